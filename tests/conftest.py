@@ -42,6 +42,25 @@ def small_proved(repo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def dock_compiled(repo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the docking robot, compiled. Only to be copied."""
+    folder = tmp_path_factory.mktemp("compiled") / "dock"
+    shutil.copytree(
+        repo / "tests/data/dock", folder, ignore=shutil.ignore_patterns(".rcsc-cache", "__pycache__")
+    )
+    assert run(["compile", "-q", str(folder), "--out", str(folder / "generated")]) == 0
+    return folder
+
+
+@pytest.fixture
+def dock(dock_compiled: Path, tmp_path: Path) -> Path:
+    """The folder of a docking robot of the test's own."""
+    folder = tmp_path / "dock"
+    shutil.copytree(dock_compiled, folder)
+    return folder
+
+
 TOOLS = ("arm-none-eabi-gcc", "chromium", "clang", "cmake", "pkg-config", "qemu-system-arm")
 """What `needs` marks may name."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")

@@ -1227,6 +1227,20 @@ class Code(StrEnum):
     them were, or the process of workstation and plant was, which cannot be taken up again; or one ended by an exception,
     which stands on the standard error stream. The message names the process. Everything was ended, and nothing is left of it.
     """
+    BAD_PLANT = """RCS729: the plant does not fit
+
+    What stands outside the levels, a class in Python or a model for MuJoCo, cannot be loaded, or is not what the buffers of
+    `system.toml` say: a field is missing, or has another type, range, unit or member than the variable at the other end. Every fault is
+    named at the buffer's line, and nothing has moved. Likewise where a plant raises while it runs, or gives what no buffer holds: a
+    number that is none, or outside what the variable holds and not declared `clamp`; the cycle is named.
+
+        class Base:
+            speed: int = 0                                      # "drive.speed_mm_s" = "base.speed"
+            travelled: Annotated[float, Range(0, 20, "m")] = 0  # "base.travelled" = "drive.travelled_mm"
+
+            def step(self, seconds: float) -> None:
+                self.travelled += self.speed / 1000 * seconds
+    """
     SHELL_NAME = """RCS731: the shell knows no such name
 
     `rcsc shell` was given a name that is no variable, level, line, module, procedure, owner or table of the level that is meant. Names

@@ -5,7 +5,7 @@ import json
 from rcsc.emit.ctext import c_type
 from rcsc.emit.identifiers import Names
 from rcsc.emit.plan import Plan
-from rcsc.lang.model import Bool, Enum, Int, Level, OneTable, Read, Real, Unit, Variable
+from rcsc.lang.model import Admit, Bool, Enum, Int, Level, OneTable, Read, Real, Unit, Variable
 
 
 def symbols(plan: Plan, names: Names) -> str:
@@ -79,6 +79,8 @@ def _described(variable: Variable) -> dict[str, object]:
     entry: dict[str, object] = {"initial": variable.initial, "doc": shortened(variable.doc)}
     if variable.safe is not None:
         entry["safe"] = variable.safe
+    if variable.admit is Admit.CLAMP:
+        entry["clamp"] = True
     match kind:
         case Enum(members=members):
             entry["members"] = list(members)

@@ -146,6 +146,13 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True)
+class Anything:
+    """Whatever stands there; somebody else looks at it."""
+
+    shown = "a value"
+
+
+@dataclass(frozen=True, slots=True)
 class Either:
     """One of several kinds, told apart by what is written."""
 
@@ -157,7 +164,9 @@ class Either:
         return ", or ".join(kind.shown for kind in self.kinds)
 
 
-Kind: TypeAlias = Number | Text | FileName | Word | Member | Flag | Listing | Entries | Record | Either
+Kind: TypeAlias = (
+    Number | Text | FileName | Word | Member | Flag | Anything | Listing | Entries | Record | Either
+)
 
 
 def shown_path(path: KeyPath) -> str:
@@ -213,6 +222,10 @@ class Document:
         """Note everything in the file that is not as `kind` says."""
         self._check(kind, self.value, ())
 
+    def check_part(self, kind: Kind, value: object, path: KeyPath) -> None:
+        """Note everything that is not as `kind` says in a value that stands at `path`."""
+        self._check(kind, value, path)
+
     def holds(self, kind: Record) -> bool:
         """Whether the keys of a record are there as it says, whatever else is."""
         keys = {**kind.needed, **kind.others}
@@ -256,7 +269,7 @@ class Document:
                 yield from ((key, value[key], every[key]) for key in value.keys() & every.keys())
             case Either(kinds):
                 yield from self._parts(next(option for option in kinds if fits(option, value)), value, path)
-            case Number() | Text() | FileName() | Word() | Member() | Flag():
+            case Number() | Text() | FileName() | Word() | Member() | Flag() | Anything():
                 return
             case _:
                 assert_never(kind)
@@ -278,6 +291,8 @@ def fits(kind: Kind, value: Any) -> bool:
             return is_member(value)
         case Flag():
             return isinstance(value, bool)
+        case Anything():
+            return True
         case Listing(_, least, most):
             return isinstance(value, list) and least <= len(value) <= most
         case Entries(_, least):

@@ -1,4 +1,4 @@
-"""The description of a system: its levels, the buffers between them, and what the database fills; one TOML file.
+"""The description of a system: its levels, the buffers between them, what the database fills, what stands outside; one TOML file.
 
 In: `system.toml`. Out: a frozen `Description`. The names of buffers and of their destinations stand here, and the
 rest is automatic (Haynes et al. 1984, section 9).
@@ -13,6 +13,7 @@ from typing import Any
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Source
 from rcsc.host.described import (
+    Anything,
     BadFile,
     Document,
     Entries,
@@ -30,6 +31,7 @@ from rcsc.host.described import (
 from rcsc.host.files.names import BadName, is_member, member, within
 from rcsc.host.files.read import CheckedFields
 from rcsc.lang.project import project_root
+from rcsc.run.declared_plant import PlantSpec, plants
 
 
 class BadDescription(BadFile):
@@ -47,7 +49,13 @@ SYSTEM = Record(
         "level": Listing(LEVEL, least=1),
         "buffers": Entries(Member()),
     },
-    {"data": Text(), "displays": Entries(Listing(Member())), "outside": Listing(Word())},
+    {
+        "data": Text(),
+        "displays": Entries(Listing(Member())),
+        "outside": Listing(Word()),
+        "plant": Entries(Anything()),
+        "script": Text(),
+    },
 )
 PARTIES = Record({key: SYSTEM.needed[key] for key in ("level", "buffers")}, {"outside": Listing(Word())})
 """What a description may say; `outside` are the parties of its buffers that are no levels."""
@@ -93,6 +101,8 @@ class Description:
         database: The data of the cell; there is no such file where the system asks no database.
         displays: Sets of variables to look at, by the name that a level's `display` gives them.
         document: The file, for the places of what is wrong with it.
+        plants: What may stand outside the levels; the first does when nobody says which.
+        script: The orders that are given when nobody says which; None where the description names none.
     """
 
     name: str
@@ -103,6 +113,8 @@ class Description:
     wires: tuple[Wire, ...]
     displays: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     document: Document | None = field(default=None, compare=False, repr=False)
+    plants: tuple[PlantSpec, ...] = ()
+    script: Path | None = None
 
     def review(self) -> Document:
         """A fresh page for faults, with the places of this description."""
@@ -122,9 +134,11 @@ def description(path: Path) -> Description:
     if document.holds(PARTIES):
         _check_parties(document)
     generated, data = (_place(path, document, key) for key in ("generated", "data"))
+    script = _place(path, document, "script") if isinstance(document.value.get("script"), str) else None
+    declared = plants(path, document)
     if document.faults:
         raise document.bad(BadDescription)
-    return _described(path, document, generated, data)
+    return replace(_described(path, document, generated, data), plants=declared, script=script)
 
 
 def _place(path: Path, document: Document, key: str) -> Path:

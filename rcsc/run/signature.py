@@ -53,6 +53,7 @@ class Leaf:
         kind: `input`, `state` or `output`.
         place: Its name in the C struct; `attribute` is its name in Python.
         members: Of an enumeration; empty for numbers and bools.
+        clamp: Whether an input outside its range is moved to its edge; else it is refused.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Leaf:
     unit: str
     initial: Value
     doc: str
+    clamp: bool = False
 
     def shown(self, value: Value) -> str:
         """The value in the table's words."""
@@ -320,6 +322,7 @@ def _leaf(entry: CheckedFields) -> Leaf:
         entry.text("unit", ""),
         initial,
         entry.text("doc"),
+        entry.flag("clamp"),
     )
 
 

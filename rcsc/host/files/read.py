@@ -346,6 +346,17 @@ class CheckedFields:
             return value
         raise Malformed(f"{self._at(key)} is no number")
 
+    def flag(self, key: str) -> bool:
+        """Return a bool; false where it is missing.
+
+        Raises:
+            Malformed: It is none.
+        """
+        value = self._get(key, default=False)
+        if not isinstance(value, bool):
+            raise Malformed(f"{self._at(key)} is no bool")
+        return value
+
     def names(self, key: str, default: Sequence[str] = _REQUIRED) -> tuple[str, ...]:
         """Return a list of identifiers.
 

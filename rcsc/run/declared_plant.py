@@ -1,0 +1,152 @@
+"""The plants that a description declares: `[plant]` and `[plant.NAME]`.
+
+In: a document. Out: a `PlantSpec` for each, in order; the first is the one that runs when nobody says which. What a plant
+is, `rcsc.run.plant` says; whether it fits the levels is seen when it is loaded.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rcsc.host.described import (
+    Document,
+    Entries,
+    KeyPath,
+    Kind,
+    Listing,
+    Number,
+    Record,
+    Text,
+    Word,
+    nearest,
+)
+from rcsc.host.files.names import BadName, is_identifier, is_member, within
+from rcsc.lang.project import project_root
+
+PYTHON: Mapping[str, Kind] = {"python": Text(), "parties": Listing(Word())}
+SENSOR = Record(
+    {"sensor": Text()},
+    {
+        "unit": Text(),
+        "element": Number(0, 1000, whole=True),
+        "over": Number(),
+        "under": Number(),
+        "scale": Number(),
+    },
+)
+ACTUATOR = Record({"actuator": Text()}, {"unit": Text(), "values": Entries(Number())})
+MODEL: Mapping[str, Kind] = {
+    "model": Text(),
+    "parties": Listing(Word()),
+    "keyframe": Text(),
+    "sensors": Entries(SENSOR),
+    "actuators": Entries(ACTUATOR),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PlantSpec:
+    """A plant of a description.
+
+    Attributes:
+        name: As `--plant` calls it; empty for `[plant]` itself.
+        python: `FILE.py:CLASS`, seen from the description, or `MODULE:NAME`; empty for a model.
+        folder: Where the description stands.
+        parties: Whom it stands for; None for all that are outside and order no level.
+        model: The file of a MuJoCo model; None where there is none.
+        keyframe: From which the model starts; empty for its first state.
+        sensors: What fills a buffer's field, by the far end; `actuators` what a field drives.
+        path: Where it stands in the document.
+    """
+
+    name: str
+    python: str = ""
+    folder: Path = field(default_factory=Path)
+    parties: tuple[str, ...] | None = None
+    model: Path | None = None
+    keyframe: str = ""
+    sensors: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    actuators: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    path: KeyPath = ("plant",)
+
+
+def plants(path: Path, document: Document) -> tuple[PlantSpec, ...]:
+    """The plants of a description; what is wrong with them is noted in the document."""
+    said = document.value.get("plant", {})
+    if not isinstance(said, dict):
+        return ()  # which its kind says
+    own = {key: value for key, value in said.items() if not isinstance(value, dict)}
+    named = {key: value for key, value in said.items() if isinstance(value, dict)}
+    specs = []
+    if "model" in own:
+        document.wrong(
+            ("plant", "model"),
+            "`[plant]` itself is in Python",
+            "write `[plant.mujoco]` above `model`, or any other name",
+        )
+    elif own:
+        document.check_part(Record({"python": PYTHON["python"]}, PYTHON), own, ("plant",))
+        specs.append(_spec(path, document, "", own, ("plant",)))
+    for name, value in named.items():
+        place = ("plant", name)
+        if not is_identifier(name):
+            document.wrong(place, f"`{name}` is no name of a plant")
+        if "model" in value:
+            document.check_part(Record({"model": Text()}, MODEL), value, place)
+            _check_ends(document, value, place)
+        elif name in MODEL and own:
+            document.wrong(
+                place,
+                f"`plant.{name}` is of a model, and `[plant]` is none",
+                f"write `[plant.mujoco.{name}]`",
+            )
+        else:
+            document.check_part(Record({"python": Text()}, PYTHON), value, place)
+        specs.append(_spec(path, document, name, value, place))
+    return () if document.faults else tuple(specs)
+
+
+def _check_ends(document: Document, said: Mapping[str, Any], place: KeyPath) -> None:
+    """Sensors and actuators are bound to buffers' ends that could be."""
+    buffers = document.value.get("buffers")
+    for key, side in (("sensors", 0), ("actuators", 1)):
+        ends = [pair[side] for pair in buffers.items()] if isinstance(buffers, dict) else []
+        bound = said.get(key, {})
+        for end in bound if isinstance(bound, dict) else ():
+            if not is_member(end) or not any(
+                end == one or end.startswith((f"{one}.", f"{one}[")) for one in ends
+            ):
+                what = "a buffer that comes from outside" if side == 0 else "a buffer that goes outside"
+                document.wrong(
+                    (*place, key, end),
+                    f"`{end}` is no end of {what}",
+                    *nearest(end, [str(one) for one in ends]),
+                )
+
+
+def _spec(path: Path, document: Document, name: str, said: Mapping[str, Any], place: KeyPath) -> PlantSpec:
+    parties = said.get("parties")
+    model = said.get("model")
+    found = None
+    if isinstance(model, str):
+        try:
+            found = within(Path(project_root(str(path))), path.parent, model, f"path `{place[-1]}.model`")
+        except BadName as error:
+            document.wrong((*place, "model"), str(error))
+    return PlantSpec(
+        name,
+        str(said.get("python", "")),
+        path.parent,
+        tuple(parties) if isinstance(parties, list) else None,
+        found,
+        str(said.get("keyframe", "")),
+        _entries(said, "sensors"),
+        _entries(said, "actuators"),
+        place,
+    )
+
+
+def _entries(said: Mapping[str, Any], key: str) -> Mapping[str, Mapping[str, Any]]:
+    found = said.get(key, {})
+    return dict(found) if isinstance(found, dict) else {}

@@ -1,0 +1,96 @@
+"""Which buffers carry orders from outside and the reports on them, and which of their fields say what.
+
+In: a description and the signatures of its levels. Out: a `Served` for each level that somebody outside orders. The only
+place in which a run knows the fields of the protocol by name (Haynes et al. 1984, section 9): an order has `inc_command`
+and `input_command`, a report `inc_command_echo`, `ref_command_echo` and `status_report`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rcsc.run.description import Description
+from rcsc.run.signature import Leaf, Signature
+
+NUMBER, COMMAND = "inc_command", "input_command"
+ECHO, STATUS = "inc_command_echo", "status_report"
+PROTOCOL = (NUMBER, COMMAND, ECHO, "ref_command_echo", STATUS)
+"""Fields that the protocol fills; all others of an order and a report are the user's."""
+DONE, FAILED = "done", "failed"
+"""What members of the status mean, by name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """A level that is ordered from outside.
+
+    Attributes:
+        level: Its name.
+        party: Who orders it.
+        order: The buffer of orders; `report` that of reports.
+        order_leaves: The fields of an order, in the buffer's order; `report_leaves` those of a report.
+        number: Where an order has its number; `command` its command.
+        echo: Where a report repeats the number; `status` what has become of the order.
+    """
+
+    level: str
+    party: str
+    order: str
+    report: str
+    order_leaves: tuple[Leaf, ...]
+    report_leaves: tuple[Leaf, ...]
+    number: int
+    command: int
+    echo: int
+    status: int
+
+
+def served(system: Description, signs: Mapping[str, Signature]) -> tuple[Served, ...]:
+    """Find the levels that somebody outside orders by number and who reports back, from the top down."""
+    wires = [(wire.source, wire.target) for wire in system.wires]
+    found = []
+    for source, target in wires:
+        party, (level, _, variable) = _owner(source), target.partition(".")
+        if party in signs or level not in signs:
+            continue
+        order = _leaves(signs[level], variable)
+        if not _has(order, NUMBER, COMMAND):
+            continue
+        for back, to in wires:
+            report = _leaves(signs[level], back.partition(".")[2]) if _owner(back) == level else ()
+            if _owner(to) == party and _has(report, ECHO, STATUS):
+                places = (
+                    _place(order, NUMBER),
+                    _place(order, COMMAND),
+                    _place(report, ECHO),
+                    _place(report, STATUS),
+                )
+                found.append(Served(level, party, source, back, order, report, *places))
+                break
+    names = list(signs)
+    return tuple(sorted(found, key=lambda one: names.index(one.level)))
+
+
+def field_of(leaf: Leaf) -> str:
+    """The name of a leaf in its record: `command.target_mm` is `target_mm`; all of it where it is a variable of its own."""
+    return leaf.name.partition(".")[2] or leaf.name
+
+
+def _leaves(sign: Signature, variable: str) -> tuple[Leaf, ...]:
+    try:
+        run = sign.record(variable)
+    except KeyError:
+        return ()
+    return sign.leaves[run.start : run.stop]
+
+
+def _has(leaves: Sequence[Leaf], *fields: str) -> bool:
+    names = {field_of(leaf) for leaf in leaves}
+    return all(field in names for field in fields)
+
+
+def _place(leaves: Sequence[Leaf], field: str) -> int:
+    return next(at for at, leaf in enumerate(leaves) if field_of(leaf) == field)
+
+
+def _owner(end: str) -> str:
+    return end.partition(".")[0]

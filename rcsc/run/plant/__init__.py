@@ -1,0 +1,51 @@
+"""Plants: what stands outside the levels and moves.
+
+A *plant* is a class of the user's. Its annotated attributes are matched by name to the far ends of `[buffers]` in
+`system.toml`; in each tick rcsc sets those that levels give, calls `step`, and takes those that levels read:
+
+    [buffers]
+    "base.travelled" = "drive.travelled_mm"     # drive.rcs: input travelled_mm : int 0 .. 20000 [mm] clamp
+    "drive.speed_mm_s" = "base.speed"
+
+>>> from typing import Annotated
+>>> class Base:
+...     speed: int = 0
+...     travelled: Annotated[float, Range(0, 20, "m")] = 0.0
+...     wheel_slips: Fault = False
+...
+...     def step(self, seconds: float) -> None:
+...         if not self.wheel_slips:
+...             self.travelled += self.speed / 1000 * seconds
+>>> from rcsc.run.plant.fields import annotations, faults, field_type, shown
+>>> shown(field_type(annotations(Base)["travelled"])), faults(Base)
+('float', ('wheel_slips',))
+
+Before anything moves, types, ranges, units and members are held against the variables, and every field that does not fit
+is told at its buffer's line (RCS729). Metres become millimetres exactly, a float is rounded to a whole number, a
+record is a class with annotated attributes, an array a `list` or `tuple`, an enumeration a `Literal`, an `Enum` or a `str`.
+A method that is named as what a feed asks answers it. An attribute `over` that is true ends the run. A constructor that
+takes `seed` gets it. A field of type `Fault` makes the plant misbehave: whoever tests the system switches it.
+
+Trusted: the file of a plant that a description names, which is imported and run; nothing of it is trusted for a proof.
+
+Modules, in the order the data flows: `fields` (what a class declares), `units`, `values` (a field against leaves), `bind`
+(a class against the buffers), `load` (a plant by its name). A model for MuJoCo is bound by data in `rcsc_cell.bound`.
+"""
+
+from typing import Protocol
+
+from rcsc.run.plant.fields import Fault, Range
+
+__all__ = ["Fault", "Plant", "Range"]
+
+
+class Plant(Protocol):
+    """What every plant has; no plant needs to name it."""
+
+    def step(self, seconds: float) -> None:
+        """One tick: read the attributes that levels give, and set those that levels read.
+
+        Args:
+            seconds: Of a tick: `tick_ms` of the description.
+        """
+        ...

@@ -1,0 +1,367 @@
+"""A plant's object bound to the buffers of a system: every field checked, then read and written in every tick.
+
+In: a class, a description and signatures. Out: a `BoundPlant`, which stands outside the levels as anything else does.
+"""
+
+import ast
+import copy
+import inspect
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rcsc.diagnostics.codes import Code
+from rcsc.host.described import BadFile, Document, KeyPath, nearest
+from rcsc.run.declared_plant import PlantSpec
+from rcsc.run.description import Description, Wire
+from rcsc.run.levels import StateTableError
+from rcsc.run.orders.roles import served
+from rcsc.run.plant import fields
+from rcsc.run.plant.values import BadValue, Link, Misfit, link, shape
+from rcsc.run.signature import Leaf, Signature, Values
+
+FieldPath = tuple[str, ...]
+
+
+class BadPlant(BadFile):
+    """A plant cannot be loaded, or does not fit the levels; nothing has moved."""
+
+    code = Code.BAD_PLANT
+
+
+class PlantFailed(StateTableError):  # noqa: N818  # what happened, not an error of ours
+    """A plant raised, or one of its fields has a value that no buffer holds; says which, and when."""
+
+    code = Code.BAD_PLANT
+
+
+@dataclass(frozen=True, slots=True)
+class Buffer:
+    """A buffer between the levels and a plant.
+
+    Attributes:
+        name: Of the buffer.
+        end: Its far end, `party.field`; the key of what a model binds to it.
+        field: The attribute of the plant, part by part.
+        leaves: What the level has at its end; `variable` is what it calls them, with its own name before it.
+        gives: Whether the plant fills it.
+        path: Where it stands in the description.
+    """
+
+    name: str
+    end: str
+    field: FieldPath
+    leaves: tuple[Leaf, ...]
+    variable: str
+    gives: bool
+    path: KeyPath
+
+
+@dataclass(slots=True)
+class BoundPlant:
+    """A plant that stands outside the levels: `rcsc.run.system.Outside`.
+
+    Attributes:
+        plant: The user's object; whoever switches its faults does so here.
+        takes: Buffers of the levels, and what puts their values into fields; `gives` the other way.
+        seconds: Of a tick.
+    """
+
+    plant: Any
+    takes: tuple[tuple[Buffer, Link], ...]
+    gives: tuple[tuple[Buffer, Link], ...]
+    seconds: float
+
+    @property
+    def over(self) -> bool:
+        """Whether the plant says that the run is at its end."""
+        return bool(getattr(self.plant, "over", False))
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """The names of its switches, fields of type `Fault`."""
+        return fields.faults(type(self.plant))
+
+    def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
+        """One tick: fields from the levels, the plant's `step`, fields to the levels.
+
+        Raises:
+            PlantFailed: The plant raised, or a field has a value that its buffer cannot hold.
+        """
+        for buffer, to_field in self.takes:
+            values = latest(buffer.name)
+            if values is not None:
+                self._put(buffer.field, to_field.taken(iter(values)))
+        try:
+            self.plant.step(self.seconds)
+        except Exception as error:
+            raise PlantFailed(f"the plant failed in cycle {tick + 1}: {raised(error)}") from error
+        return {buffer.name: self._given(tick, buffer, to_leaves) for buffer, to_leaves in self.gives}
+
+    def _put(self, field: FieldPath, value: object) -> None:
+        owner = self.plant
+        for part in field[:-1]:
+            owner = getattr(owner, part)
+        setattr(owner, field[-1], value)
+
+    def _given(self, tick: int, buffer: Buffer, to_leaves: Link) -> Values:
+        try:
+            value = self.plant
+            for part in buffer.field:
+                value = getattr(value, part)
+            return tuple(to_leaves.given(value))
+        except (BadValue, AttributeError) as error:
+            where, what = error.args if isinstance(error, BadValue) else ("", f"is missing: {error}")
+            field = f"{'.'.join(buffer.field)}{where}"
+            raise PlantFailed(f"the plant's `{field}` {what}, in cycle {tick + 1}") from error
+
+
+def raised(error: BaseException) -> str:
+    """What a user's code raised, and where: `ZeroDivisionError: division by zero (plant.py, line 12)`."""
+    frames = traceback.extract_tb(error.__traceback__)
+    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{type(error).__name__}: {error.msg} ({Path(error.filename).name}, line {error.lineno})"
+    last = next((frame for frame in reversed(frames) if not frame.filename.startswith("<")), None)
+    return said if last is None else f"{said} ({Path(last.filename).name}, line {last.lineno})"
+
+
+# --- which buffers ---
+
+
+def parties_of(system: Description, signs: Mapping[str, Signature], spec: PlantSpec) -> tuple[str, ...]:
+    """Whom a plant stands for: as it says, else everybody outside who orders no level."""
+    if spec.parties is not None:
+        return spec.parties
+    order = {one.party for one in served(system, signs)}
+    ends = [end.partition(".")[0] for wire in system.wires for end in (wire.source, wire.target)]
+    return tuple(dict.fromkeys(party for party in ends if party not in signs and party not in order))
+
+
+def buffers_of(
+    system: Description, signs: Mapping[str, Signature], parties: Sequence[str]
+) -> tuple[Buffer, ...]:
+    """The buffers between the levels and these parties, with the field that each has on their side."""
+    found = []
+    for wire in system.wires:
+        for end, other, gives in ((wire.source, wire.target, True), (wire.target, wire.source, False)):
+            party, _, name = end.partition(".")
+            level, _, variable = other.partition(".")
+            if party in parties and level in signs:
+                run = signs[level].record(variable)
+                leaves = signs[level].leaves[run.start : run.stop]
+                found.append(
+                    Buffer(wire.source, end, (party, *name.split(".")), leaves, other, gives, _path(wire))
+                )
+    return tuple(found)
+
+
+def _path(wire: Wire) -> KeyPath:
+    return ("buffers", wire.source)
+
+
+# --- checked once ---
+
+
+def bind(
+    system: Description,
+    signs: Mapping[str, Signature],
+    spec: PlantSpec,
+    of: type,
+    seed: int = 0,
+) -> BoundPlant:
+    """An object of a plant's class, bound to the buffers of a system.
+
+    Raises:
+        BadPlant: The class does not fit; everything that does not is told, each at its buffer's line.
+    """
+    page = plant_page(system)
+    parties = parties_of(system, signs, spec)
+    _check_parties(page, system, signs, spec, parties)
+    links: list[tuple[Buffer, Link]] = []
+    try:
+        hints = fields.annotations(of)
+    except fields.NoField as error:
+        page.wrong(spec.path, str(error))
+        raise page.bad(BadPlant) from error
+    for buffer in buffers_of(system, signs, parties):
+        at = _bound(page, buffer, of, hints)
+        if at is not None:
+            links.append(at)
+    _check_step(page, spec, of)
+    if page.faults:
+        raise page.bad(BadPlant)
+    plant = _made(page, spec, of, seed)
+    for buffer, to_field in links:
+        _prepare(plant, buffer, to_field)
+    takes = tuple((buffer, one) for buffer, one in links if not buffer.gives)
+    gives = tuple((buffer, one) for buffer, one in links if buffer.gives)
+    return BoundPlant(plant, takes, gives, system.tick_ms / 1000)
+
+
+def plant_page(system: Description) -> Document:
+    """A page for what is wrong with a plant, with the places of the description."""
+    return replace(system.review(), code=Code.BAD_PLANT)
+
+
+def _check_parties(
+    page: Document,
+    system: Description,
+    signs: Mapping[str, Signature],
+    spec: PlantSpec,
+    parties: Sequence[str],
+) -> None:
+    """Note parties that no buffer has, and that there is none at all."""
+    known = list(dict.fromkeys(e.partition(".")[0] for w in system.wires for e in (w.source, w.target)))
+    outside = [party for party in known if party not in signs]
+    for at, party in enumerate(spec.parties or ()):
+        if party not in outside:
+            page.wrong(
+                (*spec.path, "parties", at),
+                f"no buffer has a party `{party}` outside the levels",
+                *nearest(party, outside),
+            )
+    if not parties:
+        page.wrong(
+            spec.path,
+            "there is nobody outside the levels for whom the plant could stand",
+            "give `[buffers]` an end that is no level's",
+        )
+
+
+def _bound(page: Document, buffer: Buffer, of: type, hints: Mapping[str, Any]) -> tuple[Buffer, Link] | None:
+    """A buffer and its link; None where it does not fit, which is noted."""
+    field = buffer.field if buffer.field[0] in hints else buffer.field[1:]
+    misfits: list[Misfit] = []
+    made: Link | None = None
+    try:
+        kind = _kind(of, hints, field)
+        made = link(
+            shape(buffer.leaves, buffer.variable.partition(".")[2]), kind, misfits, gives=buffer.gives
+        )
+    except fields.NoField as error:
+        misfits.append(Misfit("", str(error)))
+    except KeyError as error:
+        _missing(page, buffer, *error.args)
+        return None
+    way = "fills" if buffer.gives else "takes"
+    for misfit in misfits:
+        where = f"`{'.'.join(field)}{misfit.place}` of `{of.__name__}`{line_of(of, field[0])}"
+        page.wrong(buffer.path, f"{where} {misfit.message}: it {way} `{buffer.variable}`", *misfit.helps)
+    return None if made is None else (replace(buffer, field=field), made)
+
+
+def _missing(page: Document, buffer: Buffer, owner: str, name: str, known: Sequence[str]) -> None:
+    wants = "fills" if buffer.gives else "takes"
+    helps = nearest(name, known) or (
+        f"add `{name}: {_suggested(buffer.leaves)}` to the class, or name whom the plant stands for: `parties = [...]`",
+    )
+    page.wrong(
+        buffer.path, f"class `{owner}` has no field `{name}`, which {wants} `{buffer.variable}`", *helps
+    )
+
+
+def _suggested(leaves: Sequence[Leaf]) -> str:
+    """The annotation of a field for a scalar; for a record a word."""
+    if len(leaves) > 1:
+        return "..."
+    [leaf] = leaves
+    if leaf.members:
+        return f"Literal[{', '.join(repr(one) for one in leaf.members)}]"
+    return {"bool": "bool", "double": "float"}.get(leaf.c_type, "int")
+
+
+def _kind(of: type, hints: Mapping[str, Any], field: FieldPath) -> fields.FieldType:
+    """The type of a field.
+
+    Raises:
+        KeyError: There is none: the class, the name, the names that it has.
+        NoField: It says nothing that a buffer could hold.
+    """
+    owner, name = of.__name__, field[0]
+    for at, name in enumerate(field):
+        if name not in hints:
+            raise KeyError(owner, name, list(hints))
+        kind = fields.field_type(hints[name])
+        if at == len(field) - 1:
+            return kind
+        if not isinstance(kind, fields.Record):
+            raise fields.NoField(f"is `{fields.shown(kind)}`, which has no fields")
+        owner, hints = kind.make.__name__, kind.hints
+    raise KeyError(owner, name, list(hints))
+
+
+def line_of(of: type, field: str) -> str:
+    """Where a class declares a field: ` (plant.py:7)`; empty where that is not known."""
+    try:
+        file, (text, first) = Path(inspect.getfile(of)).name, inspect.getsourcelines(of)
+        body = ast.parse(inspect.cleandoc("\n" + "".join(text))).body[0]
+    except (OSError, TypeError, SyntaxError, IndexError):
+        return ""
+    lines = (
+        node.lineno
+        for node in getattr(body, "body", ())
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.target.id == field
+    )
+    line = next(lines, None)
+    return "" if line is None else f" ({file}:{first + line - 1})"
+
+
+def _check_step(page: Document, spec: PlantSpec, of: type) -> None:
+    step = getattr(of, "step", None)
+    if not callable(step):
+        page.wrong(spec.path, f"class `{of.__name__}` has no method `step(self, seconds)`")
+        return
+    try:
+        inspect.signature(step).bind(None, 0.04)
+    except (TypeError, ValueError):
+        said = f"`step{inspect.signature(step)}`"
+        page.wrong(
+            spec.path,
+            f"class `{of.__name__}` has {said}, which cannot be called with the seconds of a tick",
+            "write `def step(self, seconds: float) -> None`",
+        )
+
+
+def _made(page: Document, spec: PlantSpec, of: type, seed: int) -> Any:
+    """An object of the class; one that takes a `seed` gets it.
+
+    Raises:
+        BadPlant: It cannot be made so.
+    """
+    try:
+        parameters = inspect.signature(of).parameters
+        return of(seed=seed) if "seed" in parameters else of()
+    except Exception as error:
+        page.wrong(
+            spec.path,
+            f"`{of.__name__}()` failed: {raised(error)}",
+            "a plant is made without arguments, or with `seed` alone",
+        )
+        raise page.bad(BadPlant) from error
+
+
+def _prepare(plant: Any, buffer: Buffer, to_field: Link) -> None:
+    """Has the object itself own the field, with the variable's first value where the class gives none."""
+    owner = plant
+    for part in buffer.field[:-1]:
+        owner = _own(owner, part)
+    if not hasattr(owner, buffer.field[-1]):
+        setattr(owner, buffer.field[-1], to_field.taken(iter(leaf.initial for leaf in buffer.leaves)))
+    else:
+        _own(owner, buffer.field[-1])
+
+
+def _own(owner: Any, name: str) -> Any:
+    """An attribute, which no other object shares after this."""
+    held = getattr(owner, name, None)
+    if held is None:
+        kind = fields.field_type(fields.annotations(type(owner))[name])
+        held = fields.made_of(kind, {}) if isinstance(kind, fields.Record) else None
+        setattr(owner, name, held)
+    elif name not in getattr(owner, "__dict__", {name: None}):
+        held = copy.deepcopy(held)
+        setattr(owner, name, held)
+    return held

@@ -1,0 +1,207 @@
+"""A plant by its name: the file that is imported, the class in it, and all that stands outside with it.
+
+In: a description, signatures, and which plant is meant. Out: a `Staged`: what stands outside the levels and the answers to
+what feeds ask. A file that a description names is run as the user's own program; nothing else of a description is.
+"""
+
+import importlib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeAlias
+
+from rcsc.host.described import KeyPath, nearest
+from rcsc.host.files.names import BadName, within
+from rcsc.lang.project import project_root
+from rcsc.run.declared_plant import PlantSpec
+from rcsc.run.description import Description
+from rcsc.run.levels import Query
+from rcsc.run.plant.bind import BadPlant, BoundPlant, bind, plant_page, raised
+from rcsc.run.signature import Signature
+from rcsc.run.system import Outside
+
+MODELS = "rcsc_cell.bound.model_plant:staged"
+"""Makes a plant of a MuJoCo model; imported by name, for the core needs no simulator."""
+
+
+@dataclass(frozen=True, slots=True)
+class Staged:
+    """What stands outside a system, ready for its first tick.
+
+    Attributes:
+        outside: In the order in which they step.
+        queries: The answers to what feeds ask.
+    """
+
+    outside: tuple[Outside, ...] = ()
+    queries: Mapping[str, Query] = field(default_factory=dict)
+
+    @property
+    def over(self) -> bool:
+        """Whether something outside says that the run is at its end."""
+        return any(getattr(one, "over", False) for one in self.outside)
+
+    @property
+    def plants(self) -> tuple[BoundPlant, ...]:
+        """The plants among them whose fields are bound."""
+        return tuple(one for one in self.outside if isinstance(one, BoundPlant))
+
+
+StageFunction: TypeAlias = Callable[[Description, Mapping[str, Signature], PlantSpec, int], Staged]
+"""A plant that does more than fields can say is a function: of description, signatures, plant and seed."""
+
+
+def chosen(system: Description, wanted: str | None) -> PlantSpec | None:
+    """The plant that is meant: a file, a name of the description's, or its first; None where there is none.
+
+    Raises:
+        BadPlant: The description has none of that name.
+    """
+    if wanted is None:
+        return system.plants[0] if system.plants else None
+    file, _, _ = wanted.partition(":")
+    if file.endswith(".py"):
+        return PlantSpec("", wanted, Path())
+    names = [spec.name for spec in system.plants]
+    if wanted in names:
+        return system.plants[names.index(wanted)]
+    page = plant_page(system)
+    known = [name for name in names if name]
+    helps = nearest(wanted, known) or (
+        f"its plants are {', '.join(known)}" if known else "`--plant FILE.py` takes a class in a file",
+    )
+    page.wrong(("plant",), f"the description has no plant `{wanted}`", *helps)
+    raise page.bad(BadPlant)
+
+
+def load(
+    system: Description, signs: Mapping[str, Signature], wanted: str | None = None, *, seed: int = 0
+) -> Staged:
+    """What stands outside a system.
+
+    Args:
+        system: The description.
+        signs: The signatures of its levels, by name.
+        wanted: `FILE.py`, `FILE.py:CLASS`, or a plant's name in the description; None for its first, if it has one.
+        seed: For a plant whose constructor takes one.
+
+    Raises:
+        BadPlant: There is no such plant, it cannot be imported, or it does not fit.
+    """
+    spec = chosen(system, wanted)
+    if spec is None:
+        return Staged()
+    given = spec not in system.plants
+    made = _found(system, spec, given=given) if spec.model is None else _named(system, spec, MODELS)
+    if not inspect.isclass(made):
+        stage: StageFunction = made
+        return stage(system, signs, spec, seed)
+    bound = bind(system, signs, spec, made, seed)
+    return Staged((bound,), _queries(system, bound))
+
+
+def _queries(system: Description, bound: BoundPlant) -> dict[str, Query]:
+    """The plant's methods that are named as what feeds ask; what it does not answer is told when a level needs it."""
+    asked = {feed.query for spec in system.levels for feed in spec.feeds}
+    return {name: getattr(bound.plant, name) for name in asked if callable(getattr(bound.plant, name, None))}
+
+
+def _found(system: Description, spec: PlantSpec, *, given: bool) -> Any:
+    """The class, or what stages everything, that a plant names.
+
+    Args:
+        system: The description.
+        spec: The plant.
+        given: Whether the user names the file, from where one stands.
+
+    Raises:
+        BadPlant: There is none.
+    """
+    file, _, name = spec.python.partition(":")
+    if not file.endswith(".py"):
+        return _named(system, spec, spec.python)
+    page, place = plant_page(system), (*spec.path, "python")
+    path = Path(file)
+    if not given:
+        try:
+            path = within(Path(project_root(str(spec.folder / "x"))), spec.folder, file, "path `python`")
+        except BadName as error:
+            page.wrong(place, str(error))
+            raise page.bad(BadPlant) from error
+    module = _imported(system, path, place)
+    if name:
+        of = getattr(module, name, None)
+        if of is None:
+            page.wrong(place, f"`{file}` has no class `{name}`", *nearest(name, _classes(module)))
+            raise page.bad(BadPlant)
+        return of
+    classes = [name for name in _classes(module) if callable(getattr(getattr(module, name), "step", None))]
+    if len(classes) != 1:
+        what = (
+            f"has several classes with `step`: {', '.join(classes)}"
+            if classes
+            else "has no class with `step(self, seconds)`"
+        )
+        page.wrong(place, f"`{file}` {what}", *([f"name one: `{file}:{classes[0]}`"] if classes else []))
+        raise page.bad(BadPlant)
+    return getattr(module, classes[0])
+
+
+def _classes(module: ModuleType) -> list[str]:
+    """The classes that a module itself defines."""
+    return [
+        name for name, of in inspect.getmembers(module, inspect.isclass) if of.__module__ == module.__name__
+    ]
+
+
+def _imported(system: Description, path: Path, place: KeyPath) -> ModuleType:
+    """The module of a file; what stands beside it can be imported by it.
+
+    Raises:
+        BadPlant: It cannot be.
+    """
+    page = plant_page(system)
+    name = f"rcsc_plant_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if not path.is_file() or spec is None or spec.loader is None:
+        page.wrong(place, f"there is no file `{path}`")
+        raise page.bad(BadPlant)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.append(folder)
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        page.wrong(place, f"`{path.name}` cannot be imported: {raised(error)}")
+        raise page.bad(BadPlant) from error
+    return module
+
+
+def _named(system: Description, spec: PlantSpec, name: str) -> Any:
+    """What `MODULE:NAME` names, of an installed package.
+
+    Raises:
+        BadPlant: There is no such thing.
+    """
+    module, _, attribute = name.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except ModuleNotFoundError as error:
+        if error.name is not None and not module.startswith(error.name):
+            raise  # a package of an extra, which says so itself
+        wrong: Exception = error
+    except (AttributeError, ValueError, TypeError) as error:
+        wrong = error
+    page = plant_page(system)
+    page.wrong(
+        (*spec.path, "python"),
+        f"`{name}` cannot be imported: {wrong}",
+        "write `FILE.py:CLASS`, or `MODULE:NAME`",
+    )
+    raise page.bad(BadPlant) from wrong
