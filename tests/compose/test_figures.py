@@ -317,7 +317,7 @@ def test_tables_go_round_only_where_each_may_follow_the_other(
     ts = small_level(tmp_path, "lower", lower=text)
     cycle = any_cycle(ts)
     flow = Flow(ts, Confirmation((), (), cycle, cycle.cases, Keyed(), Limits()), [])
-    assert flow._tables_round() == round_
+    assert flow._looping_tables() == round_
 
 
 # --- what has a name of its own -----------------------------------------------------------

@@ -65,7 +65,7 @@ class Promise:
     Attributes:
         level: The level that assumes it.
         record: The input that it is about.
-        assumed: In words; `reason`, whose guarantee it is.
+        assumed: The assumption in words; `reason`, who guarantees it.
         needs: What must be proved of the neighbour.
         own: What the level itself must keep: reports are about its orders only if it numbers them.
         begins: Whether both sides agree initially.

@@ -295,7 +295,7 @@ def run_by(ts: TransitionSystem) -> list[Table]:
 
 
 def _rests(ts: TransitionSystem, table: Table) -> bool:
-    """Return whether the table serves only the first command (such as PAUSE), which is the same whether new or not."""
+    """Return whether the table serves only the first command (such as PAUSE): new or not, it does the same."""
     chosen = ts.level.tables
     return not isinstance(chosen, OneTable) and [
         value for value, name in chosen.tables if name == table.name

@@ -281,7 +281,7 @@ class TransitionSystem:
     def cycle(self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None) -> Cycle:
         """Run one cycle symbolically from `before`; inputs default to fresh variables, named with the suffix.
 
-        Results of extern procedures are named with it, too, so that cycles in one query need different suffixes.
+        Results of extern procedures are named with it, too: cycles in one query need different suffixes.
         """
         if taken is None:
             taken = {name: values.variable(f"{name}{suffix}", self.kinds[name]) for name in self.inputs}

@@ -38,7 +38,7 @@ FORMAT = 1
 
 
 class BadCaseError(CodedError):
-    """A case cannot be read, or names what the tables do not have; says what."""
+    """A case cannot be read, or names what the tables do not have."""
 
     code = Code.BAD_CASE
 
@@ -134,7 +134,7 @@ def read_case(path: Path) -> FrozenCase:
     """Read a case.
 
     Raises:
-        BadCaseError: It is none.
+        BadCaseError: The file is no case.
     """
     try:
         document: dict[str, Any] = json_of(content(path))

@@ -196,7 +196,7 @@ class _Together:
 def exchange(
     systems: Mapping[str, TransitionSystem], levels: Sequence[str]
 ) -> dict[str, dict[str, tuple[str, str]]]:
-    """Map each level's inputs that another of the levels gives to that level and its name for them."""
+    """Map each level's inputs that come from another of the levels to that level and their names there."""
     sources: dict[str, dict[str, tuple[str, str]]] = {name: {} for name in levels}
     for name in levels:
         for below in systems[name].links.below:
@@ -214,5 +214,5 @@ def _renamed(ts: TransitionSystem, record: str, other: str) -> dict[str, str]:
 
 
 def _with(ts: TransitionSystem, **links: object) -> TransitionSystem:
-    """Return the level with these links, without the neighbour that is present rather than assumed."""
+    """Return the level with these links: a neighbour that is present is not assumed."""
     return TransitionSystem(ts.program, ts.level, replace(ts.links, **links))  # type: ignore[arg-type]  # fields of Links

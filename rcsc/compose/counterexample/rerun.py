@@ -166,7 +166,7 @@ def record(
 
 
 def _logged(finding: Finding, systems: Mapping[str, TransitionSystem], altered: bool) -> LoggedFinding:
-    """Return what the log says of the finding besides the states."""
+    """Return the entries of the log about the finding, besides the states."""
     cycles = {
         (row.tick, row.level): LoggedCycle(
             finding.ticks[row.tick - 1][row.level].matched,
@@ -217,7 +217,7 @@ def _inputs(program: Program) -> tuple[str, ...]:
 
 
 def _begun(finding: Finding, system: Description, kind: Kind) -> System:
-    """Set up the levels where the run begins; without `assemble`, which refuses what is made by force."""
+    """Set up the levels where the run begins; `assemble` would refuse executors made by force."""
     signs = signatures(system)
     by_level = executors(system, signs, kind)
     levels = tuple(
@@ -265,7 +265,7 @@ def _take(running: System, level: RunningLevel, ts: TransitionSystem, step: Cycl
 def _beside(
     level: RunningLevel, step: CycleRun, ts: TransitionSystem, kind: Kind, tick: int
 ) -> Iterator[str]:
-    """Describe where the executor left something else than the interpreter."""
+    """Describe where the executor left other values than the interpreter."""
     who = "Python" if kind == "python" else "C"
     there = f"tick {tick}, level `{level.name}`"
     count = len(level.sign.leaves)

@@ -225,7 +225,7 @@ class Unrolled:
         """Fix every leaf before the first cycle."""
         begun = dict(initial(self.ts.program))
         if self.search.restarted:
-            # A state may be adopted from an input, and is as that is.
+            # A state adopted from an input has its value.
             of_input = {self._start[name]: begun[name] for name in self.ts.inputs}
             begun = {
                 name: constant_of(self._start[name], of_input.get(self._start[name], value))

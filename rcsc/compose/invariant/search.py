@@ -83,7 +83,7 @@ def search(
         if closely and len(chosen) == len(invariant.predicates):
             break
         left = sorted(invariant.open)
-        invariant = _with(chosen, ts, firsts, cycle, invariant, left)
+        invariant = _searched_with(chosen, ts, firsts, cycle, invariant, left)
         if not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open):
             break
     return invariant
@@ -108,7 +108,7 @@ def strengthened(
     return replace(stronger, open=invariant.open, walked=invariant.walked)
 
 
-def _with(  # what a search is of
+def _searched_with(
     chosen: tuple[Predicate, ...],
     ts: TransitionSystem,
     firsts: Sequence[Cycle],

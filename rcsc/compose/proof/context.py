@@ -41,7 +41,7 @@ class Context:
 
     Attributes:
         unreached: Tables and lines that no reachable cycle runs; `unsure`, those neither shown to be so nor seen to run.
-        orders: Whether the level gives orders, so that there is something to repeat.
+        orders: Whether the level gives orders; else nothing is repeated.
     """
 
     unreached: tuple[tuple[str, str], ...]

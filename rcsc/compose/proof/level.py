@@ -109,7 +109,7 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProo
             looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open)
             flow = Flow(ts, asked, invariant.clauses)
             if looks and (
-                others := [*flow.ways_round(), *never_run(asked, invariant.clauses, invariant.ran)]
+                others := [*flow.no_loop_steps(), *never_run(asked, invariant.clauses, invariant.ran)]
             ):
                 invariant = strengthened(ts, firsts, cycle, invariant, others)
                 flow = Flow(ts, asked, invariant.clauses)
@@ -139,7 +139,7 @@ def _uncut(before: int) -> None:
     """Reject a result that processor time cut short: another machine might find something else.
 
     Raises:
-        GaveUpError: It did.
+        GaveUpError: Processor time cut a question short.
     """
     if smt.cut_short() > before:
         raise GaveUpError

@@ -298,5 +298,5 @@ def parts(steps: set[LinePair]) -> list[Part]:
     lines = sorted({line for step in steps for line in step})
     for middle in lines:
         reach |= {(a, c) for a in lines if (a, middle) in reach for c in lines if (middle, c) in reach}
-    rounds = {frozenset(b for b in lines if (a, b) in reach and (b, a) in reach) for a in lines}
-    return sorted((part for part in rounds if part), key=min)
+    loops = {frozenset(b for b in lines if (a, b) in reach and (b, a) in reach) for a in lines}
+    return sorted((part for part in loops if part), key=min)

@@ -103,7 +103,7 @@ class TableOutline:
 
     Attributes:
         file: Its real path.
-        default: The name of its DEFAULT line; empty where there is none.
+        default: The name of its DEFAULT line; empty if it has none.
     """
 
     file: str

@@ -190,7 +190,7 @@ def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
     """Return the program of a level, and the files that it was read from.
 
     Raises:
-        NoProgramError: It is not there, or does not resolve.
+        NoProgramError: The program is missing, or does not resolve.
     """
     from rcsc.lang.resolve import resolve
 

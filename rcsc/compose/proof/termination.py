@@ -78,7 +78,7 @@ def reports(ts: TransitionSystem) -> bool:
 
 
 def no_answers(ts: TransitionSystem) -> tuple[str, ...]:
-    """Say why it is not known which reports answer a command."""
+    """Return why reports that answer a command are not recognised."""
     above = ts.links.above
     if above is None:
         return ()
@@ -126,25 +126,25 @@ class _Phases:
     Attributes:
         leaves: The leaves whose values are a phase.
         steps: Every change from one to another; None if they are too many, or the solver gave up.
-        rounds: The loops, as sets of phases, and whether the command may be unanswered in a cycle within each.
+        loops: The loops, as sets of phases, and whether the command may be unanswered in a cycle within each.
     """
 
     leaves: tuple[str, ...]
     steps: set[Way] | None
-    rounds: tuple[tuple[set[Phase], bool], ...] = ()
+    loops: tuple[tuple[set[Phase], bool], ...] = ()
 
     @property
     def waiting(self) -> list[Way]:
         """The steps on loops on which the command may be unanswered."""
-        parts_ = [part for part, waits in self.rounds if waits]
+        parts_ = [part for part, waits in self.loops if waits]
         return sorted(way for way in self.steps or () if any(part.issuperset(way) for part in parts_))
 
     @property
     def changes(self) -> int | None:
         """The steps on the longest path, without loops on which the command is answered; None if there are other loops."""
-        if self.steps is None or any(waits for _, waits in self.rounds):
+        if self.steps is None or any(waits for _, waits in self.loops):
             return None
-        same = {phase: min(part) for part, _ in self.rounds for phase in part}
+        same = {phase: min(part) for part, _ in self.loops for phase in part}
         left = {(same.get(source, source), same.get(target, target)) for source, target in self.steps}
         return longest({(source, target) for source, target in left if source != target})
 
@@ -165,21 +165,19 @@ class Flow:
 
     def endings(self) -> Iterator[Ending]:
         """Yield the ending of each table."""
-        round_ = self._tables_round() if self.tables else set()
+        looping = self._looping_tables() if self.tables else set()
         for number in range(len(self.tables)):
-            yield self._ending(number, goes_round=number in round_)
+            yield self._ending(number, loops=number in looping)
 
-    def _ending(self, number: int, *, goes_round: bool) -> Ending:
+    def _ending(self, number: int, *, loops: bool) -> Ending:
         changes = self._phases(number).changes
         stopping = lines_that_stop(
             self.ts.program, self.asked, self.clauses, lambda still: self._turns(number, still)
         )
         table = str(self.tables[number].table.name)
-        return Ending(
-            table, None if goes_round else changes, stopping.counted, stopping.still, stopping.endless
-        )
+        return Ending(table, None if loops else changes, stopping.counted, stopping.still, stopping.endless)
 
-    def ways_round(self) -> list[Node]:
+    def no_loop_steps(self) -> list[Node]:
         """List the conditions to be proved: for each step on a loop of phases, that it is not taken."""
         conditions = []
         for number, at in enumerate(self.tables):
@@ -233,9 +231,9 @@ class Flow:
 
     def _phases_by(self, at: TableAt, leaves: tuple[str, ...]) -> _Phases:
         steps = self._steps(at, leaves)
-        return _Phases(leaves, steps, () if steps is None else tuple(self._rounds(at, leaves, steps)))
+        return _Phases(leaves, steps, () if steps is None else tuple(self._loops(at, leaves, steps)))
 
-    def _rounds(
+    def _loops(
         self, at: TableAt, leaves: tuple[str, ...], steps: set[Way]
     ) -> Iterator[tuple[set[Phase], bool]]:
         phases = sorted({phase for step in steps for phase in step})
@@ -254,7 +252,7 @@ class Flow:
             yield inside, may(solver, term)
 
     def _steps(self, at: TableAt, leaves: tuple[str, ...]) -> set[Way] | None:
-        """Return every change of phase in a cycle that runs the table; None where they are too many or the solver gave up."""
+        """Return every change of phase in a cycle that runs the table; None if they are too many or the solver gave up."""
         keyed, cycle = self.keyed, self.asked.cycle
         before, after = self._ends(leaves)
         stays = values.all_of(map(values.equal, before, after))
@@ -321,7 +319,7 @@ class Flow:
 
     # --- from table to table ---
 
-    def _tables_round(self) -> set[int]:
+    def _looping_tables(self) -> set[int]:
         """Return the tables that may follow one another in a loop while the command stays."""
         above, chosen = self.ts.links.above, self.ts.level.tables
         assert above is not None
