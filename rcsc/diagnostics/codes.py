@@ -488,7 +488,7 @@ class Code(StrEnum):
         output go : bool
         procedure start { go := n }
 
-    error: expected bool, this is int
+    error: `go` is bool, this is `n`, which is int
 
         input n : int 0 .. 9
         output go : bool

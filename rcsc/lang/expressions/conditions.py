@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
-from rcsc.lang.expressions.operators import Typed, compared
+from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import among, between, boolean, typed
@@ -52,12 +52,14 @@ class Tests:
 
     Attributes:
         subjects: What each column's heading means; None under `when`, and after an error.
+        texts: What each heading says.
         order: The place of each leaf in declared order.
     """
 
     scope: Scope
     headings: tuple[tree.Heading, ...]
     subjects: tuple[Typed | None, ...]
+    texts: tuple[str, ...]
     order: dict[str, int]
     known: dict[tuple[int, int], Test | None] = field(default_factory=dict)
     meant: dict[tuple[int, tree.Condition], Test | None] = field(default_factory=dict)
@@ -101,12 +103,26 @@ class Tests:
                 op: Operator = Op(written_op)
                 assert is_comparison(op)
                 other = typed(scope, body, value, subject.expr.type)
-                condition = None if other is None else compared(scope, op, (subject, other), span)
+                fits = other is not None and self._fits(column, subject, other, span)
+                condition = compared(scope, op, (subject, other), span) if other is not None and fits else None
             case tree.OneOf(members, span):
                 condition = among(scope, body, subject, members, span)
             case tree.Between(low, high, span):
                 condition = between(scope, body, subject, low, high, span)
         return None if condition is None else condition.expr
+
+    def _fits(self, column: int, subject: Typed, other: Typed, span: Span) -> bool:
+        """Whether a cell's value is of the kind of its column; reports it where not."""
+        wanted, given = subject.expr.type, other.expr.type
+        if same_kind(wanted, given):
+            return True
+        helps = conversion(wanted, given)
+        if isinstance(given, Bool):
+            helps = ("a whole condition stands in a column headed `when`",)
+        heading = self.texts[column]
+        message = f"column `{heading}` is {kind_word(wanted)}, this cell is {side(other)}"
+        self.scope.report(Code.KIND, message, span, *helps)
+        return False
 
 
 # --- boxes ---------------------------------------------------------------------------

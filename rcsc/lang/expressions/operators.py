@@ -18,9 +18,12 @@ from rcsc.lang.model import (
     Expr,
     Int,
     Literal,
+    Read,
+    ReadLocal,
     Real,
     Scalar,
     Unit,
+    spell,
 )
 from rcsc.lang.operator_table import Arithmetic, Comparison, Conversion, Op
 
@@ -106,12 +109,29 @@ def alike(scope: Scope, op: Arithmetic, operands: tuple[Typed, ...], span: Span)
     return applied(scope, op, operands, unit, span)
 
 
+def side(operand: Typed) -> str:
+    """An operand and its kind, for messages: by its name where it has one."""
+    match operand.expr:
+        case Read(name=name) | ReadLocal(name=name):
+            shown = f"`{name}`"
+        case Literal(value=value, type=kind):
+            shown = f"`{spell(kind, value)}`"
+        case _:
+            return f"an expression, which is {kind_word(operand.expr.type)}"
+    return f"{shown}, which is {kind_word(operand.expr.type)}"
+
+
+def conversion(one: Scalar, two: Scalar) -> tuple[str, ...]:
+    """What helps where a whole number meets a real one."""
+    both = {kind_word(one), kind_word(two)} == {"int", "real"}
+    return ("convert with `real(n)` or `int(x)`",) if both else ()
+
+
 def one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
     """Whether both sides are of one kind, and one 64-bit integer type holds both."""
     if not same_kind(left.expr.type, right.expr.type):
-        left_word, right_word = kind_word(left.expr.type), kind_word(right.expr.type)
-        helps = ("convert with `real(n)` or `int(x)`",) if {left_word, right_word} == {"int", "real"} else ()
-        scope.report(Code.KIND, f"the two sides are {left_word} and {right_word}", span, *helps)
+        message = f"the left side is {side(left)}; the right side is {side(right)}"
+        scope.report(Code.KIND, message, span, *conversion(left.expr.type, right.expr.type))
         return False
     kinds = [k for k in (left.expr.type, right.expr.type) if isinstance(k, Int)]
     unsigned = any(k.low >= 0 and k.high > I64_MAX for k in kinds)

@@ -21,6 +21,7 @@ from rcsc.lang.model import (
     Variable,
 )
 from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.rows import CALL_UNDER
 
 BASE_UNITS = frozenset("m mm s ms N kg deg rad Hz A V lb".split())
 
@@ -112,6 +113,8 @@ class Scope:
         """Reports a name that nothing declares, with the nearest one that exists."""
         near = get_close_matches(name.text, known, n=1)
         helps = (f"did you mean `{near[0]}`?",) if near else ()
+        if name.text in self.procedures:
+            helps = (f"`{name.text}` is a procedure and has no value: {CALL_UNDER}",)
         self.report(Code.UNKNOWN_NAME, f"no {kind} is called `{name.text}`", span or name.span, *helps)
 
     def unit(self, written: tree.Unit | None) -> Unit:

@@ -5,7 +5,7 @@ from typing import assert_never
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
-from rcsc.lang.expressions.operators import Typed, common_unit, kind_word, same_kind
+from rcsc.lang.expressions.operators import Typed, common_unit, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.scope import Body, Scope, root_of, spell_number
 from rcsc.lang.expressions.typed import Path, boolean, path_of, typed
 from rcsc.lang.expressions.types import constant, scalar_of
@@ -103,7 +103,7 @@ class Statements:
         if not isinstance(target.type, Bool | Enum | Int | Real):
             return self._copy(target, value, span)
         assigned = typed(self.scope, self.body, value, target.type)
-        if assigned is None or not self._assignable(target.type, assigned, value.span):
+        if assigned is None or not self._assignable(target.type, assigned, value.span, target.names[0]):
             return ()
         names = tuple(pending(name) if deferred else VariableName(name) for name in target.names)
         if target.index is None:
@@ -131,7 +131,7 @@ class Statements:
             )
             return ()
         assigned = typed(self.scope, self.body, value, local.type)
-        if assigned is None or not self._assignable(local.type, assigned, value.span):
+        if assigned is None or not self._assignable(local.type, assigned, value.span, place.name.text):
             return ()
         return (Assign(ToLocal(local.name, local.type), assigned.expr, span),)
 
@@ -151,14 +151,15 @@ class Statements:
             return False
         return True
 
-    def _assignable(self, kind: Scalar, value: Typed, span: Span) -> bool:
+    def _assignable(self, kind: Scalar, value: Typed, span: Span, name: str = "") -> bool:
+        """Whether a value may be given to what has this type, and this name if it is a variable; reports it where not."""
+        if not same_kind(kind, value.expr.type):
+            wanted = f"`{name}` is {kind_word(kind)}" if name else f"expected {kind_word(kind)}"
+            helps = conversion(kind, value.expr.type)
+            self.scope.report(Code.KIND, f"{wanted}, this is {side(value)}", span, *helps)
+            return False
         if isinstance(value.expr, Literal):
             return fits(self.scope, kind, value, span)
-        if not same_kind(kind, value.expr.type):
-            self.scope.report(
-                Code.KIND, f"expected {kind_word(kind)}, this is {kind_word(value.expr.type)}", span
-            )
-            return False
         if isinstance(kind, Int | Real):
             least = Literal(kind.low, kind)
             return common_unit(self.scope, (Typed(least), value), span) is not None

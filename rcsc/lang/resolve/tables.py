@@ -34,7 +34,8 @@ def table(scope: Scope, written: tree.TableDecl, sources: Sources) -> Table:
     columns = tuple(
         _column(heading, subject, text) for heading, subject in zip(written.conditions, subjects, strict=True)
     )
-    cells = _Cells(scope, written, text, Tests(scope, written.conditions, subjects, order))
+    headings = tuple(column.heading for column in columns)
+    cells = _Cells(scope, written, text, Tests(scope, written.conditions, subjects, headings, order))
     lines: list[Line] = []
     default: Default | None = None
     names: dict[str, Span] = {}

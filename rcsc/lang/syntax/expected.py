@@ -1,6 +1,7 @@
-"""What the parser expected, in a person's words: never a list of forty terminals."""
+"""What the parser expected, in a person's words: never a list of forty terminals; and what was meant, where that is plain."""
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 from rcsc.lang.operator_table import LOGIC
 
@@ -43,6 +44,20 @@ _WORDS = {
     "_REAL": "`real`",
 }
 _MOST = 6
+_CLASSES = {
+    "KIND": ("input", "state", "output"),
+    "ADMIT": ("clamp", "reject"),
+    "STANDING": ("assumed", "monitored", "proved"),
+    "FUNCTION": ("abs", "min", "max"),
+    "_INT": ("int",),
+    "_REAL": ("real",),
+}
+"""The words of the terminals that are not called as their one word is."""
+ELSEWHERE = {
+    "===": "=", "!==": "/=", "==": "=", "!=": "/=", "<>": "/=", "&&": "and", "||": "or", "=>": "implies", "->": "implies",
+    "=<": "<=", "&": "and", "!": "not", "~": "not", "%": "mod",
+}  # fmt: skip
+"""Operators of other languages, and how this one writes them; the longest first where one begins another."""
 
 
 def expected(terminals: Iterable[str]) -> str:
@@ -63,3 +78,19 @@ def expected(terminals: Iterable[str]) -> str:
     single = sorted(_WORDS.get(name, f"`{name.lower()}`") for name in names)
     words = (parts + single)[:_MOST]
     return " or ".join(words) if len(words) < 3 else ", ".join(words[:-1]) + " or " + words[-1]
+
+
+def operator_meant(text: str, at: int) -> tuple[int, str] | None:
+    """Where an operator of another language begins, and how it is written there: the one that covers the character `at`."""
+    for operator in ELSEWHERE:
+        for begin in range(at, max(at - len(operator), -1), -1):
+            if text.startswith(operator, begin):
+                return begin, operator
+    return None
+
+
+def word_meant(word: str, terminals: Iterable[str]) -> str:
+    """The word of the language that was meant, of those that could stand there; empty where none is much like it."""
+    known = {one for name in terminals for one in _CLASSES.get(name, (name.lower(),)) if one.isalpha()}
+    near = [word.lower()] if word.lower() in known else get_close_matches(word.lower(), sorted(known), 1, 0.8)
+    return near[0] if near and word.isidentifier() else ""

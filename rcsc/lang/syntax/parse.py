@@ -3,7 +3,7 @@
 In: a `Source`. Out: a `tree.File`, or every syntax error that was found. No text makes it raise.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from importlib.resources import files as package_files
 from pathlib import Path
@@ -17,9 +17,19 @@ from rcsc.diagnostics.source import Source, Span
 from rcsc.lang.syntax import screen, tree
 from rcsc.lang.syntax.build import Build
 from rcsc.lang.syntax.comments import Comments, words
-from rcsc.lang.syntax.expected import expected
+from rcsc.lang.syntax.expected import ELSEWHERE, expected, operator_meant, word_meant
 from rcsc.lang.syntax.lalr import ParseLeaf, ParseNode, Tables
-from rcsc.lang.syntax.rows import ACTION_WORDS, NAME, Cell, Cells, cut, is_separator
+from rcsc.lang.syntax.rows import (
+    ACTION_WORDS,
+    CALL,
+    CALL_UNDER,
+    EMPTY_CELL,
+    NAME,
+    Cell,
+    Cells,
+    cut,
+    is_separator,
+)
 
 MOST_ERRORS = 20
 
@@ -124,12 +134,23 @@ def _syntax_error(error: lark.UnexpectedInput, file: str, start: int, end: int, 
     elif isinstance(error, lark.UnexpectedCharacters):
         wanted = set(error.allowed or ())
         word = text[at] if at < len(text) else ""
+    meant = operator_meant(text, position - start) if word else None
+    if meant is not None:
+        begin, operator = meant
+        there = Span(file, start + begin, start + begin + len(operator))
+        return _error(
+            Code.SYNTAX, f"there is no operator `{operator}`", there, f"write `{ELSEWHERE[operator]}`"
+        )
     if word and not word.isascii():
         message = f"`{word}` is not allowed here: names are made of ASCII letters, digits and `_`"
         return _error(Code.NON_ASCII_NAME, message, Span(file, position, position + len(word)))
     seen = f"`{screen.shortened(word)}`" if word else "the end of the text"
+    near = word_meant(word, wanted)
     return _error(
-        Code.SYNTAX, f"expected {expected(wanted)}, found {seen}", Span(file, position, position + len(word))
+        Code.SYNTAX,
+        f"expected {expected(wanted)}, found {seen}",
+        Span(file, position, position + len(word)),
+        *([f"did you mean `{near}`?"] if near else []),
     )
 
 
@@ -168,9 +189,8 @@ class _Rows:
         start = row.start_pos
         cells = cut(str(row), start)
         if isinstance(cells, str):
-            self.diagnostics.append(
-                _error(Code.RAGGED_ROW, cells, Span(self.source.name, start, start + len(row.rstrip())))
-            )
+            there = Span(self.source.name, start, start + len(row.rstrip()))
+            self.diagnostics.append(_error(Code.RAGGED_ROW, cells, there, EMPTY_CELL))
             return None
         return cells
 
@@ -233,7 +253,7 @@ class _Rows:
                         Code.RAGGED_ROW,
                         f"this row has {len(got)} cells of {side}, the heading {len(want)}",
                         Span(self.source.name, start, start + len(row.rstrip())),
-                        "a blank cell between `|` is don't care",
+                        EMPTY_CELL,
                     )
                 )
                 return False
@@ -252,11 +272,12 @@ class _Rows:
             return ()
         if heading.subject is None:
             return cast("tuple[tree.Statement, ...]", self._parse("actions", cell) or ())
-        value = self._parse("when", cell)
+        helps = CALL_UNDER if CALL.match(cell.text) else ""
+        value = self._parse("when", cell, helps)
         return () if value is None else tree.Comparison("=", value, Span("", 0, len(cell.text)))
 
-    def _parse(self, start: str, cell: Cell) -> Any:
-        """The parsed cell, from memory where the same text stood before; None after an error."""
+    def _parse(self, start: str, cell: Cell, helps: str = "") -> Any:
+        """The parsed cell, from memory where the same text stood before; None after an error, which `helps` then."""
         if (start, cell.text) in self.memory:
             return self.memory[start, cell.text]
         try:
@@ -266,7 +287,8 @@ class _Rows:
                 return None
             parsed = Build("", Comments(Source("", "")), None).cell(node)
         except lark.UnexpectedInput as error:
-            self.diagnostics.append(_syntax_error(error, self.source.name, cell.start, cell.end, cell.text))
+            wrong = _syntax_error(error, self.source.name, cell.start, cell.end, cell.text)
+            self.diagnostics.append(replace(wrong, help=(helps,)) if helps else wrong)
             return None
         self.memory[start, cell.text] = parsed
         return parsed

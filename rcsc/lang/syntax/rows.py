@@ -9,6 +9,11 @@ from dataclasses import dataclass
 ACTION_WORDS = frozenset({"procedures", "command_out", "status_out"})
 SEPARATOR = re.compile(r"\|[\s|:-]*-[\s|:-]*$")
 NAME = re.compile(r"[A-Za-z0-9_]+$")
+CALL = re.compile(r"(?!(?:abs|min|max|int|real|not)\b)[A-Za-z_][A-Za-z0-9_]*\s*\(|[^=]*:=")
+"""What looks like a call or an assignment, and stands perhaps where a value should."""
+CALL_UNDER = "a call or an assignment stands under `procedures`, `command_out` or `status_out`"
+EMPTY_CELL = "an empty cell is `| |`, with a blank; `||` stands once in a row, between conditions and actions"
+"""What helps where cells of a row are missing, or stand on the wrong side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +49,7 @@ def cut(row: str, start: int) -> Cells | str:
     if not bar:
         return "a row needs `||` between its conditions and its actions"
     if "||" in right:
-        return "a row has exactly one `||`"
+        return f"a row has exactly one `||`, this one has {row.count('||')}"
     return Cells(_cells(left, start, 1), _cells(right, start + len(left) + 2, 0))
 
 
