@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.diagnostics.codes import Code
+from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import joined
 from rcsc.lang.model import Program, key_bounds, key_of, value_of_key
@@ -24,7 +25,8 @@ from rcsc.table.regions import partition
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench import families
-from tests.support.programs.stages import BOXES, program_of
+from tests.support.programs.stages import BOXES, drawn_program, program_of
+from tests.support.programs.texts import table as table_text
 
 HEAD = """enum colour { red, green, blue }
 input a : bool
@@ -198,6 +200,60 @@ def test_a_repair_that_is_shown_repairs(text: str) -> None:
             new = [p for p in right if len(after[p]) > len(right[p])]
             assert new, "it closed nothing"
             assert not any(right[p] for p in new), "it made an overlap"
+
+
+ACROSS = {
+    "n": st.sampled_from(["", "0", "< m", ">= m", "/= m", "<= 2", "0 .. m"]),
+    "n - m": st.sampled_from(["", "0", "> 1", "<= 0", "/= 2", "-1 .. 1"]),
+    "when": st.sampled_from(["", "a or n > m", "a implies n = m", "n * m > 1"]),
+    "a": st.sampled_from(["", "true", "false"]),
+}
+"""Cells of columns across variables: `n * m` is for a solver, and no part of a row that is proposed."""
+
+
+@given(
+    st.lists(st.tuples(*ACROSS.values()), min_size=1, max_size=4),
+    st.sampled_from(["", "a", "n < m", "n + m > 1 or a"]),
+)
+def test_a_line_across_variables_that_is_shown_closes_what_it_says(
+    rows: list[tuple[str, ...]], assumed: str
+) -> None:
+    """Over every input that the assumption allows: it meets no line, fills something, and fills all where it says so."""
+    head = "input a : bool\ninput n : int -1 .. 3\ninput m : int 0 .. 3\n"
+    head += f"assume so assumed : {assumed}\n" if assumed else ""
+    texts = [f"l{at} | {' | '.join(row)} ||" for at, row in enumerate(rows)]
+    heading = f"line | {' | '.join(ACROSS)} ||"
+    assuming = "so" if assumed else ""
+    program = drawn_program(head + table_text("t", heading, *texts, assuming=assuming), "RCS301", "RCS306")
+    verdict = prove_table(program, program.tables[0], Options())
+    [gap] = [found for found in verdict.found if isinstance(found, Gap)] or [None]
+    if gap is None or (help_ := closing_line(program, program.tables[0], gap)) is None:
+        return
+    row = re.search(r"`\| (.*\|\|) \.\.\. \|`", help_)
+    assert row is not None, help_
+    mended = program_of(head + table_text("t", heading, *texts, row[1], assuming=assuming))
+    filled = False
+    for a, n, m in product((False, True), range(-1, 4), range(4)):
+        at = {"a": a, "n": n, "m": m}
+        if any(not fold(one.condition, at) for one in mended.assumptions):
+            continue
+        found = matching_lines(mended.tables[0], at)
+        assert not ("new" in found and len(found) > 1), (at, help_)
+        assert found or "closes this part" in help_, (at, help_)
+        filled |= "new" in found
+    assert filled
+
+
+def test_a_table_with_as_many_pairs_as_nobody_looks_at_gets_no_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "input n : int 0 .. 9\ninput m : int 0 .. 9\n" + table_text("t", "line | n ||", "low | < m ||")
+    program = program_of(text)
+    [gap] = prove_table(program, program.tables[0], Options()).found
+    assert isinstance(gap, Gap)
+    assert closing_line(program, program.tables[0], gap) == (
+        "a line `| new | >= m || ... |` closes the gap and overlaps no other: proved"
+    )
+    monkeypatch.setattr("rcsc.table.repair.MOST_ASKED", 0)
+    assert closing_line(program, program.tables[0], gap) is None
 
 
 def changed(text: str, line: str, column: str, cell: str) -> str:
