@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from rcsc.compose.contract.obligations import ObligationKey, Sort, may_meet
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS, defaults_reported, first_match, undeferred
 from rcsc.compose.counterexample.cycle_run import broken, seen_by_table
-from rcsc.compose.counterexample.finding import Finding, of_trace, rows
+from rcsc.compose.counterexample.finding import Finding, beginnings, of_trace, rows
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, frozen, read_case
 from rcsc.compose.counterexample.pair import broken_together
 from rcsc.compose.counterexample.repair import helps, weakest_condition
@@ -29,7 +30,7 @@ from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, record
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceResult, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
 from rcsc.host.files.write import UNPROVED
-from rcsc.lang.interpret import Fault, holds, matching_lines
+from rcsc.lang.interpret import Fault, holds, initial, matching_lines
 from rcsc.lang.model import LineName, Program, Table, Value, VariableName, key_bounds, spell, value_of_key
 from rcsc.run.description import Description, description
 from rcsc.run.log.read import read
@@ -40,7 +41,7 @@ from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
 from tests.support.programs.stages import shipped
 from tests.support.programs.systems import SYSTEM, small_level, small_system, small_text
-from tests.support.programs.texts import edit_file, edited
+from tests.support.programs.texts import edit_file, edited, without_row
 from tests.support.proved import every_obligation, obligation_of, shortest, time_line
 
 REPO = Path(__file__).parents[2]
@@ -248,8 +249,68 @@ def test_a_run_can_begin_with_a_restart(tmp_path: Path) -> None:
     found = traces(ts, [obligation], replace(LEGAL, restarted=True))[obligation.key]
     assert isinstance(found, Trace)
     assert found.restarted
-    first = of_trace(ts, obligation, found).start("upper")
+    finding = of_trace(ts, obligation, found)
+    first = finding.start("upper")
     assert spell(ts.kinds["cur_state"], first["cur_state"]) == "f_state"
+    [begun] = beginnings({"upper": ts}, finding)
+    assert (begun.tick, begun.line) == (0, "restart")
+    shown = {**begun.takes, **begun.leaves}
+    assert {name: shown[name] for name in ("cur_state", "status_report")} == {
+        "cur_state": "f_state",
+        "status_report": "failed",
+    }
+    [table] = [one for one in ts.program.tables if one.name == "work"]
+    usual = initial(ts.program)
+    assert shown.keys() == {name for name in usual if name in table.variables or first[name] != usual[name]}
+    assert shown == {name: spell(ts.kinds[name], first[name]) for name in shown}
+    assert beginnings({"upper": ts}, replace(finding, restarted=False)) == ()
+
+
+def test_the_state_in_which_a_restart_begins_is_the_first_row(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    upper = small_text("upper", ("cur_state in {d_state, f_state} and ref", "cur_state = d_state and ref"))
+    system = small_system(tmp_path, upper=upper.replace("nextstate(f_state)", "nextstate(d_state)"))
+    assert run(["prove", "--no-cache", "--level", "upper", str(system)]) == 1
+    told = capsys.readouterr()
+    [begun, *_] = [line for line in told.err.splitlines() if "restart  " in line]
+    assert re.match(r"\s*\|\s*\| restart ", begun)
+    assert "cur_state = f_state" in told.err
+    assert "PAUSE is the first command: `rest` of `upper`, `pause` of `lower`" in told.out
+
+
+def test_where_a_pause_is_not_passed_on_it_is_said_what_is_taken_for_one(tmp_path: Path) -> None:
+    words = small_text("words", ("enum lower_command { pause, go }", "enum lower_command { go, pause }"))
+    ts = small_level(tmp_path, "upper", words=words)
+    obligation = obligation_of(ts, Sort.PAUSES, "", "to_lower")
+    found = traces(ts, [obligation], LEGAL)[obligation.key]
+    assert isinstance(found, Trace)
+    [said] = helps(ts, of_trace(ts, obligation, found))
+    assert said == (
+        "PAUSE is the first member of a command: `rest` of what `upper` takes, `go` of `to_lower`; "
+        "if another command rests, declare it first"
+    )
+
+
+def test_a_table_across_variables_that_no_line_matches_gets_a_line(tmp_path: Path) -> None:
+    """`cur_state = going` beside a column that no set of values can say."""
+    upper = without_row(small_text("upper"), "6").replace(
+        "| 7    | DEFAULT unreachable |", "| 7    | false |"
+    )
+    upper = upper.replace("| line | new_command         | idle  |", "| line | when | idle  |", 1)
+    upper = upper.replace("| 0    | true                |", "| 0    | new_command |", 1)
+    upper = upper.replace("| 1    | true                |", "| 1    | new_command and (begun or idle) |", 1)
+    for name in "2345":
+        upper = upper.replace(f"| {name}    | false               |", f"| {name}    | not new_command |", 1)
+    upper = without_row(upper, "7")
+    ts = small_level(tmp_path, "upper", upper=upper)
+    obligation = obligation_of(ts, Sort.SOME_LINE, "work", "")
+    found = traces(ts, [obligation], LEGAL)[obligation.key]
+    assert isinstance(found, Trace)
+    [said] = helps(ts, of_trace(ts, obligation, found))
+    assert re.fullmatch(
+        r"a line `\| new \| .*going \|\| \.\.\. \|` closes .* and overlaps no other: proved", said
+    )
 
 
 # --- what does not reproduce ---------------------------------------------------------------

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from rcsc.compose.contract.claims import AGAIN, RUNS, UNREACHED, Key, Need, declared, spelled
-from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.obligations import Sort, pause_of
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.proof.context import Context
 from rcsc.compose.proof.level import LevelProof, certificate
@@ -168,6 +168,14 @@ def reaction(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Ite
         if lowest:
             orders = ", ".join(f"of `{name}` in {cycles}" for name, cycles in lowest.items())
             yield f"a PAUSE of `{top}` is ordered {orders} cycles of levels, besides what buffers take"
+
+
+def pauses(made: Mapping[str, TransitionSystem]) -> Iterator[str]:
+    """Which command each level that takes orders is paused by, whatever it is called."""
+    first = {name: pause_of(ts) for name, ts in made.items()}
+    if any(first.values()):
+        said = ", ".join(f"`{member}` of `{name}`" for name, member in first.items() if member)
+        yield f"PAUSE is the first command: {said}; a restart orders it, and an empty buffer holds it"
 
 
 def confirmed(ts: TransitionSystem, proof: LevelProof) -> dict[str, bool]:

@@ -24,6 +24,7 @@ from rcsc.commands.shared.proved import (
     left_out,
     named,
     not_looked_at,
+    pauses,
     reaction,
     standing,
     trusted,
@@ -36,7 +37,7 @@ from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain, file_name
-from rcsc.compose.counterexample.finding import Finding, rows
+from rcsc.compose.counterexample.finding import Finding, beginnings, rows
 from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
 from rcsc.compose.invariant.cubes import shown
 from rcsc.compose.invariant.search import Effort
@@ -86,7 +87,7 @@ Examples:
               help="Keep each trace in DIR as a log that `rcsc replay` steps and `rcsc log` draws, with its executors.")  # fmt: skip
 @click.option("--freeze", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
               help="Keep each trace in DIR as a case for --case: a test that fails until the tables are mended.")  # fmt: skip
-@click.option("--case", "cases", multiple=True, type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+@click.option("--case", "cases", multiple=True, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="FILE",
               help="Run a frozen case on the tables as they are, and nothing else (repeatable).")  # fmt: skip
 @click.option("--without-deferral", is_flag=True,
               help="As if every next state were taken at once, not when its command is echoed: a demonstration.")  # fmt: skip
@@ -263,7 +264,13 @@ def _say_invariants(proof: SystemProof) -> None:
 
 def _say_whole(systems: dict[str, TransitionSystem], proof: SystemProof) -> None:
 
-    for line in (*reaction(systems, proof), assumptions(proof), *trusted(proof), *left_out(proof)):
+    for line in (
+        *reaction(systems, proof),
+        *pauses(systems),
+        assumptions(proof),
+        *trusted(proof),
+        *left_out(proof),
+    ):
         click.echo(line)
     click.echo(f"{proof.seconds:.1f} s in all")
 
@@ -428,13 +435,14 @@ def _time_line(systems: dict[str, TransitionSystem], finding: Finding) -> Table:
     table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
     for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
         table.add_column(heading, overflow="fold")
-    for row in rows(systems, finding):
+    for row in (*beginnings(systems, finding), *rows(systems, finding)):
         takes, leaves = (
             ", ".join(_unbroken(f"{name} = {value}") for name, value in changed.items())
             for changed in (row.takes, row.leaves)
         )
-        ran = f"{row.table}: {row.line}" + (f"\n! {row.wrong}" if row.wrong else "")
-        table.add_row(str(row.tick), *((row.level,) if several else ()), ran, takes, leaves)
+        ran = f"{row.table}: {row.line}" if row.tick else row.line
+        ran += f"\n! {row.wrong}" if row.wrong else ""
+        table.add_row(str(row.tick or ""), *((row.level,) if several else ()), ran, takes, leaves)
     return table
 
 
@@ -518,7 +526,9 @@ def _explanation_as_json(systems: dict[str, TransitionSystem], explanation: Expl
         "beside": list(explanation.beside),
         "restarted": finding is not None and finding.restarted,
         "lap": 0 if finding is None else finding.lasso,
-        "time_line": [] if finding is None else [asdict(row) for row in rows(systems, finding)],
+        "time_line": []
+        if finding is None
+        else [asdict(row) for row in (*beginnings(systems, finding), *rows(systems, finding))],
         "helps": list(explanation.helps),
         "others": list(explanation.others),
         "log": "" if explanation.log is None else str(explanation.log),

@@ -289,6 +289,12 @@ def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
             yield f"`{leaf}` is no enumeration"
 
 
+def pause_of(ts: TransitionSystem) -> str:
+    """Return the first command that the level takes, PAUSE or its like, which a restart of its superior orders; empty for none."""
+    kind = None if ts.links.above is None else ts.kinds[ts.links.above.command]
+    return kind.members[0] if isinstance(kind, Enum) else ""
+
+
 def run_by(ts: TransitionSystem) -> list[Table]:
     """List the tables that the level runs."""
     return [table for table in ts.program.tables if table.name in ts.level.tables.names]

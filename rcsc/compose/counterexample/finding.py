@@ -10,7 +10,7 @@ from rcsc.compose.contract.obligations import BROKEN, Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle
 from rcsc.compose.counterexample.trace import Trace
-from rcsc.lang.interpret import Fault
+from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Value, key_bounds, key_of, spell
 
 
@@ -74,8 +74,8 @@ class TimeLineRow:
     """One cycle of one level, in the tables' words.
 
     Attributes:
-        tick: From 1.
-        line: The line that ran; all that matched if several did, `none` if none did.
+        tick: From 1; 0 where the run begins with a restart.
+        line: The line that ran; all that matched if several did, `none` if none did, `RESTART` before the first.
         takes: The inputs that changed, and their values.
         leaves: The other leaves that the cycle changed.
         wrong: What went wrong in it, or empty.
@@ -89,6 +89,8 @@ class TimeLineRow:
     leaves: Mapping[str, str]
     wrong: str
 
+
+RESTART = "restart"
 
 _FAULTS = {
     Fault.NO_LINE: "no line matches",
@@ -108,6 +110,25 @@ def rows(systems: Mapping[str, TransitionSystem], finding: Finding) -> tuple[Tim
         for tick, steps in enumerate(finding.ticks, 1)
         for name, step in steps.items()
     )
+
+
+def beginnings(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLineRow, ...]:
+    """Return a row for each level of a run that begins with a restart; none for other runs."""
+    first = {name: next(tick[name] for tick in finding.ticks if name in tick) for name in finding.levels}
+    return tuple(_begun(made[name], step) for name, step in first.items() if finding.restarted)
+
+
+def _begun(ts: TransitionSystem, step: CycleRun) -> TimeLineRow:
+    """Return the row of a restart: what the table of the first cycle reads, and what is not as it is initially."""
+    usual, tested = initial(ts.program), {str(name) for name in ts.table(step.table).variables}
+    begins = {
+        name: spell(ts.kinds[name], step.before[name])
+        for name, value in usual.items()
+        if name in tested or step.before[name] != value
+    }
+    takes = {name: said for name, said in begins.items() if name in step.taken}
+    leaves = {name: said for name, said in begins.items() if name not in step.taken}
+    return TimeLineRow(0, ts.level.name, "", RESTART, takes, leaves, "")
 
 
 def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | None) -> TimeLineRow:

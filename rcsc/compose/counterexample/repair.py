@@ -5,13 +5,14 @@ known.
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
-from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.obligations import Sort, pause_of
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun, seen_by_table
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.lang.interpret import matching_lines
-from rcsc.lang.model import Box, Program, Scalar, Snapshot, Table, key_of
+from rcsc.lang.model import Box, Enum, Program, Scalar, Snapshot, Table, key_of
 from rcsc.table import boxes, cells
 from rcsc.table.regions.partition import BudgetError, Gaps
 from rcsc.table.repair import closing_line, parting_cell
@@ -24,14 +25,37 @@ MOST_REGIONS = 3
 def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
     """Suggest changes to the table that the last cycle ran."""
     step = finding.broken
+    if finding.obligation.sort is Sort.PAUSES:
+        return tuple(_pauses(ts, finding.obligation.name))
     if finding.obligation.sort not in {
         Sort.ASSUMPTION, Sort.SOME_LINE, Sort.ONE_LINE, Sort.NO_DEFAULT,
     }:  # fmt: skip
         return ()
     table = ts.table(step.table)
     if not boxes.applies(table):
-        return ()
+        return tuple(_line(ts, replace(table, assumptions=()), step))
     return tuple(dict.fromkeys(_suggested(ts, table, step)))
+
+
+def _pauses(ts: TransitionSystem, order: str) -> Iterator[str]:
+    """Say which commands are taken for PAUSE, as the mistake may be their place."""
+    below = next((one for one in ts.links.below if one.order == order), None)
+    kind = None if below is None else ts.kinds[below.command]
+    if below is not None and isinstance(kind, Enum):
+        pause = pause_of(ts)
+        yield (
+            f"PAUSE is the first member of a command: `{pause}` of what `{ts.level.name}` takes, `{kind.members[0]}` of `{below.order}`; "
+            "if another command rests, declare it first"
+        )
+
+
+def _line(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[str]:
+    """Suggest a line for a table with conditions across variables that no line of it matched."""
+    seen = seen_by_table(ts, step)
+    if seen is not None and not matching_lines(table, seen):
+        row = closing_line(ts.program, table, Gap((seen,), (None,)))
+        if row:
+            yield row
 
 
 def _suggested(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[str]:
