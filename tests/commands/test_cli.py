@@ -189,7 +189,6 @@ def test_who_is_interrupted_does_not_wait_for_the_interpreter() -> None:
 
 
 BAD_INPUTS = [
-    ("RCS107", None),
     ("RCS101", b"table { }"),
     ("RCS105", b"# caf\xe9\n"),
     ("RCS106", b"input a : bool\x00\n"),
@@ -201,9 +200,8 @@ BAD_INPUTS = [
 
 
 @pytest.mark.parametrize(("code", "content"), BAD_INPUTS)
-def test_bad_input_is_a_coded_error(rcsc: Rcsc, code: str, content: bytes | None) -> None:
-    if content is not None:
-        Path("bad.rcs").write_bytes(content)
+def test_bad_input_is_a_coded_error(rcsc: Rcsc, code: str, content: bytes) -> None:
+    Path("bad.rcs").write_bytes(content)
     for command in ("check", "compile", "fmt"):
         ran = rcsc(command, "bad.rcs")
         if command == "fmt" and code == "RCS205":
@@ -211,7 +209,41 @@ def test_bad_input_is_a_coded_error(rcsc: Rcsc, code: str, content: bytes | None
         assert ran.status == 1, ran
         assert f"error[{code}]" in ran.out
     assert not Path("generated").exists()
-    assert content is None or Path("bad.rcs").read_bytes() == content
+    assert Path("bad.rcs").read_bytes() == content
+
+
+def test_a_path_that_is_not_there_is_a_usage_error_in_every_command_that_takes_one(rcsc: Rcsc) -> None:
+    write("there.rcs")
+    of_tables = ["check", "compile", "fmt", "test", "certify", "graph"]
+    for args in [[name, "no/such.rcs"] for name in of_tables] + [
+        ["check", "there.rcs", "no/such.rcs"],
+        ["graph", "no/such.rcs:grip"],
+        ["diff", "there.rcs", "no/such.rcs"],
+        ["prove", "no/such.toml"],
+        ["prove", "--case", "no/such.json"],
+        ["shell", "no/such.toml"],
+        ["log", "no/such.mcap"],
+        ["replay", "no/such.mcap"],
+    ]:
+        ran = rcsc(*args)
+        assert ran.status == 2, args
+        assert "no/such" in ran.err + ran.out
+    assert not Path("generated").exists()
+
+
+def test_quiet_leaves_out_the_notes_that_every_check_repeats(rcsc: Rcsc) -> None:
+    """Not errors, not warnings; and forms for programs have everything."""
+    held = edited(RIGHT, ("| wide | > 40     |", "| wide | DEFAULT  |"))
+    write("grip.rcs", held + "property kept : held then held\n")
+    noted = {"RCS407", "RCS420"}
+    for form in ((), ("--format", "line")):
+        told = rcsc("check", *form).out
+        assert all(f"note[{code}]" in told for code in noted)
+        assert rcsc("check", "--quiet", *form).out == ""
+    form_ = json.loads(rcsc("check", "--quiet", "--json").out)
+    assert {one["code"] for one in form_["diagnostics"]} == noted
+    write("grip.rcs", held + "input unused : bool\ninvariant never : held and not held\n")
+    assert "error[" in rcsc("check", "--quiet").out
 
 
 def test_a_folder_with_nothing_to_check_does_not_pass(rcsc: Rcsc) -> None:

@@ -132,8 +132,25 @@ def test_json_and_csv_say_the_same() -> None:
     assert len(rows) == len(tables[0]["vectors"]) == len(found.vectors)
     for row, vector in zip(rows, tables[0]["vectors"], strict=True):
         assert row["expected"] == vector["expected"]
+        assert row["column"] == vector["column"]
         assert row["mode_in"] == vector["inputs"]["mode_in"]
         assert int(row["width"]) == vector["inputs"]["width"]
+
+
+def test_a_vector_names_the_column_of_its_condition() -> None:
+    program = program_of(COUPLED)
+    table = program.tables[0]
+    found = vectors_of(search_in(program), table)
+    lines = {str(line.name): line for line in table.lines}
+    for vector in found.vectors:
+        if vector.purpose == "reach":
+            assert vector.column == ""
+            continue
+        at = [column.heading for column in table.columns].index(vector.column)
+        test = lines[vector.line].tests[at]
+        assert test is not None
+        assert vector.condition == test.text or vector.column == "when"
+    assert {vector.column for vector in found.vectors} == {"", "mode_in", "width", "when"}
 
 
 def test_boxes_of_plain_comparisons_are_those_of_the_resolver() -> None:

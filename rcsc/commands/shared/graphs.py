@@ -42,8 +42,12 @@ def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
     """The tables that are named.
 
     Raises:
+        UsageError: A file is named that is not there.
         WrongError: There are none, or their files are not in order.
     """
+    file = named if named.endswith(".rcs") else named.rpartition(":")[0]
+    if file.endswith(".rcs") and not Path(file).exists():
+        raise click.UsageError(f"path `{file}` does not exist")
     answer = tables(named, running=running)
     if isinstance(answer, NotFound):
         raise WrongError(answer.diagnostics, answer.sources)

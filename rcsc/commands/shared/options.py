@@ -15,8 +15,10 @@ from rcsc.solvers.options import Options
 
 Command = Callable[..., int]
 
-PATHS = click.argument("paths", nargs=-1, type=click.Path(allow_dash=True), metavar="[PATH]...")
-"""Files, folders, or `-`; the folder one stands in where none is given."""
+PATHS = click.argument(
+    "paths", nargs=-1, type=click.Path(exists=True, readable=False, allow_dash=True), metavar="[PATH]..."
+)
+"""Files, folders, or `-`, which are there; the folder one stands in where none is given."""
 
 
 def cores() -> int:
@@ -125,7 +127,12 @@ def showing(command: Command) -> Command:
         show_default=True,
         help="Colour the text; `auto` on a terminal, unless NO_COLOR is set.",
     )
-    @click.option("-q", "--quiet", is_flag=True, help="Only the findings, no summary and no progress.")
+    @click.option(
+        "-q",
+        "--quiet",
+        is_flag=True,
+        help="Only what needs attention: no summary, no progress, no note that every check repeats.",
+    )
     @wraps(command)
     def wrapped(
         *args: Any, form: str | None, file: Path | None, color: str, quiet: bool, **kwargs: Any

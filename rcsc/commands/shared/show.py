@@ -13,7 +13,8 @@ from pathlib import Path
 
 import click
 
-from rcsc.diagnostics.diagnostic import Severity
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.diagnostics.github import annotations
 from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.diagnostics.printable import escape, pad, width
@@ -56,7 +57,7 @@ class Output:
 
     Attributes:
         file: Written whole or not at all; None is standard output.
-        quiet: Leave out the summary.
+        quiet: Leave out the summary, and the notes that every check repeats.
     """
 
     form: OutputForm = OutputForm.TEXT
@@ -75,6 +76,8 @@ _OF_VERDICT = {
     Verdict.REFUTED: Style.ERROR,
     Verdict.UNDECIDED: Style.WARNING,
 }
+_REPEATED = {Code.DEFAULT_COVERS, Code.PROPERTY_ELSEWHERE}
+"""What is right, and said again by every check."""
 _METHODS = {"boxes": "boxes", "tree": "a tree of regions", "z3": "Z3"}
 
 
@@ -144,15 +147,22 @@ def _github(report: Report, _command: str, _output: Output, _closing: str) -> st
     return annotations(report)
 
 
-def _lines(report: Report, _command: str, _output: Output, _closing: str) -> str:
-    return "".join(f"{one_line(diagnostic, report.sources)}\n" for diagnostic in report.diagnostics)
+def _lines(report: Report, _command: str, output: Output, _closing: str) -> str:
+    return "".join(f"{one_line(diagnostic, report.sources)}\n" for diagnostic in _told(report, output))
+
+
+def _told(report: Report, output: Output) -> Iterator[Diagnostic]:
+    """What a person is told."""
+    for diagnostic in report.diagnostics:
+        if not (output.quiet and diagnostic.severity is Severity.NOTE and diagnostic.code in _REPEATED):
+            yield diagnostic
 
 
 def _text(report: Report, _command: str, output: Output, closing: str) -> str:
     coloured = wants_color(output.color, output.file)
     columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else 200
     rows: list[Row] = []
-    for diagnostic in report.diagnostics:
+    for diagnostic in _told(report, output):
         rows += (*full(diagnostic, report.sources, columns), ())
     if not output.quiet:
         rows += summary(report)

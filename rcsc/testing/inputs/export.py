@@ -12,7 +12,7 @@ from rcsc.lang.model import Program, Real, Snapshot, Value
 from rcsc.testing.executors.sessions import spelled
 from rcsc.testing.inputs.vectors import Vectors
 
-COLUMNS = ("table", "line", "condition", "purpose", "expected")
+COLUMNS = ("table", "line", "column", "condition", "purpose", "expected")
 
 
 def _plain(program: Program, name: str, value: Value) -> object:
@@ -51,7 +51,7 @@ def vectors_json(program: Program, parts: Sequence[Vectors]) -> str:
                     for vector in part.vectors
                 ],
                 "unshown": [
-                    {"line": unshown.line, "condition": unshown.condition, "reason": unshown.reason}
+                    {name: getattr(unshown, name) for name in ("line", "column", "condition", "reason")}
                     for unshown in part.unshown
                 ],
             }

@@ -27,6 +27,7 @@ class Vector:
 
     Attributes:
         line: The line whose condition this vector is for.
+        column: The heading that the condition stands under; empty for `reach`.
         condition: The condition in the table's words; empty for `reach`.
         purpose: `reach`, or `true` / `false`, the truth of the condition here.
         expected: Name of the line that matches; empty where none does.
@@ -35,6 +36,7 @@ class Vector:
 
     table: str
     line: str
+    column: str
     condition: str
     purpose: str
     expected: str
@@ -51,6 +53,7 @@ class Unshown:
 
     table: str
     line: str
+    column: str
     condition: str
     reason: str
 
@@ -213,31 +216,39 @@ def vectors_of(search: InputSearch, table: Table, lines: Sequence[Line] | None =
         reached = finder.reach(line)
         if isinstance(reached, Missing):
             reason = "not found" if reached is Missing.UNKNOWN else "ranges"
-            unshown.append(Unshown(table.name, line.name, "", reason))
+            unshown.append(Unshown(table.name, line.name, "", "", reason))
         else:
-            vectors.append(Vector(table.name, line.name, "", "reach", finder.name_at(reached), reached))
-        for test in (t for t in line.tests if t is not None):
+            vectors.append(Vector(table.name, line.name, "", "", "reach", finder.name_at(reached), reached))
+        for column, test in _stated(table, line):
             for number, atom in enumerate(atoms(test)):
                 conditions += 1
                 text = _spelled(atom)
                 answer = finder.pair(line, test, number)
                 if isinstance(answer, str):
-                    unshown.append(Unshown(table.name, line.name, text, answer))
+                    unshown.append(Unshown(table.name, line.name, column, text, answer))
                     continue
                 shown += 1
                 on, off, pair = answer
                 for snapshot, truth in ((on, pair.truth_on), (off, not pair.truth_on)):
                     named = finder.name_at(snapshot)
-                    vectors.append(Vector(table.name, line.name, text, str(truth).lower(), named, snapshot))
+                    purpose = str(truth).lower()
+                    vectors.append(Vector(table.name, line.name, column, text, purpose, named, snapshot))
     if table.default is not None and lines is None:
         _default_vector(finder, str(table.default.name), vectors, unshown)
     return Vectors(table.name, conditions, shown, tuple(vectors), tuple(unshown))
 
 
+def _stated(table: Table, line: Line) -> Iterator[tuple[str, Test]]:
+    """Each cell of a line that says something, with its heading."""
+    for column, test in zip(table.columns, line.tests, strict=True):
+        if test is not None:
+            yield column.heading, test
+
+
 def _default_vector(finder: Finder, name: str, vectors: list[Vector], unshown: list[Unshown]) -> None:
     table, snapshot = finder.table, finder.default()
     if not isinstance(snapshot, Missing):
-        vectors.append(Vector(table.name, name, "", "reach", finder.name_at(snapshot), snapshot))
+        vectors.append(Vector(table.name, name, "", "", "reach", finder.name_at(snapshot), snapshot))
     else:
         reason = "not found" if snapshot is Missing.UNKNOWN else "ranges"
-        unshown.append(Unshown(table.name, name, "", reason))
+        unshown.append(Unshown(table.name, name, "", "", reason))
