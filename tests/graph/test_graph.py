@@ -802,7 +802,6 @@ def test_a_folder_of_tables_is_drawn_into_a_folder(tmp_path: Path) -> None:
         (("graph", "no_such_table"), "RCS201"),
         (("graph", f"{ACQUIRE}:nothing"), "RCS201"),
         (("graph", ACQUIRE, "--state", "idle2"), "RCS771"),
-        (("graph", str(ROOT / "tables/missing.rcs")), "RCS107"),
         (("table", ACQUIRE), "RCS772"),
     ],
 )

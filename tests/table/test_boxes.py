@@ -226,8 +226,8 @@ def test_a_line_across_variables_that_is_shown_closes_what_it_says(
     assuming = "so" if assumed else ""
     program = drawn_program(head + table_text("t", heading, *texts, assuming=assuming), "RCS301", "RCS306")
     verdict = prove_table(program, program.tables[0], Options())
-    [gap] = [found for found in verdict.found if isinstance(found, Gap)] or [None]
-    if gap is None or (help_ := closing_line(program, program.tables[0], gap)) is None:
+    gaps = [finding for finding in verdict.findings if isinstance(finding, Gap)]
+    if not gaps or (help_ := closing_line(program, program.tables[0], gaps[0])) is None:
         return
     row = re.search(r"`\| (.*\|\|) \.\.\. \|`", help_)
     assert row is not None, help_
@@ -237,17 +237,17 @@ def test_a_line_across_variables_that_is_shown_closes_what_it_says(
         at = {"a": a, "n": n, "m": m}
         if any(not fold(one.condition, at) for one in mended.assumptions):
             continue
-        found = matching_lines(mended.tables[0], at)
-        assert not ("new" in found and len(found) > 1), (at, help_)
-        assert found or "closes this part" in help_, (at, help_)
-        filled |= "new" in found
+        lines = matching_lines(mended.tables[0], at)
+        assert not ("new" in lines and len(lines) > 1), (at, help_)
+        assert lines or "closes this part" in help_, (at, help_)
+        filled |= "new" in lines
     assert filled
 
 
 def test_a_table_with_as_many_pairs_as_nobody_looks_at_gets_no_line(monkeypatch: pytest.MonkeyPatch) -> None:
     text = "input n : int 0 .. 9\ninput m : int 0 .. 9\n" + table_text("t", "line | n ||", "low | < m ||")
     program = program_of(text)
-    [gap] = prove_table(program, program.tables[0], Options()).found
+    [gap] = prove_table(program, program.tables[0], Options()).findings
     assert isinstance(gap, Gap)
     assert closing_line(program, program.tables[0], gap) == (
         "a line `| new | >= m || ... |` closes the gap and overlaps no other: proved"

@@ -69,7 +69,7 @@ def _suggested(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[s
     elif not matching:
         region = around(ts.program, table, seen)
         yield f"no line matches while {_conditions(ts.program, region)}"
-        if row := closing_line(ts.program, table, Gap((seen,), (region,))):
+        if row := closing_line(ts.program, replace(table, assumptions=()), Gap((seen,), (region,))):
             yield row
     else:
         yield f"line `{table.lines[matching[0]].name}` matches all the same, and no other"

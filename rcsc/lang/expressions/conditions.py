@@ -104,7 +104,9 @@ class Tests:
                 assert is_comparison(op)
                 other = typed(scope, body, value, subject.expr.type)
                 fits = other is not None and self._fits(column, subject, other, span)
-                condition = compared(scope, op, (subject, other), span) if other is not None and fits else None
+                condition = (
+                    compared(scope, op, (subject, other), span) if other is not None and fits else None
+                )
             case tree.OneOf(members, span):
                 condition = among(scope, body, subject, members, span)
             case tree.Between(low, high, span):
