@@ -1,7 +1,7 @@
 """Restart a level from its checkpoint, or anew: then its buffers hold old values, and PAUSE goes down.
 
-In: a level, its buffers, its checkpoint; for a start anew a signature and values: an initial state with the inputs as the buffers hold
-them now; its own orders that stand. Out: values to start from.
+In: a level, its buffers, its checkpoint; for a start anew a signature, an initial state with the buffers' present inputs, and its own
+orders that stand. Out: values to start from.
 The convention of the tables: input `command` with `inc_command`, state `inc_command_seen`, orders named `to_NAME`, and the input
 `NAME` that echoes them.
 """

@@ -1,6 +1,6 @@
 """A control level that runs: its executor, the buffers it takes and gives, and what the database fills.
 
-In: a description, signatures, executors, a database. Out: `RunningLevel`, which takes, runs and gives, each when told.
+In: a description, signatures, executors, a database. Out: `RunningLevel`, which takes, runs and gives on command.
 """
 
 import struct

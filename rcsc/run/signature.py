@@ -182,7 +182,7 @@ class Signature:
             return self._invariant(at)
         return self.leaves[at].name if 0 <= at < len(self.leaves) else ""
 
-    def fault_said(self, values: Values) -> str:
+    def fault_text(self, values: Values) -> str:
         """A fault in words: `input refused: `width` = 9`, `assumption failed: `calm``, `no line matches`."""
         fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
         word = FAULTS[fault] if 0 <= fault < len(FAULTS) else f"{fault}?"

@@ -1,7 +1,7 @@
 """The whole system in one process: all levels and what stands outside them, one control tick at a time.
 
 In each tick every level that is due takes the buffers as the tick before left them, all run, and all give: what a
-level sees does not hang on the order of the levels, and is the same with every executor.
+level sees does not depend on the order of the levels, and is the same with every executor.
 """
 
 import struct
@@ -121,7 +121,7 @@ def _missing(name: str) -> RunningLevel:
 
 
 def _message(level: RunningLevel, tick: int) -> str:
-    return f"level `{level.name}`, table `{level.table}`, cycle {tick}: {level.sign.fault_said(level.values)}"
+    return f"level `{level.name}`, table `{level.table}`, cycle {tick}: {level.sign.fault_text(level.values)}"
 
 
 def signatures(system: Description, *, fitting: bool = True) -> dict[str, Signature]:

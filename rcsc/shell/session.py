@@ -56,7 +56,7 @@ class Session:
         self._programs: dict[int, tuple[RunningLevel, Program]] = {}
         # What runs is known by its executors' digest, and what it means by its sources, from before anybody edits them.
         digests = fingerprints(system.description)
-        self._made: dict[int, tuple[RunningLevel, str, KeptSources | None]] = {
+        self._builds: dict[int, tuple[RunningLevel, str, KeptSources | None]] = {
             id(level): (level, digests[spec.program], held_by(self.plant, spec))
             for level in system.levels
             for spec in (self.spec(level.name),)
@@ -96,7 +96,7 @@ class Session:
         """
         key = id(level)
         if key not in self._programs:
-            self._programs[key] = level, program_of(self.plant, self.spec(level.name), self._made[key][2])
+            self._programs[key] = level, program_of(self.plant, self.spec(level.name), self._builds[key][2])
         return self._programs[key][1]
 
     # --- cycles ---
@@ -246,7 +246,7 @@ class Session:
 
         Args:
             name: The level's.
-            anyway: Whether they are taken although the next cycle does otherwise than before, or nobody knows.
+            anyway: Whether they are taken although the next cycle does, or may do, otherwise.
             prove: Whether they are taken only if they are proved together with their neighbours; which is tried first.
 
         Raises:
@@ -269,7 +269,7 @@ class Session:
             )
         self._keep()
         self._programs[id(reloaded.level)] = reloaded.level, reloaded.program
-        self._made[id(reloaded.level)] = reloaded.level, reloaded.digest, reloaded.sources
+        self._builds[id(reloaded.level)] = reloaded.level, reloaded.digest, reloaded.sources
         self.system.levels = tuple(reloaded.level if level is old else level for level in self.levels)
         gone = self.stops.ask_again(self.levels)
         taken = f"level `{name}` runs its new tables from cycle {self.system.tick + 1} on: {reloaded.carried}"
@@ -291,7 +291,7 @@ class Session:
         """Return the running level, its reload, and the verdict on that; None where they are the same."""
         old = self.system.level(name)
         reloaded = reload(self.plant, self.spec(name), old)
-        if self._made[id(old)][1:] == (reloaded.digest, reloaded.sources):
+        if self._builds[id(old)][1:] == (reloaded.digest, reloaded.sources):
             return old, reloaded, None
         self._answer_by_hand(reloaded.level)
         try:
@@ -300,7 +300,7 @@ class Session:
             program = None
         judged = judge(Running(old, program), reloaded.level, reloaded.program, self.memory)
         runs = {
-            level.name: reloaded.sources if level is old else self._made[id(level)][2]
+            level.name: reloaded.sources if level is old else self._builds[id(level)][2]
             for level in self.levels
         }
         known = together(self.plant, name, runs, self._compiled, prove=prove)
@@ -349,7 +349,7 @@ def _fit(level: RunningLevel) -> None:
 
 
 def _fault(level: RunningLevel) -> str:
-    return f"level `{level.name}`, table `{level.table}`: {level.sign.fault_said(level.values)}"
+    return f"level `{level.name}`, table `{level.table}`: {level.sign.fault_text(level.values)}"
 
 
 def silent_queries(system: Description, signs: Mapping[str, Signature]) -> dict[str, Query]:

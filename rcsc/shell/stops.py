@@ -1,4 +1,4 @@
-"""Breakpoints: conditions and lines at which `run` stops where they come to hold."""
+"""Breakpoints: conditions and lines; `run` stops where one comes to hold."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Names as people type them: `REMOVE-FROM-BUFFER-DB` is `remove_from_buffer_db`; what is near a name that nobody knows.
+"""Names as people type them: `REMOVE-FROM-BUFFER-DB` is `remove_from_buffer_db`; suggestions for an unknown one.
 
 In: words, levels. Out: levels, leaves, lines and values, or a refusal.
 """

@@ -1,6 +1,6 @@
 """A log as a table for other programs: CSV, JSON and Parquet; and which lines the run reached.
 
-In: a log. Out: text, bytes or a file. A row is a tick; a level that did not run in it stands as it was left.
+In: a log. Out: text, bytes or a file. A row is a tick; a level that did not run in it keeps its values.
 """
 
 import json

@@ -1,10 +1,10 @@
 """Replay: every level runs again from the recorded state with the recorded inputs, and must leave what it left then.
 
-A level that was started again runs from the state that is recorded of that.
+A restarted level runs from the state that was recorded of its restart.
 
 In: a log and a folder of generated executors. Out: moments, and differences in the words of the tables. With another
-folder than the log was written with it is a what-if: the first difference is where the other tables leave something
-else; a line of another name that leaves the same is none.
+folder than that of the log it is a what-if: the first difference is where the other tables leave other values; another
+line that leaves the same values is none.
 """
 
 import struct

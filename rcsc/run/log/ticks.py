@@ -1,8 +1,8 @@
 """Show a recorded run tick by tick, as its levels saw it: the order each took, its report, its orders, the reports it saw.
 
-In: a log. Out: `LoggedTick`s, in the words of the tables. What an order and a report are is told by their fields (Haynes et al.
+In: a log. Out: `LoggedTick`s, in the words of the tables. Orders and reports are told by their fields (Haynes et al.
 1984, section 9): an order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_command_echo` and
-`status_report`. A level sees a report before it orders: so the report is set against the order that stood before the cycle.
+`status_report`. A level sees a report before it orders, so a report is compared with the order that stood before the cycle.
 """
 
 from collections.abc import Iterator, Mapping
@@ -123,7 +123,7 @@ class LevelTick:
 
     @property
     def matched(self) -> str:
-        """Which lines matched, as it is said."""
+        """Say which lines matched."""
         if len(self.lines) > 1:
             return f"lines {', '.join(self.lines[:-1])} and {self.lines[-1]} match"
         return f"line {self.lines[0]}" if self.lines else self.fault or "no line"
@@ -254,7 +254,7 @@ class _Cycle:
     def _aside(self) -> Iterator[str]:
         """Inputs that are neither orders nor reports."""
         for record, kind in self._records().items():
-            if kind == "input" and not self._is_said(record):
+            if kind == "input" and not self._is_exchanged(record):
                 yield record
 
     def _states(self) -> Iterator[ShownState]:
@@ -267,7 +267,7 @@ class _Cycle:
             yield ShownState(name, self._word(self.before, name), now, True, then if then != now else "")
         shown = {*deferred, *nexts}
         for leaf in leaves:
-            aside = leaf.kind == "state" or (leaf.kind == "output" and not self._is_said(leaf.name))
+            aside = leaf.kind == "state" or (leaf.kind == "output" and not self._is_exchanged(leaf.name))
             if aside and leaf.name not in shown and self._changed(leaf):
                 yield ShownState(
                     leaf.name, self._word(self.before, leaf.name), self._word(self.after, leaf.name)
@@ -299,7 +299,7 @@ class _Cycle:
         """Variables, records and arrays whole, with their kinds, in declared order."""
         return {leaf.name.partition(".")[0].partition("[")[0]: leaf.kind for leaf in self.logged.sign.leaves}
 
-    def _is_said(self, name: str) -> bool:
+    def _is_exchanged(self, name: str) -> bool:
         """Whether it is an order or a report, or a leaf of one."""
         record = name.partition(".")[0]
         return self._has(record, COMMAND) or self._has(record, STATUS)

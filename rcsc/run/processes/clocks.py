@@ -1,4 +1,4 @@
-"""How far each process of a system has come, so that none runs far ahead of another.
+"""Keep the processes of a system together: none runs far ahead of another.
 
 In: a block, and the period of each process. Out: `Clocks`, two words of the block for each process, and `Turn`, with which a
 process waits for the others.

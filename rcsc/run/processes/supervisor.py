@@ -3,7 +3,7 @@
 In: a description, and factories by name for what a process makes for itself. Out: a `Supervisor`, with which processes are
 stopped and started again while the others run; `run_processes`, which runs them all.
 
-Each keeps its own pace, and waits where another has come to lie more than a period behind (`clocks`). A level takes what the
+Each keeps its own pace, and waits for another that is more than a period behind (`clocks`). A level takes what the
 buffers hold, runs a cycle, and commits its state and its outputs in one step. What it sees is at times a cycle older or newer than
 in one process; tables that keep the protocol of numbers and echoes do not mind.
 """
@@ -220,7 +220,7 @@ class Supervisor:
         values = self.buffers.checkpoint(name)
         if isinstance(values, NotShared):
             return f"level `{name}`: a fault"
-        return f"level `{name}`: {self._signs[name].fault_said(values)}"
+        return f"level `{name}`: {self._signs[name].fault_text(values)}"
 
 
 def run_processes(

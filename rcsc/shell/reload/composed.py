@@ -1,4 +1,4 @@
-"""What is known of a level's new tables together with its neighbours, before they are taken.
+"""Tell what is proved of a level's new tables together with its neighbours, before they are taken.
 
 In: where the system comes from, and a level. Out: a line to show, or a refusal where they were found not to be proved. Files
 are what is proved: nothing is claimed while a level runs other tables than its file holds. No search begins unasked.

@@ -213,12 +213,12 @@ def _reach(difference: ProgramDifference, met: Sequence[Met]) -> Iterator[str]:
     if difference.undecided or not difference.changed:
         return
     if met:
-        yield f"within reach of the present state, with some inputs: {'; '.join(_met_said(met))}"
+        yield f"within reach of the present state, with some inputs: {'; '.join(_met_parts(met))}"
     else:
         yield "out of reach of the present state: whatever the inputs, the next cycle does as before"
 
 
-def _met_said(met: Sequence[Met]) -> list[str]:
+def _met_parts(met: Sequence[Met]) -> list[str]:
     """Each part once, with what matched before and matches now."""
     parts: dict[str, None] = {}
     for reachable in met:

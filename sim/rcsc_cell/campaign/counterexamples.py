@@ -77,10 +77,10 @@ def choices(records: Iterable[EpisodeRecord]) -> tuple[Choice, ...]:
 def counterexamples(
     rig: Rig, seed: int, wanted: Sequence[Choice], pool: WorkerPool
 ) -> Iterator[tuple[Choice, Shrunk]]:
-    """Shrinks all at once, each in a worker; those that a worker dies of, one try a task.
+    """Shrink all at once, each in a worker; what kills its worker, one try a task.
 
     Raises:
-        WorkersGone: Nobody is left to do it.
+        WorkersGone: No workers remain.
         OtherTables: A worker is of another checkout.
     """
     careful = [choice for choice in wanted if choice.property == SURVIVES]

@@ -1,4 +1,4 @@
-"""The journal of a campaign: JSON lines, a header and then one line an episode, so that a campaign killed at any moment goes on.
+"""The journal of a campaign: JSON lines, a header and then one line an episode, from which a killed campaign goes on.
 
 In: a file, perhaps of a campaign that was cut off. Out: the records it holds; new ones are added at its end. A last line that was torn
 is dropped; anything else that is wrong is refused, and the file is left as it is.
@@ -69,7 +69,7 @@ class EpisodeRecord:
 
 
 def header(rig: Rig, seed: int) -> dict[str, Any]:
-    """The first line: two campaigns with the same have the same episodes and outcomes.
+    """Return the first line: campaigns with the same one have the same outcomes.
 
     Raises:
         BadDescription: The system is not in order.

@@ -1,7 +1,7 @@
 """The runner: gives chunks of episodes to a worker pool, keeps what comes back in the journal, and survives workers that do not.
 
 In: how many episodes, a worker pool, a journal. Out: records as they come. When a worker dies, whatever was under way is suspected, and is
-played again with nothing beside it: whole chunks first, and the episodes of one that kills again one by one. An episode
+played again alone: whole chunks first, then, one by one, the episodes of a chunk that kills again. An episode
 that kills a worker by itself is recorded as `crash`, or as `hang` if it was ended for that.
 """
 

@@ -50,7 +50,7 @@ def shrink(episode: Episode, fails: Fails, tries: int = MOST_TRIES) -> Episode:
 
     Args:
         episode: It fails.
-        fails: Asked of each candidate; the answer hangs on the candidate alone.
+        fails: Asked of each candidate; a function of the candidate alone.
         tries: How often at most.
     """
     search = _Search(episode, fails, tries)

@@ -1,7 +1,7 @@
-"""What workers do: play episodes, within a limit of time, and say what became of them; shrink one; keep its log.
+"""Tasks of workers: play episodes within a limit of time, and report what became of them; shrink one; keep its log.
 
 In: a rig and numbers, which travel. Out: records and episodes, which travel back. An episode that raises, or does not end, is
-a finding of its own; one that takes the worker with it is the runner's to notice.
+a finding of its own; one that kills its worker is noticed by the runner.
 """
 
 import contextlib
@@ -119,7 +119,7 @@ def odd(end: str, finding: EpisodeFinding) -> EpisodeOutcome:
 
 
 def shrunk(rig: Rig, wanted: str, seed: int, index: int, name: str) -> Shrunk:
-    """The counterexample that an episode of a campaign is for a property, as small as it gets, with its log.
+    """Shrink an episode of a campaign to a counterexample of a property, with its log.
 
     Raises:
         OtherTables: As `play`.
@@ -162,7 +162,7 @@ def own_process() -> None:
 
 @contextlib.contextmanager
 def within(seconds: float) -> Iterator[None]:
-    """Stops what runs in it after so long; in a worker's own process also what does not react.
+    """Stop what runs in it after so long; in a worker's own process also what does not react.
 
     Raises:
         _OutOfTime: It was stopped.

@@ -63,7 +63,7 @@ class WorkerPool:
             return self.executor.submit(task, *args, **kwargs)
 
     def survive(self, death: BaseException, executor: Executor) -> None:
-        """After a worker's death: goes on with another executor, where this one is broken and still in use.
+        """Replace the executor after a worker's death, where it is broken and still in use.
 
         Raises:
             WorkersGone: There is no other.

@@ -1,4 +1,4 @@
-"""What can go wrong in a cell, for every plant; nothing unless somebody says so."""
+"""Faults of a cell, for every plant; none by default."""
 
 from dataclasses import dataclass
 

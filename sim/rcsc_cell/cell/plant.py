@@ -1,6 +1,6 @@
 """The plant below the levels: controllers of robot, hand, camera and vise, over a mechanism that is physics or kinematics.
 
-The controllers are the same for both, so that what a mechanism does is all that can differ. Buffers in: orders of PRIMITIVE, the
+The controllers are the same for both: only the mechanisms differ. Buffers in: orders of PRIMITIVE, the
 gripper's level, vision and the workstation. Buffers out: what robot, hand, camera and vise report.
 """
 

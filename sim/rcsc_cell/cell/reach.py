@@ -1,4 +1,4 @@
-"""Whether the arm can go where the database says: every point, and the straight lines between those that follow one another.
+"""Check that the arm can reach every point of the database, and follow the straight lines between successive ones.
 
 In: a database. Out: what is wrong, by point; nothing where all is well.
 """

@@ -45,7 +45,7 @@ def plant(
     Args:
         database: The cell.
         backend: Physics, or kinematics alone.
-        parts: What lies about; the database's parts when nobody says.
+        parts: What lies about; the database's parts by default.
         seed: Of the sensor's noise.
         make: Step and friction of physics.
 

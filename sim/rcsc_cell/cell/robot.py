@@ -1,7 +1,7 @@
 """The robot controller below PRIMITIVE (section 7.1): nine numbers of the wrist plate in, joints out; the same for every plant.
 
-It follows a pose only if the arm can be there, and be there from where it is without a joint that jumps; it says `failed`, and stays
-where it is, otherwise, or when the joints are not where they were told to be. The one reason that it knows is `robot`.
+It follows a pose only if the arm can be there, and get there without a joint that jumps. Otherwise, or when the joints are
+not where they were told to be, it reports `failed` and stays. The one reason that it knows is `robot`.
 """
 
 from collections.abc import Sequence

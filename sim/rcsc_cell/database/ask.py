@@ -1,4 +1,4 @@
-"""The levels' questions to the database, answered from memory: it is read once, before anything moves.
+"""Answer the levels' queries from memory: the database is read once, before anything moves.
 
 In: the SQLite file. Out: a `Database` whose answers are tuples in the order of the records that they fill.
 """

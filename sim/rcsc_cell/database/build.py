@@ -1,4 +1,4 @@
-"""From the data file to the database; every reference resolves and every pose is within reach, or nothing is made.
+"""Build the database from the data file, if every reference resolves and every pose is within reach.
 
 In: `cell.toml`, and the names of parts as the tables have them. Out: a SQLite file, or what is wrong.
 """
@@ -187,7 +187,7 @@ class At:
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """Where a thing of the data is: axes that stand on a station, or on the floor under the robot.
+    """A place of the data, in the axes of a station or of the floor under the robot.
 
     Attributes:
         frame: The station's axes.

@@ -142,7 +142,7 @@ class Episode:
         """Refuses what no episode can be.
 
         Raises:
-            ValueError: A backend, an executor, a fault or a harm that nobody knows; a number that is out of reach; a push with physics.
+            ValueError: An unknown backend, executor, fault or harm; a number out of reach; a push with physics.
         """
         known = {switch.name for switch in fields(Faults)}
         for word, words in (

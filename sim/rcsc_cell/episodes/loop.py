@@ -1,6 +1,6 @@
 """The cell in the loop: levels on generated executors over a plant, with what goes wrong, watched by properties, cycle by cycle.
 
-In: an episode, or one that grows while it runs. Out: an `EpisodeOutcome`. Everything that is random comes of the episode's seed.
+In: an episode, or one that grows while it runs. Out: an `EpisodeOutcome`. Everything that is random comes from the episode's seed.
 """
 
 import hashlib
@@ -344,7 +344,7 @@ def run(episode: Episode, system: Path = SYSTEM, log: Path | None = None) -> Epi
     Args:
         episode: What to run.
         system: The description of the system; its generated executors are used as they are.
-        log: Where to keep every cycle (MCAP); none where nobody says.
+        log: Where to keep every cycle (MCAP); none by default.
 
     Raises:
         BadDescription, BadData, NotBuilt: The system is not in order.

@@ -1,4 +1,4 @@
-"""The workstation and somebody beside it who gives TASK another command in mid-motion, and whom no interlock stops.
+"""The workstation, and an operator who gives TASK another command in mid-motion, which no interlock stops.
 
 In: a workstation, and rows with the ticks from which they are to be sent. Out: one order buffer, and what became of each row. A command
 that is changed is not taken up again: the script goes on with the next row when the other is done, and ends when it fails.

@@ -1,4 +1,4 @@
-"""What stands outside the levels when they run as processes: the workstation and the plant, in a process of their own.
+"""Run the workstation and the plant in a process of their own, when the levels run as processes.
 
 Made by `rcsc.run.processes.serve.Factory`, from arguments that travel: names of files. The workstation's results go to a file, a line a
 row, where the process that started all reads them. Buffers without a level at either end stay in this process.
@@ -48,7 +48,7 @@ class Told:
 
 @dataclass(slots=True)
 class Joined:
-    """Several things outside as one: what they say to each other stays between them.
+    """Several things outside as one; buffers between them are seen by nobody else.
 
     Attributes:
         shared: Buffers that levels have, too.

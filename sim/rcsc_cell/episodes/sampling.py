@@ -1,7 +1,7 @@
 """Episodes by seed, for campaigns: no Hypothesis, leaning on edges.
 
 In: a seed. Out: an `Episode`. One in five is nominal; the others have one fault, or several; one in six has a script that is not
-legal. With physics only scripts that keep what is held clear of what stands about: where to go is the workstation's to know.
+legal. With physics only scripts that keep a held part clear of the furniture: choosing the way is up to the workstation.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -61,7 +61,7 @@ def operator_of(episode: Episode, database: Database, task: Signature) -> Operat
     """The workstation with the episode's script, and whoever interrupts it.
 
     Raises:
-        BadScript: A row says nothing, or names what nobody knows.
+        BadScript: A row says nothing, or names something unknown.
         ValueError: An interruption is none of TASK's commands.
     """
     station = workstation(rows_of(episode.rows), database.locations, task)

@@ -1,4 +1,4 @@
-"""Who watches a run in the cell: where parts end, how near the joints come to their limits, what the page and the report show.
+"""Watch a run in the cell: where parts end, how near joints come to their limits, what page and report show.
 
 In: a run and its plant. Out: figures and pictures. It looks at the truth, and nobody who controls the cell looks at it.
 """

@@ -1,4 +1,4 @@
-"""Which face is drawn before which, so that what is near hides what is far: painter's algorithm.
+"""Order faces for the painter's algorithm: what is near is drawn later, and hides what is far.
 
 In: the faces of convex solids, and where the eye is. Out: an order of the faces. Two solids that a face's plane parts
 are ordered by that plane, whatever their distances: the one on the eye's side is drawn later. Solids that reach

@@ -1,4 +1,4 @@
-"""A value over time as SVG: one line, its axes, and nothing that has to be installed.
+"""Draw a value over time as SVG: one line and its axes, with nothing to install.
 
 In: points. Out: an SVG element for a page. Lines are drawn in `currentColor`, so that the page may be light or dark.
 (`rcsc log --plot` draws logs with matplotlib, with words and in other formats; a page needs neither.)

@@ -32,7 +32,7 @@ class NoStateTableError:
         """Which level met which fault."""
         for level in cycle.ran:
             if level.fault:
-                return f"level `{level.name}`, table `{level.table}`: {level.sign.fault_said(level.values)}"
+                return f"level `{level.name}`, table `{level.table}`: {level.sign.fault_text(level.values)}"
         return None
 
 

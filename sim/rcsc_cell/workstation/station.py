@@ -303,7 +303,7 @@ def workstation(
         safe: The safe location of each that has one.
 
     Raises:
-        BadScript: A row names a place or a part that nobody knows.
+        BadScript: A row names an unknown place or part.
     """
     order = tuple(task.leaves[at] for at in task.record("command"))
     report = tuple(task.leaves[at] for at in task.record("report"))
