@@ -349,7 +349,7 @@ class Run:
                 assert_never(place)
 
     def write(self, leaf: str, value: Term, when: Term) -> None:
-        """Writes a leaf where `when` holds."""
+        """Write a leaf where `when` holds."""
         if when is self.terms.false:
             return
         self.state.leaves[leaf] = self.terms.choice(when, value, self.leaf(leaf))
@@ -405,7 +405,7 @@ class Run:
     # --- calls ---
 
     def call(self, procedure: Procedure, args: Iterable[tuple[Term, Written]]) -> None:
-        """Runs a procedure; an extern one gives any value in range, or ends the cycle at any of its results."""
+        """Run a procedure; an extern one gives any value in range, or ends the cycle at any of its results."""
         given = {
             param.name: self._stored(param.type, value, param.name, written)
             for param, (value, written) in zip(procedure.params, args, strict=True)

@@ -259,7 +259,7 @@ class Debts:
         return Debt((*stopping, *map(self.terms.negation, others)), tuple(run.owed))
 
     def _tests(self, line: Line) -> list[Term]:
-        """That each condition of the line holds."""
+        """The conditions of the line, as terms."""
         return [self.start.condition(test.condition) for test in line.tests if test is not None]
 
     def _actions(self, run: _Running, actions: Iterable[Action]) -> None:

@@ -113,7 +113,7 @@ class _Terms:
                 return ((self.name(expr), 1),), ((int(yes), int(yes)),)
 
     def truth(self, left: Expr, right: Expr, rows: list[tuple[bool, bool]]) -> Formula:
-        """That the two have one of the pairs of values."""
+        """The formula that the two have one of the pairs of values."""
         if len(rows) == 3:
             [(a, b)] = [pair for pair in PAIRS if pair not in rows]
             return AnyOf((self.formula(left, not a), self.formula(right, not b)))

@@ -159,7 +159,7 @@ class _Cycle:
             return True
 
     def _in(self, node: Node, name: str, box: Box) -> Node:
-        """That a leaf lies in a part of a region, which may number members of an enumeration otherwise."""
+        """The condition that a leaf lies in part of a region, which may number members of an enumeration otherwise."""
         kind, own = self.difference.kinds.get(name, self.kinds[name]), self.kinds[name]
         if isinstance(kind, Enum) and isinstance(own, Enum):
             members = [kind.members[key] for low, high in box for key in range(low, high + 1)]

@@ -72,7 +72,7 @@ def _kept(path: Path) -> Mapping[str, object] | Diagnostic:
 
 
 def _keep(certificate: Mapping[str, object], path: Path) -> tuple[Diagnostic, ...]:
-    """Write a certificate; why it could not be written."""
+    """Write a certificate; return why it could not be written."""
     text = json.dumps(certificate, separators=(",", ":"), sort_keys=True) + "\n"
     try:
         write_atomically(path, text.encode())
@@ -127,7 +127,7 @@ def _closing(program: Program, outcome: Certified) -> str:
 
 
 def _kept_questions(outcome: Certified, folder: Path) -> list[Diagnostic]:
-    """Writes what is left, one file a question; why a file could not be written."""
+    """Write what is left, one file a question; return why a file could not be written."""
     for number, unchecked in enumerate(outcome.unchecked, start=1):
         path = folder / f"{number:03}.smt2"
         text = f"; {unchecked.name}\n; unsat: it holds\n{unchecked.question}"

@@ -21,7 +21,7 @@ class Proved:
     proofs: tuple[Proof, ...]
 
     def report(self, diagnostics: tuple[Diagnostic, ...] = ()) -> Report:
-        """Everything found, each once, and each table once, with the worst verdict of all programs that it is in."""
+        """Report each finding once, and each table once, with the worst verdict of all programs that it is in."""
         every = {
             *self.loaded.diagnostics,
             *diagnostics,

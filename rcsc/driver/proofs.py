@@ -66,7 +66,7 @@ class _Kept:
 
 @dataclass(frozen=True, slots=True)
 class _Rest:
-    """That nothing is wrong in a program but for its tables."""
+    """Nothing is wrong in a program but for its tables."""
 
 
 def _proof(

@@ -170,12 +170,12 @@ def reaction(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Ite
             yield f"a PAUSE of `{top}` is ordered {orders} cycles of levels, besides what buffers take"
 
 
-def pauses(made: Mapping[str, TransitionSystem]) -> Iterator[str]:
+def pauses(systems: Mapping[str, TransitionSystem]) -> Iterator[str]:
     """Which command each level that takes orders is paused by, whatever it is called."""
-    first = {name: pause_of(ts) for name, ts in made.items()}
+    first = {name: pause_of(ts) for name, ts in systems.items()}
     if any(first.values()):
-        said = ", ".join(f"`{member}` of `{name}`" for name, member in first.items() if member)
-        yield f"PAUSE is the first command: {said}; a restart orders it, and an empty buffer holds it"
+        paused = ", ".join(f"`{member}` of `{name}`" for name, member in first.items() if member)
+        yield f"PAUSE is the first command: {paused}; a restart orders it, and an empty buffer holds it"
 
 
 def confirmed(ts: TransitionSystem, proof: LevelProof) -> dict[str, bool]:

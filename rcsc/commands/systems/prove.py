@@ -168,7 +168,7 @@ def _jobs(levels: Iterable[TransitionSystem]) -> int:
 
 
 class _LevelProgress:
-    """Says each level on standard error as it is done, and on a terminal those that are still to come."""
+    """Name each level on standard error as it is done, and on a terminal those that are still to come."""
 
     def __init__(self, names: Sequence[str], *, wanted: bool) -> None:
         self._left = list(names)

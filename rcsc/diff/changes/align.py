@@ -223,7 +223,7 @@ def _changed(what: str, before: Mapping[str, str], after: Mapping[str, str]) -> 
 
 
 def _is_pending(variable: Variable) -> bool:
-    """Whether it is the leaf of a deferred value: declared with its variable."""
+    """Whether the variable is the leaf of a deferred value: declared with its variable."""
     return variable.name.endswith(".next")
 
 

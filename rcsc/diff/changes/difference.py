@@ -113,7 +113,7 @@ class ComparedPart:
 
     @property
     def changed(self) -> bool:
-        """Whether its meaning changed."""
+        """Whether the part's meaning changed."""
         return bool(self.notes or self.changes)
 
 

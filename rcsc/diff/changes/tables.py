@@ -122,7 +122,7 @@ class _Comparison:
         )
 
     def part(self) -> ComparedPart:
-        """Everything that changed."""
+        """The table as a part: everything that changed."""
         versions, before = self.versions, self.versions.queries
         changed: list[Change] = []
         moved: list[Change] = []
@@ -240,14 +240,14 @@ class _Comparison:
 
 
 def assumed(program: Program, table: Table, meaning: Meaning) -> Node:
-    """That the table's assumptions and the program's invariants hold."""
+    """The condition that the table's assumptions and the program's invariants hold."""
     conditions = [a.condition for a in program.assumptions if a.name in table.assumptions]
     conditions += [invariant.condition for invariant in program.invariants]
     return values.all_of(meaning.condition(condition) for condition in conditions)
 
 
 def _outcomes(table: Table, meaning: Meaning) -> Iterable[InputOutcome]:
-    """Everything that can become of an input: exactly one of them does."""
+    """All outcomes of an input: exactly one comes about."""
     lines = meaning.lines(table)
     fine = values.all_of(values.negation(bad) for bad in meaning.bad)
     many, canonical = several(lines), meaning.shared.canonical

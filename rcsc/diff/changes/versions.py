@@ -225,7 +225,7 @@ class Versions:
         return {name: self.seen[name].kind for name in box}
 
     def inside(self, boxes: Iterable[Region]) -> Node:
-        """That an input lies in one of the boxes."""
+        """The condition that an input lies in one of the boxes."""
         return values.any_of(
             values.all_of(self._in_part(name, part) for name, part in box.items()) for box in boxes
         )
