@@ -5,89 +5,45 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "examples_words_1984_types.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-typedef enum {
-    APPROACH_TASK_COMMAND_ACQUIRE = 0,
-    APPROACH_TASK_COMMAND_MOVE = 1,
-    APPROACH_TASK_COMMAND_RELEASE = 2,
-    APPROACH_TASK_COMMAND_TRANSFER = 3,
-    APPROACH_TASK_COMMAND_CLEAR = 4,
-    APPROACH_TASK_COMMAND_PAUSE = 5
-} approach_task_command_t;
+/* `line`, where table approach ran; -1 for none. */
+enum {
+    APPROACH_LINE_APPROACH_BLOCKED = 0,
+    APPROACH_LINE_APPROACH_ARRIVED = 1,
+    APPROACH_LINE_APPROACH_BRAKE = 2,
+    APPROACH_LINE_APPROACH_CRUISE = 3
+};
 
-typedef enum {
-    APPROACH_EMOVE_COMMAND_PAUSE = 0,
-    APPROACH_EMOVE_COMMAND_MOVE_TO = 1,
-    APPROACH_EMOVE_COMMAND_MOVE_TO_OBJ = 2,
-    APPROACH_EMOVE_COMMAND_LOCATE = 3,
-    APPROACH_EMOVE_COMMAND_PICKUP = 4,
-    APPROACH_EMOVE_COMMAND_RELEASE = 5
-} approach_emove_command_t;
+/* `fault`, and what a cycle returns. */
+enum {
+    APPROACH_FAULT_NONE = 0,
+    APPROACH_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
+    APPROACH_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
+    APPROACH_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
+    APPROACH_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    APPROACH_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    APPROACH_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    APPROACH_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
+};
 
-typedef enum {
-    APPROACH_LEVEL_STATUS_EXECUTING = 0,
-    APPROACH_LEVEL_STATUS_DONE = 1,
-    APPROACH_LEVEL_STATUS_FAILED = 2
-} approach_level_status_t;
-
-typedef enum {
-    APPROACH_ACQUIRE_STATE_STATE_2 = 0,
-    APPROACH_ACQUIRE_STATE_STATE_3 = 1,
-    APPROACH_ACQUIRE_STATE_STATE_4 = 2,
-    APPROACH_ACQUIRE_STATE_STATE_5 = 3,
-    APPROACH_ACQUIRE_STATE_D_STATE = 4,
-    APPROACH_ACQUIRE_STATE_F_STATE = 5
-} approach_acquire_state_t;
-
-typedef enum {
-    APPROACH_LOCATING_VIS_REQD = 0,
-    APPROACH_LOCATING_KNOWN = 1
-} approach_locating_t;
-
-typedef enum {
-    APPROACH_OBJECT_NULL_OBJ = 0,
-    APPROACH_OBJECT_TBOX = 1,
-    APPROACH_OBJECT_BBOX = 2,
-    APPROACH_OBJECT_FLAG = 3,
-    APPROACH_OBJECT_HOUS = 4,
-    APPROACH_OBJECT_UNKNOWN_OBJECT = 5
-} approach_object_t;
-
-typedef enum {
-    APPROACH_LOCATION_NULL_LOC = 0,
-    APPROACH_LOCATION_BUFFER = 1,
-    APPROACH_LOCATION_STATION_VUPOS = 2,
-    APPROACH_LOCATION_FIXTURE = 3,
-    APPROACH_LOCATION_V_BLOCK = 4,
-    APPROACH_LOCATION_PALLET = 5
-} approach_location_t;
-
-typedef enum {
-    APPROACH_REASON_NONE = 0,
-    APPROACH_REASON_CMD = 1,
-    APPROACH_REASON_MOVE = 2,
-    APPROACH_REASON_LOC = 3,
-    APPROACH_REASON_PIC = 4,
-    APPROACH_REASON_STATE = 5,
-    APPROACH_REASON_BUF = 6
-} approach_reason_t;
-
-/* The complete state in one block: copying it is copying everything that a cycle depends on. */
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    uint16_t distance_mm; /* input; 0 .. 2000 mm; Distance left to the goal point; the controller overshoots, so it is clamped. */
-    uint16_t braking_mm; /* input; 0 .. 500 mm; Distance needed to stop from the present speed. */
-    uint8_t tolerance_mm; /* input; 1 .. 20 mm; How near is near enough. */
-    double force_n; /* input; 0.0 .. 500.0 N; Force on the wrist; a reading outside this range is refused. */
-    double limit_n; /* input; 10.0 .. 400.0 N; Force at which the move is given up. */
-    double smooth_n; /* state; 0.0 .. 500.0 N; Smoothed force. */
-    uint8_t settled; /* state; 0 .. 25; Cycles spent near the goal. */
-    uint16_t speed_mm_s; /* output; 0 .. 1000 mm*s^-1; Commanded speed. */
-    uint8_t status_report; /* output; level_status */
+    uint16_t distance_mm; /* 0: input; 0 .. 2000 mm; Distance left to the goal point; the controller overshoots, so it is clamped. */
+    uint16_t braking_mm; /* 1: input; 0 .. 500 mm; Distance needed to stop from the present speed. */
+    uint8_t tolerance_mm; /* 2: input; 1 .. 20 mm; How near is near enough. */
+    double force_n; /* 3: input; 0.0 .. 500.0 N; Force on the wrist; a reading outside this range is refused. */
+    double limit_n; /* 4: input; 10.0 .. 400.0 N; Force at which the move is given up. */
+    double smooth_n; /* 5: state; 0.0 .. 500.0 N; Smoothed force. */
+    uint8_t settled; /* 6: state; 0 .. 25; Cycles spent near the goal. */
+    uint16_t speed_mm_s; /* 7: output; 0 .. 1000 mm*s^-1; Commanded speed. */
+    examples_words_1984_level_status_t status_report; /* 8: output */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
+    int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } approach_t;

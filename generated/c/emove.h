@@ -5,283 +5,165 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "emove_common_types.h"
+#include "vocabulary_types.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-typedef enum {
-    EMOVE_TASK_COMMAND_PAUSE = 0,
-    EMOVE_TASK_COMMAND_ACQUIRE = 1,
-    EMOVE_TASK_COMMAND_MOVE = 2,
-    EMOVE_TASK_COMMAND_RELEASE = 3,
-    EMOVE_TASK_COMMAND_TRANSFER = 4,
-    EMOVE_TASK_COMMAND_CLEAR = 5
-} emove_task_command_t;
+/* `line`, where table locate ran; -1 for none. */
+enum {
+    EMOVE_LINE_LOCATE_0 = 0,
+    EMOVE_LINE_LOCATE_1 = 1,
+    EMOVE_LINE_LOCATE_2 = 2,
+    EMOVE_LINE_LOCATE_3 = 3,
+    EMOVE_LINE_LOCATE_4 = 4,
+    EMOVE_LINE_LOCATE_4A = 5,
+    EMOVE_LINE_LOCATE_5 = 6,
+    EMOVE_LINE_LOCATE_6 = 7,
+    EMOVE_LINE_LOCATE_7 = 8,
+    EMOVE_LINE_LOCATE_8 = 9,
+    EMOVE_LINE_LOCATE_9 = 10,
+    EMOVE_LINE_LOCATE_10 = 11,
+    EMOVE_LINE_LOCATE_11 = 12,
+    EMOVE_LINE_LOCATE_12 = 13,
+    EMOVE_LINE_LOCATE_13 = 14,
+    EMOVE_LINE_LOCATE_14 = 15,
+    EMOVE_LINE_LOCATE_15 = 16
+};
 
-typedef enum {
-    EMOVE_EMOVE_COMMAND_PAUSE = 0,
-    EMOVE_EMOVE_COMMAND_MOVE_TO = 1,
-    EMOVE_EMOVE_COMMAND_MOVE_TO_OBJ = 2,
-    EMOVE_EMOVE_COMMAND_LOCATE = 3,
-    EMOVE_EMOVE_COMMAND_PICKUP = 4,
-    EMOVE_EMOVE_COMMAND_RELEASE = 5
-} emove_emove_command_t;
+/* `line`, where table move_to ran; -1 for none. */
+enum {
+    EMOVE_LINE_MOVE_TO_0 = 0,
+    EMOVE_LINE_MOVE_TO_1 = 1,
+    EMOVE_LINE_MOVE_TO_2 = 2,
+    EMOVE_LINE_MOVE_TO_3 = 3,
+    EMOVE_LINE_MOVE_TO_4 = 4,
+    EMOVE_LINE_MOVE_TO_5 = 5,
+    EMOVE_LINE_MOVE_TO_6 = 6,
+    EMOVE_LINE_MOVE_TO_7 = 7,
+    EMOVE_LINE_MOVE_TO_7A = 8,
+    EMOVE_LINE_MOVE_TO_8 = 9,
+    EMOVE_LINE_MOVE_TO_9 = 10,
+    EMOVE_LINE_MOVE_TO_10 = 11,
+    EMOVE_LINE_MOVE_TO_11 = 12,
+    EMOVE_LINE_MOVE_TO_12 = 13
+};
 
-typedef enum {
-    EMOVE_PRIMITIVE_COMMAND_PAUSE = 0,
-    EMOVE_PRIMITIVE_COMMAND_GOTO = 1,
-    EMOVE_PRIMITIVE_COMMAND_GOTHRU = 2,
-    EMOVE_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS = 3,
-    EMOVE_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS = 4,
-    EMOVE_PRIMITIVE_COMMAND_IMMED_GRASP = 5
-} emove_primitive_command_t;
+/* `line`, where table move_to_obj ran; -1 for none. */
+enum {
+    EMOVE_LINE_MOVE_TO_OBJ_0 = 0,
+    EMOVE_LINE_MOVE_TO_OBJ_1 = 1,
+    EMOVE_LINE_MOVE_TO_OBJ_2 = 2,
+    EMOVE_LINE_MOVE_TO_OBJ_3 = 3,
+    EMOVE_LINE_MOVE_TO_OBJ_4 = 4,
+    EMOVE_LINE_MOVE_TO_OBJ_5 = 5,
+    EMOVE_LINE_MOVE_TO_OBJ_6 = 6,
+    EMOVE_LINE_MOVE_TO_OBJ_7 = 7,
+    EMOVE_LINE_MOVE_TO_OBJ_8 = 8,
+    EMOVE_LINE_MOVE_TO_OBJ_9 = 9,
+    EMOVE_LINE_MOVE_TO_OBJ_10 = 10,
+    EMOVE_LINE_MOVE_TO_OBJ_11 = 11,
+    EMOVE_LINE_MOVE_TO_OBJ_12 = 12,
+    EMOVE_LINE_MOVE_TO_OBJ_13 = 13
+};
 
-typedef enum {
-    EMOVE_VISION_COMMAND_PAUSE = 0,
-    EMOVE_VISION_COMMAND_FLOOD_FLASH = 1,
-    EMOVE_VISION_COMMAND_LINE_FLASH = 2
-} emove_vision_command_t;
+/* `line`, where table pause_emove ran; -1 for none. */
+enum {
+    EMOVE_LINE_PAUSE_EMOVE_1 = 0,
+    EMOVE_LINE_PAUSE_EMOVE_2 = 1
+};
 
-typedef enum {
-    EMOVE_GRIPPER_COMMAND_PAUSE = 0,
-    EMOVE_GRIPPER_COMMAND_POSITION = 1,
-    EMOVE_GRIPPER_COMMAND_GRASP = 2
-} emove_gripper_command_t;
+/* `line`, where table pickup ran; -1 for none. */
+enum {
+    EMOVE_LINE_PICKUP_0 = 0,
+    EMOVE_LINE_PICKUP_1 = 1,
+    EMOVE_LINE_PICKUP_2 = 2,
+    EMOVE_LINE_PICKUP_3 = 3,
+    EMOVE_LINE_PICKUP_4 = 4,
+    EMOVE_LINE_PICKUP_5 = 5,
+    EMOVE_LINE_PICKUP_6 = 6,
+    EMOVE_LINE_PICKUP_7 = 7
+};
 
-typedef enum {
-    EMOVE_ROBOT_COMMAND_HOLD = 0,
-    EMOVE_ROBOT_COMMAND_FOLLOW = 1
-} emove_robot_command_t;
+/* `line`, where table release_part ran; -1 for none. */
+enum {
+    EMOVE_LINE_RELEASE_PART_0 = 0,
+    EMOVE_LINE_RELEASE_PART_1 = 1,
+    EMOVE_LINE_RELEASE_PART_1A = 2,
+    EMOVE_LINE_RELEASE_PART_2 = 3,
+    EMOVE_LINE_RELEASE_PART_3 = 4,
+    EMOVE_LINE_RELEASE_PART_4 = 5,
+    EMOVE_LINE_RELEASE_PART_5 = 6,
+    EMOVE_LINE_RELEASE_PART_6 = 7,
+    EMOVE_LINE_RELEASE_PART_7 = 8
+};
 
-typedef enum {
-    EMOVE_LEVEL_STATUS_DONE = 0,
-    EMOVE_LEVEL_STATUS_EXECUTING = 1,
-    EMOVE_LEVEL_STATUS_FAILED = 2
-} emove_level_status_t;
+/* Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed. */
+enum {
+    EMOVE_ASSUMPTION_IN_STEP = 0, /* in_step: only told in locate, move_to, move_to_obj, pickup, release_part */
+    EMOVE_ASSUMPTION_LOCATE_STATES = 1, /* locate_states: only told in locate */
+    EMOVE_ASSUMPTION_MOVE_TO_STATES = 2, /* move_to_states: only told in move_to */
+    EMOVE_ASSUMPTION_MOVE_TO_OBJ_STATES = 3, /* move_to_obj_states: only told in move_to_obj */
+    EMOVE_ASSUMPTION_PICKUP_STATES = 4, /* pickup_states: only told in pickup */
+    EMOVE_ASSUMPTION_RELEASE_PART_STATES = 5 /* release_part_states: only told in release_part */
+};
 
-typedef enum {
-    EMOVE_OBJECT_NULL_OBJ = 0,
-    EMOVE_OBJECT_TBOX = 1,
-    EMOVE_OBJECT_BBOX = 2,
-    EMOVE_OBJECT_FLAG = 3,
-    EMOVE_OBJECT_HOUS = 4,
-    EMOVE_OBJECT_CLOSE_GRIP = 5,
-    EMOVE_OBJECT_UNKNOWN_OBJECT = 6
-} emove_object_t;
+/* `fault`, and what a cycle returns. */
+enum {
+    EMOVE_FAULT_NONE = 0,
+    EMOVE_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
+    EMOVE_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
+    EMOVE_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
+    EMOVE_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    EMOVE_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    EMOVE_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    EMOVE_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
+};
 
-typedef enum {
-    EMOVE_REASON_NONE = 0,
-    EMOVE_REASON_CMD = 1,
-    EMOVE_REASON_MOVE = 2,
-    EMOVE_REASON_LOC = 3,
-    EMOVE_REASON_PIC = 4,
-    EMOVE_REASON_STATE = 5,
-    EMOVE_REASON_BUF = 6,
-    EMOVE_REASON_NO_PLACE = 7,
-    EMOVE_REASON_NO_POSE = 8,
-    EMOVE_REASON_ROBOT = 9,
-    EMOVE_REASON_GRIP = 10,
-    EMOVE_REASON_NOTHING_GRIPPED = 11,
-    EMOVE_REASON_WRONG_SIZE = 12,
-    EMOVE_REASON_NO_MATCH = 13,
-    EMOVE_REASON_WRONG_RANGE = 14,
-    EMOVE_REASON_RESTART = 15
-} emove_reason_t;
-
-typedef enum {
-    EMOVE_EMOVE_STATE_D_STATE = 0,
-    EMOVE_EMOVE_STATE_F_STATE = 1,
-    EMOVE_EMOVE_STATE_THROUGH = 2,
-    EMOVE_EMOVE_STATE_LAST = 3,
-    EMOVE_EMOVE_STATE_OPENING = 4,
-    EMOVE_EMOVE_STATE_LOOKING = 5,
-    EMOVE_EMOVE_STATE_FLOODING = 6,
-    EMOVE_EMOVE_STATE_CENTERING = 7,
-    EMOVE_EMOVE_STATE_LINING = 8,
-    EMOVE_EMOVE_STATE_CLOSING = 9,
-    EMOVE_EMOVE_STATE_HOVERING = 10,
-    EMOVE_EMOVE_STATE_LOWERING = 11,
-    EMOVE_EMOVE_STATE_GRASPING = 12,
-    EMOVE_EMOVE_STATE_RELEASING = 13
-} emove_emove_state_t;
-
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj;
-    uint8_t grasp;
-    uint8_t source_locpt;
-    uint8_t dest_locpt;
-    uint8_t end_at_locpt;
-    uint8_t sector;
-} emove_task_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t status_parameter;
-    uint8_t failure;
-} emove_task_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint8_t locpt_ptr;
-    uint8_t sector;
-    bool apoint_pos_flag;
-    uint8_t gripped_obj_ptr;
-} emove_emove_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-} emove_emove_report_t;
-
-typedef struct {
-    double x;
-    double y;
-    double z;
-    double c;
-    double s;
-} emove_shift_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint16_t pose_ptr;
-    emove_shift_t displaced;
-} emove_primitive_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    bool holds;
-} emove_primitive_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    double expected_range_mm;
-} emove_vision_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double x_mm;
-    double y_mm;
-    double c;
-    double s;
-    double range_mm;
-} emove_vision_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double opening_mm;
-    double force_n;
-    double speed_mm_s;
-} emove_gripper_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double opening_mm;
-} emove_gripper_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double plate[9];
-} emove_robot_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double plate[9];
-} emove_robot_report_t;
-
-typedef struct {
-    bool known;
-    uint16_t depart_first;
-    uint8_t depart_count;
-    uint16_t approach_first;
-    uint8_t approach_count;
-    uint16_t hover_point;
-    uint16_t grasp_point;
-    uint16_t view_point;
-} emove_route_t;
-
-typedef struct {
-    bool known;
-    double expected_range_mm;
-    double grip_range_mm;
-    double lift_mm;
-} emove_part_t;
-
-/* The complete state in one block: copying it is copying everything that a cycle depends on. */
-typedef struct {
-    emove_emove_order_t command; /* input; From TASK. */
-    emove_primitive_report_t primitive; /* input; From PRIMITIVE. */
-    emove_vision_report_t vision; /* input; From vision. */
-    emove_route_t origin; /* input; From the database: where the robot is. */
-    emove_route_t target; /* input; From the database: the location of the command. */
-    emove_part_t object_data; /* input; From the database: the part of the command. */
-    emove_part_t held_data; /* input; From the database: the part in the gripper. */
-    bool new_command; /* state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
-    bool begun; /* state; This level has answered the new command; pausing the levels below first is no answer. */
-    uint16_t inc_command_seen; /* state; 0 .. 65535; Number of the command now being worked on; echoed to TASK. */
-    uint8_t ref_command_in; /* state; primitive_command; Command that PRIMITIVE last echoed. */
-    uint8_t status_in; /* state; level_status; Status that PRIMITIVE reports. */
-    uint8_t ref_vision_in; /* state; vision_command; Command that vision last echoed. */
-    uint8_t vision_status_in; /* state; level_status; Status that vision reports. */
-    bool idle; /* state; Both levels below rest, and what they say answers this level's last orders. */
-    uint8_t cur_state; /* state; emove_state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
-    uint8_t cur_state_next; /* state; the deferred next value of cur_state */
-    uint8_t path_at; /* state; 0 .. 62; Which point of the path is under way. */
-    uint8_t path_at_next; /* state; the deferred next value of path_at */
-    uint8_t here; /* state; 0 .. 255; Where the robot is; 0 while it moves. */
-    uint8_t here_next; /* state; the deferred next value of here */
-    uint8_t here_sector; /* state; 0 .. 99 */
-    uint8_t here_asked; /* state; 0 .. 255; What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before. */
-    uint8_t here_sector_asked; /* state; 0 .. 99 */
-    uint16_t depart_first; /* state; 0 .. 9999; The departure of the path under way, kept because `here` is forgotten as soon as the robot moves. */
-    uint8_t depart_count; /* state; 0 .. 31 */
-    uint8_t path_length; /* state; 0 .. 62; How many points the path has. */
-    emove_shift_t displaced_here; /* state; How far the part that was located here was displaced: the departure is displaced as far. */
-    double lift_mm; /* state; -500.0 .. 500.0 mm; How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height. */
-    bool lost; /* state; A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed. */
-    emove_primitive_order_t old_order; /* state; The orders that were last numbered. */
-    emove_vision_order_t old_vision; /* state */
-    uint8_t status_report; /* state; level_status; What the command does, to be reported. */
-    uint8_t failure; /* state; reason; Why the command failed. */
-    emove_primitive_order_t to_primitive; /* output; To PRIMITIVE. */
-    emove_vision_order_t to_vision; /* output; To vision. */
-    emove_emove_report_t report; /* output; To TASK. */
+    vocabulary_emove_order_t command; /* 0 to 7: input; From TASK. */
+    vocabulary_primitive_report_t primitive; /* 8 to 12: input; From PRIMITIVE. */
+    vocabulary_vision_report_t vision; /* 13 to 21: input; From vision. */
+    emove_common_route_t origin; /* 22 to 29: input; From the database: where the robot is. */
+    emove_common_route_t target; /* 30 to 37: input; From the database: the location of the command. */
+    emove_common_part_t object_data; /* 38 to 41: input; From the database: the part of the command. */
+    emove_common_part_t held_data; /* 42 to 45: input; From the database: the part in the gripper. */
+    bool new_command; /* 46: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool begun; /* 47: state; This level has answered the new command; pausing the levels below first is no answer. */
+    uint16_t inc_command_seen; /* 48: state; 0 .. 65535; Number of the command now being worked on; echoed to TASK. */
+    vocabulary_primitive_command_t ref_command_in; /* 49: state; Command that PRIMITIVE last echoed. */
+    vocabulary_level_status_t status_in; /* 50: state; Status that PRIMITIVE reports. */
+    vocabulary_vision_command_t ref_vision_in; /* 51: state; Command that vision last echoed. */
+    vocabulary_level_status_t vision_status_in; /* 52: state; Status that vision reports. */
+    bool idle; /* 53: state; Both levels below rest, and what they say answers this level's last orders. */
+    emove_common_emove_state_t cur_state; /* 54: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
+    emove_common_emove_state_t cur_state_next; /* 55: state; the deferred next value of cur_state */
+    uint8_t path_at; /* 56: state; 0 .. 62; Which point of the path is under way. */
+    uint8_t path_at_next; /* 57: state; the deferred next value of path_at */
+    uint8_t here; /* 58: state; 0 .. 255; Where the robot is; 0 while it moves. */
+    uint8_t here_next; /* 59: state; the deferred next value of here */
+    uint8_t here_sector; /* 60: state; 0 .. 99 */
+    uint8_t here_asked; /* 61: state; 0 .. 255; What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before. */
+    uint8_t here_sector_asked; /* 62: state; 0 .. 99 */
+    uint16_t depart_first; /* 63: state; 0 .. 9999; The departure of the path under way, kept because `here` is forgotten as soon as the robot moves. */
+    uint8_t depart_count; /* 64: state; 0 .. 31 */
+    uint8_t path_length; /* 65: state; 0 .. 62; How many points the path has. */
+    vocabulary_shift_t displaced_here; /* 66 to 70: state; How far the part that was located here was displaced: the departure is displaced as far. */
+    double lift_mm; /* 71: state; -500.0 .. 500.0 mm; How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height. */
+    bool lost; /* 72: state; A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed. */
+    vocabulary_primitive_order_t old_order; /* 73 to 82: state; The orders that were last numbered. */
+    vocabulary_vision_order_t old_vision; /* 83 to 86: state */
+    vocabulary_level_status_t status_report; /* 87: state; What the command does, to be reported. */
+    vocabulary_reason_t failure; /* 88: state; Why the command failed. */
+    vocabulary_primitive_order_t to_primitive; /* 89 to 98: output; To PRIMITIVE. */
+    vocabulary_vision_order_t to_vision; /* 99 to 102: output; To vision. */
+    vocabulary_emove_report_t report; /* 103 to 106: output; To TASK. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
+    int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
-    /* assumption 0, in_step: only told in locate, move_to, move_to_obj, pickup, release_part */
-    /* assumption 1, locate_states: only told in locate */
-    /* assumption 2, move_to_states: only told in move_to */
-    /* assumption 3, move_to_obj_states: only told in move_to_obj */
-    /* assumption 4, pickup_states: only told in pickup */
-    /* assumption 5, release_part_states: only told in release_part */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } emove_t;
 

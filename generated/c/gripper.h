@@ -5,235 +5,68 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "gripper_types.h"
+#include "vocabulary_types.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-typedef enum {
-    GRIPPER_TASK_COMMAND_PAUSE = 0,
-    GRIPPER_TASK_COMMAND_ACQUIRE = 1,
-    GRIPPER_TASK_COMMAND_MOVE = 2,
-    GRIPPER_TASK_COMMAND_RELEASE = 3,
-    GRIPPER_TASK_COMMAND_TRANSFER = 4,
-    GRIPPER_TASK_COMMAND_CLEAR = 5
-} gripper_task_command_t;
+/* `line`, where table position ran; -1 for none. */
+enum {
+    GRIPPER_LINE_POSITION_1 = 0,
+    GRIPPER_LINE_POSITION_2 = 1,
+    GRIPPER_LINE_POSITION_3 = 2,
+    GRIPPER_LINE_POSITION_4 = 3,
+    GRIPPER_LINE_POSITION_5 = 4,
+    GRIPPER_LINE_POSITION_6 = 5,
+    GRIPPER_LINE_POSITION_7 = 6
+};
 
-typedef enum {
-    GRIPPER_EMOVE_COMMAND_PAUSE = 0,
-    GRIPPER_EMOVE_COMMAND_MOVE_TO = 1,
-    GRIPPER_EMOVE_COMMAND_MOVE_TO_OBJ = 2,
-    GRIPPER_EMOVE_COMMAND_LOCATE = 3,
-    GRIPPER_EMOVE_COMMAND_PICKUP = 4,
-    GRIPPER_EMOVE_COMMAND_RELEASE = 5
-} gripper_emove_command_t;
+/* `line`, where table grasp ran; -1 for none. */
+enum {
+    GRIPPER_LINE_GRASP_1 = 0,
+    GRIPPER_LINE_GRASP_2 = 1,
+    GRIPPER_LINE_GRASP_3 = 2,
+    GRIPPER_LINE_GRASP_4 = 3,
+    GRIPPER_LINE_GRASP_5 = 4,
+    GRIPPER_LINE_GRASP_6 = 5
+};
 
-typedef enum {
-    GRIPPER_PRIMITIVE_COMMAND_PAUSE = 0,
-    GRIPPER_PRIMITIVE_COMMAND_GOTO = 1,
-    GRIPPER_PRIMITIVE_COMMAND_GOTHRU = 2,
-    GRIPPER_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS = 3,
-    GRIPPER_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS = 4,
-    GRIPPER_PRIMITIVE_COMMAND_IMMED_GRASP = 5
-} gripper_primitive_command_t;
+/* `line`, where table pause_gripper ran; -1 for none. */
+enum {
+    GRIPPER_LINE_PAUSE_GRIPPER_1 = 0
+};
 
-typedef enum {
-    GRIPPER_VISION_COMMAND_PAUSE = 0,
-    GRIPPER_VISION_COMMAND_FLOOD_FLASH = 1,
-    GRIPPER_VISION_COMMAND_LINE_FLASH = 2
-} gripper_vision_command_t;
+/* `fault`, and what a cycle returns. */
+enum {
+    GRIPPER_FAULT_NONE = 0,
+    GRIPPER_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
+    GRIPPER_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
+    GRIPPER_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
+    GRIPPER_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    GRIPPER_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    GRIPPER_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    GRIPPER_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
+};
 
-typedef enum {
-    GRIPPER_GRIPPER_COMMAND_PAUSE = 0,
-    GRIPPER_GRIPPER_COMMAND_POSITION = 1,
-    GRIPPER_GRIPPER_COMMAND_GRASP = 2
-} gripper_gripper_command_t;
-
-typedef enum {
-    GRIPPER_ROBOT_COMMAND_HOLD = 0,
-    GRIPPER_ROBOT_COMMAND_FOLLOW = 1
-} gripper_robot_command_t;
-
-typedef enum {
-    GRIPPER_LEVEL_STATUS_DONE = 0,
-    GRIPPER_LEVEL_STATUS_EXECUTING = 1,
-    GRIPPER_LEVEL_STATUS_FAILED = 2
-} gripper_level_status_t;
-
-typedef enum {
-    GRIPPER_OBJECT_NULL_OBJ = 0,
-    GRIPPER_OBJECT_TBOX = 1,
-    GRIPPER_OBJECT_BBOX = 2,
-    GRIPPER_OBJECT_FLAG = 3,
-    GRIPPER_OBJECT_HOUS = 4,
-    GRIPPER_OBJECT_CLOSE_GRIP = 5,
-    GRIPPER_OBJECT_UNKNOWN_OBJECT = 6
-} gripper_object_t;
-
-typedef enum {
-    GRIPPER_REASON_NONE = 0,
-    GRIPPER_REASON_CMD = 1,
-    GRIPPER_REASON_MOVE = 2,
-    GRIPPER_REASON_LOC = 3,
-    GRIPPER_REASON_PIC = 4,
-    GRIPPER_REASON_STATE = 5,
-    GRIPPER_REASON_BUF = 6,
-    GRIPPER_REASON_NO_PLACE = 7,
-    GRIPPER_REASON_NO_POSE = 8,
-    GRIPPER_REASON_ROBOT = 9,
-    GRIPPER_REASON_GRIP = 10,
-    GRIPPER_REASON_NOTHING_GRIPPED = 11,
-    GRIPPER_REASON_WRONG_SIZE = 12,
-    GRIPPER_REASON_NO_MATCH = 13,
-    GRIPPER_REASON_WRONG_RANGE = 14,
-    GRIPPER_REASON_RESTART = 15
-} gripper_reason_t;
-
-typedef enum {
-    GRIPPER_GRIPPER_STATE_D_STATE = 0,
-    GRIPPER_GRIPPER_STATE_F_STATE = 1,
-    GRIPPER_GRIPPER_STATE_MOVING = 2
-} gripper_gripper_state_t;
-
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj;
-    uint8_t grasp;
-    uint8_t source_locpt;
-    uint8_t dest_locpt;
-    uint8_t end_at_locpt;
-    uint8_t sector;
-} gripper_task_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t status_parameter;
-    uint8_t failure;
-} gripper_task_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint8_t locpt_ptr;
-    uint8_t sector;
-    bool apoint_pos_flag;
-    uint8_t gripped_obj_ptr;
-} gripper_emove_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-} gripper_emove_report_t;
-
-typedef struct {
-    double x;
-    double y;
-    double z;
-    double c;
-    double s;
-} gripper_shift_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint16_t pose_ptr;
-    gripper_shift_t displaced;
-} gripper_primitive_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    bool holds;
-} gripper_primitive_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    double expected_range_mm;
-} gripper_vision_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double x_mm;
-    double y_mm;
-    double c;
-    double s;
-    double range_mm;
-} gripper_vision_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double opening_mm;
-    double force_n;
-    double speed_mm_s;
-} gripper_gripper_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double opening_mm;
-} gripper_gripper_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double plate[9];
-} gripper_robot_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double plate[9];
-} gripper_robot_report_t;
-
-typedef struct {
-    double opening_mm;
-    double force_n;
-} gripper_hand_report_t;
-
-typedef struct {
-    bool drive;
-    double opening_mm;
-    double force_n;
-    double speed_mm_s;
-} gripper_hand_order_t;
-
-/* The complete state in one block: copying it is copying everything that a cycle depends on. */
-typedef struct {
-    gripper_gripper_order_t command; /* input; From PRIMITIVE. */
-    gripper_hand_report_t hand; /* input; From the hand; a reading beyond the range is pulled to it. */
-    bool new_command; /* state; True in the cycle in which a new command comes. */
-    uint16_t inc_command_seen; /* state; 0 .. 65535 */
-    uint8_t cur_state; /* state; gripper_state */
-    bool at_opening; /* state; The fingers are at the commanded opening; the force on them is met; they are to close, so that a force is one against them: fingers that let go of a part still feel it for some cycles. */
-    bool forced; /* state */
-    bool closing; /* state */
-    uint8_t waited; /* state; 0 .. 150 */
-    uint8_t status_report; /* state; level_status */
-    uint8_t failure; /* state; reason */
-    gripper_hand_order_t to_hand; /* output; To the hand. */
-    gripper_gripper_report_t report; /* output; To PRIMITIVE. */
+    vocabulary_gripper_order_t command; /* 0 to 4: input; From PRIMITIVE. */
+    gripper_hand_report_t hand; /* 5 to 6: input; From the hand; a reading beyond the range is pulled to it. */
+    bool new_command; /* 7: state; True in the cycle in which a new command comes. */
+    uint16_t inc_command_seen; /* 8: state; 0 .. 65535 */
+    gripper_gripper_state_t cur_state; /* 9: state */
+    bool at_opening; /* 10: state; The fingers are at the commanded opening; the force on them is met; they are to close, so that a force is one against them: fingers that let go of a part still feel it for some cycles. */
+    bool forced; /* 11: state */
+    bool closing; /* 12: state */
+    uint8_t waited; /* 13: state; 0 .. 150 */
+    vocabulary_level_status_t status_report; /* 14: state */
+    vocabulary_reason_t failure; /* 15: state */
+    gripper_hand_order_t to_hand; /* 16 to 19: output; To the hand. */
+    vocabulary_gripper_report_t report; /* 20 to 24: output; To PRIMITIVE. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
+    int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } gripper_t;

@@ -5,275 +5,145 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "primitive_common_types.h"
+#include "vocabulary_types.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-typedef enum {
-    PRIMITIVE_TASK_COMMAND_PAUSE = 0,
-    PRIMITIVE_TASK_COMMAND_ACQUIRE = 1,
-    PRIMITIVE_TASK_COMMAND_MOVE = 2,
-    PRIMITIVE_TASK_COMMAND_RELEASE = 3,
-    PRIMITIVE_TASK_COMMAND_TRANSFER = 4,
-    PRIMITIVE_TASK_COMMAND_CLEAR = 5
-} primitive_task_command_t;
+/* `line`, where table approach_position_fingers ran; -1 for none. */
+enum {
+    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_1 = 0,
+    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_2 = 1,
+    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_3 = 2,
+    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_4 = 3,
+    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_5 = 4,
+    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_6 = 5,
+    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_7 = 6,
+    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_8 = 7
+};
 
-typedef enum {
-    PRIMITIVE_EMOVE_COMMAND_PAUSE = 0,
-    PRIMITIVE_EMOVE_COMMAND_MOVE_TO = 1,
-    PRIMITIVE_EMOVE_COMMAND_MOVE_TO_OBJ = 2,
-    PRIMITIVE_EMOVE_COMMAND_LOCATE = 3,
-    PRIMITIVE_EMOVE_COMMAND_PICKUP = 4,
-    PRIMITIVE_EMOVE_COMMAND_RELEASE = 5
-} primitive_emove_command_t;
+/* `line`, where table departure_position_fingers ran; -1 for none. */
+enum {
+    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_1 = 0,
+    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_2 = 1,
+    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_3 = 2,
+    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_4 = 3,
+    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_5 = 4,
+    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_6 = 5,
+    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_7 = 6,
+    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_8 = 7
+};
 
-typedef enum {
-    PRIMITIVE_PRIMITIVE_COMMAND_PAUSE = 0,
-    PRIMITIVE_PRIMITIVE_COMMAND_GOTO = 1,
-    PRIMITIVE_PRIMITIVE_COMMAND_GOTHRU = 2,
-    PRIMITIVE_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS = 3,
-    PRIMITIVE_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS = 4,
-    PRIMITIVE_PRIMITIVE_COMMAND_IMMED_GRASP = 5
-} primitive_primitive_command_t;
+/* `line`, where table goto ran; -1 for none. */
+enum {
+    PRIMITIVE_LINE_GOTO_1 = 0,
+    PRIMITIVE_LINE_GOTO_2 = 1,
+    PRIMITIVE_LINE_GOTO_3 = 2,
+    PRIMITIVE_LINE_GOTO_4 = 3,
+    PRIMITIVE_LINE_GOTO_5 = 4,
+    PRIMITIVE_LINE_GOTO_6 = 5,
+    PRIMITIVE_LINE_GOTO_6A = 6,
+    PRIMITIVE_LINE_GOTO_6B = 7,
+    PRIMITIVE_LINE_GOTO_7 = 8,
+    PRIMITIVE_LINE_GOTO_8 = 9,
+    PRIMITIVE_LINE_GOTO_9 = 10,
+    PRIMITIVE_LINE_GOTO_10 = 11
+};
 
-typedef enum {
-    PRIMITIVE_VISION_COMMAND_PAUSE = 0,
-    PRIMITIVE_VISION_COMMAND_FLOOD_FLASH = 1,
-    PRIMITIVE_VISION_COMMAND_LINE_FLASH = 2
-} primitive_vision_command_t;
+/* `line`, where table gothru ran; -1 for none. */
+enum {
+    PRIMITIVE_LINE_GOTHRU_1 = 0,
+    PRIMITIVE_LINE_GOTHRU_2 = 1,
+    PRIMITIVE_LINE_GOTHRU_3 = 2,
+    PRIMITIVE_LINE_GOTHRU_4 = 3,
+    PRIMITIVE_LINE_GOTHRU_5 = 4,
+    PRIMITIVE_LINE_GOTHRU_6 = 5,
+    PRIMITIVE_LINE_GOTHRU_7 = 6,
+    PRIMITIVE_LINE_GOTHRU_8 = 7
+};
 
-typedef enum {
-    PRIMITIVE_GRIPPER_COMMAND_PAUSE = 0,
-    PRIMITIVE_GRIPPER_COMMAND_POSITION = 1,
-    PRIMITIVE_GRIPPER_COMMAND_GRASP = 2
-} primitive_gripper_command_t;
+/* `line`, where table immed_grasp ran; -1 for none. */
+enum {
+    PRIMITIVE_LINE_IMMED_GRASP_1 = 0,
+    PRIMITIVE_LINE_IMMED_GRASP_2 = 1,
+    PRIMITIVE_LINE_IMMED_GRASP_3 = 2,
+    PRIMITIVE_LINE_IMMED_GRASP_4 = 3,
+    PRIMITIVE_LINE_IMMED_GRASP_5 = 4,
+    PRIMITIVE_LINE_IMMED_GRASP_6 = 5,
+    PRIMITIVE_LINE_IMMED_GRASP_7 = 6,
+    PRIMITIVE_LINE_IMMED_GRASP_8 = 7,
+    PRIMITIVE_LINE_IMMED_GRASP_9 = 8
+};
 
-typedef enum {
-    PRIMITIVE_ROBOT_COMMAND_HOLD = 0,
-    PRIMITIVE_ROBOT_COMMAND_FOLLOW = 1
-} primitive_robot_command_t;
+/* `line`, where table pause_primitive ran; -1 for none. */
+enum {
+    PRIMITIVE_LINE_PAUSE_PRIMITIVE_1 = 0,
+    PRIMITIVE_LINE_PAUSE_PRIMITIVE_2 = 1
+};
 
-typedef enum {
-    PRIMITIVE_LEVEL_STATUS_DONE = 0,
-    PRIMITIVE_LEVEL_STATUS_EXECUTING = 1,
-    PRIMITIVE_LEVEL_STATUS_FAILED = 2
-} primitive_level_status_t;
+/* Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed. */
+enum {
+    PRIMITIVE_ASSUMPTION_IN_STEP = 0, /* in_step: only told in approach_position_fingers, departure_position_fingers, goto, gothru, immed_grasp */
+    PRIMITIVE_ASSUMPTION_APPROACH_STATES = 1, /* approach_states: only told in approach_position_fingers */
+    PRIMITIVE_ASSUMPTION_DEPARTURE_STATES = 2, /* departure_states: only told in departure_position_fingers */
+    PRIMITIVE_ASSUMPTION_GOTO_STATES = 3, /* goto_states: only told in goto */
+    PRIMITIVE_ASSUMPTION_GOTHRU_STATES = 4, /* gothru_states: only told in gothru */
+    PRIMITIVE_ASSUMPTION_GRASP_STATES = 5 /* grasp_states: only told in immed_grasp */
+};
 
-typedef enum {
-    PRIMITIVE_OBJECT_NULL_OBJ = 0,
-    PRIMITIVE_OBJECT_TBOX = 1,
-    PRIMITIVE_OBJECT_BBOX = 2,
-    PRIMITIVE_OBJECT_FLAG = 3,
-    PRIMITIVE_OBJECT_HOUS = 4,
-    PRIMITIVE_OBJECT_CLOSE_GRIP = 5,
-    PRIMITIVE_OBJECT_UNKNOWN_OBJECT = 6
-} primitive_object_t;
+/* `fault`, and what a cycle returns. */
+enum {
+    PRIMITIVE_FAULT_NONE = 0,
+    PRIMITIVE_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
+    PRIMITIVE_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
+    PRIMITIVE_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
+    PRIMITIVE_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    PRIMITIVE_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    PRIMITIVE_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    PRIMITIVE_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
+};
 
-typedef enum {
-    PRIMITIVE_REASON_NONE = 0,
-    PRIMITIVE_REASON_CMD = 1,
-    PRIMITIVE_REASON_MOVE = 2,
-    PRIMITIVE_REASON_LOC = 3,
-    PRIMITIVE_REASON_PIC = 4,
-    PRIMITIVE_REASON_STATE = 5,
-    PRIMITIVE_REASON_BUF = 6,
-    PRIMITIVE_REASON_NO_PLACE = 7,
-    PRIMITIVE_REASON_NO_POSE = 8,
-    PRIMITIVE_REASON_ROBOT = 9,
-    PRIMITIVE_REASON_GRIP = 10,
-    PRIMITIVE_REASON_NOTHING_GRIPPED = 11,
-    PRIMITIVE_REASON_WRONG_SIZE = 12,
-    PRIMITIVE_REASON_NO_MATCH = 13,
-    PRIMITIVE_REASON_WRONG_RANGE = 14,
-    PRIMITIVE_REASON_RESTART = 15
-} primitive_reason_t;
-
-typedef enum {
-    PRIMITIVE_PRIMITIVE_STATE_D_STATE = 0,
-    PRIMITIVE_PRIMITIVE_STATE_F_STATE = 1,
-    PRIMITIVE_PRIMITIVE_STATE_MOVING = 2,
-    PRIMITIVE_PRIMITIVE_STATE_FINGERING = 3
-} primitive_primitive_state_t;
-
-typedef enum {
-    PRIMITIVE_DISPLAY_PATH = 0,
-    PRIMITIVE_DISPLAY_FINGERS = 1
-} primitive_display_t;
-
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj;
-    uint8_t grasp;
-    uint8_t source_locpt;
-    uint8_t dest_locpt;
-    uint8_t end_at_locpt;
-    uint8_t sector;
-} primitive_task_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t status_parameter;
-    uint8_t failure;
-} primitive_task_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint8_t locpt_ptr;
-    uint8_t sector;
-    bool apoint_pos_flag;
-    uint8_t gripped_obj_ptr;
-} primitive_emove_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-} primitive_emove_report_t;
-
-typedef struct {
-    double x;
-    double y;
-    double z;
-    double c;
-    double s;
-} primitive_shift_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint16_t pose_ptr;
-    primitive_shift_t displaced;
-} primitive_primitive_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    bool holds;
-} primitive_primitive_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    double expected_range_mm;
-} primitive_vision_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double x_mm;
-    double y_mm;
-    double c;
-    double s;
-    double range_mm;
-} primitive_vision_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double opening_mm;
-    double force_n;
-    double speed_mm_s;
-} primitive_gripper_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double opening_mm;
-} primitive_gripper_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double plate[9];
-} primitive_robot_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double plate[9];
-} primitive_robot_report_t;
-
-typedef struct {
-    bool known;
-    double plate[9];
-    double speed_mm_s;
-    double accel_mm_s2;
-    double breakpoint_mm;
-} primitive_goal_point_t;
-
-typedef struct {
-    bool known;
-    double approach_mm;
-    double departure_mm;
-    double grip_mm;
-    double tolerance_mm;
-    double force_n;
-    double speed_mm_s;
-} primitive_end_effector_t;
-
-/* The complete state in one block: copying it is copying everything that a cycle depends on. */
-typedef struct {
-    primitive_primitive_order_t command; /* input; From E-MOVE. */
-    primitive_robot_report_t robot; /* input; From the robot controller. */
-    primitive_gripper_report_t gripper; /* input; From the gripper controller. */
-    primitive_goal_point_t goal; /* input; From the database: the point of the command. */
-    primitive_end_effector_t fingers; /* input; From the database: how the part of the command is gripped. */
-    bool new_command; /* state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
-    bool begun; /* state; This level has answered the new command. */
-    uint16_t inc_command_seen; /* state; 0 .. 65535; Number of the command now being worked on; echoed to E-MOVE. */
-    uint8_t ref_robot_in; /* state; robot_command; Command that the robot controller last echoed, and its status. */
-    uint8_t robot_status_in; /* state; level_status */
-    uint8_t ref_gripper_in; /* state; gripper_command; Command that the gripper controller last echoed, and its status. */
-    uint8_t gripper_status_in; /* state; level_status */
-    bool idle; /* state; Both controllers rest. */
-    uint8_t cur_state; /* state; primitive_state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
-    uint8_t cur_state_next; /* state; the deferred next value of cur_state */
-    double from[9]; /* state; The straight line under way. */
-    double to[9]; /* state */
-    double length_mm; /* state; 1.0 .. 30000.0 mm */
-    double travelled_mm; /* state; 0.0 .. 30000.0 mm */
-    double speed_mm_s; /* state; 0.0 .. 2000.0 mm*s^-1 */
-    bool near_; /* state; The end of the line is within the breakpoint distance; the line is at its end. */
-    bool there; /* state */
-    bool settled; /* state; The robot says that it is at the end of the line: its status may be that of an earlier pose. Looked at while it follows. */
-    bool fits; /* state; The finger spacing is that of the part; the fingers touch each other. */
-    bool closed; /* state */
-    uint8_t waited; /* state; 0 .. 250; Cycles that the robot has been waited for. */
-    uint8_t old_robot; /* state; robot_command; The orders that were last numbered. */
-    primitive_gripper_order_t old_gripper; /* state */
-    uint8_t status_report; /* state; level_status; What the command does, to be reported. */
-    uint8_t failure; /* state; reason; Why the command failed. */
-    primitive_robot_order_t to_robot; /* output; To the robot controller. */
-    primitive_gripper_order_t to_gripper; /* output; To the gripper controller. */
-    primitive_primitive_report_t report; /* output; To E-MOVE. */
-    uint8_t display; /* output; display; To whoever looks. */
+    vocabulary_primitive_order_t command; /* 0 to 9: input; From E-MOVE. */
+    vocabulary_robot_report_t robot; /* 10 to 22: input; From the robot controller. */
+    vocabulary_gripper_report_t gripper; /* 23 to 27: input; From the gripper controller. */
+    primitive_common_goal_point_t goal; /* 28 to 40: input; From the database: the point of the command. */
+    primitive_common_end_effector_t fingers; /* 41 to 47: input; From the database: how the part of the command is gripped. */
+    bool new_command; /* 48: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool begun; /* 49: state; This level has answered the new command. */
+    uint16_t inc_command_seen; /* 50: state; 0 .. 65535; Number of the command now being worked on; echoed to E-MOVE. */
+    vocabulary_robot_command_t ref_robot_in; /* 51: state; Command that the robot controller last echoed, and its status. */
+    vocabulary_level_status_t robot_status_in; /* 52: state */
+    vocabulary_gripper_command_t ref_gripper_in; /* 53: state; Command that the gripper controller last echoed, and its status. */
+    vocabulary_level_status_t gripper_status_in; /* 54: state */
+    bool idle; /* 55: state; Both controllers rest. */
+    primitive_common_primitive_state_t cur_state; /* 56: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
+    primitive_common_primitive_state_t cur_state_next; /* 57: state; the deferred next value of cur_state */
+    double from[9]; /* 58 to 66: state; -4000.0 .. 4000.0 mm; The straight line under way. */
+    double to[9]; /* 67 to 75: state; -4000.0 .. 4000.0 mm */
+    double length_mm; /* 76: state; 1.0 .. 30000.0 mm */
+    double travelled_mm; /* 77: state; 0.0 .. 30000.0 mm */
+    double speed_mm_s; /* 78: state; 0.0 .. 2000.0 mm*s^-1 */
+    bool near_; /* 79: state; The end of the line is within the breakpoint distance; the line is at its end. */
+    bool there; /* 80: state */
+    bool settled; /* 81: state; The robot says that it is at the end of the line: its status may be that of an earlier pose. Looked at while it follows. */
+    bool fits; /* 82: state; The finger spacing is that of the part; the fingers touch each other. */
+    bool closed; /* 83: state */
+    uint8_t waited; /* 84: state; 0 .. 250; Cycles that the robot has been waited for. */
+    vocabulary_robot_command_t old_robot; /* 85: state; The orders that were last numbered. */
+    vocabulary_gripper_order_t old_gripper; /* 86 to 90: state */
+    vocabulary_level_status_t status_report; /* 91: state; What the command does, to be reported. */
+    vocabulary_reason_t failure; /* 92: state; Why the command failed. */
+    vocabulary_robot_order_t to_robot; /* 93 to 103: output; To the robot controller. */
+    vocabulary_gripper_order_t to_gripper; /* 104 to 108: output; To the gripper controller. */
+    vocabulary_primitive_report_t report; /* 109 to 113: output; To E-MOVE. */
+    primitive_common_display_t display; /* 114: output; To whoever looks. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
+    int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
-    /* assumption 0, in_step: only told in approach_position_fingers, departure_position_fingers, goto, gothru, immed_grasp */
-    /* assumption 1, approach_states: only told in approach_position_fingers */
-    /* assumption 2, departure_states: only told in departure_position_fingers */
-    /* assumption 3, goto_states: only told in goto */
-    /* assumption 4, gothru_states: only told in gothru */
-    /* assumption 5, grasp_states: only told in immed_grasp */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } primitive_t;
 

@@ -5,269 +5,186 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "task_common_types.h"
+#include "vocabulary_types.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-typedef enum {
-    TASK_TASK_COMMAND_PAUSE = 0,
-    TASK_TASK_COMMAND_ACQUIRE = 1,
-    TASK_TASK_COMMAND_MOVE = 2,
-    TASK_TASK_COMMAND_RELEASE = 3,
-    TASK_TASK_COMMAND_TRANSFER = 4,
-    TASK_TASK_COMMAND_CLEAR = 5
-} task_task_command_t;
+/* `line`, where table acquire ran; -1 for none. */
+enum {
+    TASK_LINE_ACQUIRE_0 = 0,
+    TASK_LINE_ACQUIRE_1 = 1,
+    TASK_LINE_ACQUIRE_2 = 2,
+    TASK_LINE_ACQUIRE_3 = 3,
+    TASK_LINE_ACQUIRE_4 = 4,
+    TASK_LINE_ACQUIRE_5 = 5,
+    TASK_LINE_ACQUIRE_6 = 6,
+    TASK_LINE_ACQUIRE_7 = 7,
+    TASK_LINE_ACQUIRE_8 = 8,
+    TASK_LINE_ACQUIRE_9 = 9,
+    TASK_LINE_ACQUIRE_10 = 10,
+    TASK_LINE_ACQUIRE_11 = 11,
+    TASK_LINE_ACQUIRE_12 = 12,
+    TASK_LINE_ACQUIRE_13 = 13,
+    TASK_LINE_ACQUIRE_14 = 14,
+    TASK_LINE_ACQUIRE_15 = 15,
+    TASK_LINE_ACQUIRE_16 = 16
+};
 
-typedef enum {
-    TASK_EMOVE_COMMAND_PAUSE = 0,
-    TASK_EMOVE_COMMAND_MOVE_TO = 1,
-    TASK_EMOVE_COMMAND_MOVE_TO_OBJ = 2,
-    TASK_EMOVE_COMMAND_LOCATE = 3,
-    TASK_EMOVE_COMMAND_PICKUP = 4,
-    TASK_EMOVE_COMMAND_RELEASE = 5
-} task_emove_command_t;
+/* `line`, where table clear ran; -1 for none. */
+enum {
+    TASK_LINE_CLEAR_0 = 0,
+    TASK_LINE_CLEAR_1 = 1,
+    TASK_LINE_CLEAR_2 = 2,
+    TASK_LINE_CLEAR_3 = 3,
+    TASK_LINE_CLEAR_4 = 4,
+    TASK_LINE_CLEAR_5 = 5,
+    TASK_LINE_CLEAR_6 = 6,
+    TASK_LINE_CLEAR_7 = 7,
+    TASK_LINE_CLEAR_8 = 8,
+    TASK_LINE_CLEAR_9 = 9,
+    TASK_LINE_CLEAR_10 = 10,
+    TASK_LINE_CLEAR_11 = 11,
+    TASK_LINE_CLEAR_12 = 12,
+    TASK_LINE_CLEAR_13 = 13
+};
 
-typedef enum {
-    TASK_PRIMITIVE_COMMAND_PAUSE = 0,
-    TASK_PRIMITIVE_COMMAND_GOTO = 1,
-    TASK_PRIMITIVE_COMMAND_GOTHRU = 2,
-    TASK_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS = 3,
-    TASK_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS = 4,
-    TASK_PRIMITIVE_COMMAND_IMMED_GRASP = 5
-} task_primitive_command_t;
+/* `line`, where table move ran; -1 for none. */
+enum {
+    TASK_LINE_MOVE_0 = 0,
+    TASK_LINE_MOVE_1 = 1,
+    TASK_LINE_MOVE_2 = 2,
+    TASK_LINE_MOVE_3 = 3,
+    TASK_LINE_MOVE_4 = 4,
+    TASK_LINE_MOVE_5 = 5,
+    TASK_LINE_MOVE_6 = 6,
+    TASK_LINE_MOVE_7 = 7,
+    TASK_LINE_MOVE_8 = 8,
+    TASK_LINE_MOVE_9 = 9,
+    TASK_LINE_MOVE_10 = 10,
+    TASK_LINE_MOVE_11 = 11,
+    TASK_LINE_MOVE_12 = 12,
+    TASK_LINE_MOVE_13 = 13,
+    TASK_LINE_MOVE_14 = 14,
+    TASK_LINE_MOVE_15 = 15,
+    TASK_LINE_MOVE_16 = 16,
+    TASK_LINE_MOVE_17 = 17,
+    TASK_LINE_MOVE_18 = 18,
+    TASK_LINE_MOVE_19 = 19,
+    TASK_LINE_MOVE_20 = 20
+};
 
-typedef enum {
-    TASK_VISION_COMMAND_PAUSE = 0,
-    TASK_VISION_COMMAND_FLOOD_FLASH = 1,
-    TASK_VISION_COMMAND_LINE_FLASH = 2
-} task_vision_command_t;
+/* `line`, where table pause_task ran; -1 for none. */
+enum {
+    TASK_LINE_PAUSE_TASK_1 = 0,
+    TASK_LINE_PAUSE_TASK_2 = 1
+};
 
-typedef enum {
-    TASK_GRIPPER_COMMAND_PAUSE = 0,
-    TASK_GRIPPER_COMMAND_POSITION = 1,
-    TASK_GRIPPER_COMMAND_GRASP = 2
-} task_gripper_command_t;
+/* `line`, where table release_part ran; -1 for none. */
+enum {
+    TASK_LINE_RELEASE_PART_0 = 0,
+    TASK_LINE_RELEASE_PART_1 = 1,
+    TASK_LINE_RELEASE_PART_2 = 2,
+    TASK_LINE_RELEASE_PART_3 = 3,
+    TASK_LINE_RELEASE_PART_4 = 4,
+    TASK_LINE_RELEASE_PART_5 = 5,
+    TASK_LINE_RELEASE_PART_6 = 6,
+    TASK_LINE_RELEASE_PART_7 = 7,
+    TASK_LINE_RELEASE_PART_8 = 8,
+    TASK_LINE_RELEASE_PART_9 = 9,
+    TASK_LINE_RELEASE_PART_10 = 10,
+    TASK_LINE_RELEASE_PART_11 = 11
+};
 
-typedef enum {
-    TASK_ROBOT_COMMAND_HOLD = 0,
-    TASK_ROBOT_COMMAND_FOLLOW = 1
-} task_robot_command_t;
+/* `line`, where table transfer ran; -1 for none. */
+enum {
+    TASK_LINE_TRANSFER_0 = 0,
+    TASK_LINE_TRANSFER_1 = 1,
+    TASK_LINE_TRANSFER_2 = 2,
+    TASK_LINE_TRANSFER_3 = 3,
+    TASK_LINE_TRANSFER_4 = 4,
+    TASK_LINE_TRANSFER_5 = 5,
+    TASK_LINE_TRANSFER_6 = 6,
+    TASK_LINE_TRANSFER_7 = 7,
+    TASK_LINE_TRANSFER_8 = 8,
+    TASK_LINE_TRANSFER_9 = 9,
+    TASK_LINE_TRANSFER_10 = 10,
+    TASK_LINE_TRANSFER_11 = 11,
+    TASK_LINE_TRANSFER_12 = 12,
+    TASK_LINE_TRANSFER_13 = 13,
+    TASK_LINE_TRANSFER_14 = 14,
+    TASK_LINE_TRANSFER_15 = 15,
+    TASK_LINE_TRANSFER_16 = 16,
+    TASK_LINE_TRANSFER_17 = 17,
+    TASK_LINE_TRANSFER_18 = 18,
+    TASK_LINE_TRANSFER_19 = 19,
+    TASK_LINE_TRANSFER_20 = 20,
+    TASK_LINE_TRANSFER_21 = 21,
+    TASK_LINE_TRANSFER_22 = 22
+};
 
-typedef enum {
-    TASK_LEVEL_STATUS_DONE = 0,
-    TASK_LEVEL_STATUS_EXECUTING = 1,
-    TASK_LEVEL_STATUS_FAILED = 2
-} task_level_status_t;
+/* Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed. */
+enum {
+    TASK_ASSUMPTION_IN_STEP = 0, /* in_step: only told in acquire, clear, move, release_part, transfer */
+    TASK_ASSUMPTION_RESTING = 1, /* resting: only told in acquire, clear, move, release_part, transfer */
+    TASK_ASSUMPTION_ACQUIRE_STATES = 2, /* acquire_states: only told in acquire */
+    TASK_ASSUMPTION_CLEAR_STATES = 3, /* clear_states: only told in clear */
+    TASK_ASSUMPTION_MOVE_STATES = 4, /* move_states: only told in move */
+    TASK_ASSUMPTION_RELEASE_STATES = 5 /* release_states: only told in release_part */
+};
 
-typedef enum {
-    TASK_OBJECT_NULL_OBJ = 0,
-    TASK_OBJECT_TBOX = 1,
-    TASK_OBJECT_BBOX = 2,
-    TASK_OBJECT_FLAG = 3,
-    TASK_OBJECT_HOUS = 4,
-    TASK_OBJECT_CLOSE_GRIP = 5,
-    TASK_OBJECT_UNKNOWN_OBJECT = 6
-} task_object_t;
+/* `fault`, and what a cycle returns. */
+enum {
+    TASK_FAULT_NONE = 0,
+    TASK_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
+    TASK_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
+    TASK_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
+    TASK_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    TASK_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    TASK_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    TASK_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
+};
 
-typedef enum {
-    TASK_REASON_NONE = 0,
-    TASK_REASON_CMD = 1,
-    TASK_REASON_MOVE = 2,
-    TASK_REASON_LOC = 3,
-    TASK_REASON_PIC = 4,
-    TASK_REASON_STATE = 5,
-    TASK_REASON_BUF = 6,
-    TASK_REASON_NO_PLACE = 7,
-    TASK_REASON_NO_POSE = 8,
-    TASK_REASON_ROBOT = 9,
-    TASK_REASON_GRIP = 10,
-    TASK_REASON_NOTHING_GRIPPED = 11,
-    TASK_REASON_WRONG_SIZE = 12,
-    TASK_REASON_NO_MATCH = 13,
-    TASK_REASON_WRONG_RANGE = 14,
-    TASK_REASON_RESTART = 15
-} task_reason_t;
-
-typedef enum {
-    TASK_TASK_STATE_D_STATE = 0,
-    TASK_TASK_STATE_F_STATE = 1,
-    TASK_TASK_STATE_STATE_2 = 2,
-    TASK_TASK_STATE_STATE_3 = 3,
-    TASK_TASK_STATE_STATE_4 = 4,
-    TASK_TASK_STATE_STATE_5 = 5,
-    TASK_TASK_STATE_STATE_6 = 6,
-    TASK_TASK_STATE_STATE_7 = 7,
-    TASK_TASK_STATE_STATE_8 = 8
-} task_task_state_t;
-
-typedef enum {
-    TASK_LOCATING_VIS_REQD = 0,
-    TASK_LOCATING_KNOWN = 1
-} task_locating_t;
-
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj;
-    uint8_t grasp;
-    uint8_t source_locpt;
-    uint8_t dest_locpt;
-    uint8_t end_at_locpt;
-    uint8_t sector;
-} task_task_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t status_parameter;
-    uint8_t failure;
-} task_task_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint8_t locpt_ptr;
-    uint8_t sector;
-    bool apoint_pos_flag;
-    uint8_t gripped_obj_ptr;
-} task_emove_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-} task_emove_report_t;
-
-typedef struct {
-    double x;
-    double y;
-    double z;
-    double c;
-    double s;
-} task_shift_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint16_t pose_ptr;
-    task_shift_t displaced;
-} task_primitive_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    bool holds;
-} task_primitive_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    double expected_range_mm;
-} task_vision_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double x_mm;
-    double y_mm;
-    double c;
-    double s;
-    double range_mm;
-} task_vision_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double opening_mm;
-    double force_n;
-    double speed_mm_s;
-} task_gripper_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double opening_mm;
-} task_gripper_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double plate[9];
-} task_robot_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double plate[9];
-} task_robot_report_t;
-
-typedef struct {
-    bool known;
-    bool vision;
-    bool buffer;
-    uint8_t vupos;
-    uint8_t safe;
-} task_place_t;
-
-/* The complete state in one block: copying it is copying everything that a cycle depends on. */
-typedef struct {
-    task_task_order_t command; /* input; From the WORKSTATION. */
-    task_emove_report_t emove; /* input; From E-MOVE. */
-    task_place_t source; /* input; From the database: the source of the command. */
-    task_place_t dest; /* input; From the database: its destination. */
-    task_place_t end_at; /* input; From the database: where it ends. */
-    task_place_t here; /* input; From the database: where the robot is. */
-    bool new_command; /* state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
-    bool begun; /* state; This level has answered the new command; pausing the level below first is no answer. */
-    uint16_t inc_command_seen; /* state; 0 .. 65535; Number of the command now being worked on; echoed to the WORKSTATION. */
-    uint8_t ref_command_in; /* state; emove_command; Command that E-MOVE last echoed. */
-    uint8_t status_in; /* state; level_status; Status that E-MOVE reports. */
-    bool idle; /* state; E-MOVE rests, and what it says answers this level's last order. */
-    uint8_t cur_state; /* state; task_state; Where the table is in its sequence. */
-    uint8_t cur_state_next; /* state; the deferred next value of cur_state */
-    uint8_t loc_of_obj; /* state; locating; Whether vision is needed at the source. */
-    bool source_spec; /* state; Whether the WORKSTATION named a source that the database knows. */
-    bool dest_spec; /* state; Whether it named a destination that the database knows. */
-    bool names_known; /* state; Every location that it named is known. */
-    bool obj_acquired; /* state; An object is in the gripper. */
-    uint8_t obj_now_in_gripper; /* state; object; The object in the gripper. */
-    uint8_t grasp_now; /* state; 0 .. 9; How it is gripped. */
-    uint8_t remember_current_loc; /* state; 0 .. 255; Where the object was taken from. */
-    uint8_t current_loc; /* state; 0 .. 255; Where the robot is; 0 while it moves. */
-    uint8_t current_sector; /* state; 0 .. 99 */
-    task_emove_order_t old_order; /* state; The order that was last numbered. */
-    uint8_t tbuffer_boxt; /* state; 0 .. 99; Box tops left on the buffer table. */
-    uint8_t bbuffer_boxb; /* state; 0 .. 99; Box bottoms left on the buffer table. */
-    uint8_t fbuffer_flag; /* state; 0 .. 99; Flags left on the buffer table. */
-    uint8_t hbuffer_hous; /* state; 0 .. 99; Houses left on the buffer table. */
-    uint8_t status_report; /* state; level_status; What the command does, to be reported. */
-    uint8_t failure; /* state; reason; Why the command failed. */
-    task_emove_order_t to_emove; /* output; To E-MOVE. */
-    task_task_report_t report; /* output; To the WORKSTATION. */
+    vocabulary_task_order_t command; /* 0 to 7: input; From the WORKSTATION. */
+    vocabulary_emove_report_t emove; /* 8 to 11: input; From E-MOVE. */
+    task_common_place_t source; /* 12 to 16: input; From the database: the source of the command. */
+    task_common_place_t dest; /* 17 to 21: input; From the database: its destination. */
+    task_common_place_t end_at; /* 22 to 26: input; From the database: where it ends. */
+    task_common_place_t here; /* 27 to 31: input; From the database: where the robot is. */
+    bool new_command; /* 32: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool begun; /* 33: state; This level has answered the new command; pausing the level below first is no answer. */
+    uint16_t inc_command_seen; /* 34: state; 0 .. 65535; Number of the command now being worked on; echoed to the WORKSTATION. */
+    vocabulary_emove_command_t ref_command_in; /* 35: state; Command that E-MOVE last echoed. */
+    vocabulary_level_status_t status_in; /* 36: state; Status that E-MOVE reports. */
+    bool idle; /* 37: state; E-MOVE rests, and what it says answers this level's last order. */
+    task_common_task_state_t cur_state; /* 38: state; Where the table is in its sequence. */
+    task_common_task_state_t cur_state_next; /* 39: state; the deferred next value of cur_state */
+    task_common_locating_t loc_of_obj; /* 40: state; Whether vision is needed at the source. */
+    bool source_spec; /* 41: state; Whether the WORKSTATION named a source that the database knows. */
+    bool dest_spec; /* 42: state; Whether it named a destination that the database knows. */
+    bool names_known; /* 43: state; Every location that it named is known. */
+    bool obj_acquired; /* 44: state; An object is in the gripper. */
+    vocabulary_object_t obj_now_in_gripper; /* 45: state; The object in the gripper. */
+    uint8_t grasp_now; /* 46: state; 0 .. 9; How it is gripped. */
+    uint8_t remember_current_loc; /* 47: state; 0 .. 255; Where the object was taken from. */
+    uint8_t current_loc; /* 48: state; 0 .. 255; Where the robot is; 0 while it moves. */
+    uint8_t current_sector; /* 49: state; 0 .. 99 */
+    vocabulary_emove_order_t old_order; /* 50 to 57: state; The order that was last numbered. */
+    uint8_t tbuffer_boxt; /* 58: state; 0 .. 99; Box tops left on the buffer table. */
+    uint8_t bbuffer_boxb; /* 59: state; 0 .. 99; Box bottoms left on the buffer table. */
+    uint8_t fbuffer_flag; /* 60: state; 0 .. 99; Flags left on the buffer table. */
+    uint8_t hbuffer_hous; /* 61: state; 0 .. 99; Houses left on the buffer table. */
+    vocabulary_level_status_t status_report; /* 62: state; What the command does, to be reported. */
+    vocabulary_reason_t failure; /* 63: state; Why the command failed. */
+    vocabulary_emove_order_t to_emove; /* 64 to 71: output; To E-MOVE. */
+    vocabulary_task_report_t report; /* 72 to 76: output; To the WORKSTATION. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed */
+    int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
-    /* assumption 0, in_step: only told in acquire, clear, move, release_part, transfer */
-    /* assumption 1, resting: only told in acquire, clear, move, release_part, transfer */
-    /* assumption 2, acquire_states: only told in acquire */
-    /* assumption 3, clear_states: only told in clear */
-    /* assumption 4, move_states: only told in move */
-    /* assumption 5, release_states: only told in release_part */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } task_t;
 

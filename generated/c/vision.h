@@ -5,245 +5,69 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "vision_types.h"
+#include "vocabulary_types.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-typedef enum {
-    VISION_TASK_COMMAND_PAUSE = 0,
-    VISION_TASK_COMMAND_ACQUIRE = 1,
-    VISION_TASK_COMMAND_MOVE = 2,
-    VISION_TASK_COMMAND_RELEASE = 3,
-    VISION_TASK_COMMAND_TRANSFER = 4,
-    VISION_TASK_COMMAND_CLEAR = 5
-} vision_task_command_t;
+/* `line`, where table flood_flash ran; -1 for none. */
+enum {
+    VISION_LINE_FLOOD_FLASH_1 = 0,
+    VISION_LINE_FLOOD_FLASH_2 = 1,
+    VISION_LINE_FLOOD_FLASH_3 = 2,
+    VISION_LINE_FLOOD_FLASH_4 = 3,
+    VISION_LINE_FLOOD_FLASH_5 = 4,
+    VISION_LINE_FLOOD_FLASH_6 = 5,
+    VISION_LINE_FLOOD_FLASH_7 = 6
+};
 
-typedef enum {
-    VISION_EMOVE_COMMAND_PAUSE = 0,
-    VISION_EMOVE_COMMAND_MOVE_TO = 1,
-    VISION_EMOVE_COMMAND_MOVE_TO_OBJ = 2,
-    VISION_EMOVE_COMMAND_LOCATE = 3,
-    VISION_EMOVE_COMMAND_PICKUP = 4,
-    VISION_EMOVE_COMMAND_RELEASE = 5
-} vision_emove_command_t;
+/* `line`, where table line_flash ran; -1 for none. */
+enum {
+    VISION_LINE_LINE_FLASH_1 = 0,
+    VISION_LINE_LINE_FLASH_2 = 1,
+    VISION_LINE_LINE_FLASH_3 = 2,
+    VISION_LINE_LINE_FLASH_4 = 3,
+    VISION_LINE_LINE_FLASH_5A = 4,
+    VISION_LINE_LINE_FLASH_5B = 5,
+    VISION_LINE_LINE_FLASH_6 = 6,
+    VISION_LINE_LINE_FLASH_7 = 7
+};
 
-typedef enum {
-    VISION_PRIMITIVE_COMMAND_PAUSE = 0,
-    VISION_PRIMITIVE_COMMAND_GOTO = 1,
-    VISION_PRIMITIVE_COMMAND_GOTHRU = 2,
-    VISION_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS = 3,
-    VISION_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS = 4,
-    VISION_PRIMITIVE_COMMAND_IMMED_GRASP = 5
-} vision_primitive_command_t;
+/* `line`, where table pause_vision ran; -1 for none. */
+enum {
+    VISION_LINE_PAUSE_VISION_1 = 0
+};
 
-typedef enum {
-    VISION_VISION_COMMAND_PAUSE = 0,
-    VISION_VISION_COMMAND_FLOOD_FLASH = 1,
-    VISION_VISION_COMMAND_LINE_FLASH = 2
-} vision_vision_command_t;
+/* `fault`, and what a cycle returns. */
+enum {
+    VISION_FAULT_NONE = 0,
+    VISION_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
+    VISION_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
+    VISION_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
+    VISION_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    VISION_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    VISION_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    VISION_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
+};
 
-typedef enum {
-    VISION_GRIPPER_COMMAND_PAUSE = 0,
-    VISION_GRIPPER_COMMAND_POSITION = 1,
-    VISION_GRIPPER_COMMAND_GRASP = 2
-} vision_gripper_command_t;
-
-typedef enum {
-    VISION_ROBOT_COMMAND_HOLD = 0,
-    VISION_ROBOT_COMMAND_FOLLOW = 1
-} vision_robot_command_t;
-
-typedef enum {
-    VISION_LEVEL_STATUS_DONE = 0,
-    VISION_LEVEL_STATUS_EXECUTING = 1,
-    VISION_LEVEL_STATUS_FAILED = 2
-} vision_level_status_t;
-
-typedef enum {
-    VISION_OBJECT_NULL_OBJ = 0,
-    VISION_OBJECT_TBOX = 1,
-    VISION_OBJECT_BBOX = 2,
-    VISION_OBJECT_FLAG = 3,
-    VISION_OBJECT_HOUS = 4,
-    VISION_OBJECT_CLOSE_GRIP = 5,
-    VISION_OBJECT_UNKNOWN_OBJECT = 6
-} vision_object_t;
-
-typedef enum {
-    VISION_REASON_NONE = 0,
-    VISION_REASON_CMD = 1,
-    VISION_REASON_MOVE = 2,
-    VISION_REASON_LOC = 3,
-    VISION_REASON_PIC = 4,
-    VISION_REASON_STATE = 5,
-    VISION_REASON_BUF = 6,
-    VISION_REASON_NO_PLACE = 7,
-    VISION_REASON_NO_POSE = 8,
-    VISION_REASON_ROBOT = 9,
-    VISION_REASON_GRIP = 10,
-    VISION_REASON_NOTHING_GRIPPED = 11,
-    VISION_REASON_WRONG_SIZE = 12,
-    VISION_REASON_NO_MATCH = 13,
-    VISION_REASON_WRONG_RANGE = 14,
-    VISION_REASON_RESTART = 15
-} vision_reason_t;
-
-typedef enum {
-    VISION_VISION_STATE_D_STATE = 0,
-    VISION_VISION_STATE_F_STATE = 1,
-    VISION_VISION_STATE_LOOKING = 2
-} vision_vision_state_t;
-
-typedef enum {
-    VISION_FLASH_DARK = 0,
-    VISION_FLASH_FLOOD = 1,
-    VISION_FLASH_LINE = 2
-} vision_flash_t;
-
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj;
-    uint8_t grasp;
-    uint8_t source_locpt;
-    uint8_t dest_locpt;
-    uint8_t end_at_locpt;
-    uint8_t sector;
-} vision_task_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t status_parameter;
-    uint8_t failure;
-} vision_task_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint8_t locpt_ptr;
-    uint8_t sector;
-    bool apoint_pos_flag;
-    uint8_t gripped_obj_ptr;
-} vision_emove_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-} vision_emove_report_t;
-
-typedef struct {
-    double x;
-    double y;
-    double z;
-    double c;
-    double s;
-} vision_shift_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    uint8_t grasp;
-    uint16_t pose_ptr;
-    vision_shift_t displaced;
-} vision_primitive_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    bool holds;
-} vision_primitive_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    uint8_t obj_ptr;
-    double expected_range_mm;
-} vision_vision_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double x_mm;
-    double y_mm;
-    double c;
-    double s;
-    double range_mm;
-} vision_vision_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double opening_mm;
-    double force_n;
-    double speed_mm_s;
-} vision_gripper_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double opening_mm;
-} vision_gripper_report_t;
-
-typedef struct {
-    uint16_t inc_command;
-    uint8_t input_command;
-    double plate[9];
-} vision_robot_order_t;
-
-typedef struct {
-    uint16_t inc_command_echo;
-    uint8_t ref_command_echo;
-    uint8_t status_report;
-    uint8_t failure;
-    double plate[9];
-} vision_robot_report_t;
-
-typedef struct {
-    uint16_t number;
-    bool matched;
-    double x_mm;
-    double y_mm;
-    double c;
-    double s;
-    double range_mm;
-    bool flat;
-} vision_picture_t;
-
-typedef struct {
-    uint16_t number;
-    uint8_t fire;
-    uint8_t obj_ptr;
-} vision_camera_order_t;
-
-/* The complete state in one block: copying it is copying everything that a cycle depends on. */
-typedef struct {
-    vision_vision_order_t command; /* input; From E-MOVE. */
-    vision_picture_t camera; /* input; From the image processing. */
-    bool new_command; /* state; True in the cycle in which a new command comes. */
-    uint16_t inc_command_seen; /* state; 0 .. 65535 */
-    uint8_t cur_state; /* state; vision_state */
-    bool arrived; /* state; The picture that was asked for is there. */
-    bool fits; /* state; Its range is the expected one. */
-    uint8_t waited; /* state; 0 .. 100 */
-    uint8_t status_report; /* state; level_status */
-    uint8_t failure; /* state; reason */
-    vision_camera_order_t to_camera; /* output; To the camera. */
-    vision_vision_report_t report; /* output; To E-MOVE. */
+    vocabulary_vision_order_t command; /* 0 to 3: input; From E-MOVE. */
+    vision_picture_t camera; /* 4 to 11: input; From the image processing. */
+    bool new_command; /* 12: state; True in the cycle in which a new command comes. */
+    uint16_t inc_command_seen; /* 13: state; 0 .. 65535 */
+    vision_vision_state_t cur_state; /* 14: state */
+    bool arrived; /* 15: state; The picture that was asked for is there. */
+    bool fits; /* 16: state; Its range is the expected one. */
+    uint8_t waited; /* 17: state; 0 .. 100 */
+    vocabulary_level_status_t status_report; /* 18: state */
+    vocabulary_reason_t failure; /* 19: state */
+    vision_camera_order_t to_camera; /* 20 to 22: output; To the camera. */
+    vocabulary_vision_report_t report; /* 23 to 31: output; To E-MOVE. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
+    int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } vision_t;

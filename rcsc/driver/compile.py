@@ -38,16 +38,16 @@ def _executors(
     """The generated files of every program that declares a table or a level, by path under the folder."""
     files: dict[str, str] = {}
     diagnostics = []
-    paths: dict[str, str] = {}
+    paths: dict[str, tuple[str, str]] = {}
     names: dict[str, dict[str, tuple[str, str]]] = {}
     for root, program in project.executable:
         plan = planned(program, defensive=defensive)
         emitted_ = emitted(plan, targets)
-        taken = next((path for path in emitted_ if paths.get(path.casefold(), root) != root), None)
+        taken = next((path for path, text in emitted_.items() if _other(paths, path, text)), None)
         if taken is not None:
-            diagnostics.append(_same_file(taken, root, paths[taken.casefold()]))
+            diagnostics.append(_same_file(taken, root, paths[taken.casefold()][0]))
             continue
-        paths |= {path.casefold(): root for path in emitted_}
+        paths |= {path.casefold(): (root, text) for path, text in emitted_.items()}
         for name in targets:
             diagnostics += _same_names(TARGETS[name], plan, root, names.setdefault(name, {}))
         files |= emitted_
@@ -72,8 +72,17 @@ def planned(proved: ProvedProgram, *, defensive: bool = False) -> Plan:
     return lower(proved, project_root(proved.program.file), defensive=defensive)
 
 
+def _other(paths: dict[str, tuple[str, str]], path: str, text: str) -> bool:
+    """Whether another text goes to the file already; types that programs share have one text."""
+    return path.casefold() in paths and paths[path.casefold()][1] != text
+
+
 def _same_file(path: str, root: str, other: str) -> Diagnostic:
     message = f"`{root}` and `{other}` would both be compiled to `{path}`"
-    return Diagnostic(
-        Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=("rename one of the files",)
-    )
+    helps = ("rename one of the files",)
+    if path.endswith("_types.h"):
+        message = f"`{root}` and `{other}` would each make other types of `{path}`"
+        helps = (
+            "let the file that declares them use all that its types need, or rename one of two files of one name",
+        )
+    return Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)

@@ -32,8 +32,17 @@ from rcsc.emit.code_tree import (
     repeated,
     when,
 )
-from rcsc.emit.ctext import SHORT, CText, c_type, locals_of, type_bounds, wide_type
-from rcsc.emit.identifiers import FAILED_BITS, NameScope, comment, guard, names_of, parameter_word
+from rcsc.emit.ctext import SHORT, CText, c_type, declared, locals_of, type_bounds, wide_type
+from rcsc.emit.identifiers import (
+    FAILED_BITS,
+    NameScope,
+    comment,
+    guard,
+    names_of,
+    parameter_word,
+    types_guard,
+    types_header,
+)
 from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, Plan, PlanTable, Truth, joined
 from rcsc.emit.rendering import render
 from rcsc.emit.symbols import symbols, unit_text
@@ -49,7 +58,17 @@ AT, FOUND, M = Name("at"), Name("line"), Name("m")
 
 
 Fields: TypeAlias = tuple[tuple[str, str], ...]
-"""Members of a struct, or of an enumeration: the declaration of each, and its doc."""
+"""Members of a struct, or constants of an enumeration: the declaration of each, and its doc."""
+FAULT_DOCS = (
+    "",
+    "an input was refused: `fault_at` is its position",
+    "no line matched, which was proved impossible",
+    "several lines matched, which was proved impossible",
+    "a result of a function of yours was refused: `fault_at` is the position of its variable",
+    "an assumption failed that the table's safety rests on: `fault_at` is its position",
+    "of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it",
+    "this machine, or its compiler, computes reals otherwise",
+)
 
 
 def emit_c(plan: Plan) -> dict[str, str]:
@@ -57,6 +76,7 @@ def emit_c(plan: Plan) -> dict[str, str]:
     maker = _Maker(plan)
     view, name = maker.view(), maker.p
     return {
+        **maker.types(),
         f"c/{name}.h": render("header.h.jinja", view),
         f"c/{name}.c": render("source.c.jinja", view),
         f"c/{maker.names.file}.json": symbols(plan, maker.names),
@@ -73,12 +93,14 @@ def outward(plan: Plan) -> Iterator[tuple[str, str]]:
     """
     maker = _Maker(plan)
     names, p = maker.names, maker.names.program
-    own = [guard(p), *(f"{p}_{end}" for end in ("t", "init", "check"))]
+    own = [f"{p}.h", guard(p), *(f"{p}_{end}" for end in ("t", "init", "check"))]
     own += [f"{p}_{stem}_{end}" for stem in names.tables.values() for end in ("line", "lines", "step")]
     own += [f"{p}_{stem}_cycle" for stem in names.levels.values()]
-    own += [f"{p}_{stem}_t" for stem in (*names.records.values(), *names.enums.values())]
-    own += [member for members in names.constants.values() for member in members]
+    own += [name for lines in names.lines.values() for name in lines]
+    own += [*names.assumptions, *names.faults]
     yield from ((name, f"a name of program `{plan.program.name}`") for name in own)
+    for unit, shared in maker.shared().items():
+        yield from ((name, f"a name of the types of `{unit}`") for name in shared)
     for extern, types in maker.declared():
         yield extern, f"a function of yours of {', '.join(types) or 'nothing'}"
 
@@ -113,7 +135,7 @@ class _Maker:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.program = plan.program
-        self.names = names_of(plan.program)
+        self.names = names_of(plan.program, plan.places)
         parameters = {
             str(procedure.name): tuple(p.type for p in procedure.params)
             for procedure in plan.program.procedures
@@ -139,8 +161,8 @@ class _Maker:
             "program": self.p,
             "guard": guard(self.p),
             "source": comment(self.plan.source),
-            "enums": [self._enum(enum) for enum in self.program.enums],
-            "structs": [self._record(record) for record in self.program.records],
+            "includes": sorted({types_header(unit) for unit in self.names.units.values()}),
+            "positions": list(self._positions()),
             "fields": list(self._fields()),
             "failed": self.names.failed,
             "reals": reals,
@@ -153,42 +175,103 @@ class _Maker:
 
     # --- declarations ---
 
-    def _enum(self, enum: Enum) -> tuple[str, Fields]:
-        pairs = zip(self.names.constants[enum.name], enum.members, strict=True)
-        fields = tuple((f"{name} = {at}", comment(member)) for at, (name, member) in enumerate(pairs))
-        return f"{self.p}_{self.names.enums[enum.name]}_t", fields
+    def types(self) -> dict[str, str]:
+        """A header for each file that declares types: all programs that use it share them."""
+        made = {}
+        for unit in dict.fromkeys(self.names.units.values()):
+            files = [file for file, word in self.names.units.items() if word == unit]
+            enums = [one for one in self.program.enums if one.file in files]
+            records = [one for one in self.program.records if one.file in files]
+            needed = {self.names.units[one.file] for record in records for one in self._parts(record)}
+            view = {
+                "source": comment(self._source(files[0])),
+                "mark": self.plan.mark,
+                "guard": types_guard(unit),
+                "includes": sorted(types_header(other) for other in needed - {unit}),
+                "enums": [self._enum(enum) for enum in enums],
+                "structs": [self._record(record) for record in records],
+            }
+            made[f"c/{types_header(unit)}"] = render("types.h.jinja", view)
+        return made
+
+    def _source(self, file: str) -> str:
+        """A file that declares types, as the first line of its header names it."""
+        own = file in {"", self.program.file}
+        return self.plan.source if own else f"{self.plan.places.get(file, file)}.rcs"
+
+    def shared(self) -> dict[str, list[str]]:
+        """Names that the header of each unit declares."""
+        names = {unit: [types_header(unit), types_guard(unit)] for unit in self.names.units.values()}
+        for one in self.program.types:
+            names[self.names.units[one.file]].append(self.names.types[one.name])
+        for enum in self.program.enums:
+            names[self.names.units[enum.file]] += self.names.constants[enum.name]
+        return names
+
+    def _parts(self, record: model.Record) -> Iterator[Enum | model.Record]:
+        """The declared types of a record's own fields."""
+        for one in record.fields:
+            kind = one.type
+            while isinstance(kind, model.Array):
+                kind = kind.element
+            if isinstance(kind, Enum | model.Record):
+                yield kind
+
+    def _enum(self, enum: Enum) -> tuple[str, str, str, Fields]:
+        return (
+            self.names.types[enum.name],
+            c_type(enum),
+            comment(enum.name),
+            self._numbered(self.names.constants[enum.name], enum.members),
+        )
+
+    def _numbered(self, names: Iterable[str], docs: Iterable[str]) -> Fields:
+        """Constants from 0 on."""
+        pairs = zip(names, docs, strict=True)
+        return tuple((f"{name} = {at}", comment(doc)) for at, (name, doc) in enumerate(pairs))
 
     def _record(self, record: model.Record) -> tuple[str, Fields]:
         names = self.names.members[record.name]
-        fields = tuple((self._declare(names[f.name], f.type), comment(f.doc)) for f in record.fields)
-        return f"{self.p}_{self.names.records[record.name]}_t", fields
-
-    def _declare(self, name: str, kind: model.Type) -> str:
-        """A declaration: the type of the innermost elements, the name, the lengths from the outermost in."""
-        lengths = ""
-        while isinstance(kind, model.Array):
-            lengths += f"[{kind.length}]"
-            kind = kind.element
-        base = (
-            f"{self.p}_{self.names.records[kind.name]}_t" if isinstance(kind, model.Record) else c_type(kind)
+        docs = ("; ".join(word for word in (_range(f.type), comment(f.doc)) if word) for f in record.fields)
+        fields = tuple(
+            (declared(self.names, names[f.name], f.type), doc)
+            for f, doc in zip(record.fields, docs, strict=True)
         )
-        return f"{base} {name}{lengths}"
+        return self.names.types[record.name], fields
+
+    def _positions(self) -> Iterator[tuple[str, Fields]]:
+        """Constants for what the trace tells by its position, each kind with what is said of it."""
+        for table in self.plan.tables:
+            names = self.names.lines[table.table.name]
+            docs = (  # where the constant does not say it
+                "" if name.endswith(f"_{line.name.upper()}") else line.name
+                for name, line in zip(names, table.lines, strict=True)
+            )
+            said = f"`line`, where table {table.table.name} ran; -1 for none"
+            yield comment(said), self._numbered(names, docs)
+        if self.names.assumptions:
+            said = "Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed"
+            yield said, self._numbered(self.names.assumptions, self.plan.checked)
+        yield "`fault`, and what a cycle returns", self._numbered(self.names.faults, FAULT_DOCS)
 
     def _fields(self) -> Iterator[tuple[str, str]]:
         variables = {v.name: v for v in self.program.variables}
-        for declared in self.program.declared:
-            root = self.names.roots[declared.name]
+        position = {v.name: at for at, v in enumerate(self.program.variables)}
+        for variable in self.program.declared:
+            root = self.names.roots[variable.name]
+            first, last = position[variable.leaves[0]], position[variable.leaves[-1]]
+            where = f"{first}" if first == last else f"{first} to {last}"
             words = [
-                declared.kind.value,
-                _range(declared.type),
-                _safe_text(variables[declared.leaves[0]]),
-                comment(declared.doc),
+                f"{where}: {variable.kind.value}",
+                _range(variable.type),
+                _safe_text(variables[variable.leaves[0]]),
+                comment(variable.doc),
             ]
-            yield self._declare(root, declared.type), "; ".join(word for word in words if word)
-            later = pending(declared.name)
+            yield declared(self.names, root, variable.type), "; ".join(word for word in words if word)
+            later = pending(variable.name)
             if later in variables:
-                doc = f"state; the deferred next value of {root}"
-                yield self._declare("".join(self.names.paths[later]), variables[later].type), doc
+                doc = f"{position[later]}: state; the deferred next value of {root}"
+                yield declared(self.names, "".join(self.names.paths[later]), variables[later].type), doc
 
     def declared(self) -> Iterator[tuple[str, tuple[str, ...]]]:
         """Each user function, and the types of its parameters; a pointer's ends in a star."""
@@ -721,8 +804,8 @@ def _range(kind: model.Type) -> str:
         case Int(low, high, unit) | Real(low, high, unit):
             units = unit_text(unit)
             return f"{low} .. {high}" + (f" {units}" if units else "")
-        case Enum(name=name):
-            return name
+        case model.Array(element=element):
+            return _range(element)
         case _:
             return ""
 

@@ -29,6 +29,7 @@ from rcsc.emit.code_tree import (
     infix,
     when,
 )
+from rcsc.emit.identifiers import Names
 from rcsc.emit.translate import FAULTLESS, Text, constant, local
 from rcsc.lang import model
 from rcsc.lang.leaves import everything
@@ -60,6 +61,16 @@ def c_type(kind: Scalar) -> str:
                 if low >= -(1 << bits - 1) and high < 1 << bits - 1:
                     return f"int{bits}_t"
     raise ValueError(kind)  # resolve keeps ranges within 64 bits
+
+
+def declared(names: Names, name: str, kind: model.Type) -> str:
+    """A declaration: the type of the innermost elements, the name, the lengths from the outermost in."""
+    lengths = ""
+    while isinstance(kind, model.Array):
+        lengths += f"[{kind.length}]"
+        kind = kind.element
+    base = names.types[kind.name] if isinstance(kind, model.Record | Enum) else c_type(kind)
+    return f"{base} {name}{lengths}"
 
 
 def wide_type(kind: Scalar) -> str:

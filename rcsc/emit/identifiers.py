@@ -9,12 +9,15 @@ names. A name that is free stays as it was written; the others get what makes th
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import groupby
+from types import MappingProxyType
 
 from rcsc.lang import reserved
+from rcsc.lang.interpret import Fault
 from rcsc.lang.meaning import checked
-from rcsc.lang.model import Array, Program, Record, Type, pending
+from rcsc.lang.model import Array, Enum, Program, Record, Type, pending
 
 TRACE = ("line", "fault", "fault_at")
 """Members of the state that tell about the last cycle; the words of failed assumptions come after them."""
@@ -34,6 +37,8 @@ _MODULE = frozenset(
 """What the Python module calls its own."""
 OWN = ("t", "init", "check", "begin", "admit", "settle", "safe")
 """Ends of the C names that every program may have."""
+FAULTS = ("none", *(fault.name.lower() for fault in Fault if fault is not Fault.OK))
+"""How C calls each fault, in order."""
 LONGEST = 100
 MOST_SAID = 400
 FAILED_BITS = 64
@@ -138,11 +143,14 @@ class Names:
         paths: Path of each leaf in the C struct, member by member and index by index.
         roots: Member of the C struct for each declared variable.
         members: For each record, what its struct calls each field.
-        tables, levels, procedures, records, enums: The stem of each.
+        tables, levels, procedures: The stem of each.
+        units: Prefix of the types of each file that declares some: programs that use the file share them.
+        types: C type of each record and enumeration.
         constants: For each enumeration, the C constant of each member.
         classes: Python class of each enumeration.
         class_members: For each enumeration, what its Python class calls each member.
         failed: Words of the trace for the monitored assumptions that failed.
+        lines: For each table, the C constant of each line; `assumptions` and `faults` likewise.
         c: What stands at file scope in C; `module` in the Python module.
     """
 
@@ -155,12 +163,15 @@ class Names:
     tables: dict[str, str]
     levels: dict[str, str]
     procedures: dict[str, str]
-    records: dict[str, str]
-    enums: dict[str, str]
+    units: dict[str, str]
+    types: dict[str, str]
     constants: dict[str, tuple[str, ...]]
     classes: dict[str, str]
     class_members: dict[str, tuple[str, ...]]
     failed: tuple[str, ...]
+    lines: dict[str, tuple[str, ...]]
+    assumptions: tuple[str, ...]
+    faults: tuple[str, ...]
     c: NameScope
     module: NameScope
 
@@ -171,11 +182,21 @@ def failed_words(monitored: int) -> tuple[str, ...]:
     return ("assumptions_failed", *(f"assumptions_failed_{number}" for number in more))
 
 
-def names_of(program: Program) -> Names:
-    """All names, made unique in declared order."""
+def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({})) -> Names:
+    """All names, made unique in declared order.
+
+    Those of types come first: they hang on the file that declares them alone, and not on the program that uses it.
+
+    Args:
+        program: The program.
+        places: `Plan.places`; a file that is not there is called by its own name.
+    """
     file, p = _program_words(program)
     failed = failed_words(len(checked(program)))
     c, module = _file_scope(program, p), NameScope(set(_MODULE))
+    units = _units(program, p, places)
+    types = _types(program, units, c)
+    constants = _constants(program, units, c)
     stems = _Stems(p, c, module)
     members = {r.name: NameScope().all((f.name, c_word(f.name)) for f in r.fields) for r in program.records}
     roots, paths = _paths(program, members, failed)
@@ -185,22 +206,79 @@ def names_of(program: Program) -> Names:
     )  # fmt: skip
     levels = stems.of((level.name for level in program.levels), ("{p}_{x}_cycle",), ("{x}_cycle",))
     procedures = stems.of((procedure.name for procedure in program.procedures), ("{p}_do_{x}",), ("_do_{x}",))
-    records = stems.of((record.name for record in program.records), ("{p}_{x}_t",), ())
-    enums = stems.of((enum.name for enum in program.enums), ("{p}_{x}_t",), ())
     classes = module.all((enum.name, python_word(enum.name)) for enum in program.enums)
     return Names(
-        file, p, _attributes(program, failed), paths, roots, members, tables, levels, procedures, records, enums,
-        _constants(program, p, c), classes, _class_members(program), failed, c, module,
+        file, p, _attributes(program, failed), paths, roots, members, tables, levels, procedures, units, types,
+        constants, classes, _class_members(program), failed, *_positions(program, p, c), c, module,
     )  # fmt: skip
 
 
 def _program_words(program: Program) -> tuple[str, str]:
-    """The program's own word, and its word in C names and files, which no library or tool reserves."""
-    own = re.sub(r"\W", "_", program.name, flags=re.ASCII) or "program"
-    own = short(own if own[0].isalpha() else f"p{own}")
-    kept = own.lower() in _FILES | C_WORDS
-    composed = any(f"{own}_{end}" in reserved.C_COMPOSED for end in OWN)
-    return own, f"{own}_" if kept or composed else own
+    """The program's own word, and the one that its C names and files bear."""
+    own = plain_word(program.name)
+    return own, file_word(own)
+
+
+def plain_word(name: str) -> str:
+    """A name of a file or of a system as a word, short."""
+    word = re.sub(r"\W", "_", name, flags=re.ASCII) or "program"
+    return short(word if word[0].isalpha() else f"p{word}")
+
+
+def file_word(word: str) -> str:
+    """A word that C names and files may bear: one that no library or tool keeps."""
+    kept = word.lower() in _FILES | C_WORDS
+    composed = any(f"{word}_{end}" in reserved.C_COMPOSED for end in OWN)
+    return f"{word}_" if kept or composed else word
+
+
+def types_header(unit: str) -> str:
+    """The name of the header that declares the types of a file."""
+    return f"{unit}_types.h"
+
+
+def _units(program: Program, p: str, places: Mapping[str, str]) -> dict[str, str]:
+    """The word of each file that declares a type: the program's for its own, else one made of the file's place.
+
+    Files whose types need each other have one word, that of the first: one header declares them.
+    """
+    declared = {one.name: one.file for one in program.types}
+    needs = {file: {file} for file in sorted(set(declared.values()))}
+    for record in program.records:
+        needs[record.file] |= {declared[name] for name in _named(record)}
+    for middle, beyond in needs.items():
+        for others in needs.values():
+            if middle in others:
+                others |= beyond  # noqa: PLW2901  # in place
+    words: dict[str, str] = {}
+    for file, others in needs.items():
+        first = next(other for other in needs if other in others and file in needs[other])
+        words[file] = words.get(first) or _unit(program, p, file, places)
+    return words
+
+
+def _unit(program: Program, p: str, file: str, places: Mapping[str, str]) -> str:
+    """The word of one file: `emove/common` is `emove_common`, `gripper/gripper` is `gripper`."""
+    if file in {"", program.file}:
+        return p
+    parts = places.get(file, file.rpartition("/")[2].removesuffix(".rcs")).split("/")
+    word = file_word(plain_word("_".join(part for part, _ in groupby(parts))))
+    return f"{word}_" if types_header(word) == f"{p}.h" else word
+
+
+def _named(record: Record) -> Iterator[str]:
+    """Names of the types that a record's own fields have."""
+    for one in record.fields:
+        kind = one.type
+        while isinstance(kind, Array):
+            kind = kind.element
+        if isinstance(kind, Enum | Record):
+            yield kind.name
+
+
+def _types(program: Program, units: Mapping[str, str], scope: NameScope) -> dict[str, str]:
+    """`UNIT_NAME_t` for each type."""
+    return {one.name: scope.fresh(f"{units[one.file]}_{_stem(one.name)}_t") for one in program.types}
 
 
 def capitals(p: str) -> str:
@@ -211,6 +289,11 @@ def capitals(p: str) -> str:
 def guard(p: str) -> str:
     """The include guard of a program's header."""
     return f"{capitals(p)}_H"
+
+
+def types_guard(unit: str) -> str:
+    """The include guard of a header of types."""
+    return f"{capitals(unit)}_TYPES_H"
 
 
 def _file_scope(program: Program, p: str) -> NameScope:
@@ -264,16 +347,38 @@ def _flat(name: str) -> str:
     return re.sub(r"[.\[]", "_", name.replace("]", ""))
 
 
-def _constants(program: Program, p: str, scope: NameScope) -> dict[str, tuple[str, ...]]:
+def constant_word(p: str, *parts: str) -> str:
     """`PROGRAM_ENUM_MEMBER`, with `_` after it where macros of a library begin like that."""
     tail = "_" if p.upper().split("_")[0] in reserved.C_FAMILIES else ""
+    return f"{capitals(p)}_{'_'.join(map(short, parts)).upper()}{tail}"
+
+
+def _constants(program: Program, units: Mapping[str, str], scope: NameScope) -> dict[str, tuple[str, ...]]:
     return {
         enum.name: tuple(
-            scope.fresh(f"{capitals(p)}_{f'{short(enum.name)}_{short(member)}{tail}'.upper()}")
-            for member in enum.members
+            scope.fresh(constant_word(units[enum.file], enum.name, member)) for member in enum.members
         )
         for enum in program.enums
     }
+
+
+def _positions(
+    program: Program, p: str, scope: NameScope
+) -> tuple[dict[str, tuple[str, ...]], tuple[str, ...], tuple[str, ...]]:
+    """Constants for what a cycle tells by its position: lines of each table, assumptions that are checked, faults."""
+    lines = {
+        str(table.name): tuple(
+            scope.fresh(constant_word(p, "line", table.name, name))
+            for name in (
+                *(line.name for line in table.lines),
+                *((table.default.name,) if table.default else ()),
+            )
+        )
+        for table in program.tables
+    }
+    named = (program.assumptions[at].name for at in checked(program))
+    assumptions = tuple(scope.fresh(constant_word(p, "assumption", name)) for name in named)
+    return lines, assumptions, tuple(scope.fresh(constant_word(p, "fault", word)) for word in FAULTS)
 
 
 def _class_members(program: Program) -> dict[str, tuple[str, ...]]:

@@ -64,12 +64,20 @@ def lower_by_force(program: Program, root: str = "") -> Plan:
 def _plan(program: Program, root: str, *, proved: bool) -> Plan:
     monitored = checked(program)
     tables = tuple(_table(program, table, monitored, _seen(table.file, root)) for table in program.tables)
-    return Plan(program, _seen(program.file, root), tables, monitored, proved)
+    types = dict.fromkeys(one.file for one in program.types)
+    places = {file: _place(file, root) for file in types if file}
+    return Plan(program, _seen(program.file, root), tables, monitored, proved, places=places)
 
 
 def _seen(file: str, root: str) -> str:
     """The file's name as seen from the folder `root`, with `/`."""
     return (os.path.relpath(file, root) if root else file).replace("\\", "/")
+
+
+def _place(file: str, root: str) -> str:
+    """Where a file stands in the project, without its ending; its name alone where it stands elsewhere."""
+    seen = _seen(file, root).removesuffix(".rcs")
+    return seen if root and not seen.startswith(("../", "/")) else seen.rpartition("/")[2]
 
 
 def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str) -> PlanTable:

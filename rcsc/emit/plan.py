@@ -4,8 +4,8 @@ A matcher is a conjunction of look-ups: each *probe* finds the class of one leaf
 several leaves together), and the class's mask has a bit for each line that it does not exclude.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from math import prod
 from typing import TypeAlias
 
@@ -160,6 +160,7 @@ class Plan:
     Attributes:
         source: The root file, relative, with `/`.
         monitored: Positions in `program.assumptions` of those that the executors check: monitored ones, and those that stop some table.
+        places: For each file that declares a type, its place in the project, relative, with `/` and without its ending.
         proved: Whether it is proved; otherwise every file is marked (`UNPROVED`).
         defensive: Whether every cycle begins with a check of the state.
     """
@@ -170,6 +171,7 @@ class Plan:
     monitored: tuple[int, ...]
     proved: bool = True
     defensive: bool = False
+    places: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def checked(self) -> tuple[str, ...]:

@@ -54,10 +54,11 @@ class Bool:
 
 @dataclass(frozen=True, slots=True)
 class Enum:
-    """A declared enumeration; values are indices into `members`, in declared order."""
+    """A declared enumeration; values are indices into `members`, in declared order; `file` declares it."""
 
     name: str
     members: tuple[str, ...]
+    file: str = field(default="", compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,10 +105,11 @@ class RecordField:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Named parts in order."""
+    """Named parts in order; `file` declares it."""
 
     name: str
     fields: tuple[RecordField, ...]
+    file: str = field(default="", compare=False, repr=False)
 
 
 Type: TypeAlias = Scalar | Array | Record
@@ -695,6 +697,11 @@ class Program:
     owners: tuple[Owner, ...]
     levels: tuple[Level, ...]
     properties: tuple[Property, ...] = ()
+
+    @property
+    def types(self) -> "tuple[Enum | Record, ...]":
+        """Every declared type."""
+        return (*self.enums, *self.records)
 
     def variable(self, name: str) -> Variable:
         """The leaf called `name`; KeyError if there is none."""

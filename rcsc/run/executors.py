@@ -23,6 +23,8 @@ from rcsc.host.files.names import BadName
 from rcsc.host.files.read import Malformed, content
 from rcsc.run.signature import FORMATS, LevelSign, Signature, Value, Values, sources_of
 
+TYPES = "_types.h"
+"""What the name of a header of types ends with, which programs share."""
 FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fPIC", "-shared")
 """A cycle takes microseconds; more optimization would only be waited for at each start."""
 
@@ -112,6 +114,7 @@ def build(generated: Path, signs: Sequence[Signature]) -> Library:
     layout = "\n".join(_layout(sign) for sign in signs)
     try:
         texts = [content(path) for sign in signs for path in _files(generated, sign)[:2]]
+        texts += map(content, sorted((generated / "c").glob(f"*{TYPES}")))
     except OSError as error:
         raise NotBuilt(f"{error.filename} cannot be read: {error.strerror}") from error
     except Malformed as error:

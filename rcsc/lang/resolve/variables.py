@@ -41,7 +41,7 @@ def declare_enum(scope: Scope, written: tree.EnumDecl) -> Enum:
         if member.text in first:
             scope.report(Code.DUPLICATE_NAME, f"`{member.text}` is a member twice", member.span)
         first.setdefault(member.text, member)
-    enum = Enum(written.name.text, tuple(first))
+    enum = Enum(written.name.text, tuple(first), written.name.span.file)
     if scope.claim(written.name, "type"):
         scope.types[enum.name] = enum
         for member_name in first:
@@ -62,7 +62,7 @@ def declare_record(scope: Scope, written: tree.RecordDecl) -> None:
         if part.name.text in parts:
             scope.report(Code.DUPLICATE_NAME, f"`{part.name.text}` is a field twice", part.name.span)
         parts.setdefault(part.name.text, RecordField(part.name.text, kind, " ".join(part.doc)))
-    record = Record(written.name.text, tuple(parts.values()))
+    record = Record(written.name.text, tuple(parts.values()), written.name.span.file)
     if size(record) > MOST_LEAVES:
         message = f"a type has at most {MOST_LEAVES} scalar parts"
         scope.report(Code.TOO_MANY_LEAVES, message, written.name.span)
