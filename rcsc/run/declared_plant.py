@@ -73,11 +73,11 @@ class PlantSpec:
 
 def plants(path: Path, document: Document) -> tuple[PlantSpec, ...]:
     """The plants of a description; what is wrong with them is noted in the document."""
-    said = document.value.get("plant", {})
-    if not isinstance(said, dict):
+    table = document.value.get("plant", {})
+    if not isinstance(table, dict):
         return ()  # which its kind says
-    own = {key: value for key, value in said.items() if not isinstance(value, dict)}
-    named = {key: value for key, value in said.items() if isinstance(value, dict)}
+    own = {key: value for key, value in table.items() if not isinstance(value, dict)}
+    named = {key: value for key, value in table.items() if isinstance(value, dict)}
     specs = []
     if "model" in own:
         document.wrong(
@@ -107,46 +107,49 @@ def plants(path: Path, document: Document) -> tuple[PlantSpec, ...]:
     return () if document.faults else tuple(specs)
 
 
-def _check_ends(document: Document, said: Mapping[str, Any], place: KeyPath) -> None:
+def _check_ends(document: Document, table: Mapping[str, Any], place: KeyPath) -> None:
     """Sensors and actuators are bound to buffers' ends that could be."""
     buffers = document.value.get("buffers")
     for key, side in (("sensors", 0), ("actuators", 1)):
         ends = [pair[side] for pair in buffers.items()] if isinstance(buffers, dict) else []
-        bound = said.get(key, {})
+        bound = table.get(key, {})
         for end in bound if isinstance(bound, dict) else ():
             if not is_member(end) or not any(
-                end == one or end.startswith((f"{one}.", f"{one}[")) for one in ends
+                end == buffer_end or end.startswith((f"{buffer_end}.", f"{buffer_end}["))
+                for buffer_end in ends
             ):
                 what = "a buffer that comes from outside" if side == 0 else "a buffer that goes outside"
                 document.wrong(
                     (*place, key, end),
                     f"`{end}` is no end of {what}",
-                    *nearest(end, [str(one) for one in ends]),
+                    *nearest(end, [str(buffer_end) for buffer_end in ends]),
                 )
 
 
-def _spec(path: Path, document: Document, name: str, said: Mapping[str, Any], place: KeyPath) -> PlantSpec:
-    parties = said.get("parties")
-    model = said.get("model")
-    found = None
+def _spec(path: Path, document: Document, name: str, table: Mapping[str, Any], place: KeyPath) -> PlantSpec:
+    parties = table.get("parties")
+    model = table.get("model")
+    model_path = None
     if isinstance(model, str):
         try:
-            found = within(Path(project_root(str(path))), path.parent, model, f"path `{place[-1]}.model`")
+            model_path = within(
+                Path(project_root(str(path))), path.parent, model, f"path `{place[-1]}.model`"
+            )
         except BadName as error:
             document.wrong((*place, "model"), str(error))
     return PlantSpec(
         name,
-        str(said.get("python", "")),
+        str(table.get("python", "")),
         path.parent,
         tuple(parties) if isinstance(parties, list) else None,
-        found,
-        str(said.get("keyframe", "")),
-        _entries(said, "sensors"),
-        _entries(said, "actuators"),
+        model_path,
+        str(table.get("keyframe", "")),
+        _entries(table, "sensors"),
+        _entries(table, "actuators"),
         place,
     )
 
 
-def _entries(said: Mapping[str, Any], key: str) -> Mapping[str, Mapping[str, Any]]:
-    found = said.get(key, {})
-    return dict(found) if isinstance(found, dict) else {}
+def _entries(table: Mapping[str, Any], key: str) -> Mapping[str, Mapping[str, Any]]:
+    entries = table.get(key, {})
+    return dict(entries) if isinstance(entries, dict) else {}

@@ -47,7 +47,7 @@ class Served:
 def served(system: Description, signs: Mapping[str, Signature]) -> tuple[Served, ...]:
     """Find the levels that somebody outside orders by number and who reports back, from the top down."""
     wires = [(wire.source, wire.target) for wire in system.wires]
-    found = []
+    levels = []
     for source, target in wires:
         party, (level, _, variable) = _owner(source), target.partition(".")
         if party in signs or level not in signs:
@@ -64,10 +64,10 @@ def served(system: Description, signs: Mapping[str, Signature]) -> tuple[Served,
                     _place(report, ECHO),
                     _place(report, STATUS),
                 )
-                found.append(Served(level, party, source, back, order, report, *places))
+                levels.append(Served(level, party, source, back, order, report, *places))
                 break
     names = list(signs)
-    return tuple(sorted(found, key=lambda one: names.index(one.level)))
+    return tuple(sorted(levels, key=lambda served_level: names.index(served_level.level)))
 
 
 def field_of(leaf: Leaf) -> str:

@@ -121,11 +121,11 @@ class BoundPlant:
 def raised(error: BaseException) -> str:
     """What a user's code raised, and where: `ZeroDivisionError: division by zero (plant.py, line 12)`."""
     frames = traceback.extract_tb(error.__traceback__)
-    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    message = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     if isinstance(error, SyntaxError) and error.filename:
         return f"{type(error).__name__}: {error.msg} ({Path(error.filename).name}, line {error.lineno})"
     last = next((frame for frame in reversed(frames) if not frame.filename.startswith("<")), None)
-    return said if last is None else f"{said} ({Path(last.filename).name}, line {last.lineno})"
+    return message if last is None else f"{message} ({Path(last.filename).name}, line {last.lineno})"
 
 
 # --- which buffers ---
@@ -135,7 +135,7 @@ def parties_of(system: Description, signs: Mapping[str, Signature], spec: PlantS
     """Whom a plant stands for: as it says, else everybody outside who orders no level."""
     if spec.parties is not None:
         return spec.parties
-    order = {one.party for one in served(system, signs)}
+    order = {level.party for level in served(system, signs)}
     ends = [end.partition(".")[0] for wire in system.wires for end in (wire.source, wire.target)]
     return tuple(dict.fromkeys(party for party in ends if party not in signs and party not in order))
 
@@ -144,7 +144,7 @@ def buffers_of(
     system: Description, signs: Mapping[str, Signature], parties: Sequence[str]
 ) -> tuple[Buffer, ...]:
     """The buffers between the levels and these parties, with the field that each has on their side."""
-    found = []
+    buffers = []
     for wire in system.wires:
         for end, other, gives in ((wire.source, wire.target, True), (wire.target, wire.source, False)):
             party, _, name = end.partition(".")
@@ -152,10 +152,10 @@ def buffers_of(
             if party in parties and level in signs:
                 run = signs[level].record(variable)
                 leaves = signs[level].leaves[run.start : run.stop]
-                found.append(
+                buffers.append(
                     Buffer(wire.source, end, (party, *name.split(".")), leaves, other, gives, _path(wire))
                 )
-    return tuple(found)
+    return tuple(buffers)
 
 
 def _path(wire: Wire) -> KeyPath:
@@ -193,11 +193,11 @@ def bind(
     _check_step(page, spec, of)
     if page.faults:
         raise page.bad(BadPlant)
-    plant = _made(page, spec, of, seed)
+    plant = _constructed(page, spec, of, seed)
     for buffer, to_field in links:
         _prepare(plant, buffer, to_field)
-    takes = tuple((buffer, one) for buffer, one in links if not buffer.gives)
-    gives = tuple((buffer, one) for buffer, one in links if buffer.gives)
+    takes = tuple((buffer, to_field) for buffer, to_field in links if not buffer.gives)
+    gives = tuple((buffer, to_field) for buffer, to_field in links if buffer.gives)
     return BoundPlant(plant, takes, gives, system.tick_ms / 1000)
 
 
@@ -235,10 +235,10 @@ def _bound(page: Document, buffer: Buffer, of: type, hints: Mapping[str, Any]) -
     """A buffer and its link; None where it does not fit, which is noted."""
     field = buffer.field if buffer.field[0] in hints else buffer.field[1:]
     misfits: list[Misfit] = []
-    made: Link | None = None
+    field_link: Link | None = None
     try:
         kind = _kind(of, hints, field)
-        made = link(
+        field_link = link(
             shape(buffer.leaves, buffer.variable.partition(".")[2]), kind, misfits, gives=buffer.gives
         )
     except fields.NoField as error:
@@ -250,7 +250,7 @@ def _bound(page: Document, buffer: Buffer, of: type, hints: Mapping[str, Any]) -
     for misfit in misfits:
         where = f"`{'.'.join(field)}{misfit.place}` of `{of.__name__}`{line_of(of, field[0])}"
         page.wrong(buffer.path, f"{where} {misfit.message}: it {way} `{buffer.variable}`", *misfit.helps)
-    return None if made is None else (replace(buffer, field=field), made)
+    return None if field_link is None else (replace(buffer, field=field), field_link)
 
 
 def _missing(page: Document, buffer: Buffer, owner: str, name: str, known: Sequence[str]) -> None:
@@ -269,7 +269,7 @@ def _suggested(leaves: Sequence[Leaf]) -> str:
         return "..."
     [leaf] = leaves
     if leaf.members:
-        return f"Literal[{', '.join(repr(one) for one in leaf.members)}]"
+        return f"Literal[{', '.join(repr(member) for member in leaf.members)}]"
     return {"bool": "bool", "double": "float"}.get(leaf.c_type, "int")
 
 
@@ -317,15 +317,15 @@ def _check_step(page: Document, spec: PlantSpec, of: type) -> None:
     try:
         inspect.signature(step).bind(None, 0.04)
     except (TypeError, ValueError):
-        said = f"`step{inspect.signature(step)}`"
+        declared = f"`step{inspect.signature(step)}`"
         page.wrong(
             spec.path,
-            f"class `{of.__name__}` has {said}, which cannot be called with the seconds of a tick",
+            f"class `{of.__name__}` has {declared}, which cannot be called with the seconds of a tick",
             "write `def step(self, seconds: float) -> None`",
         )
 
 
-def _made(page: Document, spec: PlantSpec, of: type, seed: int) -> Any:
+def _constructed(page: Document, spec: PlantSpec, of: type, seed: int) -> Any:
     """An object of the class; one that takes a `seed` gets it.
 
     Raises:

@@ -179,7 +179,7 @@ def made_of(record: Record, values: Mapping[str, object]) -> object:
     """An object of the record's class with these fields; others keep their defaults."""
     if dataclasses.is_dataclass(record.make) or issubclass(record.make, tuple):
         return record.make(**values)
-    made = record.make()
+    instance = record.make()
     for name, value in values.items():
-        setattr(made, name, value)
-    return made
+        setattr(instance, name, value)
+    return instance

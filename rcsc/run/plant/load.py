@@ -43,12 +43,12 @@ class Staged:
     @property
     def over(self) -> bool:
         """Whether something outside says that the run is at its end."""
-        return any(getattr(one, "over", False) for one in self.outside)
+        return any(getattr(part, "over", False) for part in self.outside)
 
     @property
     def plants(self) -> tuple[BoundPlant, ...]:
         """The plants among them whose fields are bound."""
-        return tuple(one for one in self.outside if isinstance(one, BoundPlant))
+        return tuple(part for part in self.outside if isinstance(part, BoundPlant))
 
 
 StageFunction: TypeAlias = Callable[[Description, Mapping[str, Signature], PlantSpec, int], Staged]
@@ -96,11 +96,11 @@ def load(
     if spec is None:
         return Staged()
     given = spec not in system.plants
-    made = _found(system, spec, given=given) if spec.model is None else _named(system, spec, MODELS)
-    if not inspect.isclass(made):
-        stage: StageFunction = made
+    factory = _factory(system, spec, given=given) if spec.model is None else _named(system, spec, MODELS)
+    if not inspect.isclass(factory):
+        stage: StageFunction = factory
         return stage(system, signs, spec, seed)
-    bound = bind(system, signs, spec, made, seed)
+    bound = bind(system, signs, spec, factory, seed)
     return Staged((bound,), _queries(system, bound))
 
 
@@ -110,7 +110,7 @@ def _queries(system: Description, bound: BoundPlant) -> dict[str, Query]:
     return {name: getattr(bound.plant, name) for name in asked if callable(getattr(bound.plant, name, None))}
 
 
-def _found(system: Description, spec: PlantSpec, *, given: bool) -> Any:
+def _factory(system: Description, spec: PlantSpec, *, given: bool) -> Any:
     """The class, or what stages everything, that a plant names.
 
     Args:

@@ -87,7 +87,7 @@ class FlagLink:
     def given(self, value: Any) -> Iterator[Value]:
         """As it is; numpy's bools are bools, too."""
         if type(value).__name__ not in {"bool", "bool_"}:
-            raise BadValue("", f"is {_said(value)}, which is no bool")
+            raise BadValue("", f"is {_shown(value)}, which is no bool")
         yield bool(value)
 
 
@@ -107,8 +107,8 @@ class MemberLink:
         """Its number."""
         name = getattr(value, "name", value)
         if name not in self.leaf.members:
-            near = "".join(f"; {one}" for one in nearest(str(name), self.leaf.members))
-            raise BadValue("", f"is {_said(value)}, which is no member of `{self.leaf.name}`{near}")
+            near = "".join(f"; {suggestion}" for suggestion in nearest(str(name), self.leaf.members))
+            raise BadValue("", f"is {_shown(value)}, which is no member of `{self.leaf.name}`{near}")
         yield self.leaf.members.index(name)
 
 
@@ -136,7 +136,7 @@ class NumberLink:
         try:
             number = value if isinstance(value, int) and not isinstance(value, bool) else float(value)
         except (TypeError, ValueError, OverflowError):
-            raise BadValue("", f"is {_said(value)}, which is no number") from None
+            raise BadValue("", f"is {_shown(value)}, which is no number") from None
         real = self.leaf.c_type == "double"
         if isinstance(number, float) and not math.isfinite(number):
             if real:
@@ -173,7 +173,7 @@ class RecordLink:
         """The values of its fields in the variable's order."""
         for name, part in self.parts.items():
             if not hasattr(value, name):
-                raise BadValue("", f"is {_said(value)}, which has no `{name}`")
+                raise BadValue("", f"is {_shown(value)}, which has no `{name}`")
             yield from _at(f".{name}", part, getattr(value, name))
 
 
@@ -193,7 +193,7 @@ class ElementsLink:
         try:
             elements = list(value)
         except TypeError:
-            raise BadValue("", f"is {_said(value)}, which has no elements") from None
+            raise BadValue("", f"is {_shown(value)}, which has no elements") from None
         if len(elements) != len(self.parts):
             raise BadValue("", f"has {len(elements)} elements, and its buffer {len(self.parts)}")
         for at, (part, element) in enumerate(zip(self.parts, elements, strict=True)):
@@ -253,7 +253,7 @@ def _elements(
     links = [
         link(part, of.of, misfits, gives=gives, place=f"{place}[{at}]") for at, part in parts.parts.items()
     ]
-    whole = tuple(one for one in links if one is not None)
+    whole = tuple(element for element in links if element is not None)
     return ElementsLink(of.make, whole) if len(whole) == count else None
 
 
@@ -273,12 +273,12 @@ def _record(
             misfits.append(Misfit(inner, f"is missing in class `{of.make.__name__}`", helps))
             continue
         try:
-            made = link(part, fields.field_type(of.hints[str(name)]), misfits, gives=gives, place=inner)
+            part_link = link(part, fields.field_type(of.hints[str(name)]), misfits, gives=gives, place=inner)
         except fields.NoField as error:
             misfits.append(Misfit(inner, str(error)))
             continue
-        if made is not None:
-            links[str(name)] = made
+        if part_link is not None:
+            links[str(name)] = part_link
     return RecordLink(of, links) if len(links) == len(names) else None
 
 
@@ -304,10 +304,10 @@ def _misfit(leaf: Leaf, of: fields.FieldType, *, gives: bool) -> tuple[str, tupl
 
 
 def _members_misfit(leaf: Leaf, of: fields.FieldType, *, gives: bool) -> tuple[str, tuple[str, ...]] | None:
-    said = f"Literal[{', '.join(repr(member) for member in leaf.members)}]"
+    annotation = f"Literal[{', '.join(repr(member) for member in leaf.members)}]"
     if not isinstance(of, fields.Members):
         return f"is `{fields.shown(of)}`, and the variable is one of {', '.join(leaf.members)}", (
-            f"declare it `{said}`",
+            f"declare it `{annotation}`",
         )
     if of.names is None:
         return None
@@ -339,11 +339,11 @@ def _range_misfit(leaf: Leaf, of: fields.Number, *, gives: bool) -> tuple[str, t
     if leaf.low is None or leaf.high is None:
         return None
     low, high = _times(into, limits.low), _times(into, limits.high)
-    said = f"{limits.low:g} to {limits.high:g}{f' {limits.unit}' if limits.unit else ''}, and the variable holds {_range(leaf)}"
+    ranges = f"{limits.low:g} to {limits.high:g}{f' {limits.unit}' if limits.unit else ''}, and the variable holds {_range(leaf)}"
     if gives and not leaf.clamp and (-math.inf < low < leaf.low or leaf.high < high < math.inf):
-        return f"goes from {said}", ("widen the variable's range, or declare it `clamp`",)
+        return f"goes from {ranges}", ("widen the variable's range, or declare it `clamp`",)
     if not gives and (leaf.low < low or high < leaf.high):
-        return f"takes {said}", ("widen the field's range, or narrow the variable's",)
+        return f"takes {ranges}", ("widen the field's range, or narrow the variable's",)
     return None
 
 
@@ -357,7 +357,7 @@ def _times(by: Factor, number: float) -> Fraction | float:
     return by.times(number) if math.isfinite(number) else number
 
 
-def _said(value: object) -> str:
+def _shown(value: object) -> str:
     text = repr(value)
     return f"`{text[:40]}{'...' if len(text) > 40 else ''}`"
 
