@@ -26,7 +26,8 @@ The rooms, in the order in which data flows; each imports only from those before
   with no code of theirs;
 - `emit` writes C and Python of what is proved; `run` runs them, with logs; `testing` holds them against the tables;
 - `diff` and `graph` show what changed and what leads where; `compose` proves levels together, for any delay;
-- `driver` is the pipeline on one screen; `shell` and `commands` are what people type.
+- `driver` is the pipeline on one screen; `shell` and `commands` are what people type, `api` what Python calls:
+  `rcsc.check`, `rcsc.prove` and so on are imported when they are first asked for.
 
 Trusted: `lang` for what a text means, `emit` for the executors, and either `certify` or the prover (the README has
 the list with lines). What it costs: tables whose tests look at one variable each are decided without a solver; the
@@ -34,4 +35,38 @@ rest is budgeted in steps of the solver, so that a verdict does not depend on th
 is undecided and never proved.
 """
 
+import importlib
+from typing import Any
+
 __version__ = "0.1.0"
+__all__ = [
+    "Claim",
+    "CodedError",
+    "Diagnostic",
+    "LoadedSystem",
+    "Position",
+    "Proof",
+    "Report",
+    "Severity",
+    "Span",
+    "Unproved",
+    "Verdict",
+    "__version__",
+    "check",
+    "compile",
+    "load_system",
+    "prove",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """A name of `rcsc.api`, imported now: so that `import rcsc` costs nothing. Their types stand in `__init__.pyi`."""
+    if name not in __all__:
+        raise AttributeError(f"module `rcsc` has no attribute `{name}`")
+    globals()[name] = value = getattr(importlib.import_module("rcsc.api"), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    """What a reader may ask for."""
+    return sorted(__all__)

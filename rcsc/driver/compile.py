@@ -14,6 +14,8 @@ from rcsc.emit.lower import lower
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import project_root
+from rcsc.run.description import description, places
+from rcsc.solvers.options import Options
 
 
 def compile_(
@@ -30,6 +32,21 @@ def compile_(
     if report.failed:
         return Conclusion(report, "" if only_check else "nothing was written")
     return Conclusion(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {out}")
+
+
+def compile_system(path: Path) -> Conclusion:
+    """Prove the tables of a system's levels anew, and write their executors where its description says.
+
+    Raises:
+        BadDescription: It is not in order.
+    """
+    system = description(path)
+    files = tuple(
+        str(next(file for file in places(path, spec.program) if file.is_file()))
+        for spec in system.levels
+        if any(file.is_file() for file in places(path, spec.program))
+    )
+    return compile_(Settings(files, Options()), system.generated, TARGETS, only_check=False)
 
 
 def _executors(

@@ -6,11 +6,7 @@ import click
 
 from rcsc.commands.shared.show import Output, show
 from rcsc.diagnostics.coded import CodedError
-from rcsc.driver.compile import compile_
-from rcsc.driver.settings import Settings
-from rcsc.emit import TARGETS
-from rcsc.run.description import description
-from rcsc.solvers.options import Options
+from rcsc.driver.compile import compile_system
 
 SYSTEM = click.option(
     "--system", "system", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
@@ -46,14 +42,7 @@ def system_path(given: Path | None) -> Path:
 
 def compiled(path: Path, quiet: bool) -> bool:
     """Prove and compile what changed, and show findings; return whether it was in order."""
-    system = description(path)
-    files = tuple(
-        str(file)
-        for spec in system.levels
-        for file in (path.parent / spec.program / f"{spec.program}.rcs", path.parent / f"{spec.program}.rcs")
-        if file.is_file()
-    )
-    conclusion = compile_(Settings(files, Options()), system.generated, TARGETS, only_check=False)
+    conclusion = compile_system(path)
     if conclusion.report.failed:
         show(conclusion.report, "compile", Output())
     elif not quiet:

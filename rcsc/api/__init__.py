@@ -1,0 +1,45 @@
+r"""The commands as functions: what `import rcsc` gives.
+
+>>> import rcsc
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> with TemporaryDirectory() as folder:
+...     _ = Path(folder, "a.rcs").write_text("input a : bool\ntable t {\n| line | a ||\n|------|---||\n| 1 | true ||\n}\n")
+...     report = rcsc.check(folder, cache=False)
+>>> [(found.code.value, found.witnesses[0].values) for found in report.diagnostics]
+[('RCS401', ('false',))]
+
+Results are frozen values. What is wrong with tables is in a report; what keeps a function from doing its work (a
+description that cannot be, a plant that does not fit) is raised as `rcsc.CodedError`, with its code and what helps.
+Nothing is printed, and nothing ends the process.
+
+Nothing here is trusted for a verdict: each function is one call of the driver, of `compose` or of `run`. Importing
+`rcsc` imports nothing else; a name is imported when it is first asked for.
+
+Modules, in the order the data flows: `proofs` (`check`, `compile`, `prove`), `running` (`load_system`, `run`).
+"""
+
+from rcsc.api.proofs import Claim, Proof, Unproved, check, compile, prove  # noqa: A004  # as the command is called
+from rcsc.api.running import LoadedSystem, load_system
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.diagnostics.report import Report, Verdict
+from rcsc.diagnostics.source import Position, Span
+
+__all__ = [
+    "Claim",
+    "CodedError",
+    "Diagnostic",
+    "LoadedSystem",
+    "Position",
+    "Proof",
+    "Report",
+    "Severity",
+    "Span",
+    "Unproved",
+    "Verdict",
+    "check",
+    "compile",
+    "load_system",
+    "prove",
+]
