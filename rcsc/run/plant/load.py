@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from rcsc.host.described import KeyPath, nearest
 from rcsc.host.files.names import BadName, within
@@ -20,6 +20,7 @@ from rcsc.lang.project import project_root
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description
 from rcsc.run.levels import Query
+from rcsc.run.orders.operator import Operator, ScriptedRun
 from rcsc.run.plant.bind import BadPlant, BoundPlant, bind, plant_page, raised
 from rcsc.run.signature import Signature
 from rcsc.run.system import Outside
@@ -29,16 +30,70 @@ MODELS = "rcsc_cell.bound.model_plant:staged"
 
 
 @dataclass(frozen=True, slots=True)
+class Setup:
+    """What a plant is made for.
+
+    Attributes:
+        system: The description; `signs` the signatures of its levels, by name.
+        spec: The plant, as it is declared.
+        seed: Of what is random in it.
+        script: What is to be ordered, as the user calls it; empty where nothing is.
+        database: A database to be used as it is; None for the system's own.
+        answers_only: Whether only the answers to feeds are wanted: a level's process needs no plant.
+    """
+
+    system: Description
+    signs: Mapping[str, Signature]
+    spec: PlantSpec
+    seed: int = 0
+    script: str = ""
+    database: Path | None = None
+    answers_only: bool = False
+
+
+class Resumable(Protocol):
+    """What keeps a run that was stopped, and goes on from there."""
+
+    def keep(self, run: ScriptedRun, script: str) -> object:
+        """Writes where the run stands.
+
+        Raises:
+            OSError: It could not be written.
+        """
+        ...
+
+    def go_on(self, run: ScriptedRun) -> None:
+        """Puts a run that has not begun where the stopped one stood.
+
+        Raises:
+            CodedError: There is nothing to go on from.
+        """
+        ...
+
+    def forget(self) -> None:
+        """Removes what was kept."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
 class Staged:
     """What stands outside a system, ready for its first tick.
 
     Attributes:
         outside: In the order in which they step.
         queries: The answers to what feeds ask.
+        operator: Who gives the orders of the script, where the plant reads scripts of its own.
+        pictures: How it looks now: an SVG document by the kind of picture, each drawn when it is called.
+        witness: Makes what watches a run in the plant's own way (`rcsc_cell.pictures.witness`).
+        resume: Keeps a stopped run; None where the plant cannot be put back.
     """
 
     outside: tuple[Outside, ...] = ()
     queries: Mapping[str, Query] = field(default_factory=dict)
+    operator: Operator | None = None
+    pictures: Mapping[str, Callable[[], str]] = field(default_factory=dict)
+    witness: Callable[[ScriptedRun], Any] | None = None
+    resume: Resumable | None = None
 
     @property
     def over(self) -> bool:
@@ -51,8 +106,8 @@ class Staged:
         return tuple(part for part in self.outside if isinstance(part, BoundPlant))
 
 
-StageFunction: TypeAlias = Callable[[Description, Mapping[str, Signature], PlantSpec, int], Staged]
-"""A plant that does more than fields can say is a function: of description, signatures, plant and seed."""
+StageFunction: TypeAlias = Callable[[Setup], Staged]
+"""A plant that does more than fields can say is a function."""
 
 
 def chosen(system: Description, wanted: str | None) -> PlantSpec | None:
@@ -79,7 +134,14 @@ def chosen(system: Description, wanted: str | None) -> PlantSpec | None:
 
 
 def load(
-    system: Description, signs: Mapping[str, Signature], wanted: str | None = None, *, seed: int = 0
+    system: Description,
+    signs: Mapping[str, Signature],
+    wanted: str | None = None,
+    *,
+    seed: int = 0,
+    script: str = "",
+    database: Path | None = None,
+    answers_only: bool = False,
 ) -> Staged:
     """What stands outside a system.
 
@@ -88,9 +150,13 @@ def load(
         signs: The signatures of its levels, by name.
         wanted: `FILE.py`, `FILE.py:CLASS`, or a plant's name in the description; None for its first, if it has one.
         seed: For a plant whose constructor takes one.
+        script: For a plant that reads scripts of its own; empty for none.
+        database: For a plant that has one.
+        answers_only: Whether nothing but the answers to feeds is wanted.
 
     Raises:
         BadPlant: There is no such plant, it cannot be imported, or it does not fit.
+        CodedError: What else a plant that is a function finds wrong.
     """
     spec = chosen(system, wanted)
     if spec is None:
@@ -99,7 +165,7 @@ def load(
     factory = _factory(system, spec, given=given) if spec.model is None else _named(system, spec, MODELS)
     if not inspect.isclass(factory):
         stage: StageFunction = factory
-        return stage(system, signs, spec, seed)
+        return stage(Setup(system, signs, spec, seed, script, database, answers_only))
     bound = bind(system, signs, spec, factory, seed)
     return Staged((bound,), _queries(system, bound))
 

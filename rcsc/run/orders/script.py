@@ -1,0 +1,270 @@
+"""Scripts of orders: rows of a CSV or TOML file, checked whole against the levels that can be ordered.
+
+In: a file, and a system. Out: rows, or all that is wrong with them. A column is a field of the order by its name (`command` is
+the field that has the command), the end of a buffer from outside (`base.bumper`), or one of these:
+
+- `level`: which level is ordered, where several can be;
+- `cycles`: how long the row takes, whatever is reported; without it an order takes until it is done or failed;
+- `within`: how many cycles it may take at most;
+- `expect`: how it is to end where that is not `done`.
+
+    command,target_mm,expect
+    goto,500,
+    goto,20000,failed
+"""
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
+from rcsc.host.described import nearest
+from rcsc.host.files.read import MIB, Malformed, text, toml_of
+from rcsc.run.description import Description
+from rcsc.run.orders.roles import DONE, PROTOCOL, Served, field_of, served
+from rcsc.run.signature import Leaf, Signature, Value
+
+COMMAND, LEVEL, CYCLES, WITHIN, EXPECT = "command", "level", "cycles", "within", "expect"
+OWN = (COMMAND, LEVEL, CYCLES, WITHIN, EXPECT)
+"""Columns that are no field of an order."""
+MOST_ROWS, MOST_CYCLES = 100_000, 10_000_000
+
+
+class BadScript(CodedError):  # noqa: N818  # what happened, not an error of ours
+    """The script cannot be read; says every row that is wrong."""
+
+    code = Code.BAD_SCRIPT
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRow:
+    """One row.
+
+    Attributes:
+        number: As the file counts, from 1.
+        text: As it is shown.
+        served: Who is ordered; None for a row without a command.
+        order: The fields of the order but its number, in the buffer's order.
+        set: What buffers from outside hold while the row is under way: by the buffer, values by the place in it.
+        cycles: How long it takes; None until it is answered.
+        within: How many cycles it may take; None for any number.
+        expect: The status that it is to end with.
+    """
+
+    number: int
+    text: str
+    served: Served | None = None
+    order: tuple[Value, ...] = ()
+    set: Mapping[str, Mapping[int, Value]] = field(default_factory=dict)
+    cycles: int | None = None
+    within: int | None = None
+    expect: str = DONE
+
+
+@dataclass(frozen=True, slots=True)
+class OutsideBuffer:
+    """A buffer that no level fills, and its leaves as the level that takes it has them."""
+
+    name: str
+    leaves: tuple[Leaf, ...]
+
+    def place(self, column: str) -> int | None:
+        """Which of its leaves a column names; None for none."""
+        inner = column.removeprefix(self.name)
+        names = [self._part(leaf) for leaf in self.leaves]
+        return names.index(inner) if column.startswith(self.name) and inner in names else None
+
+    @property
+    def columns(self) -> list[str]:
+        """What its leaves are called in a script."""
+        return [f"{self.name}{self._part(leaf)}" for leaf in self.leaves]
+
+    def _part(self, leaf: Leaf) -> str:
+        return leaf.name.removeprefix(self._variable)
+
+    @property
+    def _variable(self) -> str:
+        if len(self.leaves) == 1:
+            return self.leaves[0].name
+        return self.leaves[0].name.partition(".")[0].partition("[")[0]
+
+
+def outside_buffers(system: Description, signs: Mapping[str, Signature]) -> tuple[OutsideBuffer, ...]:
+    """The buffers from outside to a level."""
+    buffers = []
+    for wire in system.wires:
+        level, _, variable = wire.target.partition(".")
+        if level in signs and wire.source.partition(".")[0] not in signs:
+            run = signs[level].record(variable)
+            buffers.append(OutsideBuffer(wire.source, signs[level].leaves[run.start : run.stop]))
+    return tuple(buffers)
+
+
+def script_path(name: str, folder: Path) -> Path:
+    """The file that a name means: itself, or one of those beside the description or in `scripts` there."""
+    path = Path(name)
+    if path.suffix in {".csv", ".toml"} or path.is_file():
+        return path
+    places = [folder / place / f"{name}{end}" for place in ("scripts", ".") for end in (".csv", ".toml")]
+    return next((place for place in places if place.is_file()), places[0])
+
+
+def read_script(path: Path, system: Description, signs: Mapping[str, Signature]) -> tuple[OrderRow, ...]:
+    """The rows of a script.
+
+    Raises:
+        BadScript: The file cannot be read, or a row says what cannot be; all that is wrong is told.
+    """
+    try:
+        content = text(path, MIB)
+        lines = _toml_rows(content) if path.suffix == ".toml" else _csv_rows(content)
+    except OSError as error:
+        raise BadScript(f"{path} cannot be read: {error.strerror}") from error
+    except Malformed as error:
+        raise BadScript(f"{path}: {error}") from error
+    if len(lines) > MOST_ROWS:
+        raise BadScript(f"{path} has {len(lines)} rows, more than {MOST_ROWS}")
+    reader = _Reader(served(system, signs), outside_buffers(system, signs))
+    wrong = [f"{path}: {message}" for message in reader.check_columns(lines)]
+    rows = []
+    for number, line in enumerate(lines, 1) if not wrong else ():
+        try:
+            rows.append(reader.row(number, line))
+        except ValueError as error:
+            wrong.append(f"{path}, row {number}: {error}")
+    if wrong:
+        raise BadScript("\n".join(wrong))
+    return tuple(rows)
+
+
+def _csv_rows(content: str) -> list[dict[str, str]]:
+    try:
+        table = csv.reader(io.StringIO(content, newline=""), strict=True)
+        lines = [[cell.strip() for cell in line] for line in table if any(cell.strip() for cell in line)]
+    except csv.Error as error:
+        raise Malformed(f"is no CSV file: {error}") from error
+    if not lines:
+        raise Malformed("has no heading: the first line names the columns")
+    heading = lines[0]
+    if twice := next((name for name in heading if heading.count(name) > 1), None):
+        raise Malformed(f"has two columns `{twice}`")
+    for number, line in enumerate(lines[1:], 1):
+        if len(line) > len(heading):
+            raise Malformed(f"row {number} has {len(line)} cells, and the heading {len(heading)}")
+    return [{name: cell for name, cell in zip(heading, line, strict=False) if cell} for line in lines[1:]]
+
+
+def _toml_rows(content: str) -> list[dict[str, str]]:
+    rows = toml_of(content).get("row")
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise Malformed("is no script: write each row under `[[row]]`")
+    return [{name: _cell(name, value) for name, value in row.items()} for row in rows]
+
+
+def _cell(name: str, value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str | int | float):
+        return str(value).strip()
+    raise Malformed(f'`{name}` is no text, number or bool; a name with a dot is written in quotes: "base.bumper"')
+
+
+@dataclass(frozen=True, slots=True)
+class _Reader:
+    """Reads rows for the levels that can be ordered, and the buffers that can be set."""
+
+    levels: tuple[Served, ...]
+    buffers: tuple[OutsideBuffer, ...]
+
+    def check_columns(self, lines: Sequence[Mapping[str, str]]) -> Iterator[str]:
+        """What is wrong with the names of columns."""
+        fields = [field_of(leaf) for level in self.levels for leaf in level.order_leaves]
+        known = {*OWN, *(name for name in fields if name not in PROTOCOL)}
+        known |= {column for buffer in self.buffers for column in buffer.columns}
+        for name in dict.fromkeys(name for line in lines for name in line):
+            if name not in known:
+                near = "".join(f"; {help_}" for help_ in nearest(name, sorted(known)))
+                yield f"no order has a field `{name}`, and no buffer from outside is called so{near}"
+
+    def row(self, number: int, line: Mapping[str, str]) -> OrderRow:
+        """A row.
+
+        Raises:
+            ValueError: It says what cannot be.
+        """
+        shown = " ".join(cell if name in (COMMAND, LEVEL) else f"{name}={cell}" for name, cell in line.items())
+        level = self._level(line) if COMMAND in line else None
+        order = () if level is None else _order(level, line)
+        fields = set() if level is None else {field_of(leaf) for leaf in level.order_leaves}
+        stray = next((name for name in line if "." not in name and name not in (*OWN, *fields)), None)
+        if stray is not None:
+            raise ValueError(f"`{stray}` is no field of {'an order, for there is no `command`' if level is None else f'`{level.order}`'}")
+        expect = line.get(EXPECT, DONE)
+        if level is not None:
+            _read(level.report_leaves[level.status], expect, EXPECT)
+        cycles, within = (_whole(line, name) for name in (CYCLES, WITHIN))
+        return OrderRow(
+            number, shown, level, order, self._set(line), 1 if level is None and cycles is None else cycles, within, expect
+        )
+
+    def _level(self, line: Mapping[str, str]) -> Served:
+        if not self.levels:
+            raise ValueError("no level is ordered from outside: a numbered order from outside, and a report back, are no buffers here")
+        names = [level.level for level in self.levels]
+        if LEVEL not in line and len(names) > 1:
+            raise ValueError(f"several levels can be ordered: name one under `level`: {', '.join(names)}")
+        name = line.get(LEVEL, names[0])
+        if name not in names:
+            raise ValueError(f"no level `{name}` is ordered from outside{''.join(f'; {h}' for h in nearest(name, names))}")
+        return self.levels[names.index(name)]
+
+    def _set(self, line: Mapping[str, str]) -> dict[str, dict[int, Value]]:
+        values: dict[str, dict[int, Value]] = {}
+        for name, cell in line.items():
+            for buffer in self.buffers if "." in name else ():
+                place = buffer.place(name)
+                if place is not None:
+                    values.setdefault(buffer.name, {})[place] = _read(buffer.leaves[place], cell, name)
+        return values
+
+
+def _order(level: Served, line: Mapping[str, str]) -> tuple[Value, ...]:
+    """The fields of an order but its number; what the row does not say is as the variable is at first."""
+    values = []
+    for place, leaf in enumerate(level.order_leaves):
+        if place == level.number:
+            continue
+        name = COMMAND if place == level.command else field_of(leaf)
+        values.append(_read(leaf, line[name], name) if name in line else leaf.initial)
+    return tuple(values)
+
+
+def _read(leaf: Leaf, cell: str, column: str) -> Value:
+    """The value that a cell means.
+
+    Raises:
+        ValueError: It is none of the leaf's.
+    """
+    try:
+        value = leaf.read(cell)
+    except ValueError:
+        known = leaf.members or (("false", "true") if leaf.c_type == "bool" else ())
+        near = "".join(f"; {help_}" for help_ in nearest(cell, known)) or f"; known are {', '.join(known)}" * bool(known)
+        limits = f", which holds {leaf.low} .. {leaf.high}" if leaf.low is not None else ""
+        raise ValueError(f"`{cell}` under `{column}` is no value of `{leaf.name}`{limits}{near}") from None
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"`{cell}` under `{column}` is no number")
+    return value
+
+
+def _whole(line: Mapping[str, str], name: str) -> int | None:
+    cell = line.get(name)
+    if cell is None:
+        return None
+    if not cell.isdecimal() or not 1 <= int(cell) <= MOST_CYCLES:
+        raise ValueError(f"`{cell}` under `{name}` is no number of cycles")
+    return int(cell)

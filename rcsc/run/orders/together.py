@@ -1,0 +1,79 @@
+"""Everything outside the levels as one: who gives orders, what moves, and what a script sets for a while.
+
+In: an operator, plants, the buffers of a system. Out: one thing outside. What its parts say to each other in buffers that
+no level has stays between them. A row's values stand in their buffers for as long as the row is under way, in place of
+what a plant says; where no plant fills the buffer they stay.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rcsc.run.orders.numbered import Latest
+from rcsc.run.orders.operator import Operator, ScriptOperator
+from rcsc.run.signature import Value, Values
+from rcsc.run.system import Outside
+
+
+@dataclass(slots=True)
+class Together:
+    """Operator and plants.
+
+    Attributes:
+        operator: None where nobody gives orders.
+        others: In the order in which they step.
+        first: The buffers from outside that a script may set, and what they hold at first.
+        shared: Buffers that levels have, too.
+        results: Where what became of each row is written, a line a row; None for nowhere.
+    """
+
+    operator: Operator | None
+    others: tuple[Outside, ...]
+    first: Mapping[str, Values]
+    shared: frozenset[str]
+    results: Path | None = None
+    _between: dict[str, Values] = field(default_factory=dict)
+    _set: dict[str, Values] = field(default_factory=dict)
+    _written: int = 0
+
+    @property
+    def over(self) -> bool:
+        """Whether the script is at its end and its level rests, or a plant says that it is over."""
+        ended = self.operator is not None and self.operator.over and self.operator.at_rest
+        return ended or any(getattr(plant, "over", False) for plant in self.others)
+
+    def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
+        """One tick of all: each sees what the tick before left."""
+
+        def seen(name: str) -> Values | None:
+            return latest(name) if name in self.shared else self._between.get(name)
+
+        parts: tuple[Outside, ...] = self.others if self.operator is None else (self.operator, *self.others)
+        published = {name: values for part in parts for name, values in part.step(tick, seen).items()}
+        self._between |= {name: values for name, values in published.items() if name not in self.shared}
+        self._write()
+        shared = {name: values for name, values in published.items() if name in self.shared}
+        return self._with_row(shared)
+
+    def _with_row(self, published: dict[str, Values]) -> dict[str, Values]:
+        """What is published, with the values that the row under way sets."""
+        held = self.operator.held if isinstance(self.operator, ScriptOperator) else {}
+        for name, values in held.items():
+            base = published.get(name, self._set.get(name, self.first[name]))
+            self._set[name] = _placed(base, values)
+        still = {name: values for name, values in self._set.items() if name in held or name not in published}
+        return published | still
+
+    def _write(self) -> None:
+        if self.operator is None or self.results is None:
+            return
+        for result in self.operator.results[self._written :]:
+            row = [result.row.number, result.row.text, result.state, result.reason, result.ticks]
+            with self.results.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+            self._written += 1
+
+
+def _placed(base: Values, values: Mapping[int, Value]) -> Values:
+    return tuple(values.get(place, value) for place, value in enumerate(base))

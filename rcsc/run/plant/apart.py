@@ -1,0 +1,86 @@
+"""What stands outside the levels when they run as processes: operator and plants, in a process of their own.
+
+Made by `rcsc.run.processes.serve.Factory`, from arguments that travel: names of files. Results go to a file, a line a row,
+where the process that started all reads them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rcsc.run.description import Description, description
+from rcsc.run.levels import Query
+from rcsc.run.orders.operator import Operator, ScriptOperator
+from rcsc.run.orders.script import outside_buffers, read_script, script_path
+from rcsc.run.orders.together import Together
+from rcsc.run.plant.load import Staged, load
+from rcsc.run.signature import Signature
+from rcsc.run.system import Outside, signatures
+
+
+@dataclass(frozen=True, slots=True)
+class StageOrder:
+    """Which system, plant and script are meant, in words that travel to a process.
+
+    Attributes:
+        system: The description's path.
+        plant: As `load` has it; empty for the description's first.
+        script: Its name; empty for none.
+        database: Path of one to be used as it is; empty for the system's own.
+    """
+
+    system: str
+    plant: str = ""
+    script: str = ""
+    database: str = ""
+    seed: int = 0
+
+
+def staged(order: StageOrder, system: Description, signs: Mapping[str, Signature], *, answers_only: bool = False) -> Staged:
+    """What stands outside; of a plant that reads no scripts itself, with the operator of this one.
+
+    Raises:
+        CodedError: Plant or script is not in order.
+    """
+    from dataclasses import replace
+
+    stage = load(
+        system, signs, order.plant or None, seed=order.seed, script=order.script,
+        database=Path(order.database) if order.database else None, answers_only=answers_only,
+    )  # fmt: skip
+    if stage.operator is not None or not order.script or answers_only:
+        return stage
+    rows = read_script(script_path(order.script, Path(order.system).parent), system, signs)
+    operator: Operator = ScriptOperator(rows)
+    return replace(stage, operator=operator)
+
+
+def together(stage: Staged, system: Description, signs: Mapping[str, Signature], results: Path | None = None) -> Together:
+    """All that stands outside as one."""
+    first = {
+        buffer.name: tuple(leaf.initial for leaf in buffer.leaves) for buffer in outside_buffers(system, signs)
+    }
+    shared = frozenset(wire.source for wire in system.wires)
+    return Together(stage.operator, stage.outside, first, shared, results)
+
+
+def outside(order: StageOrder, results: str, first: int = 0) -> list[Outside]:
+    """Operator and plants, for a process.
+
+    Args:
+        order: Which.
+        results: Path of the file where results go.
+        first: The row to begin at, from 0, as if those before were done.
+    """
+    system = description(Path(order.system))
+    signs = signatures(system)
+    stage = staged(order, system, signs)
+    if stage.operator is not None:
+        stage.operator.begin_at(first)
+    return [together(stage, system, signs, Path(results))]
+
+
+def queries(order: StageOrder) -> dict[str, Query]:
+    """The answers to what feeds ask, for a level's process."""
+    system = description(Path(order.system))
+    return dict(staged(order, system, signatures(system), answers_only=True).queries)

@@ -1,0 +1,215 @@
+"""Who watches a run, for the page that follows it and the report: rows, values, lines that ran, pictures where there are any.
+
+In: a run. Out: what has become of its rows, and a `Story`. It looks at the run from outside, and nothing that runs looks at
+it. The paper's cell adds what is true of the cell alone.
+"""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Protocol
+
+from rcsc.run.levels import RunningLevel
+from rcsc.run.orders.operator import ScriptedRun
+from rcsc.run.system import System
+from rcsc_cell.pictures.report import CellPicture, Figure, Matched, ReportRow, Story
+
+FRAMES_APART, LONG_APART = 25, 80
+"""Cycles between pictures of the filmstrip: at the least, and in the middle of a long row."""
+MOST_SERIES = 8
+"""Values that the report draws where the description has no displays."""
+
+
+class LivePage(Protocol):
+    """The page that follows a run (`rcsc_cell.live`)."""
+
+    def publish(self, tick: int, values: Mapping[str, float | str]) -> None:
+        """The values after a tick."""
+        ...
+
+    def frame_due(self, kind: str) -> bool:
+        """Whether a picture of a kind would be looked at."""
+        ...
+
+    def frame(self, kind: str, svg: str) -> None:
+        """A picture."""
+        ...
+
+    def row(self, number: int, text: str, state: str) -> None:
+        """What has become of a row of the script."""
+        ...
+
+
+@dataclass(slots=True)
+class RunWitness:
+    """Watches every cycle of a run; in `System.watch`.
+
+    Attributes:
+        run: System and operator.
+        pictures: How what stands outside looks: an SVG document by kind, drawn when it is called.
+        live: The page that follows; None where nobody looks.
+        film: Whether pictures and series for a report are kept.
+        seconds: Spent on watching.
+        matched: How often each line ran, by level, table and line.
+    """
+
+    run: ScriptedRun
+    pictures: Mapping[str, Callable[[], str]] = field(default_factory=dict)
+    live: LivePage | None = None
+    film: bool = False
+    seconds: float = 0.0
+    frames: list[CellPicture] = field(default_factory=list)
+    series: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    matched: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+    _row: int = -1
+    _drawn: int = -FRAMES_APART
+    _told: int = -1
+
+    def __call__(self, system: System, due: tuple[RunningLevel, ...]) -> None:
+        """After each cycle."""
+        begun = time.perf_counter()
+        for level in due:
+            self.matched[level.name, level.table, level.line] += 1
+        self.look()
+        if self.film:
+            self._film(system)
+        if self.live is not None:
+            self._show(self.live, system)
+        self.seconds += time.perf_counter() - begun
+
+    def look(self) -> None:
+        """Looks at what stands outside, after each cycle; here nothing is known of it."""
+
+    @property
+    def series_names(self) -> Mapping[str, str]:
+        """What the report draws: `level.variable` by the name above the drawing."""
+        return series_names(self.run.system)
+
+    # --- the report ---
+
+    def _film(self, system: System) -> None:
+        seconds = system.tick * 0.001 * system.description.tick_ms
+        for shown, name in self.series_names.items():
+            level, _, leaf = name.partition(".")
+            self.series.setdefault(shown, []).append((seconds, float(system.level(level).value(leaf))))
+        at = 0 if self.run.operator is None else self.run.operator.at
+        since = system.tick - self._drawn
+        drawing = next(reversed(self.pictures.values()), None)
+        if drawing is not None and (since >= LONG_APART or (at != self._row and since >= FRAMES_APART)):
+            self._drawn, self._row = system.tick, at
+            self.frames.append(CellPicture(system.tick, self._caption(at), drawing()))
+
+    def _caption(self, at: int) -> str:
+        rows = () if self.run.operator is None else self.run.operator.rows
+        if not rows:
+            return f"cycle {self.run.system.tick}"
+        row = rows[min(at, len(rows) - 1)]
+        return f"row {row.number}: {row.text}"
+
+    def story(self, title: str, seconds: float) -> Story:
+        """For the report.
+
+        Args:
+            title: Of the page.
+            seconds: That the run took.
+        """
+        system = self.run.system
+        cycle_s = 0.001 * system.description.tick_ms
+        results = () if self.run.operator is None else self.run.operator.results
+        return Story(
+            title,
+            [ReportRow(end.row.number, end.row.text, end.state, end.ticks, end.reason) for end in results],
+            self.frames,
+            self.series,
+            [Matched(*line, self.matched[line]) for line in _lines(system, self.matched)],
+            [
+                Figure("cycles", float(system.tick), ""),
+                Figure("control time", system.tick * cycle_s, "s"),
+                Figure("computing", seconds, "s"),
+                Figure("times as fast as the clock", system.tick * cycle_s / max(seconds, 1e-9), ""),
+                Figure("of it pictures and figures", self.seconds, "s"),
+            ],
+            tick_ms=system.description.tick_ms,
+        )
+
+    def closing(self) -> Iterator[str]:
+        """What is said of the plant at the end, a line each."""
+        yield from ()
+
+    # --- the page ---
+
+    def finish(self) -> None:
+        """The page sees how the last row ended."""
+        if self.live is not None:
+            self._tell(self.live)
+
+    def _tell(self, live: LivePage) -> None:
+        """What has become of the rows; those to come stand there from the start."""
+        operator = self.run.operator
+        if operator is None:
+            return
+        if self._told < 0:
+            for row in operator.rows:
+                live.row(row.number, row.text, "")
+        for end in operator.results[max(0, self._told) :]:
+            live.row(end.row.number, end.row.text, end.state)
+        if self._told != len(operator.results) and operator.at < len(operator.rows):
+            row = operator.rows[operator.at]
+            live.row(row.number, row.text, "running")
+        self._told = len(operator.results)
+
+    def _show(self, live: LivePage, system: System) -> None:
+        self._tell(live)
+        live.publish(system.tick, variables(system))
+        for kind, drawing in self.pictures.items():
+            if live.frame_due(kind):
+                live.frame(kind, drawing())
+
+
+def variables(system: System) -> dict[str, float | str]:
+    """Every leaf of every level by its whole name; words for what the tables have words for."""
+    return {
+        f"{level.name}.{leaf.name}": leaf.shown(value) if leaf.members else float(value)
+        for level in system.levels
+        for leaf, value in zip(level.sign.leaves, level.values, strict=False)
+    }
+
+
+def names(system: System) -> tuple[str, ...]:
+    """The names of all these."""
+    return tuple(f"{level.name}.{leaf.name}" for level in system.levels for leaf in level.sign.leaves)
+
+
+def series_names(system: System) -> dict[str, str]:
+    """What can be drawn over time: the numbers of the displays, else numbers that come from outside or go there."""
+    shown = [name for names_ in system.description.displays.values() for name in names_]
+    numbers = {
+        f"{level.name}.{leaf.name}": f"{level.name}.{leaf.name}{f' ({leaf.unit})' if leaf.unit else ''}"
+        for level in system.levels
+        for leaf in level.sign.leaves
+        if not leaf.members and leaf.c_type != "bool"
+    }
+    chosen = [name for name in shown if name in numbers] or list(_outside(system, numbers))[:MOST_SERIES]
+    return {numbers[name]: name for name in dict.fromkeys(chosen)}
+
+
+def _outside(system: System, known: Iterable[str]) -> Iterator[str]:
+    """Names of variables of buffers with one end outside the levels."""
+    levels = {level.name for level in system.levels}
+    for wire in system.description.wires:
+        ends = [end for end in (wire.source, wire.target) if end.partition(".")[0] in levels]
+        if len(ends) == 1 and ends[0] in known:
+            yield ends[0]
+
+
+def _lines(system: System, matched: Counter[tuple[str, str, str]]) -> list[tuple[str, str, str]]:
+    """All lines of all levels' tables, in their order; those that ran are among them."""
+    every = [
+        (level.name, table, line)
+        for level in system.levels
+        for table in (level.level.tables.values() or [level.level.table])
+        for line in level.sign.tables.get(table, ())
+    ]
+    return list(dict.fromkeys(chain(every, matched)))
