@@ -39,14 +39,14 @@ COMMANDS = {
     "new": "Make a small project.",
     "systems.prove": "Prove the levels of a system together, for any delay.",
     "systems.replay": "Run a recorded run again and compare.",
-    "systems.run": "Run a workstation's script in the simulated cell.",
+    "systems.run": "Run a system with its plant, by a script of orders.",
     "systems.shell": "Run, step and change a system by hand.",
     "tables.table": "Make a table of a state graph.",
     "tables.test": "Test the generated executors against the tables.",
 }
 """The module of each command, whose last name is the command's, and what `rcsc --help` says of it."""
 
-NEEDS = {"campaign": "cell", "run": "cell"}
+NEEDS = {"campaign": "cell"}
 """Commands that do nothing without an extra. What others lack, an import or an option of theirs says."""
 
 

@@ -1160,9 +1160,9 @@ class Code(StrEnum):
     EXTRA_MISSING = """RCS705: a package is missing
 
     `pip install rcsc` brings what checking, compiling, proving and the hooks need. The rest comes with extras, which the help names:
-    `cell` for `rcsc run` and `rcsc campaign` (MuJoCo), `log` for logs, `plot` for pictures of them, `parquet` for Parquet files, `live`
-    for the page that follows a run, `certify` for cvc5, `graph` for drawings of tables, `cluster` for a campaign on a cluster. In a
-    checkout: `pip install -e '.[cell]'`.
+    `log` for logs and so for `rcsc run`, `cell` for the paper's cell, models for MuJoCo and `rcsc campaign`, `plot` for pictures of
+    logs, `parquet` for Parquet files, `live` for the page that follows a run, `certify` for cvc5, `graph` for drawings of tables,
+    `cluster` for a campaign on a cluster. In a checkout: `pip install -e '.[cell]'`.
     """
     NO_FINDING = """RCS706: a log keeps no finding
 
@@ -1191,16 +1191,19 @@ class Code(StrEnum):
     """
     BAD_SCRIPT = """RCS723: the script cannot be run
 
-    A row of the workstation's script says no command, no part or no location that is known, the file cannot be read, or the script has
-    no such row as `--from-row` names. Nothing has moved. Mend the script and run it; one that was stopped and is changed since is begun
-    anew with `--from-row`, for `--resume` goes on with the same script only.
+    A script has a row an order, in CSV or TOML: `command` and other fields of the order, ends of buffers from outside (`base.bumper`),
+    and `level`, `cycles`, `within`, `expect`; the paper's cell reads rows of its own. A column or a value is none of these, the file
+    cannot be read, or the script has no such row as `--from-row` names. Every row that is wrong is told, and nothing has moved. Mend
+    the script and run it; one that was stopped and is changed since is begun anew with `--from-row`, for `--resume` goes on with the
+    same script only.
     """
     SCRIPT_STOPPED = """RCS724: the script was stopped
 
-    A row failed, with the reason that TASK reported, or an interlock refused it before it began: it would have machined a loose part,
-    put a second part into the fixture, or let go of a part. The robot is paused, and where everything stands is kept: mend the cause
-    and go on from this row with `rcsc run SCRIPT --resume`. What has been done of the row is not done again. `--from-row N` besides
-    goes on after it, as if it were done.
+    A row failed, with what the level reported, or did not end within the cycles that it may take. The level was told to rest: mend the
+    cause and begin anew at the row with `--from-row`. In the paper's cell an interlock may refuse a row before it begins, for it would
+    machine a loose part, put a second part into the fixture, or let go of a part; there all is kept as it stands, and `rcsc run
+    SCRIPT --resume` goes on from the row. What has been done of it is not done again. `--from-row N` besides goes on after it, as if
+    it were done.
     """
     STATE_TABLE_ERROR = """RCS725: STATE-TABLE error
 

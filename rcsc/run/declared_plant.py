@@ -12,6 +12,7 @@ from typing import Any
 from rcsc.host.described import (
     Document,
     Entries,
+    Flag,
     KeyPath,
     Kind,
     Listing,
@@ -24,7 +25,7 @@ from rcsc.host.described import (
 from rcsc.host.files.names import BadName, is_identifier, is_member, within
 from rcsc.lang.project import project_root
 
-PYTHON: Mapping[str, Kind] = {"python": Text(), "parties": Listing(Word())}
+PYTHON: Mapping[str, Kind] = {"python": Text(), "parties": Listing(Word()), "by_hand": Flag()}
 SENSOR = Record(
     {"sensor": Text()},
     {
@@ -39,6 +40,7 @@ ACTUATOR = Record({"actuator": Text()}, {"unit": Text(), "values": Entries(Numbe
 MODEL: Mapping[str, Kind] = {
     "model": Text(),
     "parties": Listing(Word()),
+    "by_hand": Flag(),
     "keyframe": Text(),
     "sensors": Entries(SENSOR),
     "actuators": Entries(ACTUATOR),
@@ -57,6 +59,7 @@ class PlantSpec:
         model: The file of a MuJoCo model; None where there is none.
         keyframe: From which the model starts; empty for its first state.
         sensors: What fills a buffer's field, by the far end; `actuators` what a field drives.
+        by_hand: Whether `rcsc shell` takes it when nobody says which.
         path: Where it stands in the document.
     """
 
@@ -68,6 +71,7 @@ class PlantSpec:
     keyframe: str = ""
     sensors: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     actuators: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    by_hand: bool = False
     path: KeyPath = ("plant",)
 
 
@@ -146,6 +150,7 @@ def _spec(path: Path, document: Document, name: str, table: Mapping[str, Any], p
         str(table.get("keyframe", "")),
         _entries(table, "sensors"),
         _entries(table, "actuators"),
+        table.get("by_hand") is True,
         place,
     )
 

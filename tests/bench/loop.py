@@ -14,6 +14,7 @@ from pathlib import Path
 
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.recorder import Recorder
+from rcsc.run.orders.operator import ScriptedRun
 from rcsc.run.system import Kind, System
 from rcsc_cell.cell.ready import Backend, plant
 from rcsc_cell.database.ask import Database
@@ -73,7 +74,10 @@ def spent(backend: Backend, kind: Kind, log: Path) -> Spent:
 
     run = prepare(SYSTEM, "make_boxt", kind, outside)
     with Recorder(run.system, log) as recorder:
-        watches = [Stopwatch(recorder), Stopwatch(Witness(run, timed[0]))]
+        watches = [
+            Stopwatch(recorder),
+            Stopwatch(Witness(ScriptedRun(run.system, run.station), timed=timed[0], database=run.database)),
+        ]
         run.system.watch.extend(watches)
         begun = time.perf_counter()
         assert [result.state for result in run.steps()] == ["done"] * 27

@@ -18,12 +18,13 @@ import pytest
 from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
 from rcsc.run.description import description
+from rcsc.run.plant.staging import StageOrder
+from rcsc.run.plant.staging import outside as outside_of_processes
 from rcsc.run.signature import Value, Values
 from rcsc.run.system import Outside, StateTableError, signatures
 from rcsc_cell.cell.plant import Plant
 from rcsc_cell.cell.ready import lying, plant
 from rcsc_cell.database.ask import Database
-from rcsc_cell.episodes.processes import outside as outside_of_processes
 from rcsc_cell.episodes.witness import Timed
 from rcsc_cell.workstation.interlocks import CellState
 from rcsc_cell.workstation.orders import (
@@ -693,7 +694,7 @@ def test_as_a_process_what_no_level_hears_stays_inside(project: Path) -> None:
     results = project / "results"
     system = "tables/system.toml"
     shared = {wire.source for wire in description(Path(system)).wires}
-    [joined] = outside_of_processes(system, "go.csv", "", str(results), 1)
+    [joined] = outside_of_processes(StageOrder(system, "kinematic", "go.csv"), str(results), 1)
     held: dict[str, Values] = {}
 
     def latest(name: str) -> Values | None:

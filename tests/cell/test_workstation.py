@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.commands import run
+from rcsc.run.orders.script import BadScript
 from rcsc.run.system import System
 from rcsc_cell.cell import reach
 from rcsc_cell.cell.mujoco_model import Body
@@ -17,7 +18,7 @@ from rcsc_cell.database.ask import Database, open_database
 from rcsc_cell.database.build import BadData, build
 from rcsc_cell.workstation.interlocks import CellState, after, refusal
 from rcsc_cell.workstation.prepared import prepare
-from rcsc_cell.workstation.script import BadScript, ScriptRow, read_script
+from rcsc_cell.workstation.script import ScriptRow, read_script
 from tests.support.cells import REPO, SYSTEM
 
 PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object")

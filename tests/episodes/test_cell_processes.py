@@ -5,6 +5,7 @@ import signal
 from pathlib import Path
 
 from rcsc.run.description import description
+from rcsc.run.plant.staging import StageOrder
 from rcsc.run.processes.serve import Factory
 from rcsc.run.processes.supervisor import Supervisor, run_processes
 from tests.support.cells import SYSTEM
@@ -17,10 +18,9 @@ KILLED = ("task", "primitive", "emove", "gripper", "vision")
 def test_make_boxt_ends_though_every_level_is_killed_once(tmp_path: Path) -> None:
     results = tmp_path / "results"
     results.touch()
-    outside = Factory(
-        "rcsc_cell.episodes.processes:outside", (str(SYSTEM), "make_boxt", "", str(results), 0, "kinematic")
-    )
-    queries = Factory("rcsc_cell.episodes.processes:queries", (str(SYSTEM), ""))
+    order = StageOrder(str(SYSTEM), "kinematic", "make_boxt")
+    outside = Factory("rcsc.run.plant.staging:outside", (order, str(results)))
+    queries = Factory("rcsc.run.plant.staging:queries", (order,))
     killed: list[str] = []
 
     def watch(system: Supervisor) -> None:

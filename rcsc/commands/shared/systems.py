@@ -7,10 +7,17 @@ import click
 from rcsc.commands.shared.show import Output, show
 from rcsc.diagnostics.coded import CodedError
 from rcsc.driver.compile import compile_system
+from rcsc.host.files.read import MOST_TOML_BYTES, Malformed, text, toml_of
 
+PLACES = ("system.toml", "tables/system.toml")
+"""Where a folder has its description."""
 SYSTEM = click.option(
-    "--system", "system", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
-    help="The system's description; else system.toml here or in tables/.",
+    "--system", "system", type=click.Path(exists=True, path_type=Path), default=None, metavar="SYSTEM",
+    help="The system's description, or a folder that has one; else system.toml here or in tables/.",
+)  # fmt: skip
+PLANT = click.option(
+    "--plant", "plant", default=None, metavar="PLANT",
+    help="What stands outside: a file FILE.py or FILE.py:CLASS, or a plant's name in the description; else its first.",
 )  # fmt: skip
 EXECUTOR = click.option(
     "--executor", type=click.Choice(["c", "python"]), default="c", show_default=True,
@@ -34,10 +41,52 @@ def system_path(given: Path | None) -> Path:
     Raises:
         NoSystem: There is none.
     """
-    for path in [given] if given else [Path("system.toml"), Path("tables/system.toml")]:
-        if path.is_file():
-            return path
-    raise NoSystem("there is no system.toml here nor in tables/")
+    if given is not None and not given.is_dir():
+        return given
+    folder = given or Path()
+    for name in PLACES:
+        if (folder / name).is_file():
+            return folder / name
+    raise NoSystem(
+        f"there is no system.toml {f'in `{given}`' if given else 'here'} nor in {folder / 'tables'}/"
+    )
+
+
+def meant(target: str | None, system: Path | None, script: str | None) -> tuple[Path, str]:
+    """The description and the script that an argument and two options mean; the script may be none.
+
+    Args:
+        target: A folder or a file of a system, a script, or a script's name; None for the system that is here.
+        system: What `--system` says.
+        script: What `--script` says.
+
+    Raises:
+        NoSystem: There is none.
+        click.UsageError: There is no such file or folder, or script or system are named twice.
+    """
+    if target is None:
+        return system_path(system), script or ""
+    path = Path(target)
+    described = path.is_dir() and any((path / name).is_file() for name in PLACES)
+    if described or (path.suffix == ".toml" and not _is_script(path)):
+        if system is not None:
+            raise click.UsageError(f"`{target}` is a system, and `--system` names another")
+        if not path.exists():
+            raise click.UsageError(f"there is no file `{target}`")
+        return system_path(path), script or ""
+    if path.is_dir() and not path.suffix and (path.parent != Path() or target.endswith("/")):
+        raise click.UsageError(f"the folder `{target}` has no system.toml")
+    if script is not None:
+        raise click.UsageError(f"`{target}` is a script, and `--script` names another")
+    return system_path(system), target
+
+
+def _is_script(path: Path) -> bool:
+    """Whether a TOML file has rows; one that cannot be read is told by who reads it."""
+    try:
+        return "row" in toml_of(text(path, MOST_TOML_BYTES))
+    except (OSError, Malformed):
+        return False
 
 
 def compiled(path: Path, quiet: bool) -> bool:

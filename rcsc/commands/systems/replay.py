@@ -1,12 +1,15 @@
 """`rcsc replay`: whether a recorded run would do it again."""
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
 import click
 
 from rcsc.commands.shared.logs import FILE, SHOWN, refuse, told
+from rcsc.commands.shared.systems import SYSTEM, NoSystem, system_path
 from rcsc.diagnostics.codes import Code
+from rcsc.run.description import BadDescription, description
 from rcsc.run.log.queries import predicate
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.replay import Replay, ReplayedCycle, ReplayMoment, find
@@ -18,6 +21,7 @@ from rcsc.run.log.states import TRACED, begun_in_words, fault_in_words, words
     epilog="""\b
 Examples:
   rcsc replay run.mcap                          every cycle leaves what it left
+  rcsc replay run.mcap --system my_robot        of a system that is not here
   rcsc replay run.mcap --executor python        with the Python executors
   rcsc replay run.mcap --generated edited       what would other tables have done?
   rcsc replay run.mcap --at 120 --show task     one cycle, and a level's whole state
@@ -26,17 +30,17 @@ Examples:
 @FILE
 @click.option("--executor", type=click.Choice(["c", "python"]), default="c", show_default=True,
               help="What runs the levels.")  # fmt: skip
-@click.option("--generated", type=click.Path(file_okay=False, path_type=Path), default=Path("generated"),
-              show_default=True, metavar="FOLDER",
-              help="The executors; another folder than the run's own asks what its tables would have done.")  # fmt: skip
+@SYSTEM
+@click.option("--generated", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="FOLDER",
+              help="The executors; else the system's. Another folder than the run's own asks what its tables would have done.")  # fmt: skip
 @click.option("--at", type=int, default=None, metavar="CYCLE", help="Run this cycle alone, and show it.")
 @click.option("--find", "find_", default=None, metavar="EXPR",
               help="Go to the first cycle, from --at on, in which EXPR holds, and show it.")  # fmt: skip
 @click.option("--show", "level", default=None, metavar="LEVEL", help="Show this level's whole state, too.")
 @told
 def command(
-    *, file: Path, executor: str, generated: Path, at: int | None, find_: str | None, level: str | None
-) -> int:
+    *, file: Path, executor: str, system: Path | None, generated: Path | None, at: int | None, find_: str | None, level: str | None,
+) -> int:  # fmt: skip
     """Run the run recorded in FILE again, each cycle from the recorded state with the recorded inputs.
 
     Every leaf must be what it was, bit for bit; the first that is not is named. A log that is not whole is replayed as far as it goes,
@@ -46,7 +50,9 @@ def command(
     tick = _wanted(log, at, find_)
     if level is not None and level not in {logged.name for logged in log.levels}:
         raise click.BadParameter(f"there is no level `{level}` in this log", param_hint="--show")
-    again = Replay(log, generated, "python" if executor == "python" else "c")
+    again = Replay(
+        log, generated or _executors_of(log, file, system), "python" if executor == "python" else "c"
+    )
     if tick == 0:
         click.echo(f"`{find_}` holds in no cycle")
         return 1
@@ -65,6 +71,18 @@ def command(
     if not log.complete:
         return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {log.checked.text}")
     return 0
+
+
+def _executors_of(log: Log, file: Path, system: Path | None) -> Path:
+    """The generated folder of the log's system: of the one that is named, else of that here or where the log lies."""
+    if system is not None:
+        return description(system_path(system)).generated
+    for folder in (Path(), file.parent, file.parent.parent):
+        with contextlib.suppress(NoSystem, BadDescription):
+            candidate = description(system_path(folder))
+            if candidate.name == log.facts["name"]:
+                return candidate.generated
+    return Path("generated")
 
 
 def _wanted(log: Log, at: int | None, find_: str | None) -> int | None:

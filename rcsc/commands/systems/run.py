@@ -1,4 +1,4 @@
-"""`rcsc run`: a workstation's script in the simulated cell, on the generated executors."""
+"""`rcsc run`: a system with its plant, by a script of orders, on the generated executors."""
 
 import contextlib
 import shlex
@@ -13,41 +13,52 @@ import click
 
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.stopped import Stopped
-from rcsc.commands.shared.systems import DATABASE, EXECUTOR, SYSTEM, compiled, system_path
+from rcsc.commands.shared.systems import DATABASE, EXECUTOR, PLANT, SYSTEM, compiled, meant
 from rcsc.diagnostics.codes import Code
-from rcsc.host.cache import open_cache
 from rcsc.host.children import scratch
 from rcsc.host.files.read import content, json_of
-from rcsc.run.description import BadDescription, description
-from rcsc.run.log.recorder import Recorder
+from rcsc.run.description import BadDescription, Description, description
+from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
+from rcsc.run.orders.script import BadScript
+from rcsc.run.plant.load import Resumable, Staged
+from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.processes.serve import Factory
 from rcsc.run.processes.supervisor import Supervisor, run_processes
-from rcsc_cell.cell.reach import checked
-from rcsc_cell.cell.ready import Backend, plant
-from rcsc_cell.episodes.witness import Timed, Witness, names
+from rcsc.run.signature import Signature
+from rcsc.run.system import assemble, signatures
 from rcsc_cell.pictures.report import report
-from rcsc_cell.workstation.prepared import ScriptDraft, prepare
-from rcsc_cell.workstation.script import BadScript
-from rcsc_cell.workstation.stopped import forget, go_on, keep
+from rcsc_cell.pictures.witness import RunWitness, names
 
 if TYPE_CHECKING:
     from rcsc_cell.live import Live
 
+UNORDERED_TICKS = 1000
+"""Cycles of a run that no script ends."""
+WATCHED_RATE = 4.0
+"""How many times as fast as the clock processes and a page that is watched run, where nobody says."""
+
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """What the user asked for."""
+    """What the user asked for.
 
-    script: str
+    Attributes:
+        title: As the user called it.
+        order: System, plant, script and database by name.
+        rate: How many times as fast as the clock; None for as fast as it goes.
+        most: Cycles at most; None where nobody says.
+        again: What to type for the same run; how it begins is to be added.
+    """
+
+    title: str
     path: Path
+    order: StageOrder
     kind: Literal["c", "python"]
-    database: Path | None
-    backend: Backend
-    seed: int
     log: Path | None
     report: Path | None
     live: bool
-    rate: float
+    rate: float | None
+    most: int | None
     quiet: bool
     again: str
 
@@ -56,9 +67,12 @@ class RunOptions:
     "run",
     epilog="""\b
 Examples:
-  rcsc run make_boxt                     Fig. 7, corrected, to the end
+  rcsc run my_robot                      the system in a folder, with the script that it names
+  rcsc run my_robot --script dock.csv    with other orders
+  rcsc run my_robot --plant base.py      with another plant
+  rcsc run my_robot --rate 1             in real time
+  rcsc run make_boxt                     Fig. 7, corrected, to the end: a script of the system that is here
   rcsc run make_boxt_printed             as printed: refused at row 22
-  rcsc run make_boxt --executor python   the same, by the Python executors
   rcsc run make_boxt --plant kinematic   without physics
   rcsc run make_boxt --log boxt.mcap     keep every cycle
   rcsc run make_boxt --report boxt.html  a page about it
@@ -66,135 +80,157 @@ Examples:
   rcsc run make_boxt --processes         each level in a process of its own
   rcsc run make_boxt --resume            go on from the row that stopped it""",
 )
-@click.argument("script", metavar="SCRIPT")
+@click.argument("target", metavar="[SYSTEM|SCRIPT]", required=False)
 @SYSTEM
+@click.option("--script", default=None, metavar="SCRIPT",
+              help="The orders: a CSV or TOML file, or the name of one beside the system or in its scripts/.")  # fmt: skip
+@PLANT
 @EXECUTOR
 @DATABASE
-@click.option("--plant", "backend", type=click.Choice(["mujoco", "kinematic"]), default="mujoco", show_default=True,
-              help="The cell by contact physics, or by kinematics alone.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
-              help="Of the sensor's noise; the same seed gives the same log.")  # fmt: skip
+              help="Of what is random in the plant; the same seed gives the same log.")  # fmt: skip
+@click.option("--cycles", type=click.IntRange(min=1), default=None, metavar="N",
+              help=f"How many cycles at most; without a script {UNORDERED_TICKS}, if nobody says.")  # fmt: skip
 @click.option("--log", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
-              help="Where the complete state of every cycle is kept (MCAP); else in .rcsc-cache beside the data.")  # fmt: skip
+              help="Where the complete state of every cycle is kept (MCAP); else in .rcsc-cache beside the system.")  # fmt: skip
 @click.option("--report", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
               help="Write a page about the run: pictures, plots, lines, timing; one file that needs nothing else.")  # fmt: skip
 @click.option("--live", is_flag=True,
-              help="Show the cell in a browser's page while it runs, at --rate; to this machine only.")  # fmt: skip
+              help="Show the run in a browser's page, at --rate; to this machine only.")  # fmt: skip
 @click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
               help="Prove and compile what changed before anything moves.")  # fmt: skip
 @click.option("--processes", is_flag=True,
               help="Each level in a process of its own, over shared memory, nothing else changed.")  # fmt: skip
-@click.option("--rate", type=click.FloatRange(min=0.1, max=20), default=4.0, show_default=True, metavar="N",
-              help="With --processes or --live: how many times as fast as the clock.")  # fmt: skip
+@click.option("--rate", type=click.FloatRange(min=0.1, max=20), default=None, metavar="N",
+              help=f"Times as fast as the clock; else as fast as it goes, with --processes or --live {WATCHED_RATE:g}.")  # fmt: skip
 @click.option("--from-row", type=click.IntRange(min=1), default=None, metavar="N",
               help="Begin at row N, as if the rows before were done; with --resume, those from the row that stopped.")  # fmt: skip
 @click.option("--resume", "resumes", is_flag=True,
-              help="Go on from the row that stopped the last run, with everything as it stood then.")  # fmt: skip
+              help="Go on from the row that stopped the last run, where the plant can be put back as it stood.")  # fmt: skip
 @click.option("-q", "--quiet", is_flag=True, help="Only what stops the script.")
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
-    script: str, system: Path | None, executor: str, database: Path | None, backend: Backend, seed: int,
-    log: Path | None, report: Path | None, live: bool, compiles: bool, processes: bool, rate: float,
-    from_row: int | None, resumes: bool, quiet: bool,
+    target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str,
+    database: Path | None, seed: int, cycles: int | None, log: Path | None, report: Path | None, live: bool,
+    compiles: bool, processes: bool, rate: float | None, from_row: int | None, resumes: bool, quiet: bool,
 ) -> int:  # fmt: skip
-    """Run SCRIPT, a name in the system's scripts or a CSV file, one row a command.
+    """Run SYSTEM with its plant and its script, or SCRIPT in the system that is here.
 
-    What changed is proved and compiled, then the script runs on the generated executors in a simulated cell whose parts
-    move by contact forces, and what each command did is printed. Interlocks refuse a row that would machine a loose part.
-    A row that fails stops the script with its reason; TASK pauses, and where everything stands is kept, so that the script
-    can be resumed.
+    SYSTEM is a description (system.toml) or a folder that has one. What changed is proved and compiled, then the generated
+    executors run with what stands outside: a class in Python, a model for MuJoCo, or nothing. The script's rows are ordered one
+    after the other, and what became of each is printed. A row that fails stops the script with its reason; the level is told
+    to rest.
     """
-    if processes and (resumes or live or report):
+    if processes and (resumes or live or report or cycles):
         raise click.UsageError(
-            "--resume, --live and --report are of one process; with --processes, use --from-row"
+            "--resume, --live, --report and --cycles are of one process; with --processes, use --from-row"
         )
     if live:
         need("live")
-    path = system_path(system)
+    path, named = meant(target, system, script)
     if compiles and not compiled(path, quiet):
         return 1
+    said = description(path)
+    order = StageOrder(
+        str(path), plant or "", named or (str(said.script) if said.script else ""), str(database or ""), seed
+    )
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
-    again = _command(script, system, database, executor, backend)
-    asked = RunOptions(script, path, kind, database, backend, seed, log, report, live, rate, quiet, again)
-
+    paced = rate or (WATCHED_RATE if live or processes else None)
+    again = _command(target, system, script, database, executor, plant)
+    title = named or said.name
+    asked = RunOptions(title, path, order, kind, log, report, live, paced, cycles, quiet, again)
     try:
-        return _run(asked, processes, from_row, resumes)
+        return _apart(asked, from_row) if processes else _run(asked, from_row, resumes)
     except ChildProcessError as error:
         raise Stopped(Code.PROCESS_LOST, str(error), "what levels say as they end stands above") from error
 
 
-def _run(asked: RunOptions, processes: bool, from_row: int | None, resumes: bool) -> int:
-    """The run itself.
+def _command(
+    target: str | None,
+    system: Path | None,
+    script: str | None,
+    database: Path | None,
+    executor: str,
+    plant: str | None,
+) -> str:
+    """What to type for the same run; how it begins is to be added."""
+    words = ["rcsc", "run", *([target] if target else [])]
+    words += ["--system", str(system)] if system else []
+    words += ["--script", script] if script else []
+    words += ["--database", str(database)] if database else []
+    words += ["--executor", executor] if executor != "c" else []
+    words += ["--plant", plant] if plant else []
+    return shlex.join(words)
+
+
+def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
+    """The run itself, in this process.
 
     Raises:
-        BadDescription, BadData, BadScript, NotBuilt, NotResumed: Something is not in order; nothing has moved.
+        CodedError: Something is not in order, and nothing has moved; or a row was not done.
         StateTableError: A level met a fault that the proofs exclude.
     """
-    timed: list[Timed] = []
-
-    def outside(database: Any) -> list[Timed]:
-        checked(database, open_cache(asked.path.parent))
-        timed.append(Timed(plant(database, asked.backend, seed=asked.seed)))
-        return timed
-
-    prepared = prepare(asked.path, asked.script, asked.kind, outside, asked.database)
-    _place(prepared, from_row, resumes)
-    if processes:
-        return _apart(prepared, asked)
-    witness = Witness(prepared, timed[0], film=asked.report is not None)
-    with _recorded(prepared, asked) as log, _followed(witness, asked):
-        prepared.system.watch.append(witness)
-        seconds = _watch(prepared, asked)
+    system = description(asked.path)
+    signs = signatures(system)
+    stage = staged(asked.order, system, signs)
+    running = assemble(system, asked.kind, stage.queries, standing(stage, system, signs))
+    run = ScriptedRun(running, stage.operator)
+    _place(run, stage.resume, from_row, resumes)
+    witness = stage.witness(run) if stage.witness else RunWitness(run, stage.pictures)
+    witness.film = asked.report is not None
+    with _recorded(run, asked) as log, _followed(witness, asked):
+        running.watch.append(witness)
+        seconds = _watch(run, asked)
     if asked.report is not None:
         _write_report(asked.report, witness, asked, seconds)
-    return _closing(witness, asked, seconds, log)
+    return _closing(witness, stage.resume, asked, seconds, log)
 
 
-def _place(prepared: ScriptDraft, from_row: int | None, resumes: bool) -> None:
-    """Put the run where it is to begin.
+def _place(run: ScriptedRun, resume: Resumable | None, from_row: int | None, resumes: bool) -> None:
+    """Puts the run where it is to begin.
 
     Raises:
         BadScript: There is no such row.
-        NotResumed: There is nothing to go on from.
+        CodedError: There is nothing to go on from.
     """
-    rows = len(prepared.station.rows)
+    _check_row(run, from_row)
+    if resumes and resume is None:
+        raise Stopped(
+            Code.NOT_RESUMED,
+            "this plant cannot be put back as it stood",
+            "`--from-row N` begins anew at row N",
+        )
+    if resume is not None and resumes:
+        resume.go_on(run)
+    elif resume is not None:
+        resume.forget()  # what stood somewhere else begins anew
+    if from_row is not None and run.operator is not None:
+        run.operator.begin_at(from_row - 1)
+
+
+def _check_row(run: ScriptedRun, from_row: int | None) -> None:
+    rows = 0 if run.operator is None else len(run.operator.rows)
     if from_row is not None and from_row > rows:
         raise BadScript(f"the script has {rows} rows, and none is {from_row}")
-    if resumes:
-        go_on(prepared)
-    else:
-        forget(prepared.system.description)  # what stood somewhere else begins anew
-    if from_row is not None:
-        prepared.station.begin_at(from_row - 1)
-
-
-def _command(script: str, system: Path | None, database: Path | None, executor: str, backend: str) -> str:
-    """What to type for the same run; how it begins is to be added."""
-    words = ["rcsc", "run", script]
-    words += ["--system", str(system)] if system else []
-    words += ["--database", str(database)] if database else []
-    words += ["--executor", executor] if executor != "c" else []
-    words += ["--plant", backend] if backend != "mujoco" else []
-    return shlex.join(words)
 
 
 # --- while it runs ---
 
 
 @contextlib.contextmanager
-def _recorded(prepared: ScriptDraft, asked: RunOptions) -> Iterator[Path]:
-    """Write the log; yield its path."""
-    path = (
-        asked.log
-        or prepared.system.description.database.parent
-        / ".rcsc-cache"
-        / f"{prepared.system.description.name}.mcap"
+def _recorded(run: ScriptedRun, asked: RunOptions) -> Iterator[Path]:
+    """Writes the log; its path."""
+    from rcsc.run.log.recorder import (
+        Recorder,  # of an extra; a plant that needs a larger one has said so by now
     )
+
+    system = run.system.description
+    path = asked.log or system.database.parent / ".rcsc-cache" / f"{system.name}.mcap"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        recorder = Recorder(prepared.system, path)
+        recorder = Recorder(run.system, path)
     except OSError as error:
         raise BadDescription(f"the log {path} cannot be written: {error.strerror}") from error
-    prepared.system.watch.append(recorder)
+    run.system.watch.append(recorder)
     try:
         yield path
     finally:
@@ -202,31 +238,31 @@ def _recorded(prepared: ScriptDraft, asked: RunOptions) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def _followed(witness: Witness, asked: RunOptions) -> Iterator[None]:
-    """Open the page, where one was asked for, and keep the clock's pace for whoever looks."""
-    if not asked.live:
-        yield
-        return
-    live = _page(witness, asked)
-    witness.live = live
-    click.echo(f"the cell is at {live.start()}")
-    sys.stdout.flush()
-    pace = _Pace(witness.run.system.description.tick_ms / 1000 / asked.rate)
-    witness.run.system.watch.append(pace)
+def _followed(witness: RunWitness, asked: RunOptions) -> Iterator[None]:
+    """Opens the page, where one was asked for, and keeps the clock's pace where one was named."""
+    system = witness.run.system
+    if asked.live:
+        live = _page(witness, asked)
+        witness.live = live
+        click.echo(f"{system.description.name} is at {live.start()}")
+        sys.stdout.flush()
+    if asked.rate is not None:
+        system.watch.append(_Pace(system.description.tick_ms / 1000 / asked.rate))
     try:
         yield
     finally:
         witness.finish()
-        live.stop()
+        if asked.live:
+            live.stop()
 
 
-def _page(witness: Witness, asked: RunOptions) -> "Live":
+def _page(witness: RunWitness, asked: RunOptions) -> "Live":
     from rcsc_cell.live import Live  # of an extra
 
     system = witness.run.system
     try:
         return Live(
-            names(system), system.description.displays, tick_ms=system.description.tick_ms, title=asked.script
+            names(system), system.description.displays, tick_ms=system.description.tick_ms, title=asked.title
         )
     except ValueError as error:
         raise BadDescription(f"{asked.path}, displays: {error}") from error
@@ -243,10 +279,10 @@ class _Pace:
         time.sleep(max(0.0, self._next - time.monotonic()))
 
 
-def _watch(prepared: ScriptDraft, asked: RunOptions) -> float:
-    """Run to the end and say what becomes of each row; return the seconds that it took."""
+def _watch(run: ScriptedRun, asked: RunOptions) -> float:
+    """Runs to the end, and says what becomes of each row; the seconds that it took."""
     begun = time.perf_counter()
-    for result in prepared.steps():
+    for result in run.steps(asked.most or (UNORDERED_TICKS if run.operator is None else MOST_TICKS)):
         if not asked.quiet:
             _say(result.row.number, result.row.text, result.state, result.ticks)
     return time.perf_counter() - begun
@@ -258,111 +294,127 @@ def _say(number: int, text: str, state: str, ticks: int) -> None:
     sys.stdout.flush()
 
 
-def _apart(prepared: ScriptDraft, asked: RunOptions) -> int:
-    """Run with a process for each level."""
+# --- with processes ---
+
+
+def _apart(asked: RunOptions, from_row: int | None) -> int:
+    """The same with a process for each level."""
+    system = description(asked.path)
+    rows = _checked_apart(asked, system, signatures(system), from_row)
     with scratch("run") as folder:
-        rows = _rows_apart(asked, prepared.station.at, folder / "results")
-    if not asked.quiet:
-        click.echo(f"each level in a process of its own, {asked.rate:g} times as fast as the clock")
-    if rows and rows[-1][2] != "done":
-        number, text, state, reason, _ = rows[-1]
+        ends = _rows_apart(asked, system, (from_row or 1) - 1, folder / "results")
+    if ends and ends[-1][2] != "done":
+        number, text, state, reason, _ = ends[-1]
         raise Stopped(
             Code.SCRIPT_STOPPED,
             f"row {number}, {text}: {state}: {reason}",
             f"mend the cause, then begin anew: {asked.again} --processes --from-row {number}",
         )
+    if rows > len(ends) + (from_row or 1) - 1:
+        raise Stopped(Code.SCRIPT_STOPPED, f"the plant ended the run in row {len(ends) + (from_row or 1)}")
     return 0
 
 
-def _rows_apart(asked: RunOptions, first: int, results: Path) -> list[list[Any]]:
-    """Run the processes to the end; return each row's number, text, state, reason and ticks, which travel in `results`."""
-    held = str(asked.database.resolve()) if asked.database else ""
-    place = str(asked.path.resolve())
-    outside = Factory(
-        "rcsc_cell.episodes.processes:outside",
-        (place, asked.script, held, str(results), first, asked.backend),
-    )
-    queries = Factory("rcsc_cell.episodes.processes:queries", (place, held))
-    rows: list[list[Any]] = []
+def _checked_apart(
+    asked: RunOptions, system: Description, signs: dict[str, Signature], from_row: int | None
+) -> int:
+    """How many rows there are; what is wrong with plant and script is told before a process is begun."""
+    stage: Staged = staged(asked.order, system, signs)
+    if stage.operator is None:
+        raise Stopped(
+            Code.BAD_SCRIPT,
+            "processes run until a script ends, and none is named",
+            "`--script FILE` names one",
+        )
+    rows = len(stage.operator.rows)
+    if from_row is not None and from_row > rows:
+        raise BadScript(f"the script has {rows} rows, and none is {from_row}")
+    return rows
 
-    def more() -> list[list[Any]]:
-        return [json_of(line) for line in content(results).decode().splitlines()[len(rows) :]]
+
+def _rows_apart(asked: RunOptions, system: Description, first: int, results: Path) -> list[list[Any]]:
+    """Runs the processes to the end: of each row its number, text, state, reason and ticks; `results` is where they travel."""
+    outside = Factory("rcsc.run.plant.staging:outside", (asked.order, str(results), first))
+    queries = Factory("rcsc.run.plant.staging:queries", (asked.order,))
+    rows: list[list[Any]] = []
+    rate = asked.rate or WATCHED_RATE
+    if not asked.quiet:
+        click.echo(f"each level in a process of its own, {rate:g} times as fast as the clock")
 
     def watch(_: Supervisor) -> None:
-        new = more()
+        show()
+
+    def show() -> None:
+        new = [json_of(line) for line in content(results).decode().splitlines()[len(rows) :]]
         for number, text, state, _reason, ticks in [] if asked.quiet else new:
             _say(number, text, state, ticks)
         rows.extend(new)
 
     results.touch()
-    run_processes(
-        description(asked.path),
-        asked.kind,
-        {"outside": outside},
-        queries=queries,
-        rate=asked.rate,
-        watch=watch,
-    )
-    return rows + more()
+    run_processes(system, asked.kind, {"outside": outside}, queries=queries, rate=rate, watch=watch)
+    show()
+    return rows
 
 
 # --- when it is over ---
 
 
-def _write_report(path: Path, witness: Witness, asked: RunOptions, seconds: float) -> None:
-
+def _write_report(path: Path, witness: RunWitness, asked: RunOptions, seconds: float) -> None:
     try:
-        report(path, witness.story(asked.script, seconds))
+        report(path, witness.story(asked.title, seconds))
     except OSError as error:
         raise BadDescription(f"the report {path} cannot be written: {error.strerror}") from error
 
 
-def _closing(witness: Witness, asked: RunOptions, seconds: float, log: Path) -> int:
-
-    ended = witness.run
-    again = _kept(ended, asked)
+def _closing(
+    witness: RunWitness, resume: Resumable | None, asked: RunOptions, seconds: float, log: Path
+) -> int:
+    run = witness.run
+    again = _kept(run, resume, asked)
     if not asked.quiet:
-        for line in _figures(witness, seconds):
+        for line in (*witness.closing(), _figures(run, seconds)):
             click.echo(line)
         here = log.relative_to(Path.cwd()) if log.is_relative_to(Path.cwd()) else log
         click.echo(f"log: {here}" + (f"; report: {asked.report}" if asked.report else ""))
-    station, stopped = ended.station, ended.station.stopped
-    if stopped is not None:
-        word = "refused" if stopped.state == "refused" else "failed"
+    operator = run.operator
+    if operator is None:
+        return 0
+    end = operator.stopped
+    if end is not None:
+        word = "refused" if end.state == "refused" else "failed"
         raise Stopped(
-            Code.SCRIPT_STOPPED,
-            f"row {stopped.row.number}, {stopped.row.text}: {word}: {stopped.reason}",
-            again,
+            Code.SCRIPT_STOPPED, f"row {end.row.number}, {end.row.text}: {word}: {end.reason}", again
         )
-    if not station.over:
-        raise Stopped(Code.SCRIPT_STOPPED, f"row {station.at + 1} did not end in {ended.system.tick} cycles")
+    if not operator.over:
+        raise Stopped(Code.SCRIPT_STOPPED, f"row {operator.at + 1} did not end in {run.system.tick} cycles")
     return 0
 
 
-def _figures(witness: Witness, seconds: float) -> Iterator[str]:
-    """Where parts lie, how near the joints came to their limits, and how long it took."""
-    system = witness.run.system
-    for placed in witness.placed():
-        yield f"{placed.part} at {placed.place}: {placed.error_mm:.2f} mm from where it should lie"
-    margins = ", ".join(f"{margin:.0f}" for margin in witness.margins_deg)
-    yield f"joints kept {margins} degrees from their limits"
+def _figures(run: ScriptedRun, seconds: float) -> str:
+    """How long it took."""
+    system = run.system
     control_s = system.tick * system.description.tick_ms / 1000
     failed = sum(1 for level in system.levels if level.values[-1])
-    yield (
-        f"{system.tick} cycles, {control_s:.1f} s of control time in {seconds:.2f} s: {control_s / seconds:.0f} times "
+    return (
+        f"{system.tick} cycles, {control_s:.1f} s of control time in {seconds:.2f} s: {control_s / max(seconds, 1e-9):.0f} times "
         f"as fast as the clock; {failed} assumptions failed"
     )
 
 
-def _kept(ended: ScriptDraft, asked: RunOptions) -> str:
-    """Keep a run that stopped, forget one that ended; return what to do about it."""
-    if ended.station.stopped is None:
-        if ended.station.over:
-            forget(ended.system.description)
+def _kept(run: ScriptedRun, resume: Resumable | None, asked: RunOptions) -> str:
+    """Keeps a run that stopped, forgets one that came to its end; what to do about it."""
+    operator = run.operator
+    if operator is None:
         return ""
+    if operator.stopped is None:
+        if operator.over and resume is not None:
+            resume.forget()
+        return ""
+    row = f"{asked.again} --from-row {operator.at + 1}"
+    if resume is None:
+        return f"mend the cause, then begin anew: {row}"
     try:
-        keep(ended, asked.script)
+        resume.keep(run, asked.title)
     except OSError as error:
-        row = f"{asked.again} --from-row {ended.station.at + 1}"
         return f"where it stopped could not be kept: {error.strerror}; mend the cause, then begin anew: {row}"
     return f"the robot is paused; mend the cause, then: {asked.again} --resume"

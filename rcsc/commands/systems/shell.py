@@ -8,23 +8,23 @@ from pathlib import Path
 
 import click
 
-from rcsc.commands.shared.systems import EXECUTOR, system_path
-from rcsc.run.description import BadDescription, Description, description
+from rcsc.commands.shared.systems import EXECUTOR, PLANT, system_path
+from rcsc.run.description import NO_DATA, BadDescription, Description, description
+from rcsc.run.plant.load import Staged, load
 from rcsc.run.signature import Signature
-from rcsc.run.system import Kind, Outside, assemble, signatures
+from rcsc.run.system import Kind, assemble, signatures
 from rcsc.shell.commands import Commands
 from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.reload.reload import Origin
 from rcsc.shell.session import Session, silent_queries
 from rcsc.shell.terminal import converse, follow
-from rcsc_cell.cell.ready import plant
-from rcsc_cell.workstation.prepared import database_of, needs_cell
 
 
 @click.command(
     "shell",
     epilog="""\b
 Examples:
+  rcsc shell my_robot                 the system in a folder, with its plant
   rcsc shell                          tables/system.toml, with stand-ins for robot, hand and camera
   rcsc shell --script morning.txt     commands from a file; 1 at the first that fails
   echo 'step 5' | rcsc shell --alone  nothing outside the levels, and a database that knows nothing
@@ -40,17 +40,17 @@ In the shell:
 @click.option("--script", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
               help="Do the commands of FILE, one a line; else they are read from standard input.")  # fmt: skip
 @EXECUTOR
+@PLANT
 @click.option("--alone", is_flag=True,
-              help="No stand-ins and no database, as for a system that is no such cell: what comes in is set by hand.")  # fmt: skip
-@click.argument(
-    "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
-)
-def command(script: Path | None, executor: str, alone: bool, system: Path | None) -> int:
+              help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
+@click.argument("system", required=False, type=click.Path(exists=True, path_type=Path), metavar="[SYSTEM]")
+def command(script: Path | None, executor: str, plant: str | None, alone: bool, system: Path | None) -> int:
     """Run any module, procedure, owner, table or level of SYSTEM by name; look at and set any variable; step, run, undo.
 
-    SYSTEM is a system's description; without it, system.toml here or in tables/. Generated executors run, as they are.
+    SYSTEM is a system's description or a folder that has one; without it, system.toml here or in tables/. Generated executors
+    run, as they are, with the plant that the description declares.
     """
-    commands = _commands(system_path(system), "c" if executor == "c" else "python", alone)
+    commands = _commands(system_path(system), "c" if executor == "c" else "python", plant, alone)
 
     if script is None and sys.stdin.isatty() and sys.stdout.isatty() and _has_prompt():
         return converse(commands, click.echo, _complain)
@@ -58,27 +58,28 @@ def command(script: Path | None, executor: str, alone: bool, system: Path | None
         return follow(commands, lines, name, click.echo, _complain)
 
 
-def _commands(path: Path, kind: Kind, alone: bool) -> Commands:
-
-    described = description(path)
-    signs = signatures(described)
-    outside: tuple[Outside, ...] = ()
-    if alone or not _is_cell(described, signs):
-        queries = silent_queries(described, signs)
-    else:
-        database = database_of(described, signs)
-        queries, outside = database.queries, (plant(database, "kinematic"),)
-    system = assemble(described, kind, queries, outside)
-    return Commands(Session(system, Origin(path, described, kind, queries)))
+def _commands(path: Path, kind: Kind, wanted: str | None, alone: bool) -> Commands:
+    system = description(path)
+    signs = signatures(system)
+    stage = Staged() if alone else _stage(system, signs, wanted)
+    queries = silent_queries(system, signs) | dict(stage.queries)
+    running = assemble(system, kind, queries, stage.outside)
+    return Commands(Session(running, Origin(path, system, kind, queries)))
 
 
-def _is_cell(system: Description, signs: Mapping[str, Signature]) -> bool:
-    """Whether robot, hand and camera can stand beside the system, and its database be asked."""
+def _stage(system: Description, signs: Mapping[str, Signature], wanted: str | None) -> Staged:
+    """What stands outside; a declared plant is left out where the data is not there of which it would be made.
+
+    Raises:
+        CodedError: The plant that was named is not in order.
+    """
+    by_hand = next((spec.name for spec in system.plants if spec.by_hand), None)
     try:
-        needs_cell(system, signs)
+        return load(system, signs, wanted or by_hand)
     except BadDescription:
-        return False
-    return system.database.is_file()
+        if wanted is None and system.database.name != NO_DATA and not system.database.is_file():
+            return Staged()
+        raise
 
 
 def _has_prompt() -> bool:

@@ -207,7 +207,10 @@ class ScriptOperator:
         if state == DONE:
             self.at += 1
         elif row.served is not None:
-            resting = [0 if place == row.served.command else leaf.initial for place, leaf in enumerate(row.served.order_leaves)]
+            resting = [
+                0 if place == row.served.command else leaf.initial
+                for place, leaf in enumerate(row.served.order_leaves)
+            ]
             del resting[row.served.number]
             self._lines[row.served.level].send(resting)
             self._resting = tick

@@ -170,7 +170,9 @@ def _cell(name: str, value: object) -> str:
         return str(value).lower()
     if isinstance(value, str | int | float):
         return str(value).strip()
-    raise Malformed(f'`{name}` is no text, number or bool; a name with a dot is written in quotes: "base.bumper"')
+    raise Malformed(
+        f'`{name}` is no text, number or bool; a name with a dot is written in quotes: "base.bumper"'
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,30 +198,45 @@ class _Reader:
         Raises:
             ValueError: It says what cannot be.
         """
-        shown = " ".join(cell if name in (COMMAND, LEVEL) else f"{name}={cell}" for name, cell in line.items())
+        shown = " ".join(
+            cell if name in (COMMAND, LEVEL) else f"{name}={cell}" for name, cell in line.items()
+        )
         level = self._level(line) if COMMAND in line else None
         order = () if level is None else _order(level, line)
         fields = set() if level is None else {field_of(leaf) for leaf in level.order_leaves}
         stray = next((name for name in line if "." not in name and name not in (*OWN, *fields)), None)
         if stray is not None:
-            raise ValueError(f"`{stray}` is no field of {'an order, for there is no `command`' if level is None else f'`{level.order}`'}")
+            raise ValueError(
+                f"`{stray}` is no field of {'an order, for there is no `command`' if level is None else f'`{level.order}`'}"
+            )
         expect = line.get(EXPECT, DONE)
         if level is not None:
             _read(level.report_leaves[level.status], expect, EXPECT)
         cycles, within = (_whole(line, name) for name in (CYCLES, WITHIN))
         return OrderRow(
-            number, shown, level, order, self._set(line), 1 if level is None and cycles is None else cycles, within, expect
+            number,
+            shown,
+            level,
+            order,
+            self._set(line),
+            1 if level is None and cycles is None else cycles,
+            within,
+            expect,
         )
 
     def _level(self, line: Mapping[str, str]) -> Served:
         if not self.levels:
-            raise ValueError("no level is ordered from outside: a numbered order from outside, and a report back, are no buffers here")
+            raise ValueError(
+                "no level is ordered from outside: a numbered order from outside, and a report back, are no buffers here"
+            )
         names = [level.level for level in self.levels]
         if LEVEL not in line and len(names) > 1:
             raise ValueError(f"several levels can be ordered: name one under `level`: {', '.join(names)}")
         name = line.get(LEVEL, names[0])
         if name not in names:
-            raise ValueError(f"no level `{name}` is ordered from outside{''.join(f'; {h}' for h in nearest(name, names))}")
+            raise ValueError(
+                f"no level `{name}` is ordered from outside{''.join(f'; {h}' for h in nearest(name, names))}"
+            )
         return self.levels[names.index(name)]
 
     def _set(self, line: Mapping[str, str]) -> dict[str, dict[int, Value]]:
@@ -253,7 +270,9 @@ def _read(leaf: Leaf, cell: str, column: str) -> Value:
         value = leaf.read(cell)
     except ValueError:
         known = leaf.members or (("false", "true") if leaf.c_type == "bool" else ())
-        near = "".join(f"; {help_}" for help_ in nearest(cell, known)) or f"; known are {', '.join(known)}" * bool(known)
+        near = "".join(
+            f"; {help_}" for help_ in nearest(cell, known)
+        ) or f"; known are {', '.join(known)}" * bool(known)
         limits = f", which holds {leaf.low} .. {leaf.high}" if leaf.low is not None else ""
         raise ValueError(f"`{cell}` under `{column}` is no value of `{leaf.name}`{limits}{near}") from None
     if isinstance(value, float) and not math.isfinite(value):

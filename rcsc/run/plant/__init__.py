@@ -29,7 +29,8 @@ takes `seed` gets it. A field of type `Fault` makes the plant misbehave: whoever
 Trusted: the file of a plant that a description names, which is imported and run; nothing of it is trusted for a proof.
 
 Modules, in the order the data flows: `fields` (what a class declares), `units`, `values` (a field against leaves), `bind`
-(a class against the buffers), `load` (a plant by its name). A model for MuJoCo is bound by data in `rcsc_cell.bound`.
+(a class against the buffers), `load` (a plant by its name), `staging` (with its script). A model for MuJoCo is bound by
+data in `rcsc_cell.bound`.
 """
 
 from typing import Protocol

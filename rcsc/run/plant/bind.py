@@ -74,6 +74,10 @@ class BoundPlant:
     gives: tuple[tuple[Buffer, Link], ...]
     seconds: float
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> "BoundPlant":
+        """The plant as it is now; what it is bound to never changes."""
+        return BoundPlant(copy.deepcopy(self.plant, memo), self.takes, self.gives, self.seconds)
+
     @property
     def over(self) -> bool:
         """Whether the plant says that the run is at its end."""

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rcsc.run.levels import RunningLevel, running_level
 from rcsc.run.log.recorder import Recorder
+from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Values
 from rcsc.run.system import StateTableError, System, executors
 from rcsc_cell.cell.faults import Faults
@@ -32,7 +33,6 @@ from rcsc_cell.episodes.setting import lying as lying_at
 from rcsc_cell.episodes.transport import Harmed
 from rcsc_cell.properties import PROPERTIES
 from rcsc_cell.properties.cycle import Command, CycleState, PropertyClass
-from rcsc_cell.workstation.script import BadScript
 
 MOST_TICKS_A_ROW = 2500
 """A run is given up after so many ticks for each row."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rcsc.host.children import scratch
 from rcsc.run.description import Description, description
+from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Signature
 from rcsc.run.system import signatures
 from rcsc_cell.cell.mujoco_model import Body
@@ -19,7 +20,7 @@ from rcsc_cell.database.pose import about_z
 from rcsc_cell.episodes.episode import Episode, Interruption, PartSpec, script
 from rcsc_cell.episodes.operator import Operator, order
 from rcsc_cell.workstation.prepared import database_of, needs_cell
-from rcsc_cell.workstation.script import BadScript, ScriptRow, read_script
+from rcsc_cell.workstation.script import ScriptRow, read_script
 from rcsc_cell.workstation.station import workstation
 
 

@@ -16,5 +16,5 @@ Nothing here is trusted for a proof. What it costs: time by the faces that are d
 
 Modules, in the order the data flows: `solid` draws a MuJoCo model (`shapes`, `order`), `stick` the stick figure
 (`views`, `things`), `plot` a value over time; `scene` finds in a log where everything is; `finding_page` and `report`
-are pages (`page`).
+are pages (`page`); `witness` watches any run for the report and the live page.
 """

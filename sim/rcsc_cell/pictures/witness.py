@@ -96,7 +96,7 @@ class RunWitness:
             self.series.setdefault(shown, []).append((seconds, float(system.level(level).value(leaf))))
         at = 0 if self.run.operator is None else self.run.operator.at
         since = system.tick - self._drawn
-        drawing = next(reversed(self.pictures.values()), None)
+        drawing = next(reversed(list(self.pictures.values())), None)
         if drawing is not None and (since >= LONG_APART or (at != self._row and since >= FRAMES_APART)):
             self._drawn, self._row = system.tick, at
             self.frames.append(CellPicture(system.tick, self._caption(at), drawing()))

@@ -1,13 +1,9 @@
-"""Numbered orders to TASK, to the vise and to the machine; the buffers of the last two, which no level has, are named here.
+"""The buffers of the vise and the machine, which no level has: their names, what they hold, and what it means.
 
-In: what is to be sent, and the buffers. Out: an order with a number that nobody below has seen, and the answer to it. Numbers are 16
-bits and wrap; an answer is one only if it repeats the number (Haynes et al. 1984, section 8.3).
+Orders in them are numbered as those to a level are (`rcsc.run.orders.numbered`).
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-
-from rcsc.run.signature import Value, Values
+from rcsc.run.signature import Values
 
 VISE_ORDER = "workstation.vise"
 """number, right_open, left_open: how each jaw is to stand."""
@@ -28,52 +24,10 @@ KINDS = {
 
 DONE, EXECUTING, FAILED = 0, 1, 2
 """`level_status` of tables/vocabulary.rcs: how it stands in every report, the robot's too."""
-NUMBERS = 65536
 OPEN_MM = 19.0
 """An open jaw stands farther out than this."""
 CLOSED_MM = 3.0
 """A closed jaw stands nearer than this: it has met the part, or its stop."""
-
-Latest = Callable[[str], Values | None]
-
-
-@dataclass(slots=True)
-class Orders:
-    """What stands in an order buffer, and how its answer is told.
-
-    Attributes:
-        order: Name of the buffer; `report` of the one that answers.
-        echo_at: Where the report repeats the number; `number_at` where the order has it.
-        number: Of the last order.
-        sent: The last order; empty before the first of this run.
-    """
-
-    order: str
-    report: str
-    echo_at: int = 0
-    number_at: int = 0
-    number: int = 0
-    sent: tuple[Value, ...] = field(default=())
-
-    def catch_up(self, latest: Latest) -> None:
-        """Before the first order: numbers go on from the one that stands in the buffer, else from what was echoed."""
-        if self.sent:
-            return
-        standing, report = latest(self.order), latest(self.report)
-        if standing is not None:
-            self.number = int(standing[self.number_at])
-        elif report is not None:
-            self.number = int(report[self.echo_at])
-
-    def send(self, values: Sequence[Value]) -> None:
-        """Makes this the order, with the next number in its place."""
-        self.number = (self.number + 1) % NUMBERS
-        self.sent = (*values[: self.number_at], self.number, *values[self.number_at :])
-
-    def answer(self, latest: Latest) -> Values | None:
-        """The report, if it is about the last order; None while it is not."""
-        report = latest(self.report)
-        return report if report is not None and report[self.echo_at] == self.number else None
 
 
 def ajar(report: Values, *, right_open: bool, left_open: bool) -> str:

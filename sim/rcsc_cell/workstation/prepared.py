@@ -6,18 +6,17 @@ In: the description's path, a script. Out: a `ScriptDraft` that is stepped to it
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 from rcsc.host.described import Document
 from rcsc.run.description import NO_DATA, BadDescription, Description, description
+from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
 from rcsc.run.signature import Leaf, Signature
 from rcsc.run.system import Kind, Outside, System, assemble, signatures
 from rcsc_cell.database.ask import Database, fresh, open_database
 from rcsc_cell.database.build import Limit, build, digest
 from rcsc_cell.workstation.script import ROBOT, ScriptRow, read_script
 from rcsc_cell.workstation.station import RowResult, Workstation, workstation
-
-MOST_TICKS = 100_000
-"""Ticks after which a run is given up: more than an hour of control time."""
 
 
 @dataclass(slots=True)
@@ -38,12 +37,8 @@ class ScriptDraft:
         Raises:
             StateTableError: A level met a fault that the proofs exclude.
         """
-        known = len(self.station.results)
-        while not (self.station.over and self.station.at_rest) and self.system.tick < most:
-            self.system.step()
-            while known < len(self.station.results):
-                yield self.station.results[known]
-                known += 1
+        for result in ScriptedRun(self.system, self.station).steps(most):
+            yield cast(RowResult, result)
 
 
 def parts_of(signs: Mapping[str, Signature]) -> tuple[str, ...]:

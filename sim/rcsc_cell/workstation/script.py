@@ -9,21 +9,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from rcsc.diagnostics.coded import CodedError
-from rcsc.diagnostics.codes import Code
 from rcsc.host.files.read import MIB, Malformed, rows_of, text
+from rcsc.run.orders.script import BadScript
 
 COLUMNS = ("command", "part", "source", "dest", "end_at")
 ROBOT = ("acquire", "move", "release", "transfer", "clear", "pause")
 MACHINE = ("ENGRAVE PART", "MACHINE DOVETAIL")
 PARTS = {"BOXT": "tbox", "BOXB": "bbox", "FLAG": "flag", "HOUS": "hous", "CLOSE-GRIP": "close_grip"}
 """Parts as Fig. 7 calls them, and as the tables do."""
-
-
-class BadScript(CodedError):  # noqa: N818  # what happened, not an error of ours
-    """The script cannot be read; says every row that is wrong."""
-
-    code = Code.BAD_SCRIPT
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, cast
 
 from rcsc.host.files.plain import plain, read
+from rcsc.run.orders.numbered import Latest, Orders
+from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Leaf, Signature, Value, Values
 from rcsc_cell.workstation.interlocks import CellState, after, refusal
 from rcsc_cell.workstation.orders import (
@@ -18,12 +20,10 @@ from rcsc_cell.workstation.orders import (
     MACHINE_REPORT,
     VISE_ORDER,
     VISE_REPORT,
-    Latest,
-    Orders,
     ajar,
 )
 from rcsc_cell.workstation.rest import NOTHING, Progress, rest, stands
-from rcsc_cell.workstation.script import MACHINE, ROBOT, BadScript, ScriptRow
+from rcsc_cell.workstation.script import MACHINE, ROBOT, ScriptRow
 
 ANSWER_TICKS = 75
 """Within which the vise and the machine have repeated an order's number, and the vise has ended: 3 s; it gives up after two."""

@@ -1,11 +1,12 @@
-"""What stands outside the levels when they run as processes: operator and plants, in a process of their own.
+"""Everything outside a system, of words: plant, script and database by their names; in one process, or in one of its own.
 
-Made by `rcsc.run.processes.serve.Factory`, from arguments that travel: names of files. Results go to a file, a line a row,
-where the process that started all reads them.
+In: a `StageOrder`. Out: what stands outside, with the operator of the script. `outside` and `queries` are what
+`rcsc.run.processes.serve.Factory` makes from arguments that travel; results go to a file, a line a row, where the process
+that started all reads them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.run.description import Description, description
@@ -36,14 +37,14 @@ class StageOrder:
     seed: int = 0
 
 
-def staged(order: StageOrder, system: Description, signs: Mapping[str, Signature], *, answers_only: bool = False) -> Staged:
+def staged(
+    order: StageOrder, system: Description, signs: Mapping[str, Signature], *, answers_only: bool = False
+) -> Staged:
     """What stands outside; of a plant that reads no scripts itself, with the operator of this one.
 
     Raises:
         CodedError: Plant or script is not in order.
     """
-    from dataclasses import replace
-
     stage = load(
         system, signs, order.plant or None, seed=order.seed, script=order.script,
         database=Path(order.database) if order.database else None, answers_only=answers_only,
@@ -55,13 +56,23 @@ def staged(order: StageOrder, system: Description, signs: Mapping[str, Signature
     return replace(stage, operator=operator)
 
 
-def together(stage: Staged, system: Description, signs: Mapping[str, Signature], results: Path | None = None) -> Together:
+def together(
+    stage: Staged, system: Description, signs: Mapping[str, Signature], results: Path | None = None
+) -> Together:
     """All that stands outside as one."""
     first = {
-        buffer.name: tuple(leaf.initial for leaf in buffer.leaves) for buffer in outside_buffers(system, signs)
+        buffer.name: tuple(leaf.initial for leaf in buffer.leaves)
+        for buffer in outside_buffers(system, signs)
     }
     shared = frozenset(wire.source for wire in system.wires)
     return Together(stage.operator, stage.outside, first, shared, results)
+
+
+def standing(stage: Staged, system: Description, signs: Mapping[str, Signature]) -> tuple[Outside, ...]:
+    """What stands outside in one process; a plant that reads its own scripts knows what its parts say to each other."""
+    if stage.operator is None or isinstance(stage.operator, ScriptOperator):
+        return (together(stage, system, signs),)
+    return (stage.operator, *stage.outside)
 
 
 def outside(order: StageOrder, results: str, first: int = 0) -> list[Outside]:

@@ -1,0 +1,325 @@
+"""`rcsc run SYSTEM`: the docking robot with a plant of its own, by both executors, in one process and in several, by scripts of orders."""
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.run.description import description
+from rcsc.run.orders.operator import ScriptedRun
+from rcsc.run.orders.script import BadScript, read_script, script_path
+from rcsc.run.plant.staging import StageOrder, staged, standing
+from rcsc.run.system import System, assemble, signatures
+from tests.support.programs.texts import edited
+
+Said = Callable[[], str]
+
+
+@pytest.fixture
+def here(dock: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The docking robot's folder, seen from beside it."""
+    monkeypatch.chdir(dock.parent)
+    return dock
+
+
+def stopped(capsys: pytest.CaptureFixture[str]) -> str:
+    """What ended a command, without the lines that say how rows went."""
+    return capsys.readouterr().err
+
+
+def scripted(folder: Path, text: str, *, end: str = ".csv") -> ScriptedRun:
+    """The docking robot with a script, ready to run."""
+    (folder / f"mine{end}").write_text(text, encoding="utf-8")
+    system = description(folder / "system.toml")
+    signs = signatures(system)
+    stage = staged(StageOrder(str(folder / "system.toml"), script="mine"), system, signs)
+    running = assemble(system, "python", stage.queries, standing(stage, system, signs))
+    return ScriptedRun(running, stage.operator)
+
+
+def played(folder: Path, text: str, *, end: str = ".csv", most: int = 1000) -> list[tuple[str, str, int]]:
+    """What became of each row: state, reason, cycles."""
+    return [
+        (result.state, result.reason, result.ticks) for result in scripted(folder, text, end=end).steps(most)
+    ]
+
+
+# --- the command ---
+
+
+def test_the_docking_robot_docks_with_both_executors_and_leaves_equal_logs(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for kind in ("c", "python"):
+        assert run(["run", "dock", "--no-compile", "--executor", kind, "--log", f"{kind}.mcap"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert [line.split()[1:3] for line in lines[:3]] == [
+            ["dock", "done"],
+            ["stop", "done"],
+            ["undock", "done"],
+        ]
+    assert Path("c.mcap").read_bytes() == Path("python.mcap").read_bytes()
+    assert run(["replay", "c.mcap", "--system", "dock", "--executor", "python"]) == 0
+    assert (
+        run(
+            [
+                "replay",
+                "c.mcap",
+                "--generated",
+                str(here / "generated"),
+                "--find",
+                "supervisor.now == charging",
+            ]
+        )
+        == 0
+    )
+    assert "nothing differs" in capsys.readouterr().out
+
+
+def test_a_log_beside_its_system_is_replayed_without_a_word(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run(["run", "dock/system.toml", "--no-compile", "-q", "--executor", "python"]) == 0
+    log = here / ".rcsc-cache" / "dock.mcap"
+    assert run(["replay", str(log), "--executor", "python"]) == 0
+    monkeypatch.chdir(here)
+    assert run(["run", "dock.csv", "--no-compile", "-q", "--executor", "python"]) == 0
+    assert run(["run", "dock", "--no-compile", "-q", "--executor", "python"]) == 0
+    assert run(["run", "--no-compile", "-q", "--executor", "python", "--rate", "20"]) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("here")
+def test_each_level_in_a_process_does_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["run", "dock", "--no-compile", "--executor", "python", "--processes", "--rate", "20"]) == 0
+    lines = capsys.readouterr().out.splitlines()[1:]
+    assert [line.split()[1:3] for line in lines] == [["dock", "done"], ["stop", "done"], ["undock", "done"]]
+
+
+def test_what_is_wrong_is_told_before_a_process_is_begun(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (here / "base.py").read_text(encoding="utf-8")
+    (here / "base.py").write_text(edited(text, ("bumper: bool", "bumper: int")), encoding="utf-8")
+    for more in ([], ["--processes"]):
+        assert run(["run", "dock", "--no-compile", "-q", *more]) == 1
+        assert "error[RCS729]: `bumper` of `Base` (base.py:16) is `int`" in stopped(capsys)
+    system = (here / "system.toml").read_text(encoding="utf-8")
+    (here / "system.toml").write_text(edited(system, ('script = "dock.csv"\n', "")), encoding="utf-8")
+    (here / "base.py").write_text(text, encoding="utf-8")
+    assert run(["run", "dock", "--no-compile", "-q", "--processes"]) == 1
+    assert "processes run until a script ends" in stopped(capsys)
+
+
+def test_without_a_script_it_runs_for_so_many_cycles(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    system = (here / "system.toml").read_text(encoding="utf-8")
+    (here / "system.toml").write_text(edited(system, ('script = "dock.csv"\n', "")), encoding="utf-8")
+    assert run(["run", "dock", "--no-compile", "--executor", "python"]) == 0
+    assert capsys.readouterr().out.startswith("1000 cycles, 40.0 s of control time")
+    assert run(["run", "dock", "--no-compile", "--executor", "python", "--cycles", "7"]) == 0
+    assert capsys.readouterr().out.startswith("7 cycles")
+    base = (here / "base.py").read_text(encoding="utf-8")
+    (here / "base.py").write_text(base + "        self.over = True\n", encoding="utf-8")
+    assert run(["run", "dock", "--no-compile", "--executor", "python"]) == 0
+    assert capsys.readouterr().out.startswith("1 cycles")
+
+
+def test_without_a_plant_nothing_moves_but_what_the_script_sets(here: Path) -> None:
+    system = (here / "system.toml").read_text(encoding="utf-8")
+    (here / "system.toml").write_text(edited(system, ('[plant]\npython = "base.py"\n', "")), encoding="utf-8")
+    text = "command,base.beacon,base.contact,base.travelled,base.lateral,cycles\ndock,true,false,600,100,5\n,,true,,0,6\n"
+    run_ = scripted(here, text)
+    assert [result.state for result in run_.steps(100)] == ["done", "done"]
+    assert run_.system.level("supervisor").shown("report.status_report") == "done"
+
+
+@pytest.mark.usefixtures("here")
+def test_a_report_is_written_and_resuming_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--report", "dock.html"]) == 0
+    page = Path("dock.html").read_text(encoding="utf-8")
+    for said in (
+        "every row done",
+        "drive.travelled_mm (mm)",
+        "supervisor · dock",
+        "times as fast as the clock",
+    ):
+        assert said in page
+    assert run(["run", "dock", "--no-compile", "-q", "--resume"]) == 1
+    assert "error[RCS726]: this plant cannot be put back" in stopped(capsys)
+
+
+def test_a_row_that_fails_stops_the_script_and_says_why(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    base = (here / "base.py").read_text(encoding="utf-8")
+    (here / "base.py").write_text(
+        edited(base, ("beacon: bool = True", "beacon: bool = False")), encoding="utf-8"
+    )
+    assert run(["run", "dock", "--no-compile", "-q", "--executor", "python"]) == 1
+    error = stopped(capsys)
+    assert "error[RCS724]: row 1, dock: failed: reason no_beacon" in error
+    assert "rcsc run dock --executor python --from-row 1" in error
+    assert run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--from-row", "3"]) == 0
+    assert run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--from-row", "4"]) == 1
+    assert "error[RCS723]: the script has 3 rows, and none is 4" in stopped(capsys)
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (["nowhere/system.toml"], 2, "there is no file `nowhere/system.toml`"),
+        (["empty/"], 2, "the folder `empty/` has no system.toml"),
+        (["dock", "--system", "dock"], 2, "`dock` is a system, and `--system` names another"),
+        (["dock.csv", "--system", "dock", "--script", "x.csv"], 2, "`dock.csv` is a script, and `--script` names another"),
+        (["dock.csv"], 1, "there is no system.toml here"),
+        (["dock", "--script", "none.csv"], 1, "none.csv cannot be read"),
+        (["dock", "--plant", "none.py"], 1, "error[RCS729]: there is no file `none.py`"),
+        (["dock", "--cycles", "5", "--processes"], 2, "--cycles are of one process"),
+    ],
+)  # fmt: skip
+def test_what_is_meant_is_told_where_it_is_not_there(
+    words: list[str], status: int, message: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here.parent / "empty").mkdir()
+    assert run(["run", "--no-compile", "-q", *words]) == status
+    said = stopped(capsys)
+    if status == 1:
+        assert message in said
+
+
+def test_the_shell_steps_the_plant_and_takes_it_back(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    commands = (
+        "step", "command.inc_command = 1", "command.input_command = dock", "run until now = aligning", "undo 3",
+        "expect drive.travelled_mm < 528", "run 3", "expect drive.travelled_mm = 528",
+    )  # fmt: skip
+    (here / "steps.txt").write_text("\n".join(commands), encoding="utf-8")
+    assert run(["shell", "dock", "--executor", "python", "--script", str(here / "steps.txt")]) == 0, (
+        capsys.readouterr()
+    )
+    assert run(["shell", "dock", "--executor", "python", "--plant", "none.py", "--script", os.devnull]) == 1
+
+
+# --- scripts ---
+
+
+def test_rows_wait_set_expect_and_go_on(here: Path) -> None:
+    text = """\
+[[row]]
+command = "dock"
+"base.beacon" = false
+expect = "failed"
+
+[[row]]
+cycles = 4
+
+[[row]]
+command = "dock"
+cycles = 3
+
+[[row]]
+command = "undock"
+within = 200
+"""
+    assert played(here, text, end=".toml") == [
+        ("done", "", 2),
+        ("done", "", 4),
+        ("done", "", 3),
+        ("done", "", 95),
+    ]
+
+
+def test_a_value_that_a_row_sets_is_gone_with_the_row(here: Path) -> None:
+    run_ = scripted(here, "command,base.bumper,expect\ndock,true,failed\ndock,,done\n")
+    assert [result.state for result in run_.steps(500)] == ["done", "done"]
+    assert run_.system.buffers.latest("base.bumper") == (False,)
+
+
+def test_numbers_go_on_and_wrap(here: Path) -> None:
+    run_ = scripted(here, "command\nstop\nstop\nstop\n")
+    run_.system.buffers.publish("fleet.order", (65_534, 0))
+    numbers: list[object] = []
+
+    def watch(system: System, _due: object) -> None:
+        numbers.append((system.buffers.latest("fleet.order") or (None,))[0])
+
+    run_.system.watch.append(watch)
+    assert len(list(run_.steps(100))) == 3
+    assert list(dict.fromkeys(numbers)) == [65_535, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("text", "state", "reason"),
+    [
+        ("command,base.beacon\ndock,false\n", "failed", "reason no_beacon"),
+        ("command,within\ndock,20\n", "failed", "did not end in 20 cycles"),
+        ("command,within\ndock,1\n", "failed", "is not answered in 1 cycles"),
+        ("command,expect\nstop,failed\n", "failed", "reason none, and was to be failed"),
+        ("command,expect\ndock,executing\n", "done", ""),
+    ],
+)
+def test_a_row_ends_as_it_is_reported(text: str, state: str, reason: str, here: Path) -> None:
+    run_ = scripted(here, text)
+    [result] = run_.steps(500)
+    assert (result.state, result.reason) == (state, reason)
+    if state == "failed":
+        assert run_.system.level("supervisor").shown("command.input_command") == "stop"
+
+
+WRONG = {
+    "comand\ndock\n": "no order has a field `comand`, and no buffer from outside is called so; did you mean `command`?",
+    "command\ndok\n": "row 1: `dok` under `command` is no value of `command.input_command`; did you mean `dock`?",
+    "command,base.bumper\ndock,yes\n": "`yes` under `base.bumper` is no value of `bumper`; known are false, true",
+    "command,base.lateral\ndock,900\n": "`900` under `base.lateral` is no value of `lateral_mm`, which holds -500 .. 500",
+    "command,cycles\ndock,0\n": "row 1: `0` under `cycles` is no number of cycles",
+    "command,expect\ndock,finished\n": "`finished` under `expect` is no value of `report.status_report`",
+    "command,level\ndock,drive\n": "no level `drive` is ordered from outside",
+    "command,drive.speed_mm_s\ndock,5\n": "no buffer from outside is called so",
+    "command,inc_command\ndock,5\n": "no order has a field `inc_command`",
+    "": "has no heading",
+    "command,command\ndock,stop\n": "has two columns `command`",
+    "command\ndock,stop\n": "row 1 has 2 cells, and the heading 1",
+    'command\n"dock\n': "is no CSV file",
+}
+
+
+@pytest.mark.parametrize("text", list(WRONG))
+def test_a_script_is_checked_whole_before_anything_moves(text: str, here: Path) -> None:
+    with pytest.raises(BadScript) as caught:
+        scripted(here, text)
+    assert WRONG[text] in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("row = 3\n", "write each row under `[[row]]`"),
+        ('[[row]]\ncommand = ["dock"]\n', "`command` is no text, number or bool"),
+        ("[[row]]\nbase.bumper = true\n", "a name with a dot is written in quotes"),
+        ("[[row]\n", "is not TOML"),
+    ],
+)
+def test_a_script_in_toml_is_checked_likewise(text: str, message: str, here: Path) -> None:
+    with pytest.raises(BadScript) as caught:
+        scripted(here, text, end=".toml")
+    assert message in str(caught.value)
+
+
+def test_all_rows_that_are_wrong_are_told(here: Path) -> None:
+    with pytest.raises(BadScript) as caught:
+        scripted(here, "command\ndok\ndock\nundok\n")
+    assert [line.rpartition("csv, ")[2][:5] for line in caught.value.shown.splitlines()] == ["row 1", "row 3"]
+
+
+def test_a_system_that_nobody_outside_orders_has_no_orders(here: Path) -> None:
+    sign = json.loads((here / "generated/c/supervisor.json").read_text(encoding="utf-8"))
+    for leaf in sign["leaves"]:
+        if leaf["name"] == "report.inc_command_echo":
+            leaf["name"] = "report.echo"
+    (here / "generated/c/supervisor.json").write_text(json.dumps(sign), encoding="utf-8")
+    (here / "mine.csv").write_text("command\ndock\n", encoding="utf-8")
+    system = description(here / "system.toml")
+    with pytest.raises(BadScript, match="no level is ordered from outside"):
+        read_script(script_path("mine", here), system, signatures(system, fitting=False))
