@@ -6,7 +6,7 @@ In: a description, and perhaps a plant. Out: a `LoadedSystem`. Orders go as thos
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 from rcsc.api.proofs import PathLike
 from rcsc.diagnostics.coded import CodedError
@@ -73,7 +73,7 @@ class LoadedSystem:
         return self._staged.over
 
     @property
-    def plant(self) -> object:
+    def plant(self) -> Any:
         """The object of the plant's own class; None where there is none, or several."""
         plants = self._staged.plants
         return plants[0].plant if len(plants) == 1 else None

@@ -1,7 +1,13 @@
-"""`rcsc new`: a small project, which checks, compiles and passes its tests as it stands."""
+"""`rcsc new`: a project that checks, proves, compiles and passes its tests as it stands.
+
+A template is a folder of files in `templates`: `dot_NAME` becomes `.NAME`, and `ROBOT_NAME` in a text the project's name.
+"""
 
 import re
 import shlex
+from collections.abc import Iterator
+from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 
 import click
@@ -14,92 +20,48 @@ from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Span
 from rcsc.host.files import write_atomically
 
+NAME = "ROBOT_NAME"
+NEXT = {
+    "level": "rcsc check",
+    "system": "rcsc check && rcsc prove system.toml && rcsc run system.toml",
+    "mujoco": "rcsc check && rcsc prove system.toml && rcsc run system.toml",
+    "nbs": "rcsc run make_boxt --report boxt.html",
+}
+"""Each template, and what to type first."""
+CACHES = {".rcsc-cache", "__pycache__"}
+GUIDE = "README.md"
+"""Stands beside the paper's tables, and speaks of the repository."""
 
-@click.command("new", epilog="\b\nExample:\n  rcsc new gripper && cd gripper && rcsc check")
+
+@click.command(
+    "new",
+    epilog="""\b
+Examples:
+  rcsc new gripper && cd gripper && rcsc check    one level: a table of seven lines
+  rcsc new cart --template system                 two levels, plant, script, tests, hooks, CI
+  rcsc new robot --template mujoco                a robot that docks by contact, in MuJoCo
+  rcsc new nbs --example nbs                      the paper's system, with its cell""",
+)
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.option("--template", type=click.Choice([one for one in NEXT if one != "nbs"]), default=None,
+              help="level (the default), system or mujoco.")  # fmt: skip
+@click.option("--example", type=click.Choice(["nbs"]), default=None,
+              help="A whole system to read and run, in place of a template: nbs, the paper's.")  # fmt: skip
 @showing
-def command(folder: Path, output: Output) -> int:
-    """Make a small project in DIR, new or empty, that checks, compiles and passes its tests."""
-    scaffold = _scaffold(folder)
+def command(folder: Path, template: str | None, example: str | None, output: Output) -> int:
+    """Make a project in DIR, new or empty, that checks, proves, compiles and passes its tests."""
+    if template is not None and example is not None:
+        raise click.UsageError("--template and --example do not go together")
+    kind = example or template or "level"
+    scaffold = _scaffold(folder, kind)
     if not isinstance(scaffold, tuple):
         return finish(Report((scaffold,)), "new", output)
     place = shlex.quote(f"./{folder}" if str(folder).startswith("-") else str(folder))
-    closing = f"made {len(scaffold)} files in {folder}; now: cd {place} && rcsc check"
+    closing = f"made {len(scaffold)} files in {folder}; now: cd {place} && {NEXT[kind]}"
     return finish(Report(()), "new", output, closing)
 
 
-_PROJECT = """\
-# The root of a project of rcsc tables. `use NAME` looks beside the file, then here.
-name = "{name}"
-exclude = []
-"""
-
-_VOCABULARY = """\
-# Names that the tables share.
-enum command { hold, open, close }
-enum status { executing, done, failed }
-"""
-
-_TABLE = """\
-# A gripper. In every cycle exactly one line must match, whatever comes in; `rcsc check` proves it.
-use vocabulary
-
-## What the level above wants.
-input order : command
-## What the hand reports.
-input reported : status
-## How far the jaws are apart; a reading outside the range is clamped to it.
-input width_mm : int 0 .. 110 [mm] clamp
-
-## How many parts were gripped.
-state count : int 0 .. 1000
-
-output command_to_hand : command
-output report : status
-
-procedure count_part {
-  count := min(count + 1, 1000)
-}
-
-table grip {
-  | line   | order | reported  | width_mm || procedures | command_to_hand | report    |
-  |--------|-------|-----------|----------||------------|-----------------|-----------|
-  | rest   | hold  |           |          ||            | hold            | done      |
-  | let_go | open  |           |          ||            | open            | done      |
-  | wait   | close | executing |          ||            | close           | executing |
-  | missed | close | done      | < 20     ||            | open            | failed    |
-  | held   | close | done      | 20 .. 40 || count_part | hold            | done      |
-  | wide   | close | done      | > 40     ||            | open            | failed    |
-  | broken | close | failed    |          ||            | hold            | failed    |
-}
-
-level gripper {
-  period 40 [ms]
-  table grip
-}
-"""
-
-_README = """\
-# {name}
-
-    rcsc check          # prove that exactly one line matches, or see an input for which that is false
-    rcsc compile        # write the Python and C executors to generated/
-    rcsc test           # interpreter = Python = C, on inputs that lean on edges
-    rcsc fmt            # align the tables
-
-Take a line out of `gripper.rcs` and check again.
-"""
-
-_FILES = {
-    "rcsc.toml": _PROJECT,
-    "vocabulary.rcs": _VOCABULARY,
-    "gripper.rcs": _TABLE,
-    "README.md": _README,
-    ".gitignore": ".rcsc-cache/\n.hypothesis/\n__pycache__/\n",
-}
-
-
-def _scaffold(folder: Path) -> tuple[Path, ...] | Diagnostic:
+def _scaffold(folder: Path, kind: str) -> tuple[Path, ...] | Diagnostic:
     """Make the project in `folder`, new or empty; what was written, or why not."""
     name = re.sub(r"\W", "_", folder.resolve().name, flags=re.ASCII) or "robot"
     try:
@@ -107,13 +69,37 @@ def _scaffold(folder: Path) -> tuple[Path, ...] | Diagnostic:
         if any(folder.iterdir()):
             return _refused(folder, "the folder is not empty")
         written = []
-        for file, text in _FILES.items():
-            filled = text.format(name=name) if file in {"rcsc.toml", "README.md"} else text
-            write_atomically(folder / file, filled.encode())
-            written.append(folder / file)
+        for file, content in _files(kind):
+            path = folder / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(path, content.replace(NAME.encode(), name.encode()))
+            written.append(path)
     except OSError as error:
         return _refused(folder, error.strerror or type(error).__name__)
     return tuple(written)
+
+
+def _files(kind: str) -> Iterator[tuple[str, bytes]]:
+    """The files of a template by their paths in the project, in order; of the paper's system its tables, too."""
+    package = files("rcsc")
+    yield from _below(package / "commands" / "templates" / kind)
+    if kind == "nbs":
+        packaged = package / "_data" / "tables"
+        beside: Traversable = Path(__file__).parents[2] / "tables"
+        for file, content in _below(packaged if packaged.is_dir() else beside):
+            if file != GUIDE:
+                yield f"tables/{file}", content
+
+
+def _below(folder: Traversable) -> Iterator[tuple[str, bytes]]:
+    for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
+        name = re.sub("^dot_", ".", entry.name)
+        if entry.name in CACHES:
+            continue
+        if entry.is_dir():
+            yield from ((f"{name}/{inner}", content) for inner, content in _below(entry))
+        else:
+            yield name, entry.read_bytes()
 
 
 def _refused(folder: Path, why: str) -> Diagnostic:

@@ -19,6 +19,7 @@ from rcsc.commands.group import commands
 from rcsc.commands.shared.extras import EXTRAS
 
 REPO = Path(__file__).parents[2]
+TEMPLATES = REPO / "rcsc" / "commands" / "templates"
 README = (REPO / "README.md").read_text(encoding="utf-8")
 
 HIDDEN = """
@@ -55,6 +56,15 @@ def test_the_wheel_has_the_grammar_the_types_and_all_data(wheel: Path) -> None:
     assert {"rcsc/py.typed", "rcsc/diagnostics/schema/report.schema.json"} <= names
     templates = {path.name for path in (REPO / "rcsc" / "emit" / "templates").iterdir()}
     assert {name.rsplit("/", 1)[1] for name in names if name.startswith("rcsc/emit/templates/")} == templates
+    templates_ = {
+        path.relative_to(REPO).as_posix()
+        for path in TEMPLATES.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert len(templates_) > 25
+    assert templates_ <= names
+    assert "rcsc/_data/tables/task/acquire.rcs" in names
+    assert not [name for name in names if ".rcsc-cache" in name]
     tops = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
     assert tops == {"rcsc", "rcsc_cell"}, "nothing called `sim`, and no tests or tables"
     assert "License-Expression: MIT" in metadata
@@ -75,7 +85,15 @@ def test_the_wheel_works_with_the_checkout_hidden(wheel: Path, tmp_path: Path) -
             cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
         )  # fmt: skip
 
-    for args in (["new", "robot"], ["check", "robot"], ["compile", "robot"], ["fmt", "--check", "robot"]):
+    for args in (
+        ["new", "robot"],
+        ["check", "robot"],
+        ["compile", "robot"],
+        ["fmt", "--check", "robot"],
+        ["new", "cart", "--template", "system"],
+        ["new", "nbs", "--example", "nbs"],
+        ["check", "nbs/tables/gripper"],
+    ):
         ran = rcsc(*args)
         assert ran.returncode == 0, ran.stdout + ran.stderr
     assert (tmp_path / "generated" / "c" / "gripper.c").is_file()
