@@ -6,9 +6,10 @@ The convention of the tables: input `command` with `inc_command`, state `inc_com
 `NAME` that echoes them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TypeAlias, assert_never
 
 from rcsc.run.buffers import Buffers
 from rcsc.run.levels import RunningLevel
@@ -89,29 +90,80 @@ def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = 
         values: All leaves and the trace; states and outputs initial.
         stands: What its own buffers hold, of `standing`.
     """
-    now = list(values)
-    for name, member in FAILED.items():
-        at = sign.index.get(name)
-        if at is not None and member in sign.leaves[at].members:
-            now[at] = sign.leaves[at].members.index(member)
-    seen, taken = sign.index.get("inc_command_seen"), sign.index.get("command.inc_command")
-    if seen is not None and taken is not None and _numbers(sign, seen, taken) and _admits(sign, seen, taken):
-        now[seen] = now[taken]
-    for at, leaf in enumerate(sign.leaves):
-        if leaf.kind == "output" and leaf.name.startswith(ORDER):
-            now[at] = _order(sign, leaf.name, now, at, stands or {})
+    now, standing_ = list(values), stands or {}
+    for start in adoption(sign):
+        now[start.at] = _started(start, now, standing_)
     return tuple(now)
 
 
-def _order(sign: Signature, name: str, now: list[Value], at: int, stands: Mapping[int, Value]) -> Value:
-    """Return the start value of an order's leaf: a number not yet echoed, the first command (rest), else as it is."""
-    record, _, part = name.partition(".")
-    if part == "input_command":
-        return 0
-    echo = sign.index.get(f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}")
-    if echo is None or not _numbers(sign, at, echo):
-        return now[at]
-    return (int(stands.get(at, now[echo])) + 1) % NUMBERS
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """The leaf at a position starts with a value."""
+
+    at: int
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class Copied:
+    """It starts with what another leaf holds."""
+
+    at: int
+    source: int
+
+
+@dataclass(frozen=True, slots=True)
+class Numbered:
+    """It starts with the number after that of the order that stands, or else after the one in the leaf `echo`; modulo `NUMBERS`."""
+
+    at: int
+    echo: int
+
+
+Start: TypeAlias = Fixed | Copied | Numbered
+
+
+def adoption(sign: Signature) -> tuple[Start, ...]:
+    """Return how the leaves of a level start anew that do not start with their initial values, in the order in which they are set."""
+    return (*_failed(sign), *_seen(sign), *_orders(sign))
+
+
+def _started(start: Start, now: Sequence[Value], stands: Mapping[int, Value]) -> Value:
+    match start:
+        case Fixed(value=value):
+            return value
+        case Copied(source=source):
+            return now[source]
+        case Numbered(at=at, echo=echo):
+            return (int(stands.get(at, now[echo])) + 1) % NUMBERS
+        case _:
+            assert_never(start)
+
+
+def _failed(sign: Signature) -> Iterator[Start]:
+    for name, member in FAILED.items():
+        at = sign.index.get(name)
+        if at is not None and member in sign.leaves[at].members:
+            yield Fixed(at, sign.leaves[at].members.index(member))
+
+
+def _seen(sign: Signature) -> Iterator[Start]:
+    seen, taken = sign.index.get("inc_command_seen"), sign.index.get("command.inc_command")
+    if seen is not None and taken is not None and _numbers(sign, seen, taken) and _admits(sign, seen, taken):
+        yield Copied(seen, taken)
+
+
+def _orders(sign: Signature) -> Iterator[Start]:
+    """Yield, for each order, a number not yet echoed and the first command, which rests."""
+    for at, leaf in enumerate(sign.leaves):
+        record, _, part = leaf.name.partition(".")
+        if leaf.kind != "output" or not record.startswith(ORDER):
+            continue
+        echo = sign.index.get(f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}")
+        if part == "input_command":
+            yield Fixed(at, 0)
+        elif echo is not None and _numbers(sign, at, echo):
+            yield Numbered(at, echo)
 
 
 def _admits(sign: Signature, taker: int, giver: int) -> bool:
