@@ -20,7 +20,7 @@ Modules, in the order the data flows: `proofs` (`check`, `compile`, `prove`), `r
 """
 
 from rcsc.api.proofs import Claim, Proof, Unproved, check, compile, prove  # noqa: A004  # as the command is called
-from rcsc.api.running import LoadedSystem, RowOutcome, Run, load_system, run
+from rcsc.api.running import LoadedSystem, load_system
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.diagnostics.report import Report, Verdict
@@ -34,8 +34,6 @@ __all__ = [
     "Position",
     "Proof",
     "Report",
-    "RowOutcome",
-    "Run",
     "Severity",
     "Span",
     "Unproved",
@@ -44,5 +42,4 @@ __all__ = [
     "compile",
     "load_system",
     "prove",
-    "run",
 ]

@@ -232,9 +232,7 @@ class _Maker:
 
     def _record(self, record: model.Record) -> tuple[str, Fields]:
         names = self.names.members[record.name]
-        docs = (
-            "; ".join(word for word in (range_text(f.type), comment(f.doc)) if word) for f in record.fields
-        )
+        docs = ("; ".join(word for word in (_range(f.type), comment(f.doc)) if word) for f in record.fields)
         fields = tuple(
             (declared(self.names, names[f.name], f.type), doc)
             for f, doc in zip(record.fields, docs, strict=True)
@@ -265,7 +263,7 @@ class _Maker:
             where = f"{first}" if first == last else f"{first} to {last}"
             words = [
                 f"{where}: {variable.kind.value}",
-                range_text(variable.type),
+                _range(variable.type),
                 _safe_text(variables[variable.leaves[0]]),
                 comment(variable.doc),
             ]
@@ -801,14 +799,13 @@ def _search(index: Cuts, wide: str) -> Iterator[Stmt]:
     yield Leave(AT)
 
 
-def range_text(kind: model.Type) -> str:
-    """The range of a number, with its unit; empty for what has none."""
+def _range(kind: model.Type) -> str:
     match kind:
         case Int(low, high, unit) | Real(low, high, unit):
             units = unit_text(unit)
             return f"{low} .. {high}" + (f" {units}" if units else "")
         case model.Array(element=element):
-            return range_text(element)
+            return _range(element)
         case _:
             return ""
 

@@ -1,11 +1,27 @@
 """The symbol file: what everything is called in C and in Python, and what a log or a shell shows of it."""
 
 import json
+from collections.abc import Iterator
 
 from rcsc.emit.ctext import c_type
 from rcsc.emit.identifiers import Names
 from rcsc.emit.plan import Plan
-from rcsc.lang.model import Admit, Bool, Enum, Int, Level, OneTable, Read, Real, Unit, Variable
+from rcsc.lang.model import (
+    Admit,
+    Bool,
+    Enum,
+    Int,
+    Level,
+    OneTable,
+    Read,
+    Real,
+    Role,
+    Roles,
+    Unit,
+    Variable,
+    VariableName,
+)
+from rcsc.lang.restart import Adopted, After, Fixed, SameAs
 
 
 def symbols(plan: Plan, names: Names) -> str:
@@ -20,6 +36,8 @@ def symbols(plan: Plan, names: Names) -> str:
         "init": f"{p}_init",
         "check": f"{p}_check",
         **({"defensive": True} if plan.defensive else {}),
+        **({"roles": _roles(plan.program.roles)} if plan.program.roles is not None else {}),
+        **({"restart": [*_adopted(plan.program.restart)]} if plan.program.restart is not None else {}),
         "invariants": [invariant.name for invariant in plan.program.invariants],
         "python": {"module": f"{p}.py", "class": "State"},
         **({"failed": names.failed} if len(names.failed) > 1 else {}),
@@ -57,6 +75,29 @@ def symbols(plan: Plan, names: Names) -> str:
         ],
     }
     return json.dumps(document, indent=1) + "\n"
+
+
+def _roles(roles: Roles) -> dict[str, object]:
+    """Whom the levels serve and command: the peer, the records of orders and reports, and what their members mean."""
+
+    def said(role: Role) -> dict[str, str | None]:
+        words = {"rest": role.rest, "done": role.done, "failed": role.failed, "reason": role.reason}
+        return {"peer": role.peer, "order": role.order, "report": role.report, **words}
+
+    superior = {"serves": said(roles.superior)} if roles.superior is not None else {}
+    return {**superior, "commands": [said(role) for role in roles.subordinates]}
+
+
+def _adopted(restart: tuple[tuple[VariableName, Adopted], ...]) -> Iterator[dict[str, object]]:
+    """What each leaf adopts that starts other than initially."""
+    for leaf, adopted in restart:
+        match adopted:
+            case Fixed(value):
+                yield {"leaf": leaf, "value": value}
+            case SameAs(other):
+                yield {"leaf": leaf, "same_as": other}
+            case After(other):
+                yield {"leaf": leaf, "after": other}
 
 
 def unit_text(unit: Unit) -> str:

@@ -20,6 +20,7 @@ from rcsc.diagnostics.source import Span
 from rcsc.lang.operator_table import COMPARISONS as COMPARISONS  # noqa: PLC0414 - part of the model
 from rcsc.lang.operator_table import Op as Op  # noqa: PLC0414 - as above
 from rcsc.lang.operator_table import Operator
+from rcsc.lang.restart import Adopted
 
 VariableName = NewType("VariableName", str)
 ProcedureName = NewType("ProcedureName", str)
@@ -213,6 +214,7 @@ class Variable:
         deferred_until: For a deferred variable: at the start of a cycle, when this holds of
             the snapshot, `x` takes the value of `x.next`. `next x := e` writes `x.next`.
         safe: What an output shows after a cycle that ended in a fault; None where it stays as it is.
+        restart: What it has when the level starts anew; None where it is then as it is initially, or as `Program.restart` says.
     """
 
     name: VariableName
@@ -224,6 +226,7 @@ class Variable:
     doc: str = ""
     span: Span = at()
     safe: Value | None = None
+    restart: Value | None = None
 
 
 def pending(name: str) -> VariableName:
@@ -671,6 +674,56 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True)
+class Role:
+    """A neighbour, as a program declares it: one that it serves, or one that it commands.
+
+    Attributes:
+        order: The record that carries orders, and `report` the one that carries reports.
+        numbered: Leaves of the order that change only with its number.
+        rest: The command that rests.
+        done, failed: The statuses that answer a command.
+        reason: The leaf that says why a command failed; None where there is none.
+        late: Says that a subordinate has not echoed in time; None where it is waited for without end.
+    """
+
+    peer: str
+    order: str
+    report: str
+    numbered: tuple[VariableName, ...]
+    rest: str
+    done: str
+    failed: str
+    reason: VariableName | None = None
+    late: VariableName | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """Whom the level of a program serves and commands.
+
+    Attributes:
+        superior: None where it takes no orders.
+    """
+
+    superior: Role | None
+    subordinates: tuple[Role, ...]
+
+    def makes(self, leaf: str) -> bool:
+        """Return whether the protocol makes the leaf: a buffer, or what is kept of orders and reports."""
+        peers = [role.peer for role in (self.superior, *self.subordinates) if role is not None]
+        records = {f"{word}{peer}" for peer in peers for word in ("", "to_", "from_", "last_")}
+        own = {
+            "new_command",
+            "answered",
+            "settling",
+            "inc_command_seen",
+            "echoed",
+            *(f"{peer}_waited" for peer in peers),
+        }
+        return leaf in own or leaf.partition(".")[0] in records
+
+
+@dataclass(frozen=True, slots=True)
 class Program:
     """One root file and all that it uses: what is checked and compiled together.
 
@@ -681,6 +734,8 @@ class Program:
         variables: Every leaf.
         tables: Tables of the root file and of the files it uses.
         own_tables: Names of the tables that the root file itself declares.
+        roles: None where the protocol is written by hand, or there is none.
+        restart: What leaves adopt when the level starts anew (`rcsc.lang.restart`); None where nothing declares it, and names tell.
     """
 
     name: str
@@ -697,6 +752,8 @@ class Program:
     owners: tuple[Owner, ...]
     levels: tuple[Level, ...]
     properties: tuple[Property, ...] = ()
+    roles: Roles | None = None
+    restart: tuple[tuple[VariableName, Adopted], ...] | None = None
 
     @property
     def types(self) -> "tuple[Enum | Record, ...]":

@@ -2,30 +2,17 @@
 
 In: a level, its buffers, its checkpoint; for a start anew a signature, an initial state with the buffers' present inputs, and its own
 orders that stand. Out: values to start from.
-The convention of the tables: input `command` with `inc_command`, state `inc_command_seen`, orders named `to_NAME`, and the input
-`NAME` that echoes them.
+What is adopted is the program's (`rcsc.lang.restart`), the same for the proof.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeAlias, assert_never
 
+from rcsc.lang.restart import NUMBERS, After, Fixed, SameAs
 from rcsc.run.buffers import Buffers
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Signature, Value, Values
-
-NUMBERS = 65536
-ORDER = "to_"
-# How an order is numbered, and where the level below repeats the number; the camera's pictures are numbered, too.
-ECHOES = {"inc_command": "inc_command_echo", "number": "number"}
-# A member, by its name, for a state; the failure stands until the next command.
-FAILED = {
-    "status_report": "failed",
-    "failure": "restart",
-    "cur_state": "f_state",
-    "cur_state.next": "f_state",
-}
 
 
 class Begun(StrEnum):
@@ -90,90 +77,13 @@ def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = 
         values: All leaves and the trace; states and outputs initial.
         stands: What its own buffers hold, of `standing`.
     """
-    now, standing_ = list(values), stands or {}
-    for start in adoption(sign):
-        now[start.at] = _started(start, now, standing_)
+    now = list(values)
+    for at, adopted in sign.restart.items():
+        match adopted:
+            case Fixed(value):
+                now[at] = value
+            case SameAs(leaf):
+                now[at] = values[sign.index[leaf]]
+            case After(leaf):
+                now[at] = (int((stands or {}).get(at, values[sign.index[leaf]])) + 1) % NUMBERS
     return tuple(now)
-
-
-@dataclass(frozen=True, slots=True)
-class Fixed:
-    """The leaf at a position starts with a value."""
-
-    at: int
-    value: Value
-
-
-@dataclass(frozen=True, slots=True)
-class Copied:
-    """It starts with what another leaf holds."""
-
-    at: int
-    source: int
-
-
-@dataclass(frozen=True, slots=True)
-class Numbered:
-    """It starts with the number after that of the order that stands, or else after the one in the leaf `echo`; modulo `NUMBERS`."""
-
-    at: int
-    echo: int
-
-
-Start: TypeAlias = Fixed | Copied | Numbered
-
-
-def adoption(sign: Signature) -> tuple[Start, ...]:
-    """Return how the leaves of a level start anew that do not start with their initial values, in the order in which they are set."""
-    return (*_failed(sign), *_seen(sign), *_orders(sign))
-
-
-def _started(start: Start, now: Sequence[Value], stands: Mapping[int, Value]) -> Value:
-    match start:
-        case Fixed(value=value):
-            return value
-        case Copied(source=source):
-            return now[source]
-        case Numbered(at=at, echo=echo):
-            return (int(stands.get(at, now[echo])) + 1) % NUMBERS
-        case _:
-            assert_never(start)
-
-
-def _failed(sign: Signature) -> Iterator[Start]:
-    for name, member in FAILED.items():
-        at = sign.index.get(name)
-        if at is not None and member in sign.leaves[at].members:
-            yield Fixed(at, sign.leaves[at].members.index(member))
-
-
-def _seen(sign: Signature) -> Iterator[Start]:
-    seen, taken = sign.index.get("inc_command_seen"), sign.index.get("command.inc_command")
-    if seen is not None and taken is not None and _numbers(sign, seen, taken) and _admits(sign, seen, taken):
-        yield Copied(seen, taken)
-
-
-def _orders(sign: Signature) -> Iterator[Start]:
-    """Yield, for each order, a number not yet echoed and the first command, which rests."""
-    for at, leaf in enumerate(sign.leaves):
-        record, _, part = leaf.name.partition(".")
-        if leaf.kind != "output" or not record.startswith(ORDER):
-            continue
-        echo = sign.index.get(f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}")
-        if part == "input_command":
-            yield Fixed(at, 0)
-        elif echo is not None and _numbers(sign, at, echo):
-            yield Numbered(at, echo)
-
-
-def _admits(sign: Signature, taker: int, giver: int) -> bool:
-    """Return whether a number can have every value of another."""
-    to, of = sign.leaves[taker], sign.leaves[giver]
-    return (to.low or 0) <= (of.low or 0) and (of.high or 0) <= (to.high or 0)
-
-
-def _numbers(sign: Signature, *places: int) -> bool:
-    """Return whether all these leaves are whole numbers: a leaf of another type is no number of an order."""
-    return all(
-        sign.leaves[at].c_type not in {"bool", "double"} and not sign.leaves[at].members for at in places
-    )

@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 from rcsc.host.files.names import BadName, identifier, inside, shown
 from rcsc.host.files.read import MIB, CheckedFields, Malformed, json_of, text
+from rcsc.lang.restart import Adopted, After, Fixed, Part, SameAs, by_names
 from rcsc.run.description import BadDescription
 
 Value: TypeAlias = bool | int | float
@@ -69,6 +70,16 @@ class Leaf:
     doc: str
     clamp: bool = False
 
+    @property
+    def part(self) -> Part:
+        """What its name may mean when the program starts anew."""
+        whole = (
+            None
+            if self.members or self.c_type in {"bool", "double"}
+            else (int(self.low or 0), int(self.high or 0))
+        )
+        return Part(self.kind == "output", self.members, whole)
+
     def shown(self, value: Value) -> str:
         """The value in the table's words."""
         if self.members:
@@ -123,6 +134,7 @@ class Signature:
     failed: tuple[str, ...] = FAILED
     stops: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     invariants: tuple[str, ...] = ()
+    restart: Mapping[int, Adopted] = field(default_factory=dict)
 
     @property
     def check(self) -> str:
@@ -289,7 +301,71 @@ def signature_of(symbols: CheckedFields) -> Signature:
         failed,
         stops,
         symbols.names("invariants", ()),
+        {index[name]: adopted for name, adopted in _restart(symbols, leaves).items()},
     )
+
+
+def _restart(symbols: CheckedFields, leaves: tuple[Leaf, ...]) -> dict[str, Adopted]:
+    """What each leaf adopts that starts other than initially.
+
+    Raises:
+        Malformed: There is no such leaf, or one does not fit what it adopts.
+    """
+    parts = {leaf.name: leaf.part for leaf in leaves}
+    if "restart" not in symbols.value:
+        return by_names(parts)
+    by_name = {leaf.name: leaf for leaf in leaves}
+    adopted: dict[str, Adopted] = {}
+    for entry in symbols.each("restart", len(leaves)):
+        name = entry.member("leaf")
+        if name not in by_name:
+            raise Malformed(f"{entry.where}: there is no leaf {shown(name)}")
+        adopted[name] = _adopted(entry, by_name[name], by_name)
+    return adopted
+
+
+def restart_written(sign: Signature) -> list[dict[str, object]] | None:
+    """Return what each leaf adopts, as a symbol file has it; None where the names of the leaves say it."""
+    adopted = {sign.leaves[at].name: adopts for at, adopts in sign.restart.items()}
+    if adopted == by_names({leaf.name: leaf.part for leaf in sign.leaves}):
+        return None
+    return [{"leaf": leaf, **_entry(adopts)} for leaf, adopts in adopted.items()]
+
+
+def _entry(adopts: Adopted) -> dict[str, object]:
+    match adopts:
+        case Fixed(value):
+            return {"value": value}
+        case SameAs(other):
+            return {"same_as": other}
+        case After(other):
+            return {"after": other}
+
+
+def _adopted(entry: CheckedFields, leaf: Leaf, leaves: Mapping[str, Leaf]) -> Adopted:
+    """Read what one leaf adopts.
+
+    Raises:
+        Malformed: It is no value of the leaf, or there is no such other leaf, or it is of another type.
+    """
+    for word, form in (("same_as", SameAs), ("after", After)):
+        if word in entry.value:
+            other = leaves.get(entry.member(word))
+            if (
+                other is None
+                or (other.c_type, other.members) != (leaf.c_type, leaf.members)
+                or leaf.part.whole is None
+            ):
+                raise Malformed(f"{entry.where}: {shown(leaf.name)} cannot adopt that")
+            return form(other.name)
+    value = entry.number("value")
+    if (
+        value is None
+        or not _fits(leaf.c_type, value)
+        or (leaf.members and not 0 <= value < len(leaf.members))
+    ):
+        raise Malformed(f"{entry.where}.value is no `{leaf.c_type}` of it")
+    return Fixed(value)
 
 
 def _own(name: str, begins: str, rest: str) -> str:

@@ -37,9 +37,9 @@ def named(whole: SystemProof, level: str, needs: Sequence[Need]) -> str:
 
 
 def not_looked_at(proof: LevelProof) -> Iterator[str]:
-    """Obligations that could not be stated."""
+    """Obligations that could not be stated, and those that do not apply."""
     for unstated in proof.unstated:
-        yield f"not looked at: {unstated.shown}"
+        yield f"{'not looked at' if unstated.applies else 'does not apply'}: {unstated.shown}"
 
 
 def in_context(whole: SystemProof, proof: LevelProof) -> Iterator[str]:
@@ -93,7 +93,7 @@ def left_out(whole: SystemProof) -> Iterator[str]:
     """Say that a system is not wholly proved, and why, where no finding does."""
     if whole.whole or not whole.proved:
         return
-    unstated = sum(len(level.unstated) for level in whole.levels)
+    unstated = sum(missing.applies for level in whole.levels for missing in level.unstated)
     rests = sum(closed.accepted and not closed.proved for closed in whole.closed.values())
     ends = sum(not ending.proved for level in whole.levels for ending in level.endings)
     reasons = [

@@ -6,9 +6,9 @@ order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_c
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from rcsc.lang.model import Enum, Int, Kind, Level, OneTable, Program, Real, Scalar, Variable
+from rcsc.lang.model import Enum, Int, Kind, Level, OneTable, Program, Real, Role, Roles, Scalar, Variable
 from rcsc.run.description import BadDescription, Description
 
 NUMBER, COMMAND = "inc_command", "input_command"
@@ -23,12 +23,15 @@ class Neighbour:
         name: Its name.
         order: The record of this level that carries orders; `report`, the one that carries reports on them.
         outside: Whether it stands outside the levels.
+        done, failed: The statuses that answer a command.
     """
 
     name: str
     order: str
     report: str
     outside: bool
+    done: str = field(default="done", kw_only=True)
+    failed: str = field(default="failed", kw_only=True)
 
     @property
     def number(self) -> str:
@@ -58,7 +61,15 @@ class Neighbour:
 
 @dataclass(frozen=True, slots=True)
 class Below(Neighbour):
-    """A subordinate: `order` is an output of this level, `report` an input."""
+    """A subordinate: `order` is an output of this level, `report` an input.
+
+    Attributes:
+        late: The flag that it has not echoed in time; None where it is waited for without end.
+        held: The command and the status that are held of its report; empty where the level holds them itself.
+    """
+
+    late: str | None = None
+    held: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +126,8 @@ def links(system: Description, level: str, program: Program) -> Links:
     outputs = {_variable(w.source): _owner(w.target) for w in system.wires if _owner(w.source) == level}
     names = {str(v.name) for v in program.variables}
     levels = {spec.name for spec in system.levels}
+    if program.roles is not None:
+        return _declared(system, level, program, program.roles, inputs, outputs, levels)
     above: Above | None = None
     below: list[Below] = []
     used: set[str] = set()
@@ -136,6 +149,73 @@ def links(system: Description, level: str, program: Program) -> Links:
             _whole(level, program, order_record, record)
             below.append(Below(owner, order_record, record, owner not in levels))
             used |= {*leaves_under(program, record)}
+    asked = _asked(system, level, program)
+    used |= {leaf for one in asked for leaf in one.leaves}
+    free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
+    seen = [above.name] if above is not None else []
+    unread = _unread(program, level, inputs, outputs, levels, {*seen, *(one.name for one in below)})
+    if above is None and not isinstance(_level(program, level).tables, OneTable):
+        unread = (*unread, f"no input has `{NUMBER}` and `{COMMAND}`, so that no order selects the table")
+    return Links(level, above, tuple(below), asked, free, unread)
+
+
+def _declared(
+    system: Description,
+    level: str,
+    program: Program,
+    roles: Roles,
+    inputs: Mapping[str, str],
+    outputs: Mapping[str, str],
+    levels: set[str],
+) -> Links:
+    """Return the environment of a level that declares whom it serves and commands.
+
+    Raises:
+        BadDescription: The two buffers of a role are not both connected, and with the same neighbour.
+    """
+    above: Above | None = None
+    below = []
+    used: set[str] = set()
+    for role in (*([] if roles.superior is None else [roles.superior]), *roles.subordinates):
+        taken, given = (role.order, role.report) if role is roles.superior else (role.report, role.order)
+        owner = inputs.get(taken)
+        if owner is None or outputs.get(given) != owner:
+            raise BadDescription(
+                f"`{level}.{taken}` and `{level}.{given}` are one end of what `{level}` and `{role.peer}` say to each other: "
+                f"the first comes from `{owner or 'nobody'}`, the second goes to `{outputs.get(given, 'nobody')}`"
+            )
+        used |= {*leaves_under(program, taken)}
+        if role is roles.superior:
+            numbered = tuple(map(str, role.numbered))
+            above = Above(
+                owner,
+                role.order,
+                role.report,
+                owner not in levels,
+                numbered,
+                done=role.done,
+                failed=role.failed,
+            )
+        else:
+            below.append(_subordinate(owner, role, owner not in levels))
+    asked = _asked(system, level, program)
+    used |= {leaf for one in asked for leaf in one.leaves}
+    free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
+    return Links(level, above, tuple(below), asked, free)
+
+
+def _subordinate(owner: str, role: Role, outside: bool) -> Below:  # as `Neighbour` has it
+    late = None if role.late is None else str(role.late)
+    held = f"{role.peer}.command", f"{role.peer}.status"
+    return Below(owner, role.order, role.report, outside, late, held, done=role.done, failed=role.failed)
+
+
+def _asked(system: Description, level: str, program: Program) -> tuple[Asked, ...]:
+    """Return what a level asks of the database.
+
+    Raises:
+        BadDescription: A question has an answer of the database as a key.
+    """
     feeds = next((spec.feeds for spec in system.levels if spec.name == level), ())
     asked = tuple(Asked(feed.into, leaves_under(program, feed.into), feed.keys) for feed in feeds)
     answers = {leaf for question in asked for leaf in question.leaves}
@@ -145,15 +225,7 @@ def links(system: Description, level: str, program: Program) -> Links:
                 f"`{level}.{question.into}` is asked of the database by `{late[0]}`, which is an answer of the database itself: "
                 "of the cycle before, so that the same question need not have the same answer"
             )
-    used |= answers
-    free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
-    seen = [above.name] if above is not None else []
-    unread = _unread(
-        program, level, inputs, outputs, levels, {*seen, *(subordinate.name for subordinate in below)}
-    )
-    if above is None and not isinstance(_level(program, level).tables, OneTable):
-        unread = (*unread, f"no input has `{NUMBER}` and `{COMMAND}`, so that no order selects the table")
-    return Links(level, above, tuple(below), asked, free, unread)
+    return asked
 
 
 def _level(program: Program, name: str) -> Level:

@@ -73,11 +73,16 @@ ObligationKey: TypeAlias = tuple[Sort, str, str]
 
 @dataclass(frozen=True, slots=True)
 class Unstated:
-    """A sort of obligation that cannot be stated, because part of the level was not recognised."""
+    """A sort of obligation that is not stated: part of the level was not recognised, or it does not apply.
+
+    Attributes:
+        applies: Whether it might: then the level is not wholly proved.
+    """
 
     sort: Sort
     table: str
     missing: str
+    applies: bool = True
 
     @property
     def shown(self) -> str:
@@ -214,9 +219,10 @@ def command_stays(ts: TransitionSystem, cycle: Cycle) -> Node:
 
 
 def _waiting(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
-    """Return the condition that the command stays and the order below is not echoed."""
+    """Return the condition that the command stays and the order below is neither echoed nor too late."""
     echoed = values.equal(cycle.taken[below.echo], cycle.before[below.number])
-    return values.both(command_stays(ts, cycle), values.negation(echoed))
+    late = values.FALSE if below.late is None else cycle.middle[below.late]
+    return values.both(command_stays(ts, cycle), values.negation(values.either(echoed, late)))
 
 
 def _passes_on_a_pause(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
@@ -236,7 +242,7 @@ def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
         yield Obligation(Sort.ONCE, "", FLAG, once)
         for at in cycle.tables:
             overlooking = _overlooking(ts, cycle, at)
-            ends = bool(at.table.stops) or asks(ts.program)
+            ends = bool(at.table.stops) or asks(ts.program) or ts.program.roles is not None
             if overlooking or (overlooking is not None and ends):
                 yield _answered(ts, cycle, at, overlooking)
     for variable in ts.program.variables:
@@ -265,7 +271,7 @@ def _unstated(ts: TransitionSystem) -> Iterator[Unstated]:
     if links.above is None:
         if links.below:
             for sort in (Sort.WAITS, Sort.PAUSES, Sort.ENDS):
-                yield Unstated(sort, "", "the level takes no orders")
+                yield Unstated(sort, "", "the level takes no orders", ts.program.roles is None)
         return
     for below in links.below:
         for missing in _no_pause(ts, below):
@@ -275,14 +281,29 @@ def _unstated(ts: TransitionSystem) -> Iterator[Unstated]:
             yield Unstated(sort, "", f"there is no state `{FLAG} : bool`")
         return
     for table in run_by(ts):
-        if not any(looks_for(FLAG, line) for line in table.lines) and not _rests(ts, table):
+        if any(looks_for(FLAG, line) for line in table.lines):
+            continue
+        if ts.program.roles is None and not _rests(ts, table):
             yield Unstated(Sort.ANSWERED, str(table.name), f"no line looks at `{FLAG}`")
+        elif ts.program.roles is not None and not _keeps(ts, table):
+            why = f"its lines look neither at `{FLAG}` nor at anything that the level keeps"
+            yield Unstated(Sort.ANSWERED, str(table.name), why, applies=False)
+
+
+def _keeps(ts: TransitionSystem, table: Table) -> bool:
+    """Return whether a table of a command looks at what the level itself keeps: it may be of the command before."""
+    roles = ts.program.roles
+    assert roles is not None
+    kept = {
+        str(v.name) for v in ts.program.variables if v.kind is not Kind.INPUT and not roles.makes(str(v.name))
+    }
+    return not _rests(ts, table) and any(looks_for(leaf, line) for leaf in kept for line in table.lines)
 
 
 def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
     """Yield why PAUSE is not recognised: it is the first command, with a table of its own."""
     assert ts.links.above is not None
-    if isinstance(ts.level.tables, OneTable):
+    if isinstance(ts.level.tables, OneTable) and ts.program.roles is None:
         yield "the level has one table for all commands"
     for leaf in (ts.links.above.command, below.command):
         if not isinstance(ts.kinds[leaf], Enum):
@@ -326,9 +347,11 @@ def asks(program: Program) -> bool:
 def _overlooking(ts: TransitionSystem, cycle: Cycle, at: TableAt) -> tuple[Node, ...] | None:
     """List conditions under which a line ignores the flag: it matches with the flag up and down, all else equal.
 
-    None if no line reads the flag. DEFAULT never reads it.
+    None if no line reads the flag, and nothing shows that one should. DEFAULT never reads it.
     """
-    if not any(looks_for(FLAG, line) for line in at.table.lines):
+    if not any(looks_for(FLAG, line) for line in at.table.lines) and (
+        ts.program.roles is None or not _keeps(ts, at.table)
+    ):
         return None
     up, down = (ts.matches(cycle, at.table, {FLAG: flag}) for flag in (values.TRUE, values.FALSE))
     blind = [

@@ -190,7 +190,7 @@ def _read(ts: TransitionSystem) -> set[str]:
     if not isinstance(level.tables, OneTable):
         conditions.append(level.tables.selector)
     leaves = {str(name) for condition in conditions for name in read_by(condition)}
-    leaves |= {below.command for below in ts.links.below}
+    leaves |= {leaf for below in ts.links.below for leaf in (below.command, *below.held)}
     leaves |= {f"{GHOST}{asked.into}" for asked in ts.links.asked}
     return leaves | {
         str(pending(v.name)) for v in program.variables if v.deferred_until is not None and v.name in leaves

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
-from rcsc.compose.contract.environment import COMMAND, NUMBER, Below, Links
+from rcsc.compose.contract.environment import Below, Links
 from rcsc.lang.interpret import Fault, evaluate
 from rcsc.lang.model import (  # fmt: skip
     Action,
@@ -28,8 +28,9 @@ from rcsc.lang.model import (  # fmt: skip
     Snapshot,
     Standing,
     Table,
+    Variable,
 )
-from rcsc.run.adopt import ECHOES, FAILED, ORDER
+from rcsc.lang.restart import Adopted, After, Fixed, Part, SameAs, by_names
 from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import ExternResults, State
 from rcsc.symbolic.execution import Run
@@ -38,10 +39,6 @@ from rcsc.symbolic.values import FALSE, TRUE, Node
 GHOST = "asked "
 """Prefix of ghosts, which the proof remembers and the level does not: that the database was asked, and for which keys."""
 
-SEEN = "inc_command_seen"
-"""The number of the command being worked on; a level that restarts counts the one in its buffer as seen."""
-TAKEN = f"command.{NUMBER}"
-"""The input with that number, by the tables' convention; nothing is adopted from an order under another name."""
 EARLY = frozenset({Fault.EXTERN, Fault.ASSUMPTION})
 """Faults that no proof excludes: the cycle ends there, and the next one runs."""
 Leaves = dict[str, Node]
@@ -148,6 +145,13 @@ def _matches(run: Run, line: Line) -> Node:
     return values.all_of(run.evaluate(test.condition) for test in line.tests if test is not None)
 
 
+def _part(variable: Variable) -> Part:
+    """What the name of a leaf may mean when the program starts anew."""
+    members = variable.type.members if isinstance(variable.type, Enum) else ()
+    whole = (variable.type.low, variable.type.high) if isinstance(variable.type, Int) else None
+    return Part(variable.kind is Kind.OUTPUT, members, whole)
+
+
 @dataclass(frozen=True, slots=True)
 class Safety:
     """Why a cycle as nodes is what the executors do: every operation is defined, and every value in range.
@@ -230,30 +234,22 @@ class TransitionSystem:
         start |= {
             name: values.variable(f"{name} before restart", self.kinds[name]) for name in sorted(self.inputs)
         }
-        for name, member in FAILED.items():
-            kind = self.kinds.get(name)
-            if isinstance(kind, Enum) and member in kind.members:
-                start[name] = values.constant(kind, kind.members.index(member))
-        both = self._numbers(SEEN, TAKEN)
-        if both and both[0].low <= both[1].low and both[1].high <= both[0].high:
-            start[SEEN] = start[TAKEN]
-        outputs = [
-            str(v.name) for v in self.program.variables if v.kind is Kind.OUTPUT and v.name.startswith(ORDER)
-        ]
-        for leaf in outputs:
-            record, _, part = leaf.partition(".")
-            echo = f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}"
-            if part == COMMAND:
-                start[leaf] = values.constant(self.kinds[leaf], 0)
-            elif self._numbers(leaf, echo):
-                late = values.variable(f"{leaf} before restart", self.kinds[leaf])
-                start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
+        for leaf, adopted in self._adopted().items():
+            match adopted:
+                case Fixed(value):
+                    start[leaf] = values.constant(self.kinds[leaf], value)
+                case SameAs(other):
+                    start[leaf] = start[other]
+                case After(echo):
+                    late = values.variable(f"{leaf} before restart", self.kinds[leaf])
+                    start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
         return start
 
-    def _numbers(self, *leaves: str) -> tuple[Int, ...]:
-        """Return the types of the leaves if all exist and are whole numbers; else none."""
-        types = tuple(kind for kind in map(self.kinds.get, leaves) if isinstance(kind, Int))
-        return types if len(types) == len(leaves) else ()
+    def _adopted(self) -> Mapping[str, Adopted]:
+        """Return what each leaf adopts that starts other than initially."""
+        if self.program.restart is not None:
+            return {str(leaf): adopted for leaf, adopted in self.program.restart}
+        return by_names({str(v.name): _part(v) for v in self.program.variables})
 
     def of(self, program: Program) -> "TransitionSystem":
         """Return the same level with another program of the same leaves."""

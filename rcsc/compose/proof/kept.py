@@ -81,7 +81,7 @@ def _shortened(ts: TransitionSystem, proof: LevelProof) -> Verdicts:
     return Verdicts(
         claims,
         tuple(map(_with_table, essential(proof))),
-        tuple(unstated.shown for unstated in proof.unstated),
+        tuple(unstated.shown for unstated in proof.unstated if unstated.applies),
     )
 
 

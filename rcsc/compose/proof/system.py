@@ -63,7 +63,7 @@ class SystemProof:
         besides_ = {(proof.level, obligation.key) for proof in self.levels for obligation in besides(proof)}
         return (
             self.proved
-            and not any(proof.unstated for proof in self.levels)
+            and not any(missing.applies for proof in self.levels for missing in proof.unstated)
             and all(claim.proved for need, claim in self.closed.items() if need not in besides_)
         )
 

@@ -39,8 +39,6 @@ from rcsc.symbolic.keyed import sort
 from rcsc.symbolic.values import Node
 
 MOST_STEPS = 400
-DONE, FAILED = "done", "failed"
-"""The statuses that answer a command; with any other, the command goes on."""
 
 Phase = tuple[int, ...]
 Way = tuple[Phase, Phase]
@@ -85,8 +83,8 @@ def no_answers(ts: TransitionSystem) -> tuple[str, ...]:
     reasons = []
     for end in (above, *ts.links.below):
         kind = ts.kinds.get(end.status)
-        if not isinstance(kind, Enum) or DONE not in kind.members:
-            reasons.append(f"`{end.report}` has no `{STATUS}` with a member `{DONE}`")
+        if not isinstance(kind, Enum) or end.done not in kind.members:
+            reasons.append(f"`{end.report}` has no `{STATUS}` with a member `{end.done}`")
         if not isinstance(ts.kinds[end.command], Enum):
             reasons.append(f"`{end.command}` is no enumeration")
     return tuple(reasons)
@@ -107,8 +105,10 @@ def answered(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
 def _ended(ts: TransitionSystem, end: Neighbour, ordered: Leaves, reported: Leaves) -> Node:
     """Return the condition that the report ends the order: *done* or *failed*; the first command *done* alone."""
     rests = values.equal(ordered[end.command], values.constant(ts.kinds[end.command], 0))
-    failed = _says(ts, end.status, reported, FAILED)
-    return values.either(_says(ts, end.status, reported, DONE), values.both(values.negation(rests), failed))
+    failed = _says(ts, end.status, reported, end.failed)
+    return values.either(
+        _says(ts, end.status, reported, end.done), values.both(values.negation(rests), failed)
+    )
 
 
 def _says(ts: TransitionSystem, leaf: str, leaves: Mapping[str, Node], member: str) -> Node:

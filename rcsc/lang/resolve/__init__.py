@@ -17,7 +17,7 @@ array's elements count.
 
 Modules, in the order the data flows: `program` takes the files of a root through the others: `declarations` (units,
 enumerations, constants), `variables`, `externs`, `statements`, `procedures`, `tables`, `levels`, `owners`,
-`properties`.
+`properties`, `roles`.
 """
 
 from rcsc.lang.resolve.program import compile_text, resolve

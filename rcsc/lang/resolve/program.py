@@ -24,11 +24,13 @@ from rcsc.lang.model import (
     TableName,
 )
 from rcsc.lang.project import Loaded, load
+from rcsc.lang.protocol import declared, expanded
 from rcsc.lang.resolve import procedures as calls
 from rcsc.lang.resolve.declarations import Names
 from rcsc.lang.resolve.levels import level
 from rcsc.lang.resolve.owners import Owners
 from rcsc.lang.resolve.properties import resolve_property
+from rcsc.lang.resolve.roles import offered, restart_of, roles_of
 from rcsc.lang.resolve.tables import table
 from rcsc.lang.syntax import tree
 
@@ -88,6 +90,11 @@ class _Resolver:
     def program(self, all_: list[tree.Declaration], root: tree.File) -> Program | tuple[Diagnostic, ...]:
         """The program, or what is wrong."""
         scope = self.scope
+        parties = declared(scope, all_)
+        if scope.diagnostics:  # what would be made of it would only repeat this
+            return tuple(sorted(set(scope.diagnostics), key=sort_key))
+        deferred = [d.name.text for d in all_ if isinstance(d, tree.VariableDecl) and d.deferred]
+        all_ = expanded(parties, all_)
         enums = Names(scope, all_).declare()
         written = [d for d in all_ if isinstance(d, tree.ProcedureDecl) and scope.claim(d.name, "call")]
         scope.procedures.update({d.name.text: d for d in written})
@@ -99,6 +106,9 @@ class _Resolver:
         invariants = self._invariants(all_)
         properties = self._properties(all_)
         tables = self._tables(all_, {a.name for a in assumptions})
+        if not scope.diagnostics:
+            more, tables = offered(scope, parties, deferred, tables, procedures)
+            assumptions += more
         levels = self._levels(all_, tables, owners, procedures)
         if scope.diagnostics:
             return tuple(sorted(set(scope.diagnostics), key=sort_key))
@@ -119,6 +129,8 @@ class _Resolver:
             owners.all(),
             levels,
             properties,
+            roles_of(scope, parties),
+            restart_of(scope, parties),
         )
 
     def _assumptions(self, all_: list[tree.Declaration]) -> tuple[Assumption, ...]:

@@ -92,7 +92,8 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
         message = f"a part of `{written.name.text}`, written out, has more than {MOST_NAME} characters"
         scope.report(Code.LONG_NAME, message, written.name.span)
         return
-    initial, safe = _constant(scope, written.initial, kind, "initial"), _safe(scope, written, kind)
+    initial, safe = value_given(scope, written.initial, kind, "initial"), _safe(scope, written, kind)
+    restart = _restart(scope, written, kind)
     deferred = written.deferred_until is not None and _may_be_deferred(scope, written, kind)
     for name, leaf in flat:
         least = value_of_key(leaf, key_bounds(leaf)[0])
@@ -106,6 +107,7 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
             " ".join(written.doc),
             written.name.span,
             safe,
+            restart,
         )
         scope.leaves[name] = variable
         if deferred:
@@ -143,8 +145,8 @@ def _leaves(name: str, kind: Type) -> Iterator[tuple[str, Scalar]]:
             yield name, kind
 
 
-def _constant(scope: Scope, written: tree.Expr | None, kind: Type, what: str) -> Value | None:
-    """Return the initial or safe value; None where none is written, or no valid one."""
+def value_given(scope: Scope, written: tree.Expr | None, kind: Type, what: str) -> Value | None:
+    """Return the initial, safe or restart value; None where none is written, or no valid one."""
     if written is None:
         return None
     if not isinstance(kind, Bool | Enum | Int | Real):
@@ -162,7 +164,15 @@ def _safe(scope: Scope, written: tree.VariableDecl, kind: Type) -> Value | None:
         message = f"only an output has a safe value, `{written.name.text}` is not one"
         scope.report(Code.KIND, message, written.name.span)
         return None
-    return _constant(scope, written.safe, kind, "safe")
+    return value_given(scope, written.safe, kind, "safe")
+
+
+def _restart(scope: Scope, written: tree.VariableDecl, kind: Type) -> Value | None:
+    if written.restart is not None and written.kind == "input":
+        message = f"a state or an output has a value after a restart, `{written.name.text}` is an input"
+        scope.report(Code.KIND, message, written.name.span)
+        return None
+    return value_given(scope, written.restart, kind, "restart")
 
 
 def fits(scope: Scope, kind: Scalar, value: Typed, span: Span) -> bool:

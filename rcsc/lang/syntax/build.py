@@ -99,14 +99,25 @@ class Build:
     def _variable_decl(self, node: ParseNode) -> tree.VariableDecl:
         head = self._head(node)
         kind, name, declared, *rest = node.children
-        admit, equal, safe = (self._kind(rest, word) for word in ("ADMIT", "EQUAL", "SAFE"))
-        words = {id(word) for word in (admit, equal, safe)}
+        admit, equal, safe, again = (self._kind(rest, word) for word in ("ADMIT", "EQUAL", "SAFE", "RESTART"))
+        deferred = self._find(rest, "deferred")
+        words = {id(word) for word in (admit, equal, safe, again, deferred)}
         exprs = [item for item in rest if id(item) not in words]
         initial = self.expr(exprs.pop(0)) if equal is not None else None
         shown = self.expr(exprs.pop(0)) if safe is not None else None
-        until = self.expr(exprs[0]) if exprs else None
+        adopted = self.expr(exprs.pop(0)) if again is not None else None
+        until = self.expr(deferred.children[0]) if deferred is not None and deferred.children else None
         return tree.VariableDecl(
-            str(kind), self._name(name), self.type(declared), initial, str(admit or ""), until, shown, **head
+            str(kind),
+            self._name(name),
+            self.type(declared),
+            initial,
+            str(admit or ""),
+            until,
+            shown,
+            deferred is not None and not deferred.children,
+            adopted,
+            **head,
         )
 
     def _assume_decl(self, node: ParseNode) -> tree.AssumeDecl:
@@ -170,6 +181,45 @@ class Build:
         rows = [item for item in node.children if getattr(item, "type", None) == "ROW"]
         conditions, actions, lines = self.rows.table(rows)
         return tree.TableDecl(self._name(node.children[0]), assuming, conditions, actions, lines, **head)
+
+    def _link_decl(self, node: ParseNode) -> tree.LinkDecl:
+        head = self._head(node)
+        name, said, status, *parts = node.children
+        command, rest = map(self._name, said.children)
+        kind, done, failed, executing = map(self._name, status.children)
+        order, report = (
+            self._link_fields(self._find(parts, rule)) for rule in ("order_fields", "report_fields")
+        )
+        return tree.LinkDecl(
+            self._name(name), command, rest, kind, done, failed, executing, order, report, **head
+        )
+
+    def _link_fields(self, node: ParseNode | None) -> tuple[tree.LinkField, ...]:
+        return () if node is None else tuple(self._link_field(part) for part in node.children)
+
+    def _link_field(self, node: ParseNode) -> tree.LinkField:
+        head = self._head(node)
+        word = next(
+            (str(self._kind(node.children, w)) for w in ("STREAM", "REASON") if self._kind(node.children, w)),
+            "",
+        )
+        name, kind, *again = node.children[bool(word) :]
+        adopted = self.expr(again[1]) if again else None
+        return tree.LinkField(self._name(name), self.type(kind), word, adopted, **head)
+
+    def _serves_decl(self, node: ParseNode) -> tree.ServesDecl:
+        peer, link, *without = node.children
+        names = self._names(without[0]) if without else ()
+        return tree.ServesDecl(self._name(peer), self._name(link), names, **self._head(node))
+
+    def _commands_decl(self, node: ParseNode) -> tree.CommandsDecl:
+        head = self._head(node)
+        peer, link, *within = node.children
+        if not within:
+            return tree.CommandsDecl(self._name(peer), self._name(link), **head)
+        cycles, *late = within[0].children
+        reason = self._name(late[0]) if late else None
+        return tree.CommandsDecl(self._name(peer), self._name(link), self.expr(cycles), reason, **head)
 
     def _level_decl(self, node: ParseNode) -> tree.LevelDecl:
         head = self._head(node)

@@ -11,7 +11,7 @@ from rcsc.lang.syntax.rows import ACTION_WORDS
 from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_type
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
-         tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl)  # fmt: skip
+         tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl)  # fmt: skip
 
 
 def format_file(file: tree.File) -> str:
@@ -50,14 +50,8 @@ def _declaration(declaration: tree.Declaration) -> Iterator[str]:
     match declaration:
         case tree.Use(path):
             yield f"use {path}"
-        case tree.UnitDecl(name):
-            yield f"unit {name.text}"
-        case tree.ConstDecl(name, value):
-            yield f"const {name.text} = {spell_expr(value)}"
-        case tree.EnumDecl(name, members):
-            yield f"enum {name.text} {{ {', '.join(member.text for member in members)} }}"
-        case tree.TypeDecl(name, kind):
-            yield f"type {name.text} = {spell_type(kind)}"
+        case tree.UnitDecl() | tree.ConstDecl() | tree.EnumDecl() | tree.TypeDecl():
+            yield _type(declaration)
         case tree.RecordDecl():
             yield from _record(declaration)
         case tree.VariableDecl():
@@ -71,8 +65,24 @@ def _declaration(declaration: tree.Declaration) -> Iterator[str]:
             yield f"owner {name.text} {{{inside}}}"
         case tree.TableDecl():
             yield from _table(declaration)
+        case tree.LinkDecl():
+            yield from _link(declaration)
+        case tree.ServesDecl() | tree.CommandsDecl():
+            yield _role(declaration)
         case tree.LevelDecl():
             yield from _level(declaration)
+
+
+def _type(one: tree.UnitDecl | tree.ConstDecl | tree.EnumDecl | tree.TypeDecl) -> str:
+    match one:
+        case tree.UnitDecl(name):
+            return f"unit {name.text}"
+        case tree.ConstDecl(name, value):
+            return f"const {name.text} = {spell_expr(value)}"
+        case tree.EnumDecl(name, members):
+            return f"enum {name.text} {{ {', '.join(member.text for member in members)} }}"
+        case tree.TypeDecl(name, kind):
+            return f"type {name.text} = {spell_type(kind)}"
 
 
 def _claim(claim: tree.AssumeDecl | tree.InvariantDecl | tree.PropertyDecl) -> str:
@@ -96,16 +106,40 @@ def _record(record: tree.RecordDecl) -> Iterator[str]:
     yield "}"
 
 
+def _link(one: tree.LinkDecl) -> Iterator[str]:
+    yield f"link {one.name.text} {{"
+    yield f"  command : {one.command.text} rest {one.rest.text}"
+    yield f"  status : {one.status.text} done {one.done.text} failed {one.failed.text} executing {one.executing.text}"
+    for word, fields in (("order", one.order), ("report", one.report)):
+        if fields:
+            yield f"  {word} {{"
+            for part in fields:
+                yield from _above(part.comments, part.doc, "    ")
+                adopted = f" restart {spell_expr(part.restart)}" if part.restart is not None else ""
+                name = f"{part.word} {part.name.text}" if part.word else part.name.text
+                yield f"    {name} : {spell_type(part.type)}{adopted}"
+            yield "  }"
+    yield "}"
+
+
+def _role(one: tree.ServesDecl | tree.CommandsDecl) -> str:
+    if isinstance(one, tree.ServesDecl):
+        without = ", ".join(name.text for name in one.without)
+        return f"serves {one.peer.text} : {one.link.text}" + (f" without {without}" if without else "")
+    text = f"commands {one.peer.text} : {one.link.text}"
+    text += f" within {spell_expr(one.within)} cycles" if one.within is not None else ""
+    return text + (f" else {one.late.text}" if one.late is not None else "")
+
+
 def _variable(variable: tree.VariableDecl) -> str:
     text = f"{variable.kind} {variable.name.text} : {spell_type(variable.type)}"
     text += f" = {spell_expr(variable.initial)}" if variable.initial is not None else ""
     text += f" safe {spell_expr(variable.safe)}" if variable.safe is not None else ""
+    text += f" restart {spell_expr(variable.restart)}" if variable.restart is not None else ""
     text += f" {variable.admit}" if variable.admit else ""
-    return text + (
-        f" deferred until {spell_expr(variable.deferred_until)}"
-        if variable.deferred_until is not None
-        else ""
-    )
+    if variable.deferred_until is not None:
+        return f"{text} deferred until {spell_expr(variable.deferred_until)}"
+    return f"{text} deferred" if variable.deferred else text
 
 
 def _procedure(procedure: tree.ProcedureDecl) -> Iterator[str]:

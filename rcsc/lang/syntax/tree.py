@@ -433,10 +433,11 @@ class RecordDecl(Documented):
 
 @dataclass(frozen=True, slots=True)
 class VariableDecl(Documented):
-    """`input|state|output name : type = initial [safe value] [clamp|reject] [deferred until expr]`.
+    """`input|state|output name : type = initial [safe value] [restart value] [clamp|reject] [deferred [until expr]]`.
 
-    `admit` is "", "clamp" or "reject" and only for inputs, `safe` only for outputs. A missing initial value means
-    the least value of the type (first member, low bound, false).
+    `deferred` says that it stands without `until`: then it waits for the echoes of all the last orders. `admit` is "", "clamp" or
+    "reject" and only for inputs, `safe` only for outputs. A missing initial value means the least value of the type (first member,
+    low bound, false).
     """
 
     kind: str  # input, state, output
@@ -446,6 +447,8 @@ class VariableDecl(Documented):
     admit: str = ""
     deferred_until: Expr | None = None
     safe: Expr | None = None
+    deferred: bool = False
+    restart: Expr | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -526,6 +529,57 @@ class TableDecl(Documented):
 
 
 @dataclass(frozen=True, slots=True)
+class LinkField(FieldDecl):
+    """`[stream|reason] name : type [restart value]` in a link's order or report.
+
+    A `stream` changes without a new number, and is looked at as it comes; the `reason` says why a command failed.
+    """
+
+    word: str = ""
+    restart: Expr | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LinkDecl(Documented):
+    """`link name { command : type rest member status : type done .. failed .. executing .. order { } report { } }`.
+
+    What a superior and a subordinate say to each other; numbers and echoes are not declared.
+    """
+
+    name: Name
+    command: Name
+    rest: Name
+    status: Name
+    done: Name
+    failed: Name
+    executing: Name
+    order: tuple[LinkField, ...] = ()
+    report: tuple[LinkField, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ServesDecl(Documented):
+    """`serves peer : link [without a, b]`: who gives this level its orders, and which standard properties are not asked of it."""
+
+    peer: Name
+    link: Name
+    without: tuple[Name, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CommandsDecl(Documented):
+    """`commands peer : link [within expr cycles [else reason]]`: to whom this level gives orders.
+
+    An order that is not echoed after so many cycles counts as failed, with the reason.
+    """
+
+    peer: Name
+    link: Name
+    within: Expr | None = None
+    late: Name | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Dispatch:
     """`member : table` in a level's `table by variable { ... }`."""
 
@@ -565,6 +619,9 @@ Declaration: TypeAlias = (
     | ProcedureDecl
     | OwnerDecl
     | TableDecl
+    | LinkDecl
+    | ServesDecl
+    | CommandsDecl
     | LevelDecl
 )
 

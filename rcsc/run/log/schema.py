@@ -16,7 +16,7 @@ from rcsc.host.files.names import file_name
 from rcsc.host.files.read import CheckedFields, content, json_of
 from rcsc.run.adopt import Begun
 from rcsc.run.description import LONGEST_MS, MOST_LEVELS, Description, Wire, level_of, wire_of
-from rcsc.run.signature import FORMATS, Leaf, Signature, generated_files, signature_of
+from rcsc.run.signature import FORMATS, Leaf, Signature, generated_files, restart_written, signature_of
 
 FORMAT = "1"
 SYSTEM, PROGRAMS = "rcsc.system", "rcsc.programs"
@@ -86,7 +86,10 @@ def compact(value: object) -> str:
 
 def signature_text(sign: Signature) -> str:
     """A signature as text."""
-    return compact(asdict(sign))
+    written = asdict(sign)
+    del written["restart"]
+    declared = restart_written(sign)
+    return compact({**written, **({"restart": declared} if declared is not None else {})})
 
 
 def signature_from(text: str) -> Signature:

@@ -250,7 +250,29 @@ def _variables_and_claims() -> SearchStrategy[tree.Declaration]:
     may_be, standings = st.none() | expressions(), st.sampled_from(["", "assumed", "monitored", "proved"])
     words = st.sampled_from(["then", "until"])
     return st.one_of(
-        st.builds(tree.VariableDecl, kinds, NAMES, types(), may_be, refusals, may_be, may_be, **_HEAD),
+        st.builds(
+            tree.VariableDecl,
+            kinds,
+            NAMES,
+            types(),
+            may_be,
+            refusals,
+            may_be,
+            may_be,
+            restart=may_be,
+            **_HEAD,
+        ),
+        st.builds(
+            tree.VariableDecl,
+            kinds,
+            NAMES,
+            types(),
+            may_be,
+            refusals,
+            deferred=st.just(True),
+            restart=may_be,
+            **_HEAD,
+        ),
         st.builds(tree.AssumeDecl, NAMES, expressions(), standings, **_HEAD),
         st.builds(tree.InvariantDecl, NAMES, expressions(), **_HEAD),
         st.builds(tree.PropertyDecl, NAMES, expressions(), **_HEAD),
@@ -273,9 +295,31 @@ def _procedures() -> SearchStrategy[tree.Declaration]:
 
 
 @cache
+def _roles() -> SearchStrategy[tree.Declaration]:
+    fields = st.lists(
+        st.builds(
+            tree.LinkField,
+            NAMES,
+            types(),
+            st.sampled_from(["", "stream", "reason"]),
+            st.none() | expressions(),
+            **_HEAD,
+        ),
+        max_size=2,
+    ).map(tuple)
+    names = st.lists(NAMES, max_size=2).map(tuple)
+    return st.one_of(
+        st.builds(tree.LinkDecl, NAMES, *(NAMES for _ in range(6)), fields, fields, **_HEAD),
+        st.builds(tree.ServesDecl, NAMES, NAMES, names, **_HEAD),
+        st.builds(tree.CommandsDecl, NAMES, NAMES, **_HEAD),
+        st.builds(tree.CommandsDecl, NAMES, NAMES, expressions(), st.none() | NAMES, **_HEAD),
+    )
+
+
+@cache
 def declarations() -> SearchStrategy[tree.Declaration]:
     """Any declaration."""
-    return st.one_of(_names_of_things(), _variables_and_claims(), _procedures(), tables(), levels())
+    return st.one_of(_names_of_things(), _variables_and_claims(), _procedures(), tables(), _roles(), levels())
 
 
 @cache

@@ -1,0 +1,255 @@
+"""Who is whose superior, as a program declares it: checked before anything is made of it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.scope import Scope
+from rcsc.lang.syntax import tree
+
+MOST_DEPTH, MOST_LENGTH = 16, 1024
+"""How deep types nest, and how long arrays are, that an order is numbered by."""
+
+
+@dataclass(frozen=True, slots=True)
+class Party:
+    """A neighbour, and the link to it.
+
+    Attributes:
+        without: Standard properties that are not asked.
+        within: Cycles after which an order that is not echoed has failed; None where it is waited for without end.
+        late: The reason that is then given; None where there is none.
+        failed: The place of *failed* among the members of the status.
+        numbered: Scalars of the order that change with its number only.
+        none: The member of the reason that says that there is none; None where the report has no reason.
+    """
+
+    peer: tree.Name
+    link: tree.LinkDecl
+    failed: int
+    numbered: tuple[str, ...]
+    none: str | None
+    without: tuple[str, ...] = ()
+    within: tree.Expr | None = None
+    late: str | None = None
+
+    @property
+    def name(self) -> str:
+        """What the level calls the neighbour: what the neighbour says."""
+        return self.peer.text
+
+    @property
+    def told(self) -> str:
+        """The output to the neighbour."""
+        return f"to_{self.name}"
+
+    @property
+    def raw(self) -> str:
+        """A subordinate's report as it comes."""
+        return f"from_{self.name}"
+
+    @property
+    def last(self) -> str:
+        """The order to a subordinate that was numbered last."""
+        return f"last_{self.name}"
+
+    @property
+    def held(self) -> tuple[tree.LinkField, ...]:
+        """Fields of the report that are held until every last order is echoed."""
+        return tuple(part for part in self.link.report if part.word != "stream")
+
+    @property
+    def reason(self) -> str | None:
+        """The field of the report that says why a command failed."""
+        return next((part.name.text for part in self.link.report if part.word == "reason"), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Parties:
+    """Whom the levels of a program serve and command.
+
+    Attributes:
+        superior: None where they take no numbered orders.
+        members: Of each enumeration.
+    """
+
+    superior: Party | None
+    subordinates: tuple[Party, ...]
+    members: Mapping[str, tuple[str, ...]]
+
+    def __bool__(self) -> bool:
+        return self.superior is not None or bool(self.subordinates)
+
+    def named(self, name: str) -> Party | None:
+        """The subordinate of that name; None if there is none."""
+        return next((party for party in self.subordinates if party.name == name), None)
+
+
+def declared(scope: Scope, declarations: Sequence[tree.Declaration]) -> Parties:
+    """Find the neighbours that are declared; what is wrong with them is reported."""
+    types = _Types(declarations)
+    written = [d for d in declarations if isinstance(d, tree.LinkDecl) and scope.claim(d.name, "link")]
+    links = {link.name.text: link for link in written if _sound(scope, link, types)}
+    served = [d for d in declarations if isinstance(d, tree.ServesDecl)]
+    for more in served[1:]:
+        scope.report(Code.DUPLICATE_NAME, "a level serves one superior", more.span)
+    superior = _superior(scope, served[0], links, types) if served else None
+    below = (_subordinate(scope, d, links, types) for d in declarations if isinstance(d, tree.CommandsDecl))
+    return Parties(superior, tuple(party for party in below if party is not None), types.members)
+
+
+class _Types:
+    """What is declared of the types that links use.
+
+    Attributes:
+        members: Of each enumeration.
+    """
+
+    def __init__(self, declarations: Sequence[tree.Declaration]) -> None:
+        self.members = {
+            d.name.text: tuple(m.text for m in d.members)
+            for d in declarations
+            if isinstance(d, tree.EnumDecl)
+        }
+        self._named = {d.name.text: d for d in declarations if isinstance(d, tree.TypeDecl | tree.RecordDecl)}
+        self._lengths = {d.name.text: d.value for d in declarations if isinstance(d, tree.ConstDecl)}
+
+    def scalars(self, path: str, kind: tree.TypeExpr, depth: int = 0) -> Iterator[str]:
+        """List the scalars of a field; a type that is not sound is taken for one, and is reported elsewhere."""
+        named = self._named.get(kind.name.text) if isinstance(kind, tree.NamedType) else None
+        length = self._length(kind.length) if isinstance(kind, tree.ArrayType) else None
+        if depth > MOST_DEPTH:
+            yield path
+        elif isinstance(named, tree.RecordDecl):
+            for part in named.fields:
+                yield from self.scalars(f"{path}.{part.name.text}", part.type, depth + 1)
+        elif isinstance(named, tree.TypeDecl):
+            yield from self.scalars(path, named.type, depth + 1)
+        elif isinstance(kind, tree.ArrayType) and length is not None:
+            for at in range(length):
+                yield from self.scalars(f"{path}[{at}]", kind.element, depth + 1)
+        else:
+            yield path
+
+    def _length(self, written: tree.Expr) -> int | None:
+        if isinstance(written, tree.Reference):
+            written = self._lengths.get(written.name.text, written)
+        length = (
+            int(written.text.replace("_", ""), 0) if isinstance(written, tree.IntLiteral) else MOST_LENGTH + 1
+        )
+        return length if length <= MOST_LENGTH else None
+
+    def none(self, link: tree.LinkDecl) -> str | None:
+        """Return the first member of the link's reason; None where it has no reason."""
+        kind = next((part.type for part in link.report if part.word == "reason"), None)
+        return self.members[kind.name.text][0] if isinstance(kind, tree.NamedType) else None
+
+
+def _superior(
+    scope: Scope, served: tree.ServesDecl, links: Mapping[str, tree.LinkDecl], types: "_Types"
+) -> Party | None:
+    link = _link(scope, served.link, links)
+    if link is None:
+        return None
+    for name in served.without:
+        if name.text not in STANDARD:
+            scope.unknown("standard property", name, list(STANDARD))
+    return _party(served.peer, link, types, without=tuple(name.text for name in served.without))
+
+
+def _subordinate(
+    scope: Scope, given: tree.CommandsDecl, links: Mapping[str, tree.LinkDecl], types: "_Types"
+) -> Party | None:
+    link = _link(scope, given.link, links)
+    if link is None:
+        return None
+    late = None if given.late is None else given.late.text
+    party = _party(given.peer, link, types, within=given.within, late=late)
+    if isinstance(given.within, tree.IntLiteral) and not int(given.within.text.replace("_", ""), 0):
+        scope.report(Code.KIND, "an echo takes at least one cycle", given.within.span)
+    if given.late is not None:
+        if party.reason is None:
+            scope.report(Code.KIND, f"the report of link `{link.name.text}` has no `reason`", given.late.span)
+        else:
+            _known_reason(scope, link, given.late, types.members)
+    return party
+
+
+def _known_reason(
+    scope: Scope, link: tree.LinkDecl, late: tree.Name, members: Mapping[str, tuple[str, ...]]
+) -> None:
+    kind = next(part.type for part in link.report if part.word == "reason")
+    known = members.get(kind.name.text, ()) if isinstance(kind, tree.NamedType) else ()
+    if late.text not in known:
+        scope.unknown("reason", late, list(known))
+
+
+def _link(scope: Scope, name: tree.Name, links: Mapping[str, tree.LinkDecl]) -> tree.LinkDecl | None:
+    if (
+        name.text not in links and f"link {name.text}" not in scope.places
+    ):  # else what is wrong with it is reported
+        scope.unknown("link", name, list(links))
+    return links.get(name.text)
+
+
+def _party(peer: tree.Name, link: tree.LinkDecl, types: "_Types", **more: Any) -> Party:
+    failed = types.members[link.status.text].index(link.failed.text)
+    parts = (part for part in link.order if part.word != "stream")
+    scalars = (scalar for part in parts for scalar in types.scalars(part.name.text, part.type))
+    return Party(peer, link, failed, ("input_command", *scalars), types.none(link), **more)
+
+
+def _sound(scope: Scope, link: tree.LinkDecl, types: "_Types") -> bool:
+    """Return whether the members of a link are such; a buffer into which nobody has written must say that all rests."""
+    before, members = len(scope.diagnostics), types.members
+    for kind, named, first in (
+        (link.command, (link.rest,), "the command that rests"),
+        (link.status, (link.done, link.failed, link.executing), "the status of what is done"),
+    ):
+        if kind.text not in members:
+            scope.unknown("enumeration", kind, list(members))
+            continue
+        known = members[kind.text]
+        for member in named:
+            if member.text not in known:
+                scope.unknown(f"member of `{kind.text}`", member, list(known))
+        if named[0].text in known[1:]:
+            scope.report(
+                Code.KIND,
+                f"`{named[0].text}` is {first}, and not the first member of `{kind.text}`",
+                named[0].span,
+                "put it first: a buffer into which nobody has written shows the first member",
+            )
+    for message, span in _misplaced(link, members):
+        scope.report(Code.KIND, message, span)
+    return len(scope.diagnostics) == before
+
+
+def _misplaced(link: tree.LinkDecl, enums: Mapping[str, tuple[str, ...]]) -> Iterator[tuple[str, Span]]:
+    """Describe fields that the protocol makes itself, and reasons that are none."""
+    own = {"inc_command", "input_command"}, {"inc_command_echo", "ref_command_echo", "status_report", *_HELD}
+    for parts, made in zip((link.order, link.report), own, strict=True):
+        for part in parts:
+            if part.name.text in made:
+                yield f"the protocol makes `{part.name.text}` itself", part.name.span
+            if part.word == "reason" and parts is link.order:
+                yield "a reason is a field of the report", part.name.span
+            elif part.word == "reason" and not (
+                isinstance(part.type, tree.NamedType) and part.type.name.text in enums
+            ):
+                yield (
+                    "a reason is of an enumeration; its first member says that there is none",
+                    part.name.span,
+                )
+            if part.restart is not None and parts is link.order:
+                yield "what an order has after a restart is the protocol's", part.name.span
+    for more in [part for part in link.report if part.word == "reason"][1:]:
+        yield "a report has one reason", more.name.span
+
+
+_HELD = ("command", "status", "resting", "late")
+
+STANDARD = ("done_stays", "failed_stays", "done_without_reason", "rests_when_told")
+"""Properties that come with the protocol."""

@@ -1,0 +1,145 @@
+"""Roles as the proof and a restart need them: of leaves, when these are known."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.expressions.typed import boolean
+from rcsc.lang.model import (
+    Assumption,
+    AssumptionName,
+    Enum,
+    Procedure,
+    Role,
+    Roles,
+    Standing,
+    Table,
+    VariableName,
+    pending,
+)
+from rcsc.lang.protocol import Flags, Parties, Party, Watched, condition, in_step
+from rcsc.lang.resolve.variables import value_given
+from rcsc.lang.restart import Adopted, After, Fixed, SameAs
+
+
+def roles_of(scope: Scope, parties: Parties) -> Roles | None:
+    """Return whom the levels serve and command; None where neither is declared."""
+    if not parties:
+        return None
+    above = parties.superior
+    superior = None if above is None else _role(above, above.name, above.told, scope)
+    return Roles(
+        superior, tuple(_role(party, party.told, party.raw, scope) for party in parties.subordinates)
+    )
+
+
+def _role(party: Party, order: str, report: str, scope: Scope) -> Role:
+    records = [f"{order}.{part}" for part in party.numbered]
+    numbered = tuple(
+        leaf for leaf in map(VariableName, scope.leaves) if any(_part_of(leaf, r) for r in records)
+    )
+    late = VariableName(f"{party.name}.late") if party.within is not None else None
+    reason = VariableName(f"{report}.{party.reason}") if party.reason is not None else None
+    link = party.link
+    return Role(
+        party.name, order, report, numbered, link.rest.text, link.done.text, link.failed.text, reason, late
+    )
+
+
+def _part_of(leaf: str, record: str) -> bool:
+    return leaf == record or leaf.startswith((f"{record}.", f"{record}["))
+
+
+def restart_of(scope: Scope, parties: Parties) -> tuple[tuple[VariableName, Adopted], ...] | None:
+    """Return what leaves adopt that the protocol or a variable's `restart` says; None where neither does."""
+    adopted = dict(_protocol(scope, parties))
+    for name, leaf in scope.leaves.items():
+        if leaf.restart is not None:
+            adopted[name] = Fixed(leaf.restart)
+    return tuple((VariableName(leaf), value) for leaf, value in adopted.items()) or None
+
+
+def _protocol(scope: Scope, parties: Parties) -> Iterator[tuple[str, Adopted]]:
+    """What a level adopts that starts anew: the order in its buffer counts as seen, and has failed; each level below is to rest."""
+    above = parties.superior
+    if above is not None:
+        yield "inc_command_seen", SameAs(f"{above.name}.inc_command")
+        yield f"{above.told}.status_report", Fixed(above.failed)
+        for part in above.link.report:
+            leaf = scope.leaves.get(f"{above.told}.{part.name.text}")
+            value = None if leaf is None else value_given(scope, part.restart, leaf.type, "restart")
+            if value is not None:
+                yield f"{above.told}.{part.name.text}", Fixed(value)
+    for party in parties.subordinates:
+        yield f"{party.told}.input_command", Fixed(0)
+        yield f"{party.told}.inc_command", After(f"{party.raw}.inc_command_echo")
+
+
+# --- what each table may rest on ---
+
+
+def offered(
+    scope: Scope,
+    parties: Parties,
+    deferred: Sequence[str],
+    tables: Sequence[Table],
+    procedures: Sequence[Procedure],
+) -> tuple[tuple[Assumption, ...], tuple[Table, ...]]:
+    """Return the tables with the assumptions of the protocol that they can rest on, and these.
+
+    They are monitored, and `prove` proves them: a state goes with the order that it waits for, and what rests says so.
+    """
+    if not parties:
+        return (), tuple(tables)
+    bodies = {str(procedure.name): procedure for procedure in procedures}
+    watched = tuple(_watched(scope, parties, deferred))
+    flags = Flags("new_command", "settling") if parties.superior is not None else Flags("", "")
+    assumptions: list[Assumption] = []
+    resting: list[Table] = []
+    for table in tables:
+        texts = {"in_step": in_step(table, watched, flags, bodies), "resting": _resting(parties, table)}
+        own = []
+        for word, text in texts.items():
+            name = f"{table.name}_{word}"
+            if text is None or f"assumption {name}" in scope.places:
+                continue
+            whole = boolean(scope, Body(), condition(text, table.span))
+            if whole is not None:
+                own.append(
+                    Assumption(AssumptionName(name), Standing.MONITORED, whole, _SAID[word], table.span)
+                )
+        assumptions += own
+        resting.append(replace(table, assumptions=(*table.assumptions, *(one.name for one in own))))
+    return tuple(assumptions), tuple(resting)
+
+
+_SAID = {
+    "in_step": "A state goes with the orders that it waits for (section 9).",
+    "resting": "What rests says so.",
+}
+
+
+def _watched(scope: Scope, parties: Parties, deferred: Sequence[str]) -> Iterator[Watched]:
+    for name in deferred:
+        leaf = scope.leaves.get(name)
+        if leaf is not None and isinstance(leaf.type, Enum):
+            begins = {int(leaf.initial), int(leaf.initial if leaf.restart is None else leaf.restart)}
+            yield Watched(name, str(pending(name)), leaf.type, frozenset(begins))
+    for party in parties.subordinates:
+        leaf = scope.leaves.get(f"{party.name}.command")
+        if leaf is not None and isinstance(leaf.type, Enum):
+            order = f"{party.told}.input_command"
+            yield Watched(str(leaf.name), order, leaf.type, frozenset({0}), f"{party.name}.resting")
+
+
+def _resting(parties: Parties, table: Table) -> str | None:
+    """Say of each subordinate whose rest the table looks for what that means of what else it looks at."""
+    read = set(map(str, table.variables))
+    parts = []
+    for party in parties.subordinates:
+        said = {f"{party.name}.command": party.link.rest.text, f"{party.name}.status": party.link.done.text}
+        if f"{party.name}.resting" in read and (
+            named := [f"{leaf} = {word}" for leaf, word in said.items() if leaf in read]
+        ):
+            parts.append(f"({party.name}.resting implies {' and '.join(named)})")
+    return " and ".join(parts) or None

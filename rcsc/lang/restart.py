@@ -1,0 +1,99 @@
+"""What a level adopts that starts anew: its command counts as seen and has failed, and each level below gets its command to rest.
+
+In: the parts of a program, as leaves or as a symbol file has them. Out: for each leaf that starts other than initially, from what. The
+proof and the running level read the same list.
+
+A program that declares whom it serves and commands says itself what it adopts. For any other it goes by the names that the protocol's
+variables usually have: the input `command` with `inc_command`, the state `inc_command_seen`, orders `to_NAME`, and the input `NAME`
+that echoes them.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+Value: TypeAlias = bool | int | float
+
+NUMBERS = 65536
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """A constant."""
+
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class SameAs:
+    """What an input has."""
+
+    leaf: str
+
+
+@dataclass(frozen=True, slots=True)
+class After:
+    """The number after the one that stands in the buffer; where none stands, after the one that the input echoes."""
+
+    leaf: str
+
+
+Adopted: TypeAlias = Fixed | SameAs | After
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A leaf, as far as its name may mean something.
+
+    Attributes:
+        members: Of an enumeration; empty for others.
+        whole: Least and greatest value of a whole number; None for others.
+    """
+
+    output: bool
+    members: tuple[str, ...]
+    whole: tuple[int, int] | None
+
+
+_ORDER = "to_"
+_ECHOES = {"inc_command": "inc_command_echo", "number": "number"}
+"""How an order is numbered, and where the level below repeats the number; the camera's pictures are numbered, too."""
+_FAILED = {
+    "status_report": "failed",
+    "failure": "restart",
+    "cur_state": "f_state",
+    "cur_state.next": "f_state",
+}
+"""A member, by its name, for a state; the failure stands until the next command."""
+
+
+def by_names(parts: Mapping[str, Part]) -> dict[str, Adopted]:
+    """What a program adopts that does not declare it; what it has no variable for, or one of another type, it does not adopt."""
+    return dict((*_failed(parts), *_seen(parts), *_orders(parts)))
+
+
+def _failed(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
+    for name, member in _FAILED.items():
+        if name in parts and member in parts[name].members:
+            yield name, Fixed(parts[name].members.index(member))
+
+
+def _seen(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
+    seen, taken = parts.get("inc_command_seen"), parts.get("command.inc_command")
+    if seen is None or taken is None or seen.whole is None or taken.whole is None:
+        return
+    if seen.whole[0] <= taken.whole[0] and taken.whole[1] <= seen.whole[1]:
+        yield "inc_command_seen", SameAs("command.inc_command")
+
+
+def _orders(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
+    for name, part in parts.items():
+        if not (part.output and name.startswith(_ORDER)):
+            continue
+        record, _, field = name.partition(".")
+        if field == "input_command":
+            yield name, Fixed(0)
+            continue
+        echo = f"{record.removeprefix(_ORDER)}.{_ECHOES.get(field, '')}"
+        if part.whole is not None and echo in parts and parts[echo].whole is not None:
+            yield name, After(echo)

@@ -1,0 +1,111 @@
+"""A system whose levels declare whom they serve and command: proved with no line of the protocol by hand, refuted where it is wrong."""
+
+import shutil
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from rcsc.compose.contract.obligations import Sort, unstated
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.level import essential, prove_level
+from rcsc.compose.proof.system import transition_systems
+from rcsc.driver.compile import compile_
+from rcsc.driver.settings import Settings
+from rcsc.emit import TARGETS
+from rcsc.lang.model import key_bounds, value_of_key
+from rcsc.run.adopt import adopt
+from rcsc.run.description import description
+from rcsc.run.system import signatures
+from rcsc.solvers.options import Options
+from tests.support.programs.texts import edit_file
+
+DOCK = Path(__file__).parents[1] / "data" / "protocol"
+
+
+@pytest.fixture
+def dock(tmp_path: Path) -> Path:
+    """The description of a docking robot, to be changed."""
+    shutil.copytree(DOCK, tmp_path / "dock")
+    return tmp_path / "dock" / "system.toml"
+
+
+def test_every_obligation_of_a_docking_robot_is_stated_and_proved() -> None:
+    for name, ts in transition_systems(DOCK / "system.toml").items():
+        proof = prove_level(ts, Effort(looks=False))
+        assert not proof.open, name
+        assert not [missing for missing in unstated(ts) if missing.applies], name
+        sorts = {obligation.sort for obligation, _ in proof.verdicts}
+        assert {Sort.ONCE, Sort.ANSWERED, Sort.ECHOES, Sort.PROPERTY} <= sorts
+        assert (
+            name != "supervisor"
+            or {Sort.WAITS, Sort.PAUSES, Sort.NUMBERED, Sort.ASSUMPTION, Sort.DEFERRED} <= sorts
+        )
+
+
+@pytest.mark.parametrize(
+    ("level", "was", "now", "sort", "name"),
+    [
+        ("drive", "| start | true        |        |", "| start | true        | bad    |", Sort.SOME_LINE, ""),
+        ("drive", "| idle  | false       | idle", "| idle  |             | idle", Sort.ONE_LINE, ""),
+        ("drive", "|| blocked; stage(bad)", "|| blocked            ", Sort.PROPERTY, "failed_stays"),
+        ("drive", "stage(bad) | 0     | failed", "stage(idle)| 0     | done  ", Sort.PROPERTY, "done_without_reason"),
+        ("supervisor", "false      | true          | false |", "false      | true          |       |", Sort.ONE_LINE, ""),
+        ("supervisor", "seen := beacon\n  }", "}\n  seen := beacon", Sort.WAITS, "to_drive"),
+        ("supervisor", "|| phase(rest) | stop  | executing", "|| phase(rest) |       | executing", Sort.PAUSES, "to_drive"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_in_a_table_is_found(
+    dock: Path, level: str, was: str, now: str, sort: Sort, name: str
+) -> None:
+    edit_file(dock.parent / f"{level}.rcs", (was, now))
+    proof = prove_level(transition_systems(dock)[level], Effort(walks=6, cycles=40, looks=False))
+    broken = {(obligation.sort, obligation.name) for obligation in essential(proof)}
+    assert (sort, name) in broken, broken
+
+
+FORGETS = """
+table goto {
+  | line  | now    | bumper | travelled_mm            || procedures          | speed | status_out |
+  |-------|--------|--------|-------------------------||---------------------|-------|------------|
+  | bump  | moving | true   |                         || blocked; stage(bad) | 0     | failed     |
+  | there | moving | false  | >= supervisor.target_mm || stage(idle)         | 0     | done       |
+  | go    | moving | false  | < supervisor.target_mm  ||                     | 400   | executing  |
+  | idle  | idle   |        |                         ||                     | 0     | done       |
+  | bad   | bad    |        |                         ||                     | 0     | failed     |
+}
+"""
+
+
+def test_a_table_that_looks_at_what_it_keeps_has_to_look_for_a_new_command(dock: Path) -> None:
+    """GOTO reports of a new command what it reported of the last one: nothing moves, and all is done."""
+    drive = dock.parent / "drive.rcs"
+    text = drive.read_text()
+    begins = text.index("table goto"), text.index("table stop")
+    drive.write_text(text[: begins[0]] + FORGETS + text[begins[1] :])
+    proof = prove_level(transition_systems(dock)["drive"], Effort(walks=6, cycles=40, looks=False))
+    assert (Sort.ANSWERED, "goto") in {(one.sort, one.table) for one in essential(proof)}
+
+
+def test_a_running_level_adopts_what_the_proof_says_after_a_restart(dock: Path) -> None:
+    files = tuple(str(dock.parent / f"{name}.rcs") for name in ("supervisor", "drive"))
+    generated = dock.parent / "generated"
+    assert not compile_(Settings(files, Options()), generated, TARGETS, only_check=False).report.failed
+    signs, random = signatures(description(dock)), Random(12)  # noqa: S311  # repeatable on purpose
+    for name, ts in transition_systems(dock).items():
+        sign = signs[name]
+        for _ in range(50):
+            now: dict[str, bool | int | float] = {leaf.name: leaf.initial for leaf in sign.leaves}
+            for leaf in ts.inputs:
+                low, high = key_bounds(ts.kinds[leaf])
+                now[leaf] = value_of_key(
+                    ts.kinds[leaf], random.choice([low, high, random.randint(low, high)])
+                )
+            adopted = dict(zip(now, adopt(sign, tuple(now[leaf.name] for leaf in sign.leaves)), strict=True))
+            for leaf, node in ts.restarted().items():
+                if node.known:
+                    assert node.low == int(adopted[leaf]), leaf
+            assert ts.links.above is not None
+            assert adopted["inc_command_seen"] == now[ts.links.above.number]
+            for below in ts.links.below:
+                assert adopted[below.number] == (now[below.echo] + 1) % 65536
