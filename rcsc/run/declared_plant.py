@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rcsc.host.described import (
+    Anything,
     Document,
     Entries,
     Flag,
@@ -27,16 +28,20 @@ from rcsc.lang.project import project_root
 
 PYTHON: Mapping[str, Kind] = {"python": Text(), "parties": Listing(Word()), "by_hand": Flag()}
 SENSOR = Record(
-    {"sensor": Text()},
+    {},
     {
-        "unit": Text(),
+        "sensor": Text(),
         "element": Number(0, 1000, whole=True),
+        "unit": Text(),
+        "scale": Number(),
         "over": Number(),
         "under": Number(),
-        "scale": Number(),
+        "value": Anything(),
     },
 )
-ACTUATOR = Record({"actuator": Text()}, {"unit": Text(), "values": Entries(Number())})
+ACTUATOR = Record(
+    {}, {"actuator": Text(), "unit": Text(), "scale": Number(), "values": Entries(Number()), "ignore": Flag()}
+)
 MODEL: Mapping[str, Kind] = {
     "model": Text(),
     "parties": Listing(Word()),

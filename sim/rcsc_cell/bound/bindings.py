@@ -1,0 +1,307 @@
+"""Sensors and actuators of a model, each bound to a field of a buffer: names, elements, units and ranges checked before anything moves.
+
+In: a model, a description and signatures. Out: `SensorBinding` and `ActuatorBinding` in the order of the buffers' leaves, or all
+that does not fit, each at its line of the description.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import mujoco
+
+from rcsc.host.described import Document, KeyPath, nearest
+from rcsc.run.plant import fields
+from rcsc.run.plant.bind import Buffer
+from rcsc.run.plant.units import Factor, factor
+from rcsc.run.plant.values import FlagLink, MemberLink, NumberLink
+from rcsc.run.signature import Leaf, Value
+from rcsc_cell.bound.model_units import driven_in, sensed_in
+
+ONE = Factor(Fraction(1))
+BY_HAND = 'write the plant in Python: `[plant] python = "plant.py"`'
+
+
+@dataclass(frozen=True, slots=True)
+class SensorBinding:
+    """What a leaf from outside is filled with.
+
+    Attributes:
+        end: The field.
+        at: Where the reading stands in `sensordata`; -1 for `value`, which stands still.
+        link: To the leaf; None for a bool that is true beyond a threshold.
+        over: A bool is true above it; `under` below it.
+    """
+
+    end: str
+    at: int
+    link: NumberLink | None = None
+    over: float | None = None
+    under: float | None = None
+    value: Value = 0
+
+    def read(self, readings: Sequence[float]) -> Value:
+        """The leaf's value.
+
+        Raises:
+            BadValue: The leaf cannot hold it.
+        """
+        if self.at < 0:
+            return self.value
+        reading = float(readings[self.at])
+        if self.link is None:
+            return reading > self.over if self.over is not None else reading < (self.under or 0.0)
+        [value] = self.link.given(reading)
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorBinding:
+    """What a leaf of a level drives.
+
+    Attributes:
+        at: Of the control.
+        place: Of the leaf in its buffer.
+        link: From the leaf; None where `values` has a control for each of its members, or for false and true.
+    """
+
+    at: int
+    place: int
+    link: NumberLink | None = None
+    values: tuple[float, ...] = ()
+
+    def control(self, value: Value) -> float:
+        """The control of a value."""
+        return self.values[int(value)] if self.link is None else float(self.link.taken(iter((value,))))
+
+
+@dataclass(slots=True)
+class Binder:
+    """Binds fields to a model, and notes what does not fit.
+
+    Attributes:
+        path: Of the plant in the description.
+    """
+
+    page: Document
+    path: KeyPath
+    model: Any
+
+    def sensors(self, buffer: Buffer, said: Mapping[str, Mapping[str, Any]]) -> list[SensorBinding]:
+        """What fills each leaf of a buffer from outside; those that fit."""
+        bound = []
+        for end, leaf in _ends(buffer):
+            where = (*self.path, "sensors", end)
+            if end not in said:
+                self.page.wrong(
+                    buffer.path,
+                    f"no sensor fills `{end}`, which `{buffer.variable}` takes",
+                    f'write `"{end}" = {{ sensor = "..." }}`, or `{{ value = ... }}` where it stands still',
+                )
+                continue
+            binding = self._sensor(end, leaf, said[end], where)
+            if binding is not None:
+                bound.append(binding)
+        return bound
+
+    def actuators(self, buffer: Buffer, said: Mapping[str, Mapping[str, Any]]) -> list[ActuatorBinding]:
+        """What each leaf of a level's buffer drives; those that drive something and fit."""
+        bound = []
+        for place, (end, leaf) in enumerate(_ends(buffer)):
+            where = (*self.path, "actuators", end)
+            if end not in said:
+                self.page.wrong(
+                    buffer.path,
+                    f"no actuator takes `{end}`, which `{buffer.variable}` gives",
+                    f'write `"{end}" = {{ actuator = "..." }}`, or `{{ ignore = true }}`',
+                )
+                continue
+            if said[end].get("ignore"):
+                continue
+            binding = self._actuator(place, leaf, said[end], where)
+            if binding is not None:
+                bound.append(binding)
+        return bound
+
+    # --- sensors ---
+
+    def _sensor(self, end: str, leaf: Leaf, said: Mapping[str, Any], where: KeyPath) -> SensorBinding | None:
+        if ("sensor" in said) == ("value" in said):
+            self.page.wrong(where, f"`{end}` needs either `sensor` or `value`")
+            return None
+        if "value" in said:
+            return self._still(end, leaf, said["value"], where)
+        sensor = self._named(mujoco.mjtObj.mjOBJ_SENSOR, "sensor", said["sensor"], where)
+        if sensor is None:
+            return None
+        size, element = int(self.model.sensor_dim[sensor]), int(said.get("element", 0))
+        if element >= size or ("element" not in said and size > 1):
+            self.page.wrong(
+                where, f"sensor `{said['sensor']}` has {size} numbers", "`element = 0` takes the first"
+            )
+            return None
+        at = int(self.model.sensor_adr[sensor]) + element
+        if leaf.c_type == "bool":
+            return self._threshold(end, at, said, where)
+        if leaf.members:
+            self.page.wrong(
+                where,
+                f"a sensor gives numbers, and `{leaf.name}` is one of {', '.join(leaf.members)}",
+                BY_HAND,
+            )
+            return None
+        by = self._factor(leaf, said, sensed_in(self.model, sensor), "sensor", where)
+        return None if by is None else SensorBinding(end, at, NumberLink(leaf, False, by))
+
+    def _still(self, end: str, leaf: Leaf, value: object, where: KeyPath) -> SensorBinding | None:
+        """A field that holds one value."""
+        link = (
+            FlagLink()
+            if leaf.c_type == "bool"
+            else MemberLink(leaf, fields.Members(None))
+            if leaf.members
+            else NumberLink(leaf, False, ONE)
+        )
+        try:
+            [held] = link.given(value)
+        except ValueError as error:
+            self.page.wrong(where, f"`value` {error.args[-1]}")
+            return None
+        return SensorBinding(end, -1, value=held)
+
+    def _threshold(self, end: str, at: int, said: Mapping[str, Any], where: KeyPath) -> SensorBinding | None:
+        if ("over" in said) == ("under" in said):
+            self.page.wrong(
+                where,
+                f"`{end}` is true or false, and a sensor gives a number",
+                "`over = 0.5` makes it true above 0.5, `under = 0.5` below",
+            )
+            return None
+        return SensorBinding(end, at, None, said.get("over"), said.get("under"))
+
+    # --- actuators ---
+
+    def _actuator(
+        self, place: int, leaf: Leaf, said: Mapping[str, Any], where: KeyPath
+    ) -> ActuatorBinding | None:
+        if "actuator" not in said:
+            self.page.wrong(where, f"`{where[-1]}` needs an `actuator`, or `ignore = true`")
+            return None
+        actuator = self._named(mujoco.mjtObj.mjOBJ_ACTUATOR, "actuator", said["actuator"], where)
+        if actuator is None:
+            return None
+        words = leaf.members or (("false", "true") if leaf.c_type == "bool" else ())
+        if words:
+            values = self._values(words, said, where)
+            binding = None if values is None else ActuatorBinding(actuator, place, None, values)
+        else:
+            by = self._factor(leaf, said, driven_in(self.model, actuator), "actuator", where)
+            binding = None if by is None else ActuatorBinding(actuator, place, NumberLink(leaf, False, by))
+        if binding is not None:
+            self._check_control(binding, leaf, str(said["actuator"]), where)
+        return binding
+
+    def _values(
+        self, words: Sequence[str], said: Mapping[str, Any], where: KeyPath
+    ) -> tuple[float, ...] | None:
+        """The control of each member."""
+        values = said.get("values", {})
+        for word in values:
+            if word not in words:
+                self.page.wrong(
+                    (*where, "values", word),
+                    f"`{word}` is no value of the variable",
+                    *nearest(word, list(words)),
+                )
+        missing = [word for word in words if word not in values]
+        if missing:
+            self.page.wrong(
+                where,
+                f"`values` lacks a control for {', '.join(f'`{word}`' for word in missing)}",
+                f"write `values = {{ {missing[0]} = 0.0, ... }}`",
+            )
+        return None if missing else tuple(float(values[word]) for word in words)
+
+    def _check_control(self, binding: ActuatorBinding, leaf: Leaf, name: str, where: KeyPath) -> None:
+        """The model would cut a control beyond its range without a word."""
+        if not self.model.actuator_ctrllimited[binding.at]:
+            return
+        edges = binding.values or tuple(binding.control(edge) for edge in (leaf.low or 0, leaf.high or 0))
+        low, high = (float(bound) for bound in self.model.actuator_ctrlrange[binding.at])
+        if min(edges) < low - 1e-9 or max(edges) > high + 1e-9:
+            self.page.wrong(
+                where,
+                f"`{leaf.name}` drives actuator `{name}` from {min(edges):g} to {max(edges):g}, which takes {low:g} to {high:g}",
+                "widen the model's `ctrlrange`, or narrow the variable's range",
+            )
+
+    # --- both ---
+
+    def _named(self, kind: Any, what: str, name: object, where: KeyPath) -> int | None:
+        """The place of a thing in the model."""
+        found = int(mujoco.mj_name2id(self.model, kind, str(name)))
+        if found >= 0:
+            return found
+        count = self.model.nsensor if what == "sensor" else self.model.nu
+        names = [mujoco.mj_id2name(self.model, kind, at) or "" for at in range(count)]
+        known = [name for name in names if name]
+        self.page.wrong(
+            (*where, what),
+            f"the model has no {what} `{name}`",
+            *(nearest(str(name), known) or ((f"it has {', '.join(known)}",) if known else ())),
+        )
+        return None
+
+    def _factor(
+        self, leaf: Leaf, said: Mapping[str, Any], natural: str | None, what: str, where: KeyPath
+    ) -> Factor | None:
+        """From the model's unit to the variable's; None where they do not fit."""
+        unit = said.get("unit")
+        try:
+            if unit is not None and natural is not None and factor(unit, natural) is None:
+                self.page.wrong((*where, "unit"), f"the {what} is in `{natural}`, and never in `{unit}`")
+                return None
+            if "scale" in said:
+                return self._scaled(leaf, said, where)
+            ours = unit or natural or leaf.unit
+            if unit is None and not leaf.unit and ours:
+                self.page.wrong(
+                    where,
+                    f"the {what} is in `{ours}`, and `{leaf.name}` has no unit",
+                    f"`scale = 1000.0` says how many of the variable's one `{ours}` is"
+                    if what == "sensor"
+                    else f"`scale = 0.001` says how many `{ours}` one of the variable's is",
+                )
+                return None
+            by = factor(ours, leaf.unit)
+        except ValueError as error:
+            self.page.wrong((*where, "unit"), str(error))
+            return None
+        if by is None:
+            variable = f"is in `{leaf.unit}`" if leaf.unit else "has no unit"
+            self.page.wrong(
+                where, f"the {what} is in `{ours}`, and `{leaf.name}` {variable}: one is not the other"
+            )
+        return by
+
+    def _scaled(self, leaf: Leaf, said: Mapping[str, Any], where: KeyPath) -> Factor | None:
+        """A factor that is written: of a variable without a unit only, for any other has one of its own."""
+        if leaf.unit:
+            self.page.wrong(
+                (*where, "scale"),
+                f"`{leaf.name}` is in `{leaf.unit}`, from which the factor follows",
+                "write `unit` instead of `scale`",
+            )
+            return None
+        scale = Fraction(str(said["scale"]))
+        if scale == 0:
+            self.page.wrong((*where, "scale"), "a scale of 0 says nothing")
+            return None
+        return Factor(scale) if where[-2] == "sensors" else Factor(1 / scale)
+
+
+def _ends(buffer: Buffer) -> list[tuple[str, Leaf]]:
+    """The far end of each leaf."""
+    variable = buffer.variable.partition(".")[2]
+    return [(f"{buffer.end}{leaf.name.removeprefix(variable)}", leaf) for leaf in buffer.leaves]

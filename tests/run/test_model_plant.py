@@ -1,0 +1,217 @@
+"""A MuJoCo model as a plant: the docking robot docks by contact, and whatever does not fit is told at its line before anything moves."""
+
+import copy
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.run.description import BadDescription, description
+from rcsc.run.plant.bind import BadPlant, Buffer, PlantFailed, plant_page
+from rcsc.run.plant.load import Staged, load
+from rcsc.run.signature import Leaf, Values
+from rcsc.run.system import signatures
+from rcsc_cell.bound.bindings import Binder
+from rcsc_cell.bound.model_plant import BoundModel
+from tests.support.programs.texts import edited
+
+SPEED = '"base.speed" = { actuator = "wheels", scale = 0.001 }'
+WAY = '"base.travelled" = { sensor = "odometer", unit = "m" }'
+ASIDE = '"base.lateral" = { sensor = "beacon", element = 1 }'
+PIN = '"base.contact" = { sensor = "pin", over = 0.001 }'
+STILL = '"base.bumper" = { value = false }'
+
+
+def stage(folder: Path) -> Staged:
+    """What stands outside the docking robot."""
+    system = description(folder / "system.toml")
+    return load(system, signatures(system), "mujoco")
+
+
+def model_of(folder: Path) -> BoundModel:
+    """The model of a docking robot's folder."""
+    [model] = stage(folder).outside
+    assert isinstance(model, BoundModel)
+    return model
+
+
+def changed(folder: Path, name: str, *edits: tuple[str, str]) -> None:
+    """Edits a file of the docking robot."""
+    text = (folder / name).read_text(encoding="utf-8")
+    (folder / name).write_text(edited(text, *edits), encoding="utf-8")
+
+
+def ordered(speed: int) -> dict[str, Values]:
+    """The buffers while the drive gives a speed, in mm/s."""
+    return {"drive.speed_mm_s": (speed,)}
+
+
+def test_the_robot_docks_by_contact(dock: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (dock / "in.csv").write_text("command\ndock\nstop\n", encoding="utf-8")
+    asked = ["run", str(dock), "--plant", "mujoco", "--script", "in", "--no-compile"]
+    logs = []
+    for kind in ("c", "python"):
+        log = dock / f"{kind}.mcap"
+        assert run([*asked, "--executor", kind, "--log", str(log), "--report", str(dock / "dock.html")]) == 0
+        logs.append(log.read_bytes())
+    assert logs[0] == logs[1]
+    assert [line.split()[1:3] for line in capsys.readouterr().out.splitlines()[:2]] == [
+        ["dock", "done"],
+        ["stop", "done"],
+    ]
+    assert run(["replay", str(dock / "c.mcap"), "--system", str(dock)]) == 0
+    page = (dock / "dock.html").read_text(encoding="utf-8")
+    assert page.count("<figure") >= 2
+    assert "drive.travelled_mm (mm)" in page
+
+
+def test_controls_and_readings_are_converted(dock: Path) -> None:
+    model = model_of(dock)
+    assert model.steps == 20
+    nobody: dict[str, Values] = {}
+    first = model.step(0, nobody.get)
+    assert first == {
+        "base.travelled": (0,), "base.lateral": (120,), "base.bumper": (False,), "base.beacon": (True,), "base.contact": (False,),
+    }  # fmt: skip
+    for tick in range(25):
+        given = model.step(tick, ordered(400).get)
+    assert model.data.ctrl[0] == 0.4
+    [travelled] = given["base.travelled"]
+    assert travelled == round(1000 * float(model.data.qpos[0]))
+    assert 350 < travelled < 400
+
+
+def test_what_moves_can_be_taken_back(dock: Path) -> None:
+    """As the shell's `undo` does."""
+    model = model_of(dock)
+    model.step(0, ordered(400).get)
+    before = copy.deepcopy(model)
+    after = [model.step(tick, ordered(800).get) for tick in range(5)]
+    assert before.model is model.model
+    assert [before.step(tick, ordered(800).get) for tick in range(5)] == after
+
+
+def test_the_model_can_be_looked_at(dock: Path) -> None:
+    staged = stage(dock)
+    assert staged.pictures["solid"]().startswith("<svg")
+
+
+MISFITS = {
+    "no sensor": (PIN, "", "no sensor fills `base.contact`, which `supervisor.contact` takes", 'write `"base.contact" = {'),
+    "no actuator": (SPEED, "", "no actuator takes `base.speed`, which `drive.speed_mm_s` gives", "`{ ignore = true }`"),
+    "sensor's name": (WAY, WAY.replace("odometer", "odometre"), "the model has no sensor `odometre`", "did you mean `odometer`?"),
+    "actuator's name": (SPEED, SPEED.replace("wheels", "legs"), "the model has no actuator `legs`", "it has wheels"),
+    "unit": (WAY, WAY.replace('"m"', '"rad"'), "the sensor is in `m`, and never in `rad`", ""),
+    "garbled unit": (WAY, WAY.replace('"m"', '"m per s"'), "`m per s` is no unit", ""),
+    "no unit": (SPEED, SPEED.replace(", scale = 0.001", ""), "the actuator is in `m/s`, and `speed_mm_s` has no unit", "`scale = 0.001`"),
+    "scale of a unit": (WAY, WAY.replace('unit = "m"', "scale = 2.0"), "`travelled_mm` is in `mm`, from which the factor follows", ""),
+    "no scale": (SPEED, SPEED.replace("0.001", "0"), "a scale of 0 says nothing", ""),
+    "control": (SPEED, SPEED.replace("0.001", "0.01"), "from -2 to 8, which takes -0.2 to 0.8", "`ctrlrange`"),
+    "element": (ASIDE, ASIDE.replace(", element = 1", ""), "sensor `beacon` has 3 numbers", "`element = 0` takes the first"),
+    "no element": (ASIDE, ASIDE.replace("1", "3"), "sensor `beacon` has 3 numbers", ""),
+    "threshold": (PIN, PIN.replace(", over = 0.001", ""), "`base.contact` is true or false", "`over = 0.5`"),
+    "two thresholds": (PIN, PIN.replace("over", "under = 1, over"), "`base.contact` is true or false", ""),
+    "both": (STILL, STILL.replace("value", 'sensor = "pin", value'), "needs either `sensor` or `value`", ""),
+    "neither": (STILL, STILL.replace("value = false", "over = 1"), "needs either `sensor` or `value`", ""),
+    "value": (STILL, STILL.replace("false", "3"), "`value` is `3`, which is no bool", ""),
+    "keyframe": ('keyframe = "beside"', 'keyframe = "besides"', "the model has no keyframe `besides`", ""),
+    "model": ('"robot.xml"', '"robot.xlm"', "the model `robot.xlm` cannot be read: there is no such file", ""),
+    "tick": ("tick_ms = 40", "tick_ms = 5", "a tick of 5 ms is 2.5 of the model's steps of 2 ms", "timestep"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", list(MISFITS))
+def test_what_does_not_fit_is_told_at_its_line(what: str, dock: Path) -> None:
+    before, after, message, help_ = MISFITS[what]
+    changed(dock, "system.toml", (before, after))
+    with pytest.raises(BadPlant) as caught:
+        stage(dock)
+    [diagnostic] = caught.value.diagnostics
+    assert message in diagnostic.message
+    assert any(help_ in said for said in diagnostic.help) or not help_
+    source = caught.value.sources[diagnostic.primary.span.file]
+    line = source.line(source.position(diagnostic.primary.span.start).line)
+    place = {
+        "keyframe": "keyframe",
+        "model": "model",
+        "tick": "model",
+        "no sensor": "base.contact",
+        "no actuator": "drive.speed",
+    }
+    assert place.get(what, before.split("=")[0].strip().strip('"')) in line
+
+
+def test_a_model_that_mujoco_refuses_is_told(dock: Path) -> None:
+    changed(dock, "robot.xml", ("<worldbody>", "<worldbod>"))
+    with pytest.raises(BadPlant, match=r"the model `robot\.xml` cannot be read: XML"):
+        stage(dock)
+
+
+def test_what_a_joint_gives_hangs_on_whether_it_turns(dock: Path) -> None:
+    slides, turns = ('type="slide" axis="1 0 0"', 'type="hinge" axis="0 0 1"')
+    changed(dock, "robot.xml", (f'name="way" {slides}', f'name="way" {turns}'))
+    changed(dock, "system.toml", (WAY, WAY.replace(', unit = "m"', "")))
+    with pytest.raises(
+        BadPlant, match="the sensor is in `rad`, and `travelled_mm` is in `mm`: one is not the other"
+    ):
+        stage(dock)
+
+
+def leaf(c_type: str, members: tuple[str, ...] = ()) -> Leaf:
+    """An output called `lamp`."""
+    return Leaf("lamp", "output", "lamp", "lamp", c_type, members, None, None, "", 0, "")
+
+
+@pytest.mark.parametrize(("c_type", "members"), [("bool", ()), ("uint8_t", ("dark", "lit"))])
+def test_a_word_drives_by_its_own_control(c_type: str, members: tuple[str, ...], dock: Path) -> None:
+    words = members or ("false", "true")
+    model = model_of(dock).model
+    buffer = Buffer(
+        "a.lamp", "base.lamp", ("base", "lamp"), (leaf(c_type, members),), "a.lamp", gives=False, path=()
+    )
+    page = plant_page(description(dock / "system.toml"))
+    binder = Binder(page, ("plant", "mujoco"), model)
+    said = {"actuator": "wheels", "values": {words[0]: 0.0, words[1]: 0.5}}
+    [binding] = binder.actuators(buffer, {"base.lamp": said})
+    assert [binding.control(value) for value in (0, 1)] == [0.0, 0.5]
+    assert binder.actuators(buffer, {"base.lamp": {"ignore": True}}) == []
+    assert page.faults == []
+    wrong = (
+        ({words[0]: 0.0}, f"`values` lacks a control for `{words[1]}`"),
+        ({words[0]: 0.0, words[1]: 0.5, "dim": 1.0}, "`dim` is no value"),
+    )
+    for values, message in wrong:
+        binder.actuators(buffer, {"base.lamp": {"actuator": "wheels", "values": values}})
+        assert message in page.faults.pop().message
+    binder.sensors(buffer, {"base.lamp": {"sensor": "pin", **({} if members else {"under": 0.5})}})
+    assert bool(page.faults) == bool(members)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        (
+            '"base.speed" = { motor = "wheels" }',
+            "`plant.mujoco.actuators.base.speed.motor` means nothing here",
+        ),
+        ('"base.sped" = { actuator = "wheels" }', "`base.sped` is no end of a buffer that goes outside"),
+        ('"base.speed" = { actuator = 3 }', "must be a text in quotes"),
+    ],
+)
+def test_the_keys_of_a_model_are_checked(entry: str, message: str, dock: Path) -> None:
+    changed(dock, "system.toml", (SPEED, entry))
+    with pytest.raises(BadDescription) as caught:
+        description(dock / "system.toml")
+    assert message in str(caught.value)
+
+
+def test_a_model_that_flies_apart_ends_the_run(dock: Path) -> None:
+    changed(dock, "robot.xml", ('mass="3"', 'mass="0.001"'), ('kv="60"', 'kv="-1e9"'))
+    model = model_of(dock)
+
+    def fifty() -> None:
+        for tick in range(50):
+            model.step(tick, ordered(800).get)
+
+    with pytest.raises(PlantFailed, match="the model became unstable in cycle"):
+        fifty()
