@@ -47,6 +47,8 @@ __all__ = [
     "Position",
     "Proof",
     "Report",
+    "RowOutcome",
+    "Run",
     "Severity",
     "Span",
     "Unproved",
@@ -56,6 +58,7 @@ __all__ = [
     "compile",
     "load_system",
     "prove",
+    "run",
 ]
 
 
@@ -63,6 +66,8 @@ def __getattr__(name: str) -> Any:
     """A name of `rcsc.api`, imported now: so that `import rcsc` costs nothing. Their types stand in `__init__.pyi`."""
     if name not in __all__:
         raise AttributeError(f"module `rcsc` has no attribute `{name}`")
+    if name == "run":  # a room of that name, which is called as a function
+        return importlib.import_module("rcsc.run")
     globals()[name] = value = getattr(importlib.import_module("rcsc.api"), name)
     return value
 

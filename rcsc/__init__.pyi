@@ -7,6 +7,8 @@ from rcsc.api import LoadedSystem as LoadedSystem
 from rcsc.api import Position as Position
 from rcsc.api import Proof as Proof
 from rcsc.api import Report as Report
+from rcsc.api import RowOutcome as RowOutcome
+from rcsc.api import Run as Run
 from rcsc.api import Severity as Severity
 from rcsc.api import Span as Span
 from rcsc.api import Unproved as Unproved
@@ -15,6 +17,7 @@ from rcsc.api import check as check
 from rcsc.api import compile as compile  # noqa: A004  # as the command is called
 from rcsc.api import load_system as load_system
 from rcsc.api import prove as prove
+from rcsc.api import run as run
 
 __version__: str
 __all__ = [
@@ -25,6 +28,8 @@ __all__ = [
     "Position",
     "Proof",
     "Report",
+    "RowOutcome",
+    "Run",
     "Severity",
     "Span",
     "Unproved",
@@ -34,4 +39,5 @@ __all__ = [
     "compile",
     "load_system",
     "prove",
+    "run",
 ]

@@ -20,7 +20,7 @@ Modules, in the order the data flows: `proofs` (`check`, `compile`, `prove`), `r
 """
 
 from rcsc.api.proofs import Claim, Proof, Unproved, check, compile, prove  # noqa: A004  # as the command is called
-from rcsc.api.running import LoadedSystem, load_system
+from rcsc.api.running import LoadedSystem, RowOutcome, Run, load_system, run
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.diagnostics.report import Report, Verdict
@@ -34,6 +34,8 @@ __all__ = [
     "Position",
     "Proof",
     "Report",
+    "RowOutcome",
+    "Run",
     "Severity",
     "Span",
     "Unproved",
@@ -42,4 +44,5 @@ __all__ = [
     "compile",
     "load_system",
     "prove",
+    "run",
 ]

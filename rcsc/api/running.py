@@ -1,9 +1,12 @@
-"""`load_system` as a function: a system that is stepped, ordered and looked at from Python.
+"""`load_system` and `run` as functions: a system that is stepped, ordered and looked at from Python, or run by a script.
 
-In: a description, and perhaps a plant. Out: a `LoadedSystem`. Orders go as those of a script do: each with the next number.
+In: a description, and perhaps a plant and a script. Out: a `LoadedSystem`, or a `Run`. Orders go as those of a script do: each
+with the next number.
 """
 
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -11,9 +14,11 @@ from typing import Any, Literal, TypeAlias
 from rcsc.api.proofs import PathLike
 from rcsc.diagnostics.coded import CodedError
 from rcsc.driver.compile import compile_system
-from rcsc.run.description import description
+from rcsc.run.description import Description, description
+from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
 from rcsc.run.orders.roles import COMMAND, Served, field_of, served
-from rcsc.run.plant.load import Staged, load
+from rcsc.run.plant.load import Staged
+from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.signature import Leaf, Signature, Value, Values
 from rcsc.run.system import System, assemble, signatures
 
@@ -177,17 +182,122 @@ def load_system(
     Raises:
         CodedError: The description, a table or the plant is not in order; its code and text say what, `helps` what helps.
     """
-    described = description(Path(path))
+    described, signs, stage = _staged(Path(path), plant, "", seed, prove=prove)
+    orders = _Orders()
+    system = assemble(described, executor, stage.queries, (orders, *standing(stage, described, signs)))
+    return LoadedSystem(Path(path), system, signs, stage, served(described, signs), orders)
+
+
+@dataclass(frozen=True, slots=True)
+class RowOutcome:
+    """What became of a row of a script.
+
+    Attributes:
+        number: As the file counts, from 1.
+        text: As it is shown.
+        state: `done`, or what became of it else: `failed`, for one.
+        reason: Why it was not done; empty where it was.
+        ticks: How many it took.
+    """
+
+    number: int
+    text: str
+    state: str
+    reason: str
+    ticks: int
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run that is over.
+
+    Attributes:
+        rows: Those of the script that were begun and ended, in order.
+        done: Whether every row of the script was done; True without a script.
+        ticks: All that were run; `seconds`, the control time that they took.
+        assumptions_failed: Levels whose last cycle saw an assumption fail.
+    """
+
+    rows: tuple[RowOutcome, ...]
+    done: bool
+    ticks: int
+    seconds: float
+    assumptions_failed: tuple[str, ...]
+
+
+def run(  # noqa: PLR0913  # as many as there are options
+    path: PathLike,
+    *,
+    script: PathLike | None = None,
+    plant: str | None = None,
+    executor: Literal["c", "python"] = "c",
+    seed: int = 0,
+    cycles: int | None = None,
+    log: PathLike | None = None,
+    prove: bool = True,
+) -> Run:
+    """Run a system with its plant by a script of orders, as fast as it goes, as `rcsc run` does.
+
+    Args:
+        path: The description, `system.toml`.
+        script: The orders, a CSV or TOML file; that of the description without, if it has one.
+        plant: `FILE.py`, `FILE.py:CLASS`, or a plant's name in the description; its first without, if it has one.
+        executor: Which of the generated executors run; both do the same. `c` needs a C compiler.
+        seed: For a plant whose constructor takes one.
+        cycles: Ticks at most; without a script 1000, if nobody says.
+        log: Where the complete state of every cycle is kept (MCAP; the extra `log`); nowhere without.
+        prove: False to run executors as they are.
+
+    Raises:
+        CodedError: Something is not in order, and nothing has moved; or a level met a fault that the proofs exclude.
+    """
+    name = None if script is None else os.fspath(script)
+    system, signs, stage = _staged(Path(path), plant, name, seed, prove=prove)
+    running = assemble(system, executor, stage.queries, standing(stage, system, signs))
+    scripted = ScriptedRun(running, stage.operator)
+    most = cycles or (UNORDERED_TICKS if stage.operator is None else MOST_TICKS)
+    with _recorded(running, log):
+        results = list(scripted.steps(most))
+    rows = tuple(
+        RowOutcome(result.row.number, result.row.text, result.state, result.reason, result.ticks)
+        for result in results
+    )
+    operator = stage.operator
+    done = operator is None or (operator.over and operator.stopped is None)
+    failed = tuple(level.name for level in running.levels if level.values[-1])
+    return Run(rows, done, running.tick, running.tick * system.tick_ms / 1000, failed)
+
+
+UNORDERED_TICKS = 1000
+"""Of a run that no script ends."""
+
+
+def _staged(
+    path: Path, plant: str | None, script: str | None, seed: int, *, prove: bool
+) -> tuple[Description, Mapping[str, Signature], Staged]:
+    """The system, proved and compiled, and what stands outside; a script of None is the description's, an empty one none."""
+    system = description(path)
     if prove:
-        report = compile_system(Path(path)).report
+        report = compile_system(path).report
         if report.failed:
             first = next((found.message for found in report.diagnostics), "not everything is proved")
             raise NotProvedError(f"{path} is not proved: {first}")
-    signs = signatures(described)
-    staged = load(described, signs, plant, seed=seed)
-    orders = _Orders()
-    system = assemble(described, executor, staged.queries, (orders, *staged.outside))
-    return LoadedSystem(Path(path), system, signs, staged, served(described, signs), orders)
+    named = script if script is not None else str(system.script or "")
+    signs = signatures(system)
+    return system, signs, staged(StageOrder(str(path), plant or "", named, seed=seed), system, signs)
+
+
+@contextmanager
+def _recorded(running: System, log: PathLike | None) -> Iterator[None]:
+    """Keeps every cycle, where a log is asked for."""
+    if log is None:
+        yield
+        return
+    from rcsc.run.log.recorder import Recorder  # of an extra
+
+    with Recorder(running, Path(log)) as recorder:
+        running.watch.append(recorder)
+        yield
 
 
 def _shown(leaf: Leaf, value: Value) -> Shown:

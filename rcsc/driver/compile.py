@@ -1,97 +1,168 @@
 """`rcsc compile`: the executors of every proved program."""
 
-from collections.abc import Collection, Iterator
+import os
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
-from rcsc.driver.pipeline import Proved, proved
+from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Conclusion, Settings
-from rcsc.emit import TARGETS, Target, emitted
+from rcsc.emit import TARGETS, emitted
 from rcsc.emit.generated import stale, write
 from rcsc.emit.lower import lower
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import project_root
-from rcsc.run.description import description, places
+from rcsc.link import emit_system, linked, outward
+from rcsc.run.description import BadDescription, description, places
 from rcsc.solvers.options import Options
 
 
 def compile_(
-    settings: Settings, out: Path, targets: Collection[str], *, only_check: bool, defensive: bool = False
+    settings: Settings,
+    out: Path,
+    targets: Collection[str],
+    *,
+    only_check: bool,
+    defensive: bool = False,
+    systems: Sequence[Path] = (),
 ) -> Conclusion:
-    """Prove every table anew, then write the executors, or say whether they are fresh."""
+    """Prove every table anew, then write the executors, or say whether they are fresh.
+
+    Args:
+        settings: Which tables, and how they are proved.
+        out: The generated folder.
+        targets: Languages, as `TARGETS` names them.
+        only_check: Whether nothing is written.
+        defensive: Whether the executors check their state in every cycle.
+        systems: Descriptions of systems whose levels are among the tables; their C is written with that of the levels.
+
+    Raises:
+        BadDescription: A system does not fit its programs.
+    """
     project = proved(settings)
     report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was written")
-    files, clashes = _executors(project, targets, defensive=defensive)
-    diagnostics = clashes or (stale if only_check else write)(files, str(out))
-    report = project.report(diagnostics)
+    generated = _Generated(targets, defensive)
+    for root, program in project.executable:
+        generated.add_program(root, program)
+    for path in systems:
+        generated.add_system(path)
+    files = generated.files
+    diagnostics = generated.clashes or (stale if only_check else write)(files, str(out))
+    report = project.report(tuple(diagnostics))
     if report.failed:
         return Conclusion(report, "" if only_check else "nothing was written")
     return Conclusion(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {out}")
 
 
 def compile_system(path: Path) -> Conclusion:
-    """Prove the tables of a system's levels anew, and write their executors where its description says.
+    """Prove the tables of a system's levels anew, and write their executors and the system's C where its description says.
 
     Raises:
         BadDescription: It is not in order.
     """
-    system = description(path)
-    files = tuple(
-        str(next(file for file in places(path, spec.program) if file.is_file()))
-        for spec in system.levels
-        if any(file.is_file() for file in places(path, spec.program))
+    settings = Settings(level_sources(path), Options())
+    return compile_(settings, description(path).generated, TARGETS, only_check=False, systems=(path,))
+
+
+def level_sources(path: Path) -> tuple[str, ...]:
+    """The files of the programs of a system's levels, as far as they are there.
+
+    Raises:
+        BadDescription: The description is not in order.
+    """
+    tried = (places(path, spec.program) for spec in description(path).levels)
+    return tuple(
+        str(next(file for file in files if file.is_file()))
+        for files in tried
+        if any(file.is_file() for file in files)
     )
-    return compile_(Settings(files, Options()), system.generated, TARGETS, only_check=False)
 
 
-def _executors(
-    project: Proved, targets: Collection[str], *, defensive: bool
-) -> tuple[dict[str, str], tuple[Diagnostic, ...]]:
-    """The generated files of every program that declares a table or a level, by path under the folder."""
-    files: dict[str, str] = {}
-    diagnostics = []
-    paths: dict[str, tuple[str, str]] = {}
-    names: dict[str, dict[str, tuple[str, str]]] = {}
-    for root, program in project.executable:
-        plan = planned(program, defensive=defensive)
-        emitted_ = emitted(plan, targets)
-        taken = next((path for path, text in emitted_.items() if _other(paths, path, text)), None)
-        if taken is not None:
-            diagnostics.append(_same_file(taken, root, paths[taken.casefold()][0]))
-            continue
-        paths |= {path.casefold(): (root, text) for path, text in emitted_.items()}
-        for name in targets:
-            diagnostics += _same_names(TARGETS[name], plan, root, names.setdefault(name, {}))
-        files |= emitted_
-    return files, tuple(diagnostics)
+@dataclass(slots=True)
+class _Generated:
+    """Collects generated files.
 
+    Attributes:
+        files: By path under the folder.
+        clashes: Files and names that would be two things.
+        plans: Of each program, by its root file's real path.
+    """
 
-def _same_names(
-    target: Target, plan: Plan, root: str, names: dict[str, tuple[str, str]]
-) -> Iterator[Diagnostic]:
-    """The first name that this program shares with another, or gives to two things; `names` has who has which, and gets its own."""
-    for name, what in target.outward(plan):
-        other, other_what = names.setdefault(name, (root, what))
-        if other_what != what:
-            message = f"`{name}` would be two things in {target.title}: {other_what} in `{other}`, and {what} in `{root}`"
-            helps = ("rename one of the programs, or the table, level or type",)
-            yield Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)
+    targets: Collection[str]
+    defensive: bool
+    files: dict[str, str] = field(default_factory=dict)
+    clashes: list[Diagnostic] = field(default_factory=list)
+    plans: dict[str, Plan] = field(default_factory=dict)
+    _paths: dict[str, tuple[str, str]] = field(default_factory=dict)
+    _names: dict[str, dict[str, tuple[str, str]]] = field(default_factory=dict)
+
+    def add_program(self, root: str, program: ProvedProgram) -> None:
+        """Adds the executors of a program that declares a table or a level."""
+        plan = self.plans[os.path.realpath(root)] = planned(program, defensive=self.defensive)
+        if self._add(root, emitted(plan, self.targets)):
+            for name in self.targets:
+                self._share(root, name, TARGETS[name].outward(plan))
+
+    def add_system(self, path: Path) -> None:
+        """Adds the C of a system whose programs were added.
+
+        Raises:
+            BadDescription: It does not fit them.
+        """
+        if "c" not in self.targets:
             return
+        system, page = description(path), description(path).review()
+        plans = {}
+        for at, spec in enumerate(system.levels):
+            files = [file for file in places(path, spec.program) if os.path.realpath(file) in self.plans]
+            if files:
+                plans[spec.name] = self.plans[os.path.realpath(files[0])]
+            else:
+                key = "name" if spec.program == spec.name else "program"
+                tried = " and ".join(f"`{file}`" for file in places(path, spec.program))
+                page.wrong(("level", at, key), f"there is no program `{spec.program}`", f"looked for {tried}")
+        if page.faults:
+            raise page.bad(BadDescription)
+        source = os.path.relpath(path, project_root(str(path))).replace("\\", "/")
+        found = linked(system, plans, source)
+        if self._add(str(path), emit_system(found)):
+            self._share(str(path), "c", outward(found))
+
+    def _add(self, root: str, files: Mapping[str, str]) -> bool:
+        """Adds files, if no other text goes to one of them already; types that programs share have one text."""
+        for path, text in files.items():
+            other, there = self._paths.get(path.casefold(), (root, text))
+            if there != text:
+                self.clashes.append(_same_file(path, root, other))
+                return False
+        self._paths |= {path.casefold(): (root, text) for path, text in files.items()}
+        self.files |= files
+        return True
+
+    def _share(self, root: str, target: str, names: Iterable[tuple[str, str]]) -> None:
+        """Notes the first name that is shared with another root, or given to two things."""
+        known = self._names.setdefault(target, {})
+        for name, what in names:
+            other, other_what = known.setdefault(name, (root, what))
+            if other_what != what:
+                title = TARGETS[target].title
+                message = f"`{name}` would be two things in {title}: {other_what} in `{other}`, and {what} in `{root}`"
+                helps = ("rename one of the programs, or the table, level or type",)
+                self.clashes.append(
+                    Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)
+                )
+                return
 
 
 def planned(proved: ProvedProgram, *, defensive: bool = False) -> Plan:
     """How the executors of a proved program are laid out."""
     return lower(proved, project_root(proved.program.file), defensive=defensive)
-
-
-def _other(paths: dict[str, tuple[str, str]], path: str, text: str) -> bool:
-    """Whether another text goes to the file already; types that programs share have one text."""
-    return path.casefold() in paths and paths[path.casefold()][1] != text
 
 
 def _same_file(path: str, root: str, other: str) -> Diagnostic:

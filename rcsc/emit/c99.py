@@ -232,7 +232,9 @@ class _Maker:
 
     def _record(self, record: model.Record) -> tuple[str, Fields]:
         names = self.names.members[record.name]
-        docs = ("; ".join(word for word in (_range(f.type), comment(f.doc)) if word) for f in record.fields)
+        docs = (
+            "; ".join(word for word in (range_text(f.type), comment(f.doc)) if word) for f in record.fields
+        )
         fields = tuple(
             (declared(self.names, names[f.name], f.type), doc)
             for f, doc in zip(record.fields, docs, strict=True)
@@ -263,7 +265,7 @@ class _Maker:
             where = f"{first}" if first == last else f"{first} to {last}"
             words = [
                 f"{where}: {variable.kind.value}",
-                _range(variable.type),
+                range_text(variable.type),
                 _safe_text(variables[variable.leaves[0]]),
                 comment(variable.doc),
             ]
@@ -799,13 +801,14 @@ def _search(index: Cuts, wide: str) -> Iterator[Stmt]:
     yield Leave(AT)
 
 
-def _range(kind: model.Type) -> str:
+def range_text(kind: model.Type) -> str:
+    """The range of a number, with its unit; empty for what has none."""
     match kind:
         case Int(low, high, unit) | Real(low, high, unit):
             units = unit_text(unit)
             return f"{low} .. {high}" + (f" {units}" if units else "")
         case model.Array(element=element):
-            return _range(element)
+            return range_text(element)
         case _:
             return ""
 

@@ -23,3 +23,19 @@ Source: Haynes et al. 1984, sections 8 and 9. Modules, in the order the data flo
 `signature`, `executors` (`unproved` keeps forced ones out), `answers` (what externs give in a finding's run), `buffers`,
 `levels`, `adopt` (starting again), `system`; rooms `orders` (scripts), `plant` (what moves), `log` and `processes`.
 """
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+
+class _Room(ModuleType):
+    """This room, which is a function as well: `rcsc.run("system.toml")` is that of `rcsc.api`."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Run a system, as `rcsc.api.run` says."""
+        return import_module("rcsc.api").run(*args, **kwargs)
+
+
+sys.modules[__name__].__class__ = _Room

@@ -149,11 +149,11 @@ def signatures(system: Description, *, fitting: bool = True) -> dict[str, Signat
     if page.faults:
         raise page.bad(BadDescription)
     if fitting:
-        _check_fit(system, signs)
+        check_fit(system, signs)
     return signs
 
 
-def _check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
+def check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
     """Check what the description says of levels and variables against their programs.
 
     Raises:

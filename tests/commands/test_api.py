@@ -15,6 +15,8 @@ import pytest
 
 import rcsc
 from rcsc.commands import run as command
+from rcsc.run.log.export import rows
+from rcsc.run.log.read import read
 from tests.support.programs.systems import SYSTEM, small_system, small_text
 from tests.support.programs.texts import edit_file
 
@@ -194,3 +196,42 @@ def test_nothing_runs_that_is_not_proved(dock: Path) -> None:
 def test_another_plant_than_there_is_is_raised(dock: Path) -> None:
     with pytest.raises(rcsc.CodedError, match="no plant `other`"):
         rcsc.load_system(dock / "system.toml", plant="other", prove=False)
+
+
+def test_a_run_is_that_of_the_command(dock: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Row by row, with both executors; it can be cut short, and go without a script."""
+    system = dock / "system.toml"
+    logs = [dock / f"{name}.mcap" for name in ("c", "python", "command")]
+    ended = rcsc.run(system, log=logs[0], prove=False)
+    assert ended == rcsc.run(system, executor="python", log=logs[1], prove=False)
+    assert command(["run", "--no-compile", str(system), "--log", str(logs[2])]) == 0
+    shown = re.findall(r"^ +(\d+)  (\S+) +(done) +(\d+) cycles$", capsys.readouterr().out, re.MULTILINE)
+    assert [(str(row.number), row.text, row.state, str(row.ticks)) for row in ended.rows] == shown
+    assert len(shown) == 3
+    assert ended.done
+    states = [list(rows(read(log))) for log in logs]
+    assert states[0] == states[1] == states[2]
+    assert len(states[0]) == ended.ticks
+    cut = rcsc.run(system, cycles=10, prove=False)
+    assert (cut.rows, cut.done, cut.ticks, cut.seconds) == ((), False, 10, 0.4)
+    (dock / "other.csv").write_text("command,wrong\ndock,3\n")
+    with pytest.raises(rcsc.CodedError, match="no order has a field `wrong`"):
+        rcsc.run(system, script=dock / "other.csv", prove=False)
+
+
+def test_a_row_that_fails_ends_the_run_with_its_reason(dock: Path) -> None:
+    (dock / "blind.py").write_text(
+        "from base import Base\nclass Blind(Base):\n    beacon: bool = False\n    travelled: float = 0.0\n",
+        encoding="utf-8",
+    )
+    ended = rcsc.run(dock / "system.toml", plant=str(dock / "blind.py") + ":Blind", prove=False)
+    assert not ended.done
+    assert [(row.text, row.state) for row in ended.rows] == [("dock", "failed")]
+    assert "no_beacon" in ended.rows[0].reason
+
+
+def test_the_room_and_the_function_have_one_name() -> None:
+    """Whichever is imported first."""
+    for first in ("rcsc.run.system", "rcsc.api", "rcsc"):
+        script = f"import {first}, rcsc; f = rcsc.run; import rcsc.run.system; assert f is rcsc.run and callable(f); rcsc.run.system.System"
+        subprocess.run([sys.executable, "-c", script], check=True)

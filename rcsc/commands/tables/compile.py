@@ -1,13 +1,16 @@
 """`rcsc compile`: the executors of proved tables."""
 
+import os
 from pathlib import Path
 
 import click
 
 from rcsc.commands.shared.options import PATHS, proving, settings_of, showing
 from rcsc.commands.shared.show import Output, finish
+from rcsc.commands.shared.systems import described, sources
 from rcsc.driver.compile import compile_
 from rcsc.emit import TARGETS
+from rcsc.run.description import description
 from rcsc.solvers.options import Options
 
 
@@ -18,11 +21,12 @@ Examples:
   rcsc compile tables                  write generated/python and generated/c
   rcsc compile tables --check          write nothing; 1 if generated/ is not fresh
   rcsc compile grip.rcs --target c     C alone
-  rcsc compile grip.rcs --out build    to another folder""",
+  rcsc compile grip.rcs --out build    to another folder
+  rcsc compile robot/system.toml       the levels of a system, and one C of them all""",
 )
 @PATHS
-@click.option("--out", type=click.Path(path_type=Path), default=Path("generated"), show_default=True,
-              metavar="FOLDER", help="Where the executors go, in FOLDER/python and FOLDER/c.")  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path), default=None, metavar="FOLDER",
+              help="Where the executors go, in FOLDER/python and FOLDER/c; else where the system says, else generated.")  # fmt: skip
 @click.option("--target", default=",".join(TARGETS), show_default=True, metavar="LIST",
               help=f"What to write, by commas: {', '.join(TARGETS)}.")  # fmt: skip
 @click.option("--check", "only_check", is_flag=True, help="Write nothing; say whether the files are fresh.")
@@ -31,10 +35,13 @@ Examples:
 @proving
 @showing
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
-    paths: tuple[str, ...], out: Path, target: str, only_check: bool, defensive: bool,
+    paths: tuple[str, ...], out: Path | None, target: str, only_check: bool, defensive: bool,
     options: Options, use_cache: bool, output: Output,
 ) -> int:  # fmt: skip
     """Prove the tables, then write their Python and C executors.
+
+    Of a system, given by its system.toml or by the folder that holds it, also the C of the whole: one struct, and a
+    function that runs all levels that are due and carries the buffers between them.
 
     Nothing is written unless everything is proved. Files are replaced whole: a kill leaves the old ones. The
     same tables give the same bytes on every machine, so the files belong in version control.
@@ -42,11 +49,25 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     targets = tuple(name.strip() for name in target.split(",") if name.strip())
     if not targets or not set(targets) <= TARGETS.keys():
         raise click.BadParameter(f"choose from {' and '.join(TARGETS)}", param_hint="--target")
+    systems = tuple(described(paths))
     conclusion = compile_(
-        settings_of(options, use_cache, output, paths),
-        out,
+        settings_of(options, use_cache, output, sources(paths, systems)),
+        out or _generated(systems),
         targets,
         only_check=only_check,
         defensive=defensive,
+        systems=systems,
     )
     return finish(conclusion.report, "compile", output, conclusion.closing)
+
+
+def _generated(systems: tuple[Path, ...]) -> Path:
+    """The generated folder that the systems' descriptions say, from here; without systems the usual one.
+
+    Raises:
+        UsageError: They do not agree.
+    """
+    folders = {description(path).generated for path in systems}
+    if len(folders) > 1:
+        raise click.UsageError("the systems name several generated folders: choose one with --out")
+    return Path(os.path.relpath(folders.pop())) if folders else Path("generated")

@@ -10,7 +10,7 @@ import rcsc
 HERE = Path(__file__).parents[1]
 
 
-def run(robot: rcsc.LoadedSystem, most: int = 1000) -> dict[str, Any]:
+def answer(robot: rcsc.LoadedSystem, most: int = 1000) -> dict[str, Any]:
     """Runs until the order is answered; the last report."""
     for _ in range(most):
         robot.step()
@@ -23,6 +23,10 @@ def run(robot: rcsc.LoadedSystem, most: int = 1000) -> dict[str, Any]:
 def test_everything_is_proved() -> None:
     assert not rcsc.check(HERE).failed
     assert rcsc.prove(HERE / "system.toml").whole
+
+
+def test_the_day_s_orders_are_done() -> None:
+    assert rcsc.run(HERE / "system.toml").done
 
 
 def test_the_model_moves_by_contact_alone() -> None:
@@ -38,12 +42,12 @@ def test_it_docks_and_leaves_again() -> None:
     robot = rcsc.load_system(HERE / "system.toml")
     plate = robot.plant.data.joint("plate")
     robot.order("dock")
-    assert run(robot)["status_report"] == "done"
+    assert answer(robot)["status_report"] == "done"
     robot.step(100)
     assert robot.plant.contact >= 3, "it stays where it is"
     assert plate.qpos[0] > 0.005, "the plate is pushed back"
     robot.order("undock")
-    assert run(robot)["status_report"] == "done"
+    assert answer(robot)["status_report"] == "done"
     assert robot.plant.range > 0.55
     assert robot.plant.contact == 0
     assert abs(plate.qpos[0]) < 0.001, "its spring has pushed it out again"
@@ -53,5 +57,5 @@ def test_dead_motors_are_reported() -> None:
     robot = rcsc.load_system(HERE / "system.toml")
     robot.plant.motors_dead = True
     robot.order("dock")
-    report = run(robot)
+    report = answer(robot)
     assert (report["status_report"], report["failure"]) == ("failed", "not_reached")

@@ -8,7 +8,7 @@ import rcsc
 HERE = Path(__file__).parents[1]
 
 
-def run(robot: rcsc.LoadedSystem, most: int = 1000) -> dict[str, Any]:
+def answer(robot: rcsc.LoadedSystem, most: int = 1000) -> dict[str, Any]:
     """Runs until the order is answered; the last report."""
     for _ in range(most):
         robot.step()
@@ -23,12 +23,16 @@ def test_everything_is_proved() -> None:
     assert rcsc.prove(HERE / "system.toml").whole
 
 
+def test_the_day_s_orders_are_done() -> None:
+    assert rcsc.run(HERE / "system.toml").done
+
+
 def test_a_delivery_goes_out_and_comes_back() -> None:
     robot = rcsc.load_system(HERE / "system.toml")
     places = []
     robot.system.watch.append(lambda *_: places.append(int(robot.value("axis.position_mm"))))
     robot.order("deliver", far_mm=700)
-    assert run(robot)["status_report"] == "done"
+    assert answer(robot)["status_report"] == "done"
     assert abs(max(places) - 700) <= 20
     assert places[-1] <= 20
 
@@ -38,7 +42,7 @@ def test_a_cart_that_is_stuck_is_reported() -> None:
     robot.order("deliver", far_mm=700)
     robot.step(20)
     robot.plant.stuck = True
-    report = run(robot)
+    report = answer(robot)
     assert (report["status_report"], report["failure"]) == ("failed", "axis_failed")
     robot.order("rest")
-    assert run(robot)["status_report"] == "done"
+    assert answer(robot)["status_report"] == "done"

@@ -1,0 +1,22 @@
+"""The C of a whole system: its levels, the buffers between them, and a `step()` that does what `rcsc.run.system` does.
+
+In: a description, and for each level the plan of its program and its signature. Out: `c/NAME.h`, `c/NAME.c`, `c/NAME.cmake`
+and `c/NAME.pc`. The levels' own C stays as it is; what is made here is one struct with the state of every level, what stands
+outside (`in` and `out`, named as `[buffers]` names them), and what levels give each other (`between`).
+
+A step is that of `System.step`: all levels that are due take what the step before left, then all run from the top down, then
+all give. Each buffer has one reader, and all are read before the first level runs, so that one copy of each is enough.
+
+>>> from rcsc.link import system_word
+>>> system_word("dock", ["supervisor", "drive"]), system_word("gripper", ["gripper"])
+('dock', 'gripper_system')
+
+Trusted: all of it, for what the system's C does; tests run it beside the Python system, with restarts, refused inputs and
+periods, and compare every leaf of every cycle. What starts a level anew is asked of `rcsc.run.adopt`, as the Python system
+does. Modules: `wiring` finds the places in C that a description speaks of; `system_c` spells the files.
+"""
+
+from rcsc.link.system_c import emit_system, outward
+from rcsc.link.wiring import Linked, linked, system_word
+
+__all__ = ["Linked", "emit_system", "linked", "outward", "system_word"]

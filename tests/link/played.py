@@ -1,0 +1,367 @@
+"""A system run by a script of drawn outside values, restarts and refused inputs: by the Python system and by its C.
+
+The C is seen from outside: places of leaves are what the compiler says of the members that the header documents
+(`in.PARTY.NAME`, `out.PARTY.NAME`, `between.LEVEL_NAME`, `LEVEL.MEMBER`).
+"""
+
+import ctypes
+import math
+import re
+import struct
+import subprocess
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from random import Random
+from typing import TypeAlias
+
+from rcsc.emit.ctext import type_bounds
+from rcsc.run.description import Description
+from rcsc.run.levels import BadState, Query, StateTableError
+from rcsc.run.signature import FORMATS, Leaf, Signature, Value, Values
+from rcsc.run.system import System, assemble
+
+Published: TypeAlias = dict[str, Values]
+Seen: TypeAlias = tuple[object, ...]
+"""What is compared of a tick: who faulted, what each restart gave, every leaf of every level, every buffer."""
+
+
+@dataclass(frozen=True)
+class Tick:
+    """What happens in one tick.
+
+    Attributes:
+        begins: Before it, levels that start again: anew, or from what they were after an earlier tick.
+        publishes: What stands outside gives at its end, for the next.
+    """
+
+    begins: tuple[tuple[str, int | None], ...]
+    publishes: Published
+
+
+# --- the script -------------------------------------------------------------------------
+
+
+def drawing(seed: int) -> Random:
+    """What draws, the same every time."""
+    return Random(seed)  # noqa: S311  # repeatable on purpose
+
+
+def edges(leaf: Leaf) -> list[Value]:
+    """Values at the edges of a leaf's range, and just beyond where its C type holds that."""
+    if leaf.c_type == "bool":
+        return [False, True]
+    low, high = (0.0, len(leaf.members) - 1.0) if leaf.members else (leaf.low or 0, leaf.high or 0)
+    if leaf.c_type == "double":
+        return [low, high, (low + high) / 2, low - 0.5, high + 0.5, math.nan]
+    least, most = type_bounds(leaf.c_type)
+    near = [int(end) + by for end in (low, high) for by in (-1, 0, 1)]
+    return [value for value in near if least <= value <= most]
+
+
+def drawn(random: Random, leaf: Leaf, before: Value) -> Value:
+    """A value for a leaf: mostly in its range, a number mostly the one before or the next."""
+    low, high = (0.0, len(leaf.members) - 1.0) if leaf.members else (leaf.low or 0, leaf.high or 0)
+    inside = [value for value in edges(leaf) if leaf.c_type == "bool" or low <= value <= high]
+    way = random.random()
+    if leaf.name.endswith(("inc_command", "inc_command_echo")) and way < 0.8:
+        return before if way < 0.3 or before >= high else int(before) + 1
+    if way < 0.03:
+        return random.choice(edges(leaf))
+    if way < 0.5 or leaf.c_type == "bool":
+        return random.choice(inside)
+    if leaf.c_type == "double":
+        return random.uniform(low, high)
+    return random.randint(int(low), int(high))
+
+
+def script(system: Description, signs: Mapping[str, Signature], random: Random, ticks: int) -> list[Tick]:
+    """A script for a system; buffers keep their values for some ticks, and some are not there from the beginning."""
+    last: Published = {}
+    made = []
+    for tick in range(ticks):
+        begins = [
+            (random.choice(system.levels).name, random.choice([None, None, random.randrange(tick or 1)]))
+            for _ in range(random.choice([0] * 12 + [1, 1, 2]))
+        ]
+        publishes: Published = {}
+        for wire in system.wires:
+            level, _, variable = wire.target.partition(".")
+            if wire.source.partition(".")[0] in signs or random.random() < 0.6:
+                continue
+            leaves = [signs[level].leaves[at] for at in signs[level].record(variable)]
+            before = last.get(wire.source, tuple(leaf.initial for leaf in leaves))
+            publishes[wire.source] = last[wire.source] = tuple(
+                drawn(random, leaf, value) for leaf, value in zip(leaves, before, strict=True)
+            )
+        made.append(Tick(tuple(begin for begin in begins if tick or begin[1] is None), publishes))
+    return made
+
+
+# --- in Python -----------------------------------------------------------------------------
+
+
+@dataclass
+class Told:
+    """What stands outside, and publishes what a test says."""
+
+    publishes: Published = field(default_factory=dict)
+
+    def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:  # noqa: ARG002  # what all outside have
+        return self.publishes
+
+
+def by_python(
+    system: Description, ticks: Sequence[Tick], queries: Mapping[str, Query] | None = None
+) -> list[Seen]:
+    """What the Python system does."""
+    told = Told()
+    running = assemble(system, "python", queries or {}, [told])
+    history: list[dict[str, Values]] = []
+    seen: list[Seen] = []
+    for tick in ticks:
+        results = []
+        for name, since in tick.begins:
+            try:
+                running.restart(name, None if since is None else history[since][name])
+                results.append(True)
+            except BadState:
+                results.append(False)
+        told.publishes = tick.publishes
+        try:
+            running.step()
+            faulty = ""
+        except StateTableError as error:
+            faulty = re.findall(r"level `(\w+)`", str(error))[0]
+        history.append({level.name: level.executor.values() for level in running.levels})
+        states = tuple(level.sign.packed.pack(*level.executor.values()) for level in running.levels)
+        seen.append((faulty, tuple(results), states, _buffers(running)))
+    return seen
+
+
+def _buffers(running: System) -> tuple[bytes | None, ...]:
+    latest = ((wire.source, running.buffers.latest(wire.source)) for wire in running.description.wires)
+    return tuple(
+        None if values is None else struct.pack(running.forms[name], *values) for name, values in latest
+    )
+
+
+# --- in C ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Some leaves in the system's struct: the offset and the format of each."""
+
+    offsets: tuple[int, ...]
+    formats: tuple[str, ...]
+
+    def read(self, memory: bytes) -> Values:
+        return tuple(
+            struct.unpack_from(f"={form}", memory, at)[0]
+            for at, form in zip(self.offsets, self.formats, strict=True)
+        )
+
+
+FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fPIC", "-Wall", "-Werror")
+
+
+class CSystem:
+    """The C of a system in a library.
+
+    Attributes:
+        word: What its names begin with.
+    """
+
+    def __init__(
+        self,
+        system: Description,
+        signs: Mapping[str, Signature],
+        folder: Path,
+        queries: Mapping[str, Query] | None = None,
+        word: str = "",
+    ) -> None:
+        self.system, self.signs, self.folder, self.word = system, signs, folder, word or system.name
+        self.queries = queries or {}
+        self._callbacks: list[object] = []
+        self._members = [self._level_members(level.name) for level in system.levels]
+        self._members += [self._buffer_members(wire.source, wire.target) for wire in system.wires]
+        self._objects = self._built()
+
+    def _level_members(self, level: str) -> list[tuple[str, str]]:
+        sign = self.signs[level]
+        leaves = [(f"{level}.{leaf.place}", FORMATS[leaf.c_type]) for leaf in sign.leaves]
+        return leaves + [
+            (f"{level}.{name}", form) for name, form in zip(sign.trace, sign.trace_format, strict=True)
+        ]
+
+    def _buffer_members(self, source: str, target: str) -> list[tuple[str, str]]:
+        ends = [end.partition(".")[::2] for end in (source, target)]
+        (giver, given), (taker, taken) = ends
+        if taker not in self.signs:
+            level, variable, place = giver, given, f"out.{target}"
+        else:
+            level, variable = taker, taken
+            flat = re.sub(r"\W+", "_", source).strip("_")
+            place = f"in.{source}" if giver not in self.signs else f"between.{flat}"
+        sign = self.signs[level]
+        leaves = [sign.leaves[at] for at in sign.record(variable)]
+        return [(f"{place}{leaf.place.removeprefix(variable)}", FORMATS[leaf.c_type]) for leaf in leaves]
+
+    def _built(self) -> list[str]:
+        """The objects of what no mutant changes."""
+        word = self.word
+        members = ", ".join(f"offsetof({word}_t, {name})" for run in self._members for name, _ in run)
+        answers = "".join(self._answer(at, *ask) for at, ask in enumerate(self._asked()))
+        (self.folder / "seen.c").write_text(
+            f'#include <stddef.h>\n#include "{word}.h"\nconst size_t seen_places[] = {{{members}, sizeof({word}_t)}};\n'
+            "void (*seen_ask)(int which, const double *keys, double *answer);\n" + answers
+        )
+        include = f"-I{self.system.generated / 'c'}"
+        programs = sorted({sign.program for sign in self.signs.values()})
+        sources = [str(self.system.generated / f"c/{program}.c") for program in programs]
+        subprocess.run(["cc", *FLAGS, include, "-c", "seen.c", *sources], cwd=self.folder, check=True)
+        return ["seen.o", *(f"{program}.o" for program in programs)]
+
+    def _asked(self) -> list[tuple[str, str, str]]:
+        """Each function of the user's: its query, its prototype, a feed that it fills."""
+        header = (self.system.generated / f"c/{self.word}.h").read_text(encoding="utf-8")
+        found = re.findall(rf"/\* yours: (\S+) of .*\nextern (void {self.word}_(\w+)\(.*\));", header)
+        return [(query, head, fills) for fills, head, query in found]
+
+    def _answer(self, at: int, query: str, head: str, fills: str) -> str:
+        """A function of the user's that asks Python."""
+        assert query in self.queries
+        level, _, into = fills.partition(".")
+        sign = self.signs[level]
+        leaves = [sign.leaves[one] for one in sign.record(into)]
+        keys = ", ".join(f"(double){key}" for key in re.findall(r"key_\d+", head))
+        sets = "".join(
+            f"answer->{leaf.place.removeprefix(f'{into}.')} = ({leaf.c_type})got[{number}]; "
+            for number, leaf in enumerate(leaves)
+        )
+        return f"{head} {{ double got[{len(leaves)}]; const double keys[] = {{{keys}}}; seen_ask({at}, keys, got); {sets}}}\n"
+
+    def play(self, ticks: Sequence[Tick], text: str | None = None) -> list[Seen] | str:
+        """What the C system does, or another text in its place; why it does not build.
+
+        Args:
+            ticks: The script.
+            text: A mutant of the source.
+        """
+        source = self.system.generated / f"c/{self.word}.c"
+        (self.folder / "system.c").write_text(text or source.read_text(encoding="utf-8"))
+        library = self.folder / f"system{len(list(self.folder.glob('*.so')))}.so"
+        flags = FLAGS if text is None else FLAGS[:-2]
+        made = subprocess.run(
+            ["cc", *flags, f"-I{self.system.generated / 'c'}", "-shared", "system.c", *self._objects, "-o", library.name],
+            cwd=self.folder, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        return self._played(ctypes.CDLL(str(library)), ticks) if made.returncode == 0 else made.stderr
+
+    def _played(self, library: ctypes.CDLL, ticks: Sequence[Tick]) -> list[Seen]:
+        count = sum(map(len, self._members)) + 1
+        *places, size = list((ctypes.c_size_t * count).in_dll(library, "seen_places"))
+        runs = [0]
+        for members in self._members:
+            runs.append(runs[-1] + len(members))
+        slots = [
+            Slots(tuple(places[first:end]), tuple(form for _, form in members))
+            for (first, end), members in zip(pairwise(runs), self._members, strict=True)
+        ]
+        self._hear(library)
+        return _Playing(self, library, slots, ctypes.create_string_buffer(b"\xaa" * size, size)).all(ticks)
+
+    def _hear(self, library: ctypes.CDLL) -> None:
+        asked = self._asked()
+        kind = ctypes.CFUNCTYPE(
+            None, ctypes.c_int, ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_double)
+        )
+
+        def answer(
+            which: int, keys: "ctypes._Pointer[ctypes.c_double]", got: "ctypes._Pointer[ctypes.c_double]"
+        ) -> None:
+            query, head, _ = asked[which]
+            given = [int(keys[at]) for at, _ in enumerate(re.findall(r"key_\d+", head))]
+            for at, value in enumerate(self.queries[query](*given)):
+                got[at] = float(value)
+
+        if asked:
+            self._callbacks.append(kind(answer))
+            ctypes.memmove(
+                ctypes.addressof(ctypes.c_void_p.in_dll(library, "seen_ask")),
+                ctypes.byref(ctypes.cast(self._callbacks[-1], ctypes.c_void_p)),  # type: ignore[arg-type]  # a callback is a pointer
+                ctypes.sizeof(ctypes.c_void_p),
+            )
+
+
+@dataclass
+class _Playing:
+    """One run of a library."""
+
+    system: CSystem
+    library: ctypes.CDLL
+    slots: list[Slots]
+    memory: "ctypes.Array[ctypes.c_char]"
+    given: set[str] = field(default_factory=set)
+
+    def all(self, ticks: Sequence[Tick]) -> list[Seen]:
+        word = self.system.word
+        init, step, restart, resume = (
+            getattr(self.library, f"{word}_{name}") for name in ("init", "step", "restart", "resume")
+        )
+        step.restype = ctypes.c_uint16 if len(self.system.system.levels) > 255 else ctypes.c_uint8
+        restart.restype = resume.restype = ctypes.c_int32
+        names = ["", *(level.name for level in self.system.system.levels)]
+        init(self.memory)
+        history: list[bytes] = []
+        seen: list[Seen] = []
+        for tick in ticks:
+            results = []
+            for name, since in tick.begins:
+                level = names.index(name)
+                if since is None:
+                    results.append(restart(self.memory, level) == -1)
+                else:
+                    before = ctypes.create_string_buffer(history[since], len(history[since]))
+                    results.append(resume(self.memory, level, before) == -1)
+            faulty = names[step(self.memory)]
+            for wire, slots in zip(self.system.system.wires, self._of_buffers(), strict=True):
+                if wire.source in tick.publishes:
+                    self._put(slots, tick.publishes[wire.source])
+                    self.given.add(wire.source)
+            history.append(self.memory.raw)
+            seen.append((faulty, tuple(results), self._states(), self._buffers()))
+        return seen
+
+    def _of_buffers(self) -> list[Slots]:
+        return self.slots[len(self.system.system.levels) :]
+
+    def _put(self, slots: Slots, values: Values) -> None:
+        for at, form, value in zip(slots.offsets, slots.formats, values, strict=True):
+            struct.pack_into(f"={form}", self.memory, at, value)
+
+    def _states(self) -> tuple[bytes, ...]:
+        return tuple(
+            self.system.signs[level.name].packed.pack(*slots.read(self.memory.raw))
+            for level, slots in zip(self.system.system.levels, self.slots, strict=False)
+        )
+
+    def _buffers(self) -> tuple[bytes | None, ...]:
+        found = []
+        for wire, slots in zip(self.system.system.wires, self._of_buffers(), strict=True):
+            there = wire.source in self.given or wire.source.partition(".")[0] in self.system.signs
+            form = "<" + "".join("B" if one == "?" else one for one in slots.formats)
+            found.append(struct.pack(form, *slots.read(self.memory.raw)) if there else None)
+        return tuple(found)
+
+
+def first_difference(one: Sequence[Seen], other: Sequence[Seen]) -> str:
+    """Where two runs part; empty where they do not."""
+    words = ("fault", "restarts", "levels", "buffers")
+    for tick, (first, second) in enumerate(zip(one, other, strict=True)):
+        for word, a, b in zip(words, first, second, strict=True):
+            if a != b:
+                return f"tick {tick}, {word}: {a!r} and {b!r}"
+    return ""
