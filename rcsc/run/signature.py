@@ -115,6 +115,23 @@ class LevelSign:
 
 
 @dataclass(frozen=True, slots=True)
+class Serves:
+    """Whom a program's level serves, as it declares it.
+
+    Attributes:
+        order: The record of orders, and `report` that of reports.
+        rest: The command that rests.
+        done, failed: The statuses that answer a command.
+    """
+
+    order: str
+    report: str
+    rest: str
+    done: str
+    failed: str
+
+
+@dataclass(frozen=True, slots=True)
 class Signature:
     """A program from outside.
 
@@ -135,6 +152,7 @@ class Signature:
     stops: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     invariants: tuple[str, ...] = ()
     restart: Mapping[int, Adopted] = field(default_factory=dict)
+    serves: Serves | None = None
 
     @property
     def check(self) -> str:
@@ -302,7 +320,27 @@ def signature_of(symbols: CheckedFields) -> Signature:
         stops,
         symbols.names("invariants", ()),
         {index[name]: adopted for name, adopted in _restart(symbols, leaves).items()},
+        _serves(symbols, leaves),
     )
+
+
+def _serves(symbols: CheckedFields, leaves: tuple[Leaf, ...]) -> Serves | None:
+    """Whom the level serves: in a symbol file among its roles, in a log by itself; None where nothing is declared.
+
+    Raises:
+        Malformed: The level has no such records, or no such members.
+    """
+    roles = symbols.table("roles") if "roles" in symbols.value else symbols
+    if "serves" not in roles.value:
+        return None
+    role = roles.table("serves")
+    serves = Serves(*(role.name(key) for key in ("order", "report", "rest", "done", "failed")))
+    inside = tuple(f"{record}." for record in (serves.order, serves.report))
+    members = {member for leaf in leaves if leaf.name.startswith(inside) for member in leaf.members}
+    missing = [word for word in (serves.rest, serves.done, serves.failed) if word not in members]
+    if missing:
+        raise Malformed(f"{role.where}: no order or report has a member {shown(missing[0])}")
+    return serves
 
 
 def _restart(symbols: CheckedFields, leaves: tuple[Leaf, ...]) -> dict[str, Adopted]:

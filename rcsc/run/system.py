@@ -230,6 +230,27 @@ def _check_ends(page: Document, system: Description, signs: Mapping[str, Signatu
             page.wrong(("buffers", wire.source), f"`{wire.source}` and `{wire.target}` hold other things")
 
 
+def _check_answered(system: Description, queries: Mapping[str, Query]) -> None:
+    """Every question of a feed has somebody who answers it.
+
+    Raises:
+        BadDescription: One has not.
+    """
+    page = system.review()
+    for at, spec in enumerate(system.levels):
+        for number, feed in enumerate(spec.feeds):
+            if feed.query not in queries:
+                helps = nearest(feed.query, list(queries)) or (
+                    f"the plant answers it with a method `def {feed.query}(self, key)`",
+                )
+                where = ("level", at, "feed", number, "query")
+                page.wrong(
+                    where, f"nobody answers `{feed.query}`, which fills `{spec.name}.{feed.into}`", *helps
+                )
+    if page.faults:
+        raise page.bad(BadDescription)
+
+
 def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -> dict[str, Executor]:
     """An executor for each level.
 
@@ -256,6 +277,7 @@ def assemble(
     """
     refuse_unproved(system)
     signs = signatures(system)
+    _check_answered(system, queries)
     for name, sign in signs.items():
         if not any(level.name == name for level in sign.levels):
             raise BadDescription(f"program `{sign.program}` has no level `{name}`")

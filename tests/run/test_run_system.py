@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 from rcsc.commands import run
 from rcsc.run.description import description
 from rcsc.run.orders.operator import ScriptedRun
+from rcsc.run.orders.roles import served
 from rcsc.run.orders.script import BadScript, read_script, script_path
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.system import System, assemble, signatures
@@ -323,3 +326,88 @@ def test_a_system_that_nobody_outside_orders_has_no_orders(here: Path) -> None:
     system = description(here / "system.toml")
     with pytest.raises(BadScript, match="no level is ordered from outside"):
         read_script(script_path("mine", here), system, signatures(system, fitting=False))
+
+
+@pytest.fixture(scope="module")
+def declared(repo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A docking robot that declares its roles, and says `finished` and `broken` where others say done and failed; compiled."""
+    folder = tmp_path_factory.mktemp("declared") / "dock"
+    shutil.copytree(repo / "tests/data/protocol", folder, ignore=shutil.ignore_patterns(".rcsc-cache"))
+    for path in folder.glob("*.rcs"):
+        text = re.sub(
+            r"\bfailed\b", "broken", re.sub(r"\bdone\b", "finished", path.read_text(encoding="utf-8"))
+        )
+        text = text.replace("finished finished", "done finished").replace("broken broken", "failed broken")
+        path.write_text(text, encoding="utf-8")
+    (folder / "base.py").write_text(SMALL_BASE, encoding="utf-8")
+    assert run(["compile", "-q", str(folder), "--out", str(folder / "generated")]) == 0
+    return folder
+
+
+SMALL_BASE = """\
+class Base:
+    speed: int = 0
+    travelled: float = 0.0
+    bumper: bool = False
+    beacon: bool = True
+
+    def step(self, seconds: float) -> None:
+        self.travelled += self.speed * seconds
+"""
+
+
+def test_what_a_program_declares_of_its_roles_is_what_a_script_goes_by(
+    declared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    system = description(declared / "system.toml")
+    [level] = served(system, signatures(system))
+    assert (level.order, level.report, level.done, level.failed) == (
+        "fleet.order",
+        "supervisor.to_fleet",
+        "finished",
+        "broken",
+    )
+    script = tmp_path / "day.csv"
+    script.write_text("command,base.beacon,expect\ndock,,\nstop,,\ndock,false,broken\n", encoding="utf-8")
+    log = tmp_path / "day.mcap"
+    asked = [
+        "run",
+        str(declared),
+        "--plant",
+        "base.py",
+        "--script",
+        str(script),
+        "--no-compile",
+        "--executor",
+        "python",
+        "--log",
+        str(log),
+    ]
+    assert run(asked) == 0, capsys.readouterr()
+    assert run(["replay", str(log), "--system", str(declared), "--executor", "python"]) == 0
+    script.write_text("command,base.beacon\ndock,false\n", encoding="utf-8")
+    assert run([*asked, "-q"]) == 1
+    assert "row 1, dock base.beacon=false: failed: why no_beacon" in stopped(capsys)
+
+
+FEED = 'name = "drive"\nfeed = [{ into = "lateral_mm", query = "aside", keys = ["travelled_mm"] }]'
+
+
+def test_a_plant_answers_what_a_feed_asks(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    system = (here / "system.toml").read_text(encoding="utf-8")
+    aside = '"base.lateral" = { sensor = "beacon", element = 1 }\n'
+    text = edited(
+        system, ('name = "drive"', FEED), ('"base.lateral" = "drive.lateral_mm"\n', ""), (aside, "")
+    )
+    (here / "system.toml").write_text(text, encoding="utf-8")
+    assert run(["run", "dock", "--no-compile", "-q", "--executor", "python"]) == 1
+    assert "error[RCS721]: nobody answers `aside`, which fills `drive.lateral_mm`" in stopped(capsys)
+    base = (here / "base.py").read_text(encoding="utf-8")
+    answer = "\n    def aside(self, travelled_mm: int) -> tuple[int]:\n        return (max(0, 120 - travelled_mm // 5),)\n"
+    (here / "base.py").write_text(base + answer, encoding="utf-8")
+    (here / "go.csv").write_text("command,base.contact\ndock,true\n", encoding="utf-8")
+    for more in ([], ["--processes", "--rate", "20"]):
+        assert (
+            run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--script", "go.csv", *more])
+            == 0
+        )

@@ -88,6 +88,8 @@ def signature_text(sign: Signature) -> str:
     """A signature as text."""
     written = asdict(sign)
     del written["restart"]
+    if sign.serves is None:
+        del written["serves"]
     declared = restart_written(sign)
     return compact({**written, **({"restart": declared} if declared is not None else {})})
 

@@ -193,8 +193,8 @@ class ScriptOperator:
             status = row.served.report_leaves[row.served.status].shown(report[row.served.status])
             if status == row.expect:
                 return DONE, ""
-            if status in (DONE, FAILED):
-                wanted = "" if row.expect == DONE else f", and was to be {row.expect}"
+            if status in (row.served.done, row.served.failed):
+                wanted = "" if row.expect == row.served.done else f", and was to be {row.expect}"
                 return FAILED, f"{_said(row.served, report) or status}{wanted}"
         if row.within is not None and ticks >= row.within:
             answered = "did not end" if report is not None else "is not answered"
@@ -208,7 +208,7 @@ class ScriptOperator:
             self.at += 1
         elif row.served is not None:
             resting = [
-                0 if place == row.served.command else leaf.initial
+                row.served.rest if place == row.served.command else leaf.initial
                 for place, leaf in enumerate(row.served.order_leaves)
             ]
             del resting[row.served.number]
@@ -220,7 +220,7 @@ class ScriptOperator:
         assert level is not None
         report = self._lines[level.level].answer(latest)
         status = "" if report is None else level.report_leaves[level.status].shown(report[level.status])
-        if status in (DONE, FAILED) or tick - self._resting >= REST_TICKS:
+        if status in (level.done, level.failed) or tick - self._resting >= REST_TICKS:
             self._resting = -1
 
 

@@ -1,15 +1,16 @@
 """Which buffers carry orders from outside and the reports on them, and which of their fields say what.
 
-In: a description and the signatures of its levels. Out: a `Served` for each level that somebody outside orders. The only
-place in which a run knows the fields of the protocol by name (Haynes et al. 1984, section 9): an order has `inc_command`
-and `input_command`, a report `inc_command_echo`, `ref_command_echo` and `status_report`.
+In: a description and the signatures of its levels. Out: a `Served` for each level that somebody outside orders. A program
+that declares whom it serves says which records these are, and which members mean rest, done and failed. Of any other the
+names say it (Haynes et al. 1984, section 9): an order has `inc_command` and `input_command`, a report `inc_command_echo`,
+`ref_command_echo` and `status_report`; the first command rests. Scripts know them only here.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.run.description import Description
-from rcsc.run.signature import Leaf, Signature
+from rcsc.run.signature import Leaf, Serves, Signature, Value
 
 NUMBER, COMMAND = "inc_command", "input_command"
 ECHO, STATUS = "inc_command_echo", "status_report"
@@ -30,6 +31,8 @@ class Served:
         order_leaves: The fields of an order, in the buffer's order; `report_leaves` those of a report.
         number: Where an order has its number; `command` its command.
         echo: Where a report repeats the number; `status` what has become of the order.
+        rest: The command that rests.
+        done, failed: The statuses that answer an order.
     """
 
     level: str
@@ -42,6 +45,9 @@ class Served:
     command: int
     echo: int
     status: int
+    rest: Value = 0
+    done: str = DONE
+    failed: str = FAILED
 
 
 def served(system: Description, signs: Mapping[str, Signature]) -> tuple[Served, ...]:
@@ -52,8 +58,8 @@ def served(system: Description, signs: Mapping[str, Signature]) -> tuple[Served,
         party, (level, _, variable) = _owner(source), target.partition(".")
         if party in signs or level not in signs:
             continue
-        order = _leaves(signs[level], variable)
-        if not _has(order, NUMBER, COMMAND):
+        role, order = signs[level].serves, _leaves(signs[level], variable)
+        if not _has(order, NUMBER, COMMAND) or (role is not None and variable != role.order):
             continue
         for back, to in wires:
             report = _leaves(signs[level], back.partition(".")[2]) if _owner(back) == level else ()
@@ -64,10 +70,19 @@ def served(system: Description, signs: Mapping[str, Signature]) -> tuple[Served,
                     _place(report, ECHO),
                     _place(report, STATUS),
                 )
-                levels.append(Served(level, party, source, back, order, report, *places))
+                levels.append(
+                    Served(level, party, source, back, order, report, *places, *_words(role, order))
+                )
                 break
     names = list(signs)
     return tuple(sorted(levels, key=lambda served_level: names.index(served_level.level)))
+
+
+def _words(role: Serves | None, order: Sequence[Leaf]) -> tuple[Value, str, str]:
+    """The command that rests, and the statuses that mean done and failed."""
+    if role is None:
+        return 0, DONE, FAILED
+    return order[_place(order, COMMAND)].members.index(role.rest), role.done, role.failed
 
 
 def field_of(leaf: Leaf) -> str:

@@ -108,7 +108,7 @@ def script_path(name: str, folder: Path) -> Path:
     """The file that a name means: itself, or one of those beside the description or in `scripts` there."""
     path = Path(name)
     if path.suffix in {".csv", ".toml"} or path.is_file():
-        return path
+        return path if path.is_file() or not (folder / path).is_file() else folder / path
     places = [folder / place / f"{name}{end}" for place in ("scripts", ".") for end in (".csv", ".toml")]
     return next((place for place in places if place.is_file()), places[0])
 
@@ -209,7 +209,7 @@ class _Reader:
             raise ValueError(
                 f"`{stray}` is no field of {'an order, for there is no `command`' if level is None else f'`{level.order}`'}"
             )
-        expect = line.get(EXPECT, DONE)
+        expect = line.get(EXPECT, DONE if level is None else level.done)
         if level is not None:
             _read(level.report_leaves[level.status], expect, EXPECT)
         cycles, within = (_whole(line, name) for name in (CYCLES, WITHIN))

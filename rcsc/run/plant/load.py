@@ -120,7 +120,9 @@ def chosen(system: Description, wanted: str | None) -> PlantSpec | None:
         return system.plants[0] if system.plants else None
     file, _, _ = wanted.partition(":")
     if file.endswith(".py"):
-        return PlantSpec("", wanted, Path())
+        beside = Path(system.document.name).parent if system.document is not None else Path()
+        here = Path(file).is_file() or not (beside / file).is_file()
+        return PlantSpec("", wanted if here else f"{beside / wanted}", Path())
     names = [spec.name for spec in system.plants]
     if wanted in names:
         return system.plants[names.index(wanted)]
