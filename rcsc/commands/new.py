@@ -29,8 +29,8 @@ NEXT = {
 }
 """Each template, and what to type first."""
 CACHES = {".rcsc-cache", "__pycache__"}
-GUIDE = "README.md"
-"""Stands beside the paper's tables, and speaks of the repository."""
+GUIDE = ".md"
+"""The guides beside the paper's tables speak of the repository."""
 
 
 @click.command(
@@ -87,7 +87,7 @@ def _files(kind: str) -> Iterator[tuple[str, bytes]]:
         packaged = package / "_data" / "tables"
         beside: Traversable = Path(__file__).parents[2] / "tables"
         for file, content in _below(packaged if packaged.is_dir() else beside):
-            if file != GUIDE:
+            if not file.endswith(GUIDE):
                 yield f"tables/{file}", content
 
 
