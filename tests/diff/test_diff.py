@@ -1163,3 +1163,23 @@ def test_an_assumption_that_newly_stops_or_no_longer_does_is_said(old: str, new:
         text = plain(list(rows(Difference("a", "b", (found,)))))
         assert text.count(f"`near` {word} the cycle where it fails") == bool(word)
         assert "`odd` n" not in text
+
+
+def test_what_a_role_or_a_restart_declares_otherwise_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("a", "b"):
+        shutil.copytree(
+            REPO / "tests/data/protocol", tmp_path / name, ignore=shutil.ignore_patterns(".rcsc-cache")
+        )
+    path = tmp_path / "b" / "supervisor.rcs"
+    text = path.read_text(encoding="utf-8")
+    changed = text.replace("restart bad", "restart rest").replace(
+        "within 25 cycles else drive_silent", "within 25 cycles else blocked"
+    )
+    assert changed.count("restart rest") == changed.count("else blocked") == 1
+    path.write_text(changed, encoding="utf-8")
+    run(["diff", str(tmp_path / "a" / "supervisor.rcs"), str(path)])
+    said = capsys.readouterr().out
+    assert "`now`" in said
+    assert "restart" in said

@@ -191,6 +191,8 @@ _COMPARED: Mapping[str, tuple[str, Mapping[str, object]]] = {
 """What the members of a program's field are called, and which of their fields a comparison of their own looks at."""
 _UNSEEN = {"name", "file", "own_tables"}
 """Fields of a program that mean nothing to it: where it stands, and which file declares what."""
+_UNNAMED = {"roles", "restart"}
+"""Fields whose parts have no name of their own; they are compared by themselves."""
 _WORDS = {"doc": "", "text": "", "box": None}
 """Fields that say again, for people or for the prover, what others say."""
 
@@ -207,7 +209,7 @@ def unreported(versions: Versions, reported: Iterable[str]) -> Iterator[Compared
     known = set(reported)
     before, after = versions.before, versions.after
     for field in fields(Program):
-        if field.name in _UNSEEN:
+        if field.name in _UNSEEN or field.name in _UNNAMED:
             continue
         what, compared = _COMPARED.get(field.name, (field.name, {}))
         old, new = ({str(m.name): m for m in getattr(p, field.name)} for p in (before, after))
@@ -222,6 +224,20 @@ def unreported(versions: Versions, reported: Iterable[str]) -> Iterator[Compared
                 yield ComparedPart(what, name, ("declared otherwise",))
         if [name for name in old if name in new] != [name for name in new if name in old]:
             yield ComparedPart("order", field.name, ("declared in another order",))
+    if before.roles != after.roles:
+        yield ComparedPart("roles", before.name, ("declared otherwise",))
+    yield from _restarts(before, after)
+
+
+def _restarts(before: Program, after: Program) -> Iterator[ComparedPart]:
+    """Every variable of both versions that a restart finds otherwise."""
+    old, new = dict(before.restart or ()), dict(after.restart or ())
+    shared = {variable.name for variable in before.variables} & {
+        variable.name for variable in after.variables
+    }
+    for name in dict.fromkeys((*old, *new)):
+        if name in shared and old.get(name) != new.get(name):
+            yield ComparedPart("restart", name, ("declared otherwise",))
 
 
 def _rest_of(member: Any, compared: Mapping[str, object]) -> str:
