@@ -18,10 +18,10 @@ from rcsc.commands.group import commands
 from tests.picture import CHECK, PICTURE_OF, PICTURES, RUN, masked, printed
 
 REPO = Path(__file__).parents[2]
-GUIDES = ("README.md", "rcsc/README.md", "tables/README.md", "sim/README.md")
+GUIDES = ("README.md", "rcsc/README.md", "tables/README.md", "tables/system.md", "sim/README.md")
 TINY = {
-    "rcsc run": "rcsc run --no-compile --plant kinematic",
-    "--plant kinematic --plant kinematic": "--plant kinematic",
+    "rcsc run make_boxt": "rcsc run --no-compile --plant kinematic make_boxt",
+    "rcsc run tests/data/dock --": "rcsc run --no-compile tests/data/dock --",
     "--processes": "--processes --help",
     "rcsc campaign --episodes 1000": "rcsc campaign --no-compile --workers 1 --episodes 1",
     "rcsc campaign --backend mujoco --episodes 100": "rcsc campaign --no-compile --workers 1 --episodes 1 --seed 1",

@@ -36,7 +36,9 @@ from rcsc.host.described import (
 )
 from rcsc.host.files.names import MOST_FILE_CHARACTERS
 from rcsc.host.files.read import MOST_TOML_BYTES
-from rcsc.run.description import BadDescription, description
+from rcsc.run.declared_plant import ACTUATOR, MODEL, PYTHON, SENSOR
+from rcsc.run.description import FEED, LEVEL, SYSTEM, BadDescription, description
+from rcsc.run.orders.script import OWN
 from rcsc.run.signature import Signature
 from rcsc.run.system import signatures
 from rcsc_cell.database.build import BadData, build
@@ -445,3 +447,32 @@ if __name__ == "__main__":
                 counts[bool(found)] += 1
                 sys.stdout.write("" if found else f"taken: {name}, {what}\n")
         sys.stdout.write(f"{counts[0]} taken, {counts[1]} refused\n")
+
+
+def test_the_guide_has_every_key_of_a_description(repo: Path) -> None:
+    text = (repo / "tables" / "system.md").read_text(encoding="utf-8")
+    shown = {key for row in re.findall(r"(?m)^\| (`.*?) \|", text) for key in re.findall(r"`(\w+)`", row)}
+    kinds = (
+        SYSTEM,
+        LEVEL,
+        FEED,
+        SENSOR,
+        ACTUATOR,
+        Record(PYTHON),
+        Record(MODEL),
+        Record(dict.fromkeys(OWN, Text())),
+    )
+    known = {key for kind in kinds for key in (*kind.needed, *kind.others)}
+    assert known <= shown, known - shown
+    assert shown - known <= {"bool", "int", "real"}
+
+
+def test_the_example_of_the_guide_is_taken(repo: Path, tmp_path: Path) -> None:
+    text = (repo / "tables" / "system.md").read_text(encoding="utf-8")
+    whole, model = re.findall(r"(?ms)^```toml\n(.*?)^```", text)
+    (tmp_path / "rcsc.toml").write_text("", encoding="utf-8")
+    buffers = '"base.lateral" = "drive.lateral_mm"\n"base.contact" = "supervisor.contact"\n"base.beacon" = "supervisor.beacon_seen"\n'
+    (tmp_path / "system.toml").write_text(
+        whole.replace("[buffers]\n", f"[buffers]\n{buffers}") + model, encoding="utf-8"
+    )
+    assert [spec.name for spec in description(tmp_path / "system.toml").plants] == ["", "mujoco"]
