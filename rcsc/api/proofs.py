@@ -136,6 +136,7 @@ class Proof:
         proved: Whether nothing is found wrong.
         whole: Whether, besides, everything was looked at and nothing rests on what is not proved.
         not_looked_at: What could not be stated, in words.
+        does_not_apply: What there is nothing to state of, in words.
     """
 
     proved: bool
@@ -143,6 +144,7 @@ class Proof:
     claims: tuple[Claim, ...]
     unproved: tuple[Unproved, ...]
     not_looked_at: tuple[str, ...]
+    does_not_apply: tuple[str, ...] = ()
 
 
 def prove(
@@ -168,12 +170,14 @@ def prove(
     kept = open_cache(path.parent) if cache else None
     proof = prove_transition_systems(systems, None, jobs, tuple(levels) or tuple(systems), cache=kept)
     runs = explain(systems, proof, TraceSettings(description(path), cycles))
+    left = [(level.level, unstated) for level in proof.levels for unstated in level.unstated]
     return Proof(
         proof.proved,
         proof.whole,
         tuple(_claims(proof)),
         tuple(_unproved(systems, explanation) for explanation in runs),
-        tuple(f"{level.level}: {unstated.shown}" for level in proof.levels for unstated in level.unstated),
+        tuple(f"{name}: {unstated.shown}" for name, unstated in left if unstated.applies),
+        tuple(f"{name}: {unstated.shown}" for name, unstated in left if not unstated.applies),
     )
 
 

@@ -11,7 +11,6 @@ import mujoco
 from rcsc.run.plant import Fault, Range
 
 MODEL = Path(__file__).with_name("rover.xml")
-WHEEL_M = 0.06
 FAR_M = 2.0
 
 
@@ -32,7 +31,7 @@ class Rover:
 
     def step(self, seconds: float) -> None:
         """One tick: the wheels are driven as ordered, physics runs, sensors are read."""
-        self.data.ctrl[:] = 0.0 if self.motors_dead else self.speed / 1000 / WHEEL_M
+        self.data.ctrl[:] = 0.0 if self.motors_dead else self.speed / 1000
         mujoco.mj_step(self.model, self.data, nstep=round(seconds / self.model.opt.timestep))
         self._sense()
 

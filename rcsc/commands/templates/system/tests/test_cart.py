@@ -43,6 +43,6 @@ def test_a_cart_that_is_stuck_is_reported() -> None:
     robot.step(20)
     robot.plant.stuck = True
     report = answer(robot)
-    assert (report["status_report"], report["failure"]) == ("failed", "axis_failed")
+    assert (report["status_report"], report["why"]) == ("failed", "too_late")
     robot.order("rest")
     assert answer(robot)["status_report"] == "done"
