@@ -9,7 +9,7 @@ import math
 import re
 import struct
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -32,11 +32,12 @@ class Tick:
     """What happens in one tick.
 
     Attributes:
-        begins: Before it, levels that start again: anew, or from what they were after an earlier tick.
+        begins: Before it, levels that start again: anew (None), from what they were after an earlier tick, or from that and with a leaf
+            in which something else stands, by its position.
         publishes: What stands outside gives at its end, for the next.
     """
 
-    begins: tuple[tuple[str, int | None], ...]
+    begins: tuple[tuple[str, int | None, tuple[int, Value] | None], ...]
     publishes: Published
 
 
@@ -60,14 +61,14 @@ def edges(leaf: Leaf) -> list[Value]:
     return [value for value in near if least <= value <= most]
 
 
-def drawn(random: Random, leaf: Leaf, before: Value) -> Value:
+def drawn(random: Random, leaf: Leaf, before: Value, wild: float) -> Value:
     """A value for a leaf: mostly in its range, a number mostly the one before or the next."""
     low, high = (0.0, len(leaf.members) - 1.0) if leaf.members else (leaf.low or 0, leaf.high or 0)
     inside = [value for value in edges(leaf) if leaf.c_type == "bool" or low <= value <= high]
     way = random.random()
     if leaf.name.endswith(("inc_command", "inc_command_echo")) and way < 0.8:
         return before if way < 0.3 or before >= high else int(before) + 1
-    if way < 0.03:
+    if way < wild:
         return random.choice(edges(leaf))
     if way < 0.5 or leaf.c_type == "bool":
         return random.choice(inside)
@@ -76,15 +77,21 @@ def drawn(random: Random, leaf: Leaf, before: Value) -> Value:
     return random.randint(int(low), int(high))
 
 
-def script(system: Description, signs: Mapping[str, Signature], random: Random, ticks: int) -> list[Tick]:
-    """A script for a system; buffers keep their values for some ticks, and some are not there from the beginning."""
+def script(
+    system: Description, signs: Mapping[str, Signature], random: Random, ticks: int, wild: float = 0.03
+) -> list[Tick]:
+    """A script for a system; buffers keep their values for some ticks, and some are not there from the beginning.
+
+    Args:
+        system: The description.
+        signs: The signature of each level's program.
+        random: Draws.
+        ticks: How many.
+        wild: How often a value is drawn from the edges of its range and beyond.
+    """
     last: Published = {}
     made = []
     for tick in range(ticks):
-        begins = [
-            (random.choice(system.levels).name, random.choice([None, None, random.randrange(tick or 1)]))
-            for _ in range(random.choice([0] * 12 + [1, 1, 2]))
-        ]
         publishes: Published = {}
         for wire in system.wires:
             level, _, variable = wire.target.partition(".")
@@ -93,10 +100,32 @@ def script(system: Description, signs: Mapping[str, Signature], random: Random, 
             leaves = [signs[level].leaves[at] for at in signs[level].record(variable)]
             before = last.get(wire.source, tuple(leaf.initial for leaf in leaves))
             publishes[wire.source] = last[wire.source] = tuple(
-                drawn(random, leaf, value) for leaf, value in zip(leaves, before, strict=True)
+                drawn(random, leaf, value, wild) for leaf, value in zip(leaves, before, strict=True)
             )
-        made.append(Tick(tuple(begin for begin in begins if tick or begin[1] is None), publishes))
+        made.append(Tick(tuple(begins(system, signs, random, tick, often=wild > 0.1)), publishes))
     return made
+
+
+def begins(
+    system: Description, signs: Mapping[str, Signature], random: Random, tick: int, *, often: bool
+) -> Iterator[tuple[str, int | None, tuple[int, Value] | None]]:
+    """Levels that start again before a tick."""
+    many = len(system.levels) if tick == 0 else random.choice([0] * (2 if often else 12) + [1, 1, 2])
+    for _ in range(many):
+        name = random.choice(system.levels).name
+        if tick == 0 or random.random() < 0.6:
+            yield name, None, None
+            continue
+        sign = signs[name]
+        wrong = [
+            (at, value)
+            for at, leaf in enumerate(sign.leaves)
+            if leaf.kind != "input" and leaf.c_type != "double"
+            for value in edges(leaf)[-1:]
+            if leaf.c_type != "bool" and value > (len(leaf.members) - 1 if leaf.members else leaf.high or 0)
+        ]
+        spoilt = random.choice([None, *([random.choice([wrong[0], *wrong])] if wrong else [])])
+        yield name, random.randrange(tick), spoilt
 
 
 # --- in Python -----------------------------------------------------------------------------
@@ -119,12 +148,16 @@ def by_python(
     told = Told()
     running = assemble(system, "python", queries or {}, [told])
     history: list[dict[str, Values]] = []
-    seen: list[Seen] = []
+    states = tuple(level.sign.packed.pack(*level.values) for level in running.levels)
+    seen: list[Seen] = [("", (True,), states, _begun(running))]
     for tick in ticks:
         results = []
-        for name, since in tick.begins:
+        for name, since, spoilt in tick.begins:
+            values = None if since is None else history[since][name]
+            if values is not None and spoilt is not None:
+                values = (*values[: spoilt[0]], spoilt[1], *values[spoilt[0] + 1 :])
             try:
-                running.restart(name, None if since is None else history[since][name])
+                running.restart(name, values)
                 results.append(True)
             except BadState:
                 results.append(False)
@@ -138,6 +171,18 @@ def by_python(
         states = tuple(level.sign.packed.pack(*level.executor.values()) for level in running.levels)
         seen.append((faulty, tuple(results), states, _buffers(running)))
     return seen
+
+
+def _begun(running: System) -> tuple[bytes, ...]:
+    """What a buffer holds in C from the beginning: what its reader begins with, or its giver where nobody in the system reads it."""
+    signs = {level.name: level.sign for level in running.levels}
+    found = []
+    for wire in running.description.wires:
+        ends = (end.partition(".")[::2] for end in (wire.target, wire.source))
+        level, variable = next((level, variable) for level, variable in ends if level in signs)
+        initial = [signs[level].leaves[at].initial for at in signs[level].record(variable)]
+        found.append(struct.pack(running.forms[wire.source], *initial))
+    return tuple(found)
 
 
 def _buffers(running: System) -> tuple[bytes | None, ...]:
@@ -200,11 +245,10 @@ class CSystem:
         ends = [end.partition(".")[::2] for end in (source, target)]
         (giver, given), (taker, taken) = ends
         if taker not in self.signs:
-            level, variable, place = giver, given, f"out.{target}"
+            level, variable, place = giver, given, f"out.{taker}.{_flat(taken)}"
         else:
             level, variable = taker, taken
-            flat = re.sub(r"\W+", "_", source).strip("_")
-            place = f"in.{source}" if giver not in self.signs else f"between.{flat}"
+            place = f"in.{giver}.{_flat(given)}" if giver not in self.signs else f"between.{_flat(source)}"
         sign = self.signs[level]
         leaves = [sign.leaves[at] for at in sign.record(variable)]
         return [(f"{place}{leaf.place.removeprefix(variable)}", FORMATS[leaf.c_type]) for leaf in leaves]
@@ -243,24 +287,29 @@ class CSystem:
         )
         return f"{head} {{ double got[{len(leaves)}]; const double keys[] = {{{keys}}}; seen_ask({at}, keys, got); {sets}}}\n"
 
-    def play(self, ticks: Sequence[Tick], text: str | None = None) -> list[Seen] | str:
+    def play(
+        self, ticks: Sequence[Tick], text: str | None = None, expected: Sequence[Seen] = ()
+    ) -> list[Seen] | str:
         """What the C system does, or another text in its place; why it does not build.
 
         Args:
             ticks: The script.
             text: A mutant of the source.
+            expected: What should be seen; it is left where something else is.
         """
         source = self.system.generated / f"c/{self.word}.c"
         (self.folder / "system.c").write_text(text or source.read_text(encoding="utf-8"))
         library = self.folder / f"system{len(list(self.folder.glob('*.so')))}.so"
-        flags = FLAGS if text is None else FLAGS[:-2]
+        flags = FLAGS if text is None else ("-std=c99", "-O0", "-fPIC")
         made = subprocess.run(
             ["cc", *flags, f"-I{self.system.generated / 'c'}", "-shared", "system.c", *self._objects, "-o", library.name],
             cwd=self.folder, capture_output=True, text=True, check=False,
         )  # fmt: skip
-        return self._played(ctypes.CDLL(str(library)), ticks) if made.returncode == 0 else made.stderr
+        return (
+            self._played(ctypes.CDLL(str(library)), ticks, expected) if made.returncode == 0 else made.stderr
+        )
 
-    def _played(self, library: ctypes.CDLL, ticks: Sequence[Tick]) -> list[Seen]:
+    def _played(self, library: ctypes.CDLL, ticks: Sequence[Tick], expected: Sequence[Seen]) -> list[Seen]:
         count = sum(map(len, self._members)) + 1
         *places, size = list((ctypes.c_size_t * count).in_dll(library, "seen_places"))
         runs = [0]
@@ -271,7 +320,9 @@ class CSystem:
             for (first, end), members in zip(pairwise(runs), self._members, strict=True)
         ]
         self._hear(library)
-        return _Playing(self, library, slots, ctypes.create_string_buffer(b"\xaa" * size, size)).all(ticks)
+        return _Playing(self, library, slots, ctypes.create_string_buffer(b"\xaa" * size, size)).all(
+            ticks, expected
+        )
 
     def _hear(self, library: ctypes.CDLL) -> None:
         asked = self._asked()
@@ -296,6 +347,10 @@ class CSystem:
             )
 
 
+def _flat(text: str) -> str:
+    return re.sub(r"\W+", "_", text).strip("_")
+
+
 @dataclass
 class _Playing:
     """One run of a library."""
@@ -306,7 +361,7 @@ class _Playing:
     memory: "ctypes.Array[ctypes.c_char]"
     given: set[str] = field(default_factory=set)
 
-    def all(self, ticks: Sequence[Tick]) -> list[Seen]:
+    def all(self, ticks: Sequence[Tick], expected: Sequence[Seen]) -> list[Seen]:
         word = self.system.word
         init, step, restart, resume = (
             getattr(self.library, f"{word}_{name}") for name in ("init", "step", "restart", "resume")
@@ -315,16 +370,25 @@ class _Playing:
         restart.restype = resume.restype = ctypes.c_int32
         names = ["", *(level.name for level in self.system.system.levels)]
         init(self.memory)
+        refused = [
+            restart(self.memory, level) == -2 == resume(self.memory, level, self.memory)
+            for level in (0, len(names))
+        ]
         history: list[bytes] = []
-        seen: list[Seen] = []
+        seen: list[Seen] = [("", (all(refused),), self._states(), self._buffers(begun=True))]
         for tick in ticks:
             results = []
-            for name, since in tick.begins:
+            for name, since, spoilt in tick.begins:
                 level = names.index(name)
                 if since is None:
                     results.append(restart(self.memory, level) == -1)
                 else:
                     before = ctypes.create_string_buffer(history[since], len(history[since]))
+                    if spoilt is not None:
+                        slots = self.slots[level - 1]
+                        struct.pack_into(
+                            f"={slots.formats[spoilt[0]]}", before, slots.offsets[spoilt[0]], spoilt[1]
+                        )
                     results.append(resume(self.memory, level, before) == -1)
             faulty = names[step(self.memory)]
             for wire, slots in zip(self.system.system.wires, self._of_buffers(), strict=True):
@@ -333,6 +397,8 @@ class _Playing:
                     self.given.add(wire.source)
             history.append(self.memory.raw)
             seen.append((faulty, tuple(results), self._states(), self._buffers()))
+            if expected and seen[-1] != expected[len(seen) - 1]:
+                break
         return seen
 
     def _of_buffers(self) -> list[Slots]:
@@ -348,10 +414,10 @@ class _Playing:
             for level, slots in zip(self.system.system.levels, self.slots, strict=False)
         )
 
-    def _buffers(self) -> tuple[bytes | None, ...]:
+    def _buffers(self, *, begun: bool = False) -> tuple[bytes | None, ...]:
         found = []
         for wire, slots in zip(self.system.system.wires, self._of_buffers(), strict=True):
-            there = wire.source in self.given or wire.source.partition(".")[0] in self.system.signs
+            there = begun or wire.source in self.given or wire.source.partition(".")[0] in self.system.signs
             form = "<" + "".join("B" if one == "?" else one for one in slots.formats)
             found.append(struct.pack(form, *slots.read(self.memory.raw)) if there else None)
         return tuple(found)
@@ -360,8 +426,8 @@ class _Playing:
 def first_difference(one: Sequence[Seen], other: Sequence[Seen]) -> str:
     """Where two runs part; empty where they do not."""
     words = ("fault", "restarts", "levels", "buffers")
-    for tick, (first, second) in enumerate(zip(one, other, strict=True)):
+    for tick, (first, second) in enumerate(zip(one, other, strict=False), start=-1):
         for word, a, b in zip(words, first, second, strict=True):
             if a != b:
                 return f"tick {tick}, {word}: {a!r} and {b!r}"
-    return ""
+    return "" if len(one) == len(other) else f"{len(one)} and {len(other)} ticks"

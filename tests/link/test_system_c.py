@@ -1,9 +1,15 @@
 """The C of a system does what the Python system does: every leaf of every level, every buffer, in every tick."""
 
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
+from rcsc.driver.compile import compile_system
 from rcsc.run.description import description
 from rcsc.run.system import signatures
+from tests.link.drawn_systems import drawn_system
 from tests.link.played import CSystem, by_python, drawing, first_difference, script
 from tests.support.cells import SYSTEM, database
 
@@ -30,3 +36,65 @@ def test_the_shipped_system(tmp_path: Path) -> None:
     expected, made = by_python(system, ticks, data.queries), built.play(ticks)
     assert not isinstance(made, str), made
     assert first_difference(expected, made) == ""
+
+
+@pytest.mark.parametrize("seed", range(14))
+def test_drawn_systems(seed: int, tmp_path: Path) -> None:
+    random = drawing(seed)
+    path = drawn_system(tmp_path, random)
+    conclusion = compile_system(path)
+    assert not conclusion.report.failed, conclusion.report.diagnostics
+    system = description(path)
+    signs = signatures(system)
+    ticks = script(system, signs, random, 200)
+    expected, made = by_python(system, ticks), CSystem(system, signs, tmp_path).play(ticks)
+    assert not isinstance(made, str), made
+    assert first_difference(expected, made) == ""
+
+
+KEPT = re.compile(r"number = \(uint64_t\)now|return|break|const|u?int\w* |\w+_t \w+( =|;)")
+SWAPS = (
+    ("== UINT64_C(0)", "!= UINT64_C(0)"), ("!= UINT64_C(0)", "== UINT64_C(0)"), ("UINT64_C(1)", "UINT64_C(2)"),
+    ("(at < 0)", "(at < 1)"), ("% UINT64_C(2)", "% UINT64_C(3)"), ("% UINT64_C(3)", "% UINT64_C(2)"),
+    ("% UINT64_C(4)", "% UINT64_C(2)"), ("== DRAWN_LEVEL_NONE", "!= DRAWN_LEVEL_NONE"),
+    ("UINT64_C(255)", "UINT64_C(256)"), ("65536", "65535"), ("_echo;", "_echo + 1u;"),
+)  # fmt: skip
+
+
+def mutants(text: str) -> Iterator[tuple[str, str]]:
+    """What is changed, and the text: each statement left out, each comparison and constant another one."""
+    lines = text.splitlines(keepends=True)
+    for at, line in enumerate(lines):
+        before, after, word = "".join(lines[:at]), "".join(lines[at + 1 :]), line.strip()
+        if line.startswith("    ") and word.endswith(";") and not KEPT.match(word):
+            yield f"{at + 1}: without {word}", before + after
+        for old, new in SWAPS:
+            if old in line:
+                yield f"{at + 1}: {word} with {new}", before + line.replace(old, new) + after
+
+
+SAME = r"without now\.to_low\.input_command = \(uint8_t\)0u"  # it is 0 in the initial state
+UNTRIED = {
+    9: rf"{SAME}|with (65535|UINT64_C\(256\))|without at = 0;|without at = low_check|at < 1",  # 10 fits the type, and not the range
+    255: rf"{SAME}|with 65535|without at = \w+_check|at < 1",  # 256 does not fit the type
+    65535: rf"{SAME}|without at = \w+_check|at < 1",
+}
+"""By the greatest number of an order: what changes nothing, or nothing that this system can show."""
+
+
+@pytest.mark.parametrize("most", [9, 255, 65535])
+def test_mutants_are_caught(most: int, tmp_path: Path) -> None:
+    random = drawing(1)
+    path = drawn_system(tmp_path, random, most=most)
+    assert not compile_system(path).report.failed
+    system = description(path)
+    signs = signatures(system)
+    ticks = script(system, signs, random, 600, wild=0.3)
+    expected, built = by_python(system, ticks), CSystem(system, signs, tmp_path)
+    text = (tmp_path / "generated/c/drawn.c").read_text(encoding="utf-8")
+    assert built.play(ticks) == expected
+    chosen = re.compile(r"^(?!.*(middle|_low_|low_|s->low))" if most == 9 else "number")
+    every = [(what, mutant) for what, mutant in mutants(text) if chosen.search(what)]
+    assert len(every) > (50 if most == 9 else 10)
+    survivors = [what for what, mutant in every if built.play(ticks, mutant, expected) == expected]
+    assert [what for what in survivors if not re.search(UNTRIED[most], what)] == []
