@@ -1,0 +1,112 @@
+"""A user builds the C of a system: by CMake, by pkg-config, as one unit, for a Cortex-M; what the guide shows does what it says."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from rcsc.testing.cortex import FLAGS, LINK, LINKER, MACHINE, STARTUP
+
+GUIDE = Path(__file__).parents[2] / "tables/README.md"
+STRICT = "-std=c99 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wpedantic -Werror".split()
+
+PRINTED = "status 0 at 628 mm\n"
+
+
+def shown(language: str) -> str:
+    """The one text in a language that the guide shows."""
+    [text] = re.findall(
+        rf"^```{language}\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
+    )
+    return str(text)
+
+
+@pytest.fixture
+def robot(dock: Path) -> Path:
+    """The docking robot with the guide's `main.c`."""
+    (dock / "main.c").write_text(shown("c"), encoding="utf-8")
+    return dock
+
+
+def sh(folder: Path, script: str) -> str:
+    """What a script prints, which must end well."""
+    ran = subprocess.run(["sh", "-eu", "-c", script], cwd=folder, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    return ran.stdout
+
+
+def test_main_is_short() -> None:
+    assert len(shown("c").splitlines()) <= 25
+    assert f"prints `{PRINTED.strip()}`" in GUIDE.read_text(encoding="utf-8")
+
+
+@pytest.mark.needs("cmake")
+def test_by_cmake(robot: Path) -> None:
+    (robot / "CMakeLists.txt").write_text(shown("cmake"), encoding="utf-8")
+    assert sh(robot, "cmake -S . -B b > log && cmake --build b > log && b/robot") == PRINTED
+
+
+@pytest.mark.needs("cmake")
+def test_a_project_may_include_the_levels_too(robot: Path) -> None:
+    text = shown("cmake").replace("include(", "include(generated/c/drive.cmake)\ninclude(")
+    text = text.replace("add_exec", "include(generated/c/supervisor.cmake)\nadd_exec").replace(
+        "robot dock", "robot drive dock"
+    )
+    (robot / "CMakeLists.txt").write_text(text, encoding="utf-8")
+    sh(robot, "cmake -S . -B b > log && cmake --build b > log && b/robot")
+
+
+@pytest.mark.needs("pkg-config")
+@pytest.mark.parametrize(
+    "build",
+    [
+        "cc main.c $(pkg-config --cflags dock) $(pkg-config --variable=sources dock) -o robot",
+        """cc $(pkg-config --cflags dock) -c $(pkg-config --variable=sources dock)
+        ar rcs generated/c/libdock.a dock.o drive.o supervisor.o
+        cc main.c $(pkg-config --cflags --libs dock) -o robot""",
+    ],
+    ids=["sources", "library"],
+)
+def test_by_pkg_config(build: str, robot: Path) -> None:
+    compiler = f"cc {' '.join(STRICT)} "
+    script = f"export PKG_CONFIG_PATH=generated/c\n{build.replace('cc ', compiler)}\n./robot"
+    assert sh(robot, script) == PRINTED
+
+
+@pytest.mark.parametrize("cc", ["gcc", pytest.param("clang", marks=pytest.mark.needs("clang"))])
+def test_as_one_unit_and_from_cpp(cc: str, robot: Path) -> None:
+    sources = ("drive", "supervisor", "dock")
+    (robot / "unit.c").write_text("".join(f'#include "{name}.c"\n' for name in sources) + shown("c"))
+    sh(robot, f"{cc} {' '.join(STRICT)} -Igenerated/c unit.c -o unit && ./unit")
+    (robot / "use.cpp").write_text(
+        '#include "dock.h"\nint main() { dock_t s; dock_init(&s); return dock_step(&s); }\n'
+    )
+    sh(robot, f"{cc} -xc++ -std=c++17 -Wall -Wextra -Werror -Igenerated/c -fsyntax-only use.cpp")
+
+
+@pytest.mark.needs("arm-none-eabi-gcc", "qemu-system-arm")
+def test_on_a_cortex_m(robot: Path) -> None:
+    """With the same warnings; the emulator runs it to its end, with no other memory than the state."""
+    (robot / "rcsc.ld").write_text(LINKER)
+    (robot / "start.c").write_text(
+        f"#include <stdint.h>\n#include <stdlib.h>\n#include <string.h>\n{STARTUP}"
+    )
+    (robot / "unit.c").write_text(
+        "".join(f'#include "{name}.c"\n' for name in ("drive", "supervisor", "dock"))
+    )
+    arm = [flag for flag in FLAGS if flag not in {"-w", "-std=gnu11"}]
+    units = f"arm-none-eabi-gcc {' '.join([*STRICT, *arm])} -Igenerated/c -c unit.c main.c"
+    link = f"arm-none-eabi-gcc -w {' '.join([*arm, *LINK])} -o robot.elf unit.o main.o start.c"
+    assert sh(robot, f"{units}\n{link}\nqemu-system-arm {' '.join(MACHINE)} -kernel robot.elf") == PRINTED
+    used = set(re.findall(r"U (\w+)", sh(robot, "arm-none-eabi-nm unit.o")))
+    assert used <= {"memcpy", "memset", "__aeabi_uldivmod"}
+
+
+def test_the_shipped_system_is_one_unit_too(repo: Path, tmp_path: Path) -> None:
+    """Its levels ask the database: functions that are declared, and that the user writes."""
+    names = ("emove", "gripper", "primitive", "task", "vision", "nbs_robot")
+    (tmp_path / "unit.c").write_text("".join(f'#include "{name}.c"\n' for name in names))
+    cc = shutil.which("arm-none-eabi-gcc") or "cc"
+    sh(tmp_path, f"{cc} {' '.join(STRICT)} -I{repo / 'generated/c'} -ffp-contract=off -c unit.c")
