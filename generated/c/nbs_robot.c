@@ -36,10 +36,10 @@ static int32_t nbs_robot_restart_task(nbs_robot_t *s)
     s->task.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_task(s);
     now = s->task;
-    now.status_report = (uint8_t)2u;
-    now.failure = (uint8_t)15u;
-    now.cur_state = (uint8_t)1u;
-    now.cur_state_next = (uint8_t)1u;
+    now.status_report = (uint8_t)INT64_C(2);
+    now.failure = (uint8_t)INT64_C(15);
+    now.cur_state = (uint8_t)INT64_C(1);
+    now.cur_state_next = (uint8_t)INT64_C(1);
     now.inc_command_seen = now.command.inc_command;
     number = (uint64_t)now.emove.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
@@ -47,7 +47,7 @@ static int32_t nbs_robot_restart_task(nbs_robot_t *s)
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_emove.inc_command = (uint16_t)number;
-    now.to_emove.input_command = (uint8_t)0u;
+    now.to_emove.input_command = (uint8_t)INT64_C(0);
     at = task_check(&now);
     if (at < 0) {
         s->task = now;
@@ -109,10 +109,10 @@ static int32_t nbs_robot_restart_emove(nbs_robot_t *s)
     s->emove.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_emove(s);
     now = s->emove;
-    now.status_report = (uint8_t)2u;
-    now.failure = (uint8_t)15u;
-    now.cur_state = (uint8_t)1u;
-    now.cur_state_next = (uint8_t)1u;
+    now.status_report = (uint8_t)INT64_C(2);
+    now.failure = (uint8_t)INT64_C(15);
+    now.cur_state = (uint8_t)INT64_C(1);
+    now.cur_state_next = (uint8_t)INT64_C(1);
     now.inc_command_seen = now.command.inc_command;
     number = (uint64_t)now.primitive.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
@@ -120,14 +120,14 @@ static int32_t nbs_robot_restart_emove(nbs_robot_t *s)
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_primitive.inc_command = (uint16_t)number;
-    now.to_primitive.input_command = (uint8_t)0u;
+    now.to_primitive.input_command = (uint8_t)INT64_C(0);
     number = (uint64_t)now.vision.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.emove_to_vision.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_vision.inc_command = (uint16_t)number;
-    now.to_vision.input_command = (uint8_t)0u;
+    now.to_vision.input_command = (uint8_t)INT64_C(0);
     at = emove_check(&now);
     if (at < 0) {
         s->emove = now;
@@ -177,9 +177,9 @@ static int32_t nbs_robot_restart_vision(nbs_robot_t *s)
     s->vision.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_vision(s);
     now = s->vision;
-    now.status_report = (uint8_t)2u;
-    now.failure = (uint8_t)15u;
-    now.cur_state = (uint8_t)1u;
+    now.status_report = (uint8_t)INT64_C(2);
+    now.failure = (uint8_t)INT64_C(15);
+    now.cur_state = (uint8_t)INT64_C(1);
     now.inc_command_seen = now.command.inc_command;
     number = (uint64_t)now.camera.number;
     if (s->tick != UINT64_C(0)) {
@@ -243,10 +243,10 @@ static int32_t nbs_robot_restart_primitive(nbs_robot_t *s)
     s->primitive.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_primitive(s);
     now = s->primitive;
-    now.status_report = (uint8_t)2u;
-    now.failure = (uint8_t)15u;
-    now.cur_state = (uint8_t)1u;
-    now.cur_state_next = (uint8_t)1u;
+    now.status_report = (uint8_t)INT64_C(2);
+    now.failure = (uint8_t)INT64_C(15);
+    now.cur_state = (uint8_t)INT64_C(1);
+    now.cur_state_next = (uint8_t)INT64_C(1);
     now.inc_command_seen = now.command.inc_command;
     number = (uint64_t)now.robot.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
@@ -254,14 +254,14 @@ static int32_t nbs_robot_restart_primitive(nbs_robot_t *s)
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_robot.inc_command = (uint16_t)number;
-    now.to_robot.input_command = (uint8_t)0u;
+    now.to_robot.input_command = (uint8_t)INT64_C(0);
     number = (uint64_t)now.gripper.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.primitive_to_gripper.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_gripper.inc_command = (uint16_t)number;
-    now.to_gripper.input_command = (uint8_t)0u;
+    now.to_gripper.input_command = (uint8_t)INT64_C(0);
     at = primitive_check(&now);
     if (at < 0) {
         s->primitive = now;
@@ -310,9 +310,9 @@ static int32_t nbs_robot_restart_gripper(nbs_robot_t *s)
     s->gripper.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_gripper(s);
     now = s->gripper;
-    now.status_report = (uint8_t)2u;
-    now.failure = (uint8_t)15u;
-    now.cur_state = (uint8_t)1u;
+    now.status_report = (uint8_t)INT64_C(2);
+    now.failure = (uint8_t)INT64_C(15);
+    now.cur_state = (uint8_t)INT64_C(1);
     now.inc_command_seen = now.command.inc_command;
     at = gripper_check(&now);
     if (at < 0) {

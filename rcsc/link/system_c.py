@@ -24,10 +24,11 @@ from rcsc.emit.code_tree import (
     repeated,
     when,
 )
-from rcsc.emit.ctext import type_bounds
+from rcsc.emit.ctext import c_type, type_bounds
 from rcsc.emit.identifiers import TRACE, comment, constant_word, guard
 from rcsc.emit.rendering import render
-from rcsc.lang.model import Admit, Array, Record, Scalar, Type
+from rcsc.emit.translate import constant
+from rcsc.lang.model import Admit, Array, Bool, Real, Record, Scalar, Type, Value
 from rcsc.link.wiring import BETWEEN, IN, OUT, OWN, TICK, Buffer, End, LevelProgram, Linked, LinkedLevel
 from rcsc.run.adopt import NUMBERS, Copied, Fixed, Numbered, Start, adoption
 
@@ -234,7 +235,7 @@ class _Maker:
         place = Name(f"now.{program.path(start.at)}")
         match start:
             case Fixed(value=value):
-                yield Set(place, _constant(leaf.c_type, int(value)))
+                yield Set(place, _constant(program.plan.program.variables[start.at].type, value))
             case Copied(source=source):
                 given = Name(f"now.{program.path(source)}")
                 same = program.sign.leaves[source].c_type == leaf.c_type
@@ -357,10 +358,9 @@ def _chosen(each: Iterable[tuple[LinkedLevel, Code]]) -> Iterator[Stmt]:
     yield Leave(AT)
 
 
-def _constant(kind: str, value: int) -> Code:
-    if kind in {"bool", "double"}:
-        return Constant(value, kind)
-    return Cast(kind, Constant(value, "uint32_t"))
+def _constant(kind: Scalar, value: Value) -> Code:
+    code = constant(kind, value)
+    return code if isinstance(kind, Bool | Real) else Cast(c_type(kind), code)
 
 
 def _greatest(level: LinkedLevel, start: Numbered) -> int:

@@ -1,6 +1,7 @@
 """The C of a system does what the Python system does: every leaf of every level, every buffer, in every tick."""
 
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,18 +15,19 @@ from tests.link.played import CSystem, by_python, drawing, first_difference, scr
 from tests.support.cells import SYSTEM, database
 
 
-def test_the_docking_robot(dock: Path, tmp_path: Path) -> None:
-    system = description(dock / "system.toml")
+@pytest.mark.parametrize("data", ["dock", "protocol"])
+def test_docking_robots(data: str, repo: Path, tmp_path: Path) -> None:
+    """One with the protocol written by hand, one that declares whom it serves and commands."""
+    shutil.copytree(repo / "tests/data" / data, tmp_path / data, ignore=shutil.ignore_patterns("generated"))
+    path = tmp_path / data / "system.toml"
+    assert not compile_system(path).report.failed
+    system = description(path)
     signs = signatures(system)
-    built = CSystem(system, signs, tmp_path)
     ticks = script(system, signs, drawing(1), 600)
-    expected, made = by_python(system, ticks), built.play(ticks)
+    expected, made = by_python(system, ticks), CSystem(system, signs, tmp_path).play(ticks)
     assert not isinstance(made, str), made
     assert first_difference(expected, made) == ""
-    assert {faulty for faulty, *_ in expected} == {
-        "",
-        "supervisor",
-    }  # the drive's readings are clamped
+    assert {faulty for faulty, *_ in expected} == {"", "supervisor"}  # the drive's readings are clamped
 
 
 def test_the_shipped_system(tmp_path: Path) -> None:
@@ -73,7 +75,7 @@ def mutants(text: str) -> Iterator[tuple[str, str]]:
                 yield f"{at + 1}: {word} with {new}", before + line.replace(old, new) + after
 
 
-SAME = r"without now\.to_low\.input_command = \(uint8_t\)0u"  # it is 0 in the initial state
+SAME = r"without now\.to_low\.input_command = \(uint8_t\)INT64_C\(0\)"  # it is 0 in the initial state
 UNTRIED = {
     9: rf"{SAME}|with (65535|UINT64_C\(256\))|without at = 0;|without at = low_check|at < 1",  # 10 fits the type, and not the range
     255: rf"{SAME}|with 65535|without at = \w+_check|at < 1",  # 256 does not fit the type
