@@ -129,14 +129,18 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     path, named = meant(target, system, script)
     if compiles and not compiled(path, quiet):
         return 1
-    said = description(path)
+    described = description(path)
     order = StageOrder(
-        str(path), plant or "", named or (str(said.script) if said.script else ""), str(database or ""), seed
+        str(path),
+        plant or "",
+        named or (str(described.script) if described.script else ""),
+        str(database or ""),
+        seed,
     )
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     paced = rate or (WATCHED_RATE if live or processes else None)
     again = _command(target, system, script, database, executor, plant)
-    title = named or said.name
+    title = named or described.name
     asked = RunOptions(title, path, order, kind, log, report, live, paced, cycles, quiet, again)
     try:
         return _apart(asked, from_row) if processes else _run(asked, from_row, resumes)
@@ -372,7 +376,7 @@ def _closing(
     run = witness.run
     again = _kept(run, resume, asked)
     if not asked.quiet:
-        for line in (*witness.closing(), _figures(run, seconds)):
+        for line in (*witness.closing(), *_unfilled(run), _figures(run, seconds)):
             click.echo(line)
         here = log.relative_to(Path.cwd()) if log.is_relative_to(Path.cwd()) else log
         click.echo(f"log: {here}" + (f"; report: {asked.report}" if asked.report else ""))
@@ -388,6 +392,19 @@ def _closing(
     if not operator.over:
         raise Stopped(Code.SCRIPT_STOPPED, f"row {operator.at + 1} did not end in {run.system.tick} cycles")
     return 0
+
+
+def _unfilled(run: ScriptedRun) -> Iterator[str]:
+    """Which buffers from outside nobody filled: a plant or a script that a newcomer forgot."""
+    levels = {level.name for level in run.system.levels}
+    sources = dict.fromkeys(wire.source for wire in run.system.description.wires)
+    missing = [
+        source
+        for source in sources
+        if source.partition(".")[0] not in levels and run.system.buffers.latest(source) is None
+    ]
+    if missing:
+        yield f"nobody outside filled {', '.join(f'`{source}`' for source in missing)}: these inputs stayed as at first"
 
 
 def _figures(run: ScriptedRun, seconds: float) -> str:

@@ -122,7 +122,7 @@ def chosen(system: Description, wanted: str | None) -> PlantSpec | None:
     if file.endswith(".py"):
         beside = Path(system.document.name).parent if system.document is not None else Path()
         here = Path(file).is_file() or not (beside / file).is_file()
-        return PlantSpec("", wanted if here else f"{beside / wanted}", Path())
+        return PlantSpec("", wanted if here else f"{beside / wanted}", Path(), path=())
     names = [spec.name for spec in system.plants]
     if wanted in names:
         return system.plants[names.index(wanted)]

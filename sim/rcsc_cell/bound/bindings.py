@@ -88,62 +88,62 @@ class Binder:
     path: KeyPath
     model: Any
 
-    def sensors(self, buffer: Buffer, said: Mapping[str, Mapping[str, Any]]) -> list[SensorBinding]:
+    def sensors(self, buffer: Buffer, entries: Mapping[str, Mapping[str, Any]]) -> list[SensorBinding]:
         """What fills each leaf of a buffer from outside; those that fit."""
         bound = []
         for end, leaf in _ends(buffer):
             where = (*self.path, "sensors", end)
-            if end not in said:
+            if end not in entries:
                 self.page.wrong(
                     buffer.path,
                     f"no sensor fills `{end}`, which `{buffer.variable}` takes",
                     f'write `"{end}" = {{ sensor = "..." }}`, or `{{ value = ... }}` where it stands still',
                 )
                 continue
-            binding = self._sensor(end, leaf, said[end], where)
+            binding = self._sensor(end, leaf, entries[end], where)
             if binding is not None:
                 bound.append(binding)
         return bound
 
-    def actuators(self, buffer: Buffer, said: Mapping[str, Mapping[str, Any]]) -> list[ActuatorBinding]:
+    def actuators(self, buffer: Buffer, entries: Mapping[str, Mapping[str, Any]]) -> list[ActuatorBinding]:
         """What each leaf of a level's buffer drives; those that drive something and fit."""
         bound = []
         for place, (end, leaf) in enumerate(_ends(buffer)):
             where = (*self.path, "actuators", end)
-            if end not in said:
+            if end not in entries:
                 self.page.wrong(
                     buffer.path,
                     f"no actuator takes `{end}`, which `{buffer.variable}` gives",
                     f'write `"{end}" = {{ actuator = "..." }}`, or `{{ ignore = true }}`',
                 )
                 continue
-            if said[end].get("ignore"):
+            if entries[end].get("ignore"):
                 continue
-            binding = self._actuator(place, leaf, said[end], where)
+            binding = self._actuator(place, leaf, entries[end], where)
             if binding is not None:
                 bound.append(binding)
         return bound
 
     # --- sensors ---
 
-    def _sensor(self, end: str, leaf: Leaf, said: Mapping[str, Any], where: KeyPath) -> SensorBinding | None:
-        if ("sensor" in said) == ("value" in said):
+    def _sensor(self, end: str, leaf: Leaf, entry: Mapping[str, Any], where: KeyPath) -> SensorBinding | None:
+        if ("sensor" in entry) == ("value" in entry):
             self.page.wrong(where, f"`{end}` needs either `sensor` or `value`")
             return None
-        if "value" in said:
-            return self._still(end, leaf, said["value"], where)
-        sensor = self._named(mujoco.mjtObj.mjOBJ_SENSOR, "sensor", said["sensor"], where)
+        if "value" in entry:
+            return self._still(end, leaf, entry["value"], where)
+        sensor = self._named(mujoco.mjtObj.mjOBJ_SENSOR, "sensor", entry["sensor"], where)
         if sensor is None:
             return None
-        size, element = int(self.model.sensor_dim[sensor]), int(said.get("element", 0))
-        if element >= size or ("element" not in said and size > 1):
+        size, element = int(self.model.sensor_dim[sensor]), int(entry.get("element", 0))
+        if element >= size or ("element" not in entry and size > 1):
             self.page.wrong(
-                where, f"sensor `{said['sensor']}` has {size} numbers", "`element = 0` takes the first"
+                where, f"sensor `{entry['sensor']}` has {size} numbers", "`element = 0` takes the first"
             )
             return None
         at = int(self.model.sensor_adr[sensor]) + element
         if leaf.c_type == "bool":
-            return self._threshold(end, at, said, where)
+            return self._threshold(end, at, entry, where)
         if leaf.members:
             self.page.wrong(
                 where,
@@ -151,7 +151,7 @@ class Binder:
                 BY_HAND,
             )
             return None
-        by = self._factor(leaf, said, sensed_in(self.model, sensor), "sensor", where)
+        by = self._factor(leaf, entry, sensed_in(self.model, sensor), "sensor", where)
         return None if by is None else SensorBinding(end, at, NumberLink(leaf, False, by))
 
     def _still(self, end: str, leaf: Leaf, value: object, where: KeyPath) -> SensorBinding | None:
@@ -170,43 +170,43 @@ class Binder:
             return None
         return SensorBinding(end, -1, value=held)
 
-    def _threshold(self, end: str, at: int, said: Mapping[str, Any], where: KeyPath) -> SensorBinding | None:
-        if ("over" in said) == ("under" in said):
+    def _threshold(self, end: str, at: int, entry: Mapping[str, Any], where: KeyPath) -> SensorBinding | None:
+        if ("over" in entry) == ("under" in entry):
             self.page.wrong(
                 where,
                 f"`{end}` is true or false, and a sensor gives a number",
                 "`over = 0.5` makes it true above 0.5, `under = 0.5` below",
             )
             return None
-        return SensorBinding(end, at, None, said.get("over"), said.get("under"))
+        return SensorBinding(end, at, None, entry.get("over"), entry.get("under"))
 
     # --- actuators ---
 
     def _actuator(
-        self, place: int, leaf: Leaf, said: Mapping[str, Any], where: KeyPath
+        self, place: int, leaf: Leaf, entry: Mapping[str, Any], where: KeyPath
     ) -> ActuatorBinding | None:
-        if "actuator" not in said:
+        if "actuator" not in entry:
             self.page.wrong(where, f"`{where[-1]}` needs an `actuator`, or `ignore = true`")
             return None
-        actuator = self._named(mujoco.mjtObj.mjOBJ_ACTUATOR, "actuator", said["actuator"], where)
+        actuator = self._named(mujoco.mjtObj.mjOBJ_ACTUATOR, "actuator", entry["actuator"], where)
         if actuator is None:
             return None
         words = leaf.members or (("false", "true") if leaf.c_type == "bool" else ())
         if words:
-            values = self._values(words, said, where)
+            values = self._values(words, entry, where)
             binding = None if values is None else ActuatorBinding(actuator, place, None, values)
         else:
-            by = self._factor(leaf, said, driven_in(self.model, actuator), "actuator", where)
+            by = self._factor(leaf, entry, driven_in(self.model, actuator), "actuator", where)
             binding = None if by is None else ActuatorBinding(actuator, place, NumberLink(leaf, False, by))
         if binding is not None:
-            self._check_control(binding, leaf, str(said["actuator"]), where)
+            self._check_control(binding, leaf, str(entry["actuator"]), where)
         return binding
 
     def _values(
-        self, words: Sequence[str], said: Mapping[str, Any], where: KeyPath
+        self, words: Sequence[str], entry: Mapping[str, Any], where: KeyPath
     ) -> tuple[float, ...] | None:
         """The control of each member."""
-        values = said.get("values", {})
+        values = entry.get("values", {})
         for word in values:
             if word not in words:
                 self.page.wrong(
@@ -240,11 +240,11 @@ class Binder:
 
     def _named(self, kind: Any, what: str, name: object, where: KeyPath) -> int | None:
         """The place of a thing in the model."""
-        found = int(mujoco.mj_name2id(self.model, kind, str(name)))
-        if found >= 0:
-            return found
+        at = int(mujoco.mj_name2id(self.model, kind, str(name)))
+        if at >= 0:
+            return at
         count = self.model.nsensor if what == "sensor" else self.model.nu
-        names = [mujoco.mj_id2name(self.model, kind, at) or "" for at in range(count)]
+        names = [mujoco.mj_id2name(self.model, kind, place) or "" for place in range(count)]
         known = [name for name in names if name]
         self.page.wrong(
             (*where, what),
@@ -254,16 +254,16 @@ class Binder:
         return None
 
     def _factor(
-        self, leaf: Leaf, said: Mapping[str, Any], natural: str | None, what: str, where: KeyPath
+        self, leaf: Leaf, entry: Mapping[str, Any], natural: str | None, what: str, where: KeyPath
     ) -> Factor | None:
         """From the model's unit to the variable's; None where they do not fit."""
-        unit = said.get("unit")
+        unit = entry.get("unit")
         try:
             if unit is not None and natural is not None and factor(unit, natural) is None:
                 self.page.wrong((*where, "unit"), f"the {what} is in `{natural}`, and never in `{unit}`")
                 return None
-            if "scale" in said:
-                return self._scaled(leaf, said, where)
+            if "scale" in entry:
+                return self._scaled(leaf, entry, where)
             ours = unit or natural or leaf.unit
             if unit is None and not leaf.unit and ours:
                 self.page.wrong(
@@ -285,7 +285,7 @@ class Binder:
             )
         return by
 
-    def _scaled(self, leaf: Leaf, said: Mapping[str, Any], where: KeyPath) -> Factor | None:
+    def _scaled(self, leaf: Leaf, entry: Mapping[str, Any], where: KeyPath) -> Factor | None:
         """A factor that is written: of a variable without a unit only, for any other has one of its own."""
         if leaf.unit:
             self.page.wrong(
@@ -294,7 +294,7 @@ class Binder:
                 "write `unit` instead of `scale`",
             )
             return None
-        scale = Fraction(str(said["scale"]))
+        scale = Fraction(str(entry["scale"]))
         if scale == 0:
             self.page.wrong((*where, "scale"), "a scale of 0 says nothing")
             return None

@@ -113,8 +113,8 @@ def _model(page: Document, setup: Setup) -> Any:
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
-        said = "there is no such file" if not path.is_file() else str(error).splitlines()[0]
-        page.wrong((*setup.spec.path, "model"), f"the model `{path.name}` cannot be read: {said}")
+        why = "there is no such file" if not path.is_file() else str(error).splitlines()[0]
+        page.wrong((*setup.spec.path, "model"), f"the model `{path.name}` cannot be read: {why}")
         raise page.bad(BadPlant) from error
 
 
