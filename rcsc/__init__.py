@@ -42,6 +42,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Claim",
     "CodedError",
+    "Consequence",
     "Diagnostic",
     "LoadedSystem",
     "Position",

@@ -2,6 +2,7 @@
 
 from rcsc.api import Claim as Claim
 from rcsc.api import CodedError as CodedError
+from rcsc.api import Consequence as Consequence
 from rcsc.api import Diagnostic as Diagnostic
 from rcsc.api import LoadedSystem as LoadedSystem
 from rcsc.api import Position as Position
@@ -23,6 +24,7 @@ __version__: str
 __all__ = [
     "Claim",
     "CodedError",
+    "Consequence",
     "Diagnostic",
     "LoadedSystem",
     "Position",

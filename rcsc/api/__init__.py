@@ -19,7 +19,15 @@ Nothing here is trusted for a verdict: each function is one call of the driver, 
 Modules, in the order the data flows: `proofs` (`check`, `compile`, `prove`), `running` (`load_system`, `run`).
 """
 
-from rcsc.api.proofs import Claim, Proof, Unproved, check, compile, prove  # noqa: A004  # as the command is called
+from rcsc.api.proofs import (
+    Claim,
+    Consequence,
+    Proof,
+    Unproved,
+    check,
+    compile,  # noqa: A004  # as the command is called
+    prove,
+)
 from rcsc.api.running import LoadedSystem, RowOutcome, Run, load_system, run
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
@@ -29,6 +37,7 @@ from rcsc.diagnostics.source import Position, Span
 __all__ = [
     "Claim",
     "CodedError",
+    "Consequence",
     "Diagnostic",
     "LoadedSystem",
     "Position",

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from rcsc.compose.contract.beginning import starts
 from rcsc.compose.contract.claims import spelled
 from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.counterexample.consequence import spelled_leaves, told
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain
 from rcsc.compose.counterexample.finding import TimeLineRow, beginnings, rows
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, transition_systems
@@ -115,6 +117,7 @@ class Unproved:
         cycle: The cycle, from 1, that breaks it; 0 without a run.
         restarted: Whether the run begins where a restart does; then its first row, of tick 0, says where.
         helps: What would mend the tables, each proved.
+        follows: What comes of it, each with its run.
     """
 
     level: str
@@ -126,6 +129,24 @@ class Unproved:
     cycle: int = 0
     restarted: bool = False
     helps: tuple[str, ...] = ()
+    follows: tuple["Consequence", ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Consequence:
+    """One way in which a run goes on that breaks what is not proved, up to what the superior takes from it.
+
+    Attributes:
+        how: `answered`, `changed` (an answer), `stops` (the system, as no line or several match) or `repeats` (unanswered).
+        what: The same in a sentence.
+        takes: What the superior takes of the report at the end, by leaf: the status first.
+        run: The whole run, a row a cycle.
+    """
+
+    how: str
+    what: str
+    takes: Mapping[str, str]
+    run: tuple[TimeLineRow, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +169,14 @@ class Proof:
 
 
 def prove(
-    system: PathLike, *, levels: Sequence[str] = (), cycles: int = 8, cache: bool = True, jobs: int = 1
+    system: PathLike,
+    *,
+    levels: Sequence[str] = (),
+    cycles: int = 8,
+    follow: int = 4,
+    where: str = "",
+    cache: bool = True,
+    jobs: int = 1,
 ) -> Proof:
     """Prove the levels of a system together, for any delay, as `rcsc prove` does.
 
@@ -156,20 +184,23 @@ def prove(
         system: The description, `system.toml`.
         levels: Only these; all without any.
         cycles: Longest run that is looked for where something is not proved; 0 looks for none. Runs need a C compiler.
+        follow: Most cycles that such a run is followed on; 0 follows none.
+        where: Initial values that runs are searched from, `leaf = value, level.leaf = value`; no verdict depends on them.
         cache: Whether earlier proofs are believed, and new ones kept.
         jobs: How many levels are proved at once.
 
     Raises:
-        CodedError: The description, or the tables of a level, are not in order.
+        CodedError: The description, the tables of a level, or `where` are not in order.
         KeyError: The system has no such level.
     """
     path = Path(system)
     systems = transition_systems(path)
     if unknown := [name for name in levels if name not in systems]:
         raise KeyError(unknown[0])
+    begins = starts(systems, where)
     kept = open_cache(path.parent) if cache else None
     proof = prove_transition_systems(systems, None, jobs, tuple(levels) or tuple(systems), cache=kept)
-    runs = explain(systems, proof, TraceSettings(description(path), cycles))
+    runs = explain(systems, proof, TraceSettings(description(path), cycles, further=follow, starts=begins))
     left = [(level.level, unstated) for level in proof.levels for unstated in level.unstated]
     return Proof(
         proof.proved,
@@ -217,4 +248,14 @@ def _unproved(systems: "Mapping[str, TransitionSystem]", explanation: Explanatio
         finding.broken_at,
         finding.restarted,
         explanation.helps,
+        tuple(_consequences(systems, explanation)),
     )
+
+
+def _consequences(
+    systems: "Mapping[str, TransitionSystem]", explanation: Explanation
+) -> Iterator[Consequence]:
+    ts = systems[explanation.level]
+    for then in explanation.follows or ():
+        run = (*beginnings(systems, then.run), *rows(systems, then.run))
+        yield Consequence(then.how.value, told(ts, then), dict(spelled_leaves(ts, then.report)), run)

@@ -1353,6 +1353,12 @@ class Code(StrEnum):
     and be right. Where it is not, count the cycles and fail, or give the state in which the command is done; a number that rises with
     the line, and that no other line sets back, shows that it ends.
     """
+    BAD_START = """RCS757: runs cannot begin so
+
+    `rcsc prove --where "variable = value, ..."` searches the runs of what is not proved from these values in place of the declared
+    initial ones. The text is not of this form, names a variable that no level has, or that several have (write `level.variable`), a
+    value outside its range, or values that an invariant excludes. No verdict depends on it.
+    """
     GRAPH_NO_STATE = """RCS771: a table has no state to draw
 
     `rcsc graph` draws the values of one variable as states: `cur_state`, else the only enumeration that the table tests and keeps as

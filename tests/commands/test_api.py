@@ -122,6 +122,9 @@ def test_a_proof_says_what_the_command_says(capsys: pytest.CaptureFixture[str]) 
             [row["line"] for row in finding["time_line"]] for finding in shown
         ]
         assert [found.helps for found in runs] == [tuple(finding["helps"]) for finding in shown]
+        assert [[(then.how, then.what) for then in found.follows] for found in runs] == [
+            [(then["how"], then["what"]) for then in finding["follows"]] for finding in shown
+        ]
         assert any(not found.warning for found in runs) == (status == 1)
 
 

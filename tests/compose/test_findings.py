@@ -263,7 +263,10 @@ def test_a_run_can_begin_with_a_restart(tmp_path: Path) -> None:
     usual = initial(ts.program)
     assert shown.keys() == {name for name in usual if name in table.variables or first[name] != usual[name]}
     assert shown == {name: spell(ts.kinds[name], first[name]) for name in shown}
-    assert beginnings({"upper": ts}, replace(finding, restarted=False)) == ()
+    [other] = beginnings({"upper": ts}, replace(finding, restarted=False))
+    assert other.line == "begins"
+    others = {**other.takes, **other.leaves}
+    assert others.keys() == {name for name in usual if first[name] != usual[name]}
 
 
 def test_the_state_in_which_a_restart_begins_is_the_first_row(

@@ -1,17 +1,13 @@
 """`rcsc prove`: the levels of a system proved together."""
 
-import io
 import json
 import os
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
-from rich import box
-from rich.console import Console
-from rich.table import Table
 
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.options import steps_option
@@ -32,12 +28,14 @@ from rcsc.commands.shared.proved import (
 )
 from rcsc.commands.shared.show import Progress, UnwritableError
 from rcsc.commands.shared.systems import system_path
-from rcsc.compose.contract.claims import CONTRACT, SAFE
+from rcsc.commands.systems.explained import explanation_as_json, say_explanation
+from rcsc.compose.contract.beginning import BadStartError, Starts, starts
+from rcsc.compose.contract.claims import CONTRACT
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain, file_name
-from rcsc.compose.counterexample.finding import Finding, beginnings, rows
+from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
 from rcsc.compose.invariant.cubes import shown
 from rcsc.compose.invariant.search import Effort
@@ -53,12 +51,6 @@ from rcsc.host.files import write_atomically
 from rcsc.run.description import description
 from rcsc.solvers.smt import Limits
 
-_WIDTH = 118
-"""Columns of a time line."""
-_LONG = 33
-"""Characters of an assignment that a column has room for, whatever the others hold."""
-_HARD = "\ue000"
-"""A space at which a time line does not break, while it is laid out; of private use, since every other one may."""
 _WORTH_PROCESSES = 40
 """Lines of the levels' tables from which several processes are quicker than one: each takes a second to begin."""
 
@@ -72,6 +64,7 @@ Examples:
   rcsc prove --certificate proof               the invariants as SMT-LIB, for another solver
   rcsc prove --level task --without-deferral   what section 9 warns of: the shortest trace
   rcsc prove --log found                       each trace as a log, for `rcsc replay` and `rcsc log`
+  rcsc prove --where "stock = 0"               traces that begin with an empty stock
   rcsc prove --case tests/found/a.json         a frozen finding, again""",
 )
 @click.argument(
@@ -83,6 +76,10 @@ Examples:
               help="Levels proved at once.")  # fmt: skip
 @click.option("--trace", "cycles", type=click.IntRange(min=0, max=40), default=8, show_default=True, metavar="N",
               help="For what is not proved, look for a trace of at most N cycles; 0 does not look.")  # fmt: skip
+@click.option("--follow", "further", type=click.IntRange(min=0, max=40), default=4, show_default=True, metavar="N",
+              help="Follow each trace on for at most N cycles, up to what the superior takes; 0 does not.")  # fmt: skip
+@click.option("--where", "begins", multiple=True, metavar="VALUES",
+              help='Search traces from these initial values: "leaf = value, level.leaf = value". No verdict depends on it.')  # fmt: skip
 @click.option("--log", "logs", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
               help="Keep each trace in DIR as a log that `rcsc replay` steps and `rcsc log` draws, with its executors.")  # fmt: skip
 @click.option("--freeze", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
@@ -107,7 +104,8 @@ Examples:
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
 @click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
-    system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int, logs: Path | None,
+    system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int,
+    further: int, begins: tuple[str, ...], logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
     certificate: Path | None, confirms: bool, no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
@@ -126,6 +124,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     unknown = [name for name in only if name not in systems]
     if unknown:
         raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(systems)}")
+    search = _Search(cycles, further, _starts(systems, begins))
     asked = {
         "without-deferral": without_deferral,
         "first-match": first_match,
@@ -151,7 +150,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         _say_agreements(proof)
         _say_whole(systems, proof)
     keep = _Keep(path, logs, freeze, variants)
-    explanations = _explanations(systems, proof, cycles, keep, None if as_json else _say_explanation)
+    explanations = _explanations(systems, proof, search, keep, quiet=as_json)
     if as_json:
         click.echo(json.dumps(_as_json(proof, systems, explanations), indent=2))
     _say_not_agreed(proof)
@@ -299,23 +298,48 @@ class _Keep:
     variants: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """Runs that are searched: of how many cycles, followed on for how many, and with which initial values."""
+
+    cycles: int
+    further: int
+    starts: Starts
+
+
+def _starts(systems: dict[str, TransitionSystem], begins: Sequence[str]) -> Starts:
+    """Read the initial values that runs are searched from."""
+    try:
+        return starts(systems, ", ".join(begins))
+    except BadStartError as error:
+        raise click.UsageError("; ".join((f"--where: {error}", *error.helps))) from error
+
+
 def _explanations(
     systems: dict[str, TransitionSystem],
     proof: SystemProof,
-    cycles: int,
+    search: _Search,
     keep: _Keep,
-    say: Callable[[dict[str, TransitionSystem], Explanation, int], None] | None,
+    *,
+    quiet: bool,
 ) -> list[Explanation]:
     """What is not proved, each with its shortest trace where there is one."""
-    settings = TraceSettings(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
+    settings = TraceSettings(
+        description(keep.system),
+        search.cycles,
+        altered=bool(keep.variants),
+        log=keep.logs,
+        further=search.further,
+        starts=search.starts,
+    )
     explanations = []
     try:
         for explanation in explain(systems, proof, settings):
             explanations.append(explanation)
             if keep.cases is not None and explanation.finding is not None and not explanation.beside:
                 _freeze(systems, explanation.finding, keep.cases, keep)
-            if say is not None:
-                say(systems, explanation, cycles)
+            if not quiet:
+                say_explanation(systems, explanation, search.cycles, search.further)
     except OSError as error:
         raise UnwritableError(
             str(error.filename or keep.logs), error.strerror or "no reason given"
@@ -345,112 +369,6 @@ def _again(cases: tuple[Path, ...]) -> int:
     return 1 if wrong else 0
 
 
-def _say_explanation(systems: dict[str, TransitionSystem], explanation: Explanation, cycles: int) -> None:
-    """Say what is not proved; runs of up to `cycles` cycles were searched."""
-    where = f"level `{explanation.level}`" + (
-        f", table `{explanation.obligation.table}`" if explanation.obligation.table else ""
-    )
-    if explanation.bug:
-        click.echo(
-            f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run: {explanation.obligation.shown}",
-            err=True,
-        )
-    elif explanation.warns:
-        click.echo(
-            f"warning[{Code.ENDLESS.value}]: {where}: not shown: {explanation.obligation.shown}", err=True
-        )
-    else:
-        click.echo(
-            f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {explanation.obligation.shown}", err=True
-        )
-    if stated := _stated(systems, explanation):
-        click.echo(f"  = note: it says: {stated}", err=True)
-    for line in explanation.beside:
-        click.echo(f"  = note: {line}", err=True)
-    if explanation.finding is not None and not explanation.beside:
-        _say_finding(systems, explanation.finding, in_c=explanation.in_c)
-    elif explanation.guessed and explanation.obligation.key == SAFE:
-        click.echo("  = note: the run that shows it meets an operation that is not defined", err=True)
-    elif explanation.guessed:
-        click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
-    elif (
-        explanation.obligation.sort.value == "assumption"
-        and explanation.obligation.name in systems[explanation.level].trusted
-    ):
-        click.echo(
-            "  = note: no first cycle can be as the tables declare, or no later one, or none that runs this table: "
-            "what rests on it says nothing",
-            err=True,
-        )
-    elif cycles and not explanation.beside:
-        click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
-    for line in explanation.helps:
-        click.echo(f"  = help: {line}", err=True)
-    if explanation.others:
-        click.echo(f"  = note: no such run shows both of lines {', '.join(explanation.others)}", err=True)
-    if explanation.log is not None:
-        folder = explanation.log.parent / "generated"
-        click.echo(f"  = log: rcsc replay {explanation.log} --generated {folder}", err=True)
-        page = explanation.log.with_suffix(".html")
-        click.echo(f"  = picture: rcsc log {explanation.log} --report {page}", err=True)
-
-
-def _stated(systems: dict[str, TransitionSystem], explanation: Explanation) -> str:
-    """What a property says, as it is written; empty for what is none."""
-    if explanation.obligation.sort is not Sort.PROPERTY:
-        return ""
-    return next(
-        stated.text
-        for stated in systems[explanation.level].program.properties
-        if stated.name == explanation.obligation.name
-    )
-
-
-def _say_finding(systems: dict[str, TransitionSystem], finding: Finding, *, in_c: bool) -> None:
-    """Print the finding's time line."""
-    begins = ", after a restart" if finding.restarted else ""
-    legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
-    run_by = "as the interpreter, the Python and the C executors run it"
-    if finding.obligation.key == SAFE:
-        run_by = "as the interpreter runs it; executors are to run nothing that is not safe"
-    elif not in_c:
-        run_by = "as the interpreter and the Python executor run it (no C function can give what is refused)"
-    what = (
-        f"goes round from cycle {finding.lasso} to cycle {finding.broken_at}"
-        if finding.lasso
-        else f"broken in cycle {finding.broken_at}"
-    )
-    click.echo(f"  = note: {what}{begins}, {run_by}{legal}", err=True)
-    with io.StringIO() as text:
-        Console(file=text, width=_WIDTH, no_color=True, highlight=False).print(_time_line(systems, finding))
-        click.echo(
-            "\n".join(f"  {line.rstrip()}" for line in text.getvalue().replace(_HARD, " ").splitlines()),
-            err=True,
-        )
-
-
-def _time_line(systems: dict[str, TransitionSystem], finding: Finding) -> Table:
-    """A row a cycle: the line that matched, the inputs that changed, what else changed, and what went wrong."""
-    several = len(finding.levels) > 1
-    table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
-    for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
-        table.add_column(heading, overflow="fold")
-    for row in (*beginnings(systems, finding), *rows(systems, finding)):
-        takes, leaves = (
-            ", ".join(_unbroken(f"{name} = {value}") for name, value in changed.items())
-            for changed in (row.takes, row.leaves)
-        )
-        ran = f"{row.table}: {row.line}" if row.tick else row.line
-        ran += f"\n! {row.wrong}" if row.wrong else ""
-        table.add_row(str(row.tick or ""), *((row.level,) if several else ()), ran, takes, leaves)
-    return table
-
-
-def _unbroken(text: str) -> str:
-    """On one line, unless it is too long for a column: then it may break at its spaces, and not in a name."""
-    return text.replace(" ", _HARD) if len(text) <= _LONG else text
-
-
 def _say_not_agreed(proof: SystemProof) -> None:
 
     for agreement in proof.agreements:
@@ -476,7 +394,7 @@ def _as_json(
     return {
         "proved": proof.proved,
         "whole": proof.whole,
-        "findings": [_explanation_as_json(systems, explanation) for explanation in explanations],
+        "findings": [explanation_as_json(systems, explanation) for explanation in explanations],
         "levels": [
             {
                 "level": level.level,
@@ -508,28 +426,4 @@ def _as_json(
             }
             for agreement in proof.agreements
         ],
-    }
-
-
-def _explanation_as_json(systems: dict[str, TransitionSystem], explanation: Explanation) -> dict[str, Any]:
-
-    finding = explanation.finding
-    return {
-        "level": explanation.level,
-        "severity": "warning" if explanation.warns else "error",
-        "what": explanation.obligation.sort.value,
-        "table": explanation.obligation.table,
-        "name": explanation.obligation.name,
-        "says": _stated(systems, explanation),
-        "lines": list(explanation.obligation.lines),
-        "reproduces": finding is not None and not explanation.beside,
-        "beside": list(explanation.beside),
-        "restarted": finding is not None and finding.restarted,
-        "lap": 0 if finding is None else finding.lasso,
-        "time_line": []
-        if finding is None
-        else [asdict(row) for row in (*beginnings(systems, finding), *rows(systems, finding))],
-        "helps": list(explanation.helps),
-        "others": list(explanation.others),
-        "log": "" if explanation.log is None else str(explanation.log),
     }

@@ -20,5 +20,5 @@ for each table, order, deferred state and statement of the program; pairs of lin
 
 Modules, in the order the data flows: `environment` (which buffers link which levels), `transition` (a cycle as nodes), `given` and `walk`
 (extern procedures, random runs), `predicates`, `properties` (invariants and properties that the program states), `obligations`, `claims`;
-`variants` are programs under other rules.
+`variants` are programs under other rules, `beginning` other values to search runs from.
 """

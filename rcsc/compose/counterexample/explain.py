@@ -8,8 +8,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from rcsc.compose.contract.beginning import Starts
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, pairs
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.consequence import Consequence, consequences
 from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
 from rcsc.compose.counterexample.pair import broken_together
@@ -20,9 +22,6 @@ from rcsc.compose.proof.level import LevelProof, essential
 from rcsc.compose.proof.system import SystemProof
 from rcsc.host.children import scratch
 from rcsc.run.description import Description
-
-SEARCHES = (TraceSearch(legal=True), TraceSearch(), TraceSearch(legal=True, restarted=True))
-"""In the order of search: runs with neighbours that began with the level are shown first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +38,7 @@ class Explanation:
         log: Where the run is kept.
         others: Pairs of lines of the same table that no run shows.
         in_c: Whether the C executor ran it, too; it cannot if an extern procedure has to give what no C function can.
+        follows: What comes of it, each with a run that the executors repeated, too; None if that was not looked for.
     """
 
     level: str
@@ -50,6 +50,7 @@ class Explanation:
     log: Path | None = None
     others: tuple[str, ...] = field(default=())
     in_c: bool = True
+    follows: tuple[Consequence, ...] | None = None
 
     @property
     def warns(self) -> bool:
@@ -71,12 +72,26 @@ class TraceSettings:
         most: Cycles of a run.
         altered: Whether the programs are variants under another rule than the language's.
         log: The folder in which runs are kept; None for none.
+        further: Cycles that a finding is followed on; 0 for none.
+        starts: For each level the leaves that runs begin with other values than the initial ones; then none begins with a restart.
     """
 
     system: Description
     most: int
     altered: bool = False
     log: Path | None = None
+    further: int = 4
+    starts: Starts = field(default_factory=dict)
+
+    def searches(self, level: str) -> tuple[TraceSearch, ...]:
+        """Return the searches for runs of a level, in order: runs with neighbours that began with it are shown first."""
+        begun = self.starts.get(level, {})
+        every = (TraceSearch(legal=True), TraceSearch(), TraceSearch(legal=True, restarted=True))
+        return tuple(
+            replace(search, most=self.most, start=begun)
+            for search in every
+            if not (search.restarted and any(self.starts.values()))
+        )
 
 
 def explain(
@@ -129,10 +144,10 @@ def _searched(
 ) -> dict[ObligationKey, TraceResult]:
     """Run the searches one after the other, each for what is still open."""
     results: dict[ObligationKey, TraceResult] = {}
-    for search in SEARCHES:
+    for search in settings.searches(str(ts.level.name)):
         left = [obligation for obligation in asked if obligation.key not in results]
         if left:
-            results |= traces(ts, left, replace(search, most=settings.most))
+            results |= traces(ts, left, search)
     return results
 
 
@@ -185,8 +200,9 @@ def _together(
     for upper, lower in ends if settings.most else []:
         if upper in systems and lower in systems:
             below = next(neighbour for neighbour in systems[upper].links.below if neighbour.name == lower)
-            search = TraceSearch(settings.most)
-            result = broken_together(systems[upper], systems[lower], below, search)
+            result = broken_together(
+                systems[upper], systems[lower], below, TraceSearch(settings.most), settings.starts
+            )
             if isinstance(result, Finding):
                 yield Explanation(result.level, result.obligation, result)
             elif result is not None:
@@ -197,10 +213,8 @@ def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -
     """Explain each command that is not shown to end by a run after which it may go on for ever."""
     tables = [ending.table for ending in proof.endings if not ending.proved]
     results: dict[str, Lasso | NotReproducedError] = {}
-    for search in SEARCHES if settings.most else ():
-        results |= lassos(
-            ts, [table for table in tables if table not in results], replace(search, most=settings.most)
-        )
+    for search in settings.searches(proof.level) if settings.most else ():
+        results |= lassos(ts, [table for table in tables if table not in results], search)
     for table in tables:
         obligation = obligation_of(table)
         match results.get(table):
@@ -233,15 +247,28 @@ class _Rerun:
         programs = {name: self.systems[name].program for name in finding.levels if name not in self._ready}
         make(programs.values(), system.generated, altered=self.settings.altered)
         self._ready |= programs.keys()
-        path = None if self.settings.log is None else self.folder / f"{self._named(finding)}.mcap"
+        name = self._named(finding)
+        path = None if self.settings.log is None else self.folder / f"{name}.mcap"
+        follows = self._follows(finding)
         try:
             record(finding, self.systems, system, path, altered=self.settings.altered)
+            for number, then in enumerate(follows or (), 1):
+                kept = None if path is None else self.folder / f"{name}_then_{number}.mcap"
+                record(then.run, self.systems, system, kept, altered=self.settings.altered)
         except ExecutorsDifferError as error:
             return replace(explanation, beside=error.beside)
         in_c = not only_in_python(finding, self.systems)
-        return replace(
-            explanation, helps=helps(self.systems[explanation.level], finding), log=path, in_c=in_c
-        )
+        repairs = helps(self.systems[explanation.level], finding)
+        return replace(explanation, helps=repairs, log=path, in_c=in_c, follows=follows)
+
+    def _follows(self, finding: Finding) -> tuple[Consequence, ...] | None:
+        """Find what comes of a finding of one level that has a superior."""
+        ts = self.systems[finding.level]
+        if not self.settings.further or ts.links.above is None or len(finding.levels) > 1:
+            return None
+        start = self.settings.starts.get(finding.level, {})
+        search = TraceSearch(restarted=finding.restarted, legal=finding.legal, start=start)
+        return consequences(ts, finding, search, self.settings.further)
 
     def _named(self, finding: Finding) -> str:
         name = file_name(finding)

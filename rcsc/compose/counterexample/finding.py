@@ -74,8 +74,8 @@ class TimeLineRow:
     """One cycle of one level, in the tables' words.
 
     Attributes:
-        tick: From 1; 0 where the run begins with a restart.
-        line: The line that ran; all that matched if several did, `none` if none did, `RESTART` before the first.
+        tick: From 1; 0 where the run begins with a restart, or otherwise than declared.
+        line: The line that ran; all that matched if several did, `none` if none did; before the first `RESTART` or `BEGINS`.
         takes: The inputs that changed, and their values.
         leaves: The other leaves that the cycle changed.
         wrong: What went wrong in it, or empty.
@@ -90,7 +90,7 @@ class TimeLineRow:
     wrong: str
 
 
-RESTART = "restart"
+RESTART, BEGINS = "restart", "begins"
 
 _FAULTS = {
     Fault.NO_LINE: "no line matches",
@@ -113,14 +113,16 @@ def rows(systems: Mapping[str, TransitionSystem], finding: Finding) -> tuple[Tim
 
 
 def beginnings(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLineRow, ...]:
-    """Return a row for each level of a run that begins with a restart; none for other runs."""
+    """Return a row for each level of a run that begins with a restart, or with other values than the initial ones."""
     first = {name: next(tick[name] for tick in finding.ticks if name in tick) for name in finding.levels}
-    return tuple(_begun(made[name], step) for name, step in first.items() if finding.restarted)
+    every = (_begun(made[name], step, restarted=finding.restarted) for name, step in first.items())
+    return tuple(row for row in every if finding.restarted or row.takes or row.leaves)
 
 
-def _begun(ts: TransitionSystem, step: CycleRun) -> TimeLineRow:
-    """Return the row of a restart: what the table of the first cycle reads, and what is not as it is initially."""
-    usual, tested = initial(ts.program), {str(name) for name in ts.table(step.table).variables}
+def _begun(ts: TransitionSystem, step: CycleRun, *, restarted: bool) -> TimeLineRow:
+    """Return what is not as it is initially, and of a restart what the table of the first cycle reads."""
+    usual = initial(ts.program)
+    tested = {str(name) for name in ts.table(step.table).variables if restarted}
     begins = {
         name: spell(ts.kinds[name], step.before[name])
         for name, value in usual.items()
@@ -128,7 +130,7 @@ def _begun(ts: TransitionSystem, step: CycleRun) -> TimeLineRow:
     }
     takes = {name: said for name, said in begins.items() if name in step.taken}
     leaves = {name: said for name, said in begins.items() if name not in step.taken}
-    return TimeLineRow(0, ts.level.name, "", RESTART, takes, leaves, "")
+    return TimeLineRow(0, ts.level.name, "", RESTART if restarted else BEGINS, takes, leaves, "")
 
 
 def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | None) -> TimeLineRow:

@@ -46,7 +46,7 @@ def lassos(
         run.further()
         for table in waiting:
             starts = range(1, len(run.cycles))
-            every = [_comes_round(ts, table, run.cycles[start:]) for start in starts]
+            every = [comes_round(ts, table, run.cycles[start:]) for start in starts]
             try:
                 if run.reaches(wrong := values.any_of(every)):
                     by_table[table] = _reproduced(ts, table, run, wrong)
@@ -55,7 +55,7 @@ def lassos(
     return by_table
 
 
-def _comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> Node:
+def comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> Node:
     """Return the condition that the cycles are a lasso of the table's command."""
     first, last = cycles[0], cycles[-1]
     number = next(at for at, table_at in enumerate(first.tables) if table_at.table.name == table)
@@ -120,7 +120,7 @@ def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[CycleRun]) -> int
 def _is_lasso(ts: TransitionSystem, table: str, lasso: Sequence[CycleRun]) -> bool:
     if any(step.fault is not Fault.OK or step.table != table for step in lasso):
         return False
-    round_ = _comes_round(ts, table, [as_cycle(ts, step) for step in lasso])
+    round_ = comes_round(ts, table, [as_cycle(ts, step) for step in lasso])
     return round_.known and bool(round_.low)
 
 

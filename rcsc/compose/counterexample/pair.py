@@ -10,7 +10,9 @@ for a while sees values late, misses some, and sees others again. All else keeps
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
+from rcsc.compose.contract.beginning import Starts
 from rcsc.compose.contract.environment import Below, leaves_under
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
@@ -31,6 +33,7 @@ class _Side:
 
     Attributes:
         takes: Each leaf that comes from the other level, and its name there.
+        begins: Leaves that begin with other values than the initial ones.
         now: Its leaves after the last tick.
         taken: For each tick the inputs that it takes if it runs.
         runs: For each tick whether it runs; `cycles`, its cycle if it does.
@@ -39,13 +42,15 @@ class _Side:
     name: str
     ts: TransitionSystem
     takes: Mapping[str, str]
+    begins: Mapping[str, Value]
     now: Leaves = field(init=False)
     taken: list[Leaves] = field(default_factory=list)
     runs: list[Node] = field(default_factory=list)
     cycles: list[Cycle] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.now = self.ts.initial()
+        begun = {leaf: values.constant(self.ts.kinds[leaf], value) for leaf, value in self.begins.items()}
+        self.now = self.ts.initial() | begun
 
     @property
     def inputs(self) -> list[str]:
@@ -54,14 +59,18 @@ class _Side:
 
 
 def broken_together(
-    upper: TransitionSystem, lower: TransitionSystem, below: Below, search: TraceSearch
+    upper: TransitionSystem,
+    lower: TransitionSystem,
+    below: Below,
+    search: TraceSearch,
+    begins: Starts = MappingProxyType({}),
 ) -> Finding | NotReproducedError | None:
     """Find the shortest run of both levels in which one breaks what the other assumes; None if none is found.
 
     That is: the lower level takes another order under the number that it took last, or a report misstates the last order of the upper
-    one, within `search.most` ticks.
+    one, within `search.most` ticks. `begins` has, for each level, what begins with other values than the initial ones.
     """
-    pair = _Together(upper, lower, below)
+    pair = _Together(upper, lower, below, begins)
     try:
         for tick in range(1, search.most + 1):
             for obligation in pair.further(tick):
@@ -79,6 +88,7 @@ class _Together:
     upper: TransitionSystem
     lower: TransitionSystem
     below: Below
+    begins: Starts
     sides: tuple[_Side, _Side] = field(init=False)
     buffers: Leaves = field(init=False)
     _run: Bounded = field(default_factory=Bounded)
@@ -90,12 +100,15 @@ class _Together:
         orders = _renamed(self.lower, above.order, self.below.order)
         others = tuple(below for below in self.upper.links.below if below != self.below)
         self.sides = (
-            _Side(self.upper.level.name, _with(self.upper, below=others), reports),
-            _Side(self.lower.level.name, _with(self.lower, above=None), orders),
+            self._side(_with(self.upper, below=others), reports),
+            self._side(_with(self.lower, above=None), orders),
         )
         self.buffers = {
             leaf: side.now[leaf] for side in self.sides for leaf in side.takes
         }  # nothing is published yet: each keeps its initial values
+
+    def _side(self, ts: TransitionSystem, takes: Mapping[str, str]) -> _Side:
+        return _Side(ts.level.name, ts, takes, self.begins.get(ts.level.name, {}))
 
     def further(self, tick: int) -> tuple[Obligation, Obligation]:
         """Add a tick; return the two obligations in it."""
@@ -162,7 +175,7 @@ class _Together:
         return Finding(level, replace(obligation, holds=values.FALSE), ticks)
 
     def _ran(self, settled: Simplest) -> Iterator[dict[str, CycleRun]]:
-        now = {side.name: dict(initial(side.ts.program)) for side in self.sides}
+        now = {side.name: {**initial(side.ts.program), **side.begins} for side in self.sides}
         held = {leaf: now[side.name][leaf] for side in self.sides for leaf in side.takes}
         runs = [
             settled.settle([side.runs[at] for side in self.sides], [True, True])

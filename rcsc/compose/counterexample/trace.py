@@ -72,11 +72,13 @@ class TraceSearch:
         legal: The superior's numbers come one after the other, and each report is of an order of this run, none older than the one
             before: narrower than the contract, which leaves room for numbers that have gone round and for what stood in the buffers
             before a restart. Such a trace can happen to two levels that begin together.
+        start: Leaves that begin with other values than the initial ones.
     """
 
     most: int = 10
     restarted: bool = False
     legal: bool = False
+    start: Mapping[str, Value] = field(default_factory=dict)
 
 
 TraceResult: TypeAlias = Trace | NotReproducedError
@@ -94,7 +96,7 @@ def traces(
             break
         cycle = run.further()
         here = {
-            obligation.key: _wrong(obligation, cycle)
+            obligation.key: wrong_in(obligation, cycle)
             for obligation in (*obligations(ts, cycle), *pairs(cycle))
         }
         for key, obligation in list(waiting.items()):
@@ -107,7 +109,7 @@ def traces(
     return results
 
 
-def _wrong(obligation: Obligation, cycle: Cycle) -> Node:
+def wrong_in(obligation: Obligation, cycle: Cycle) -> Node:
     """Return the condition that the cycle breaks the obligation; what it leaves counts only if it does not end early."""
     wrong = values.negation(obligation.holds)
     early = obligation.sort in {Sort.ASSUMPTION, Sort.ONE_LINE, Sort.SOME_LINE, Sort.NO_DEFAULT}
@@ -129,7 +131,14 @@ class Unrolled:
 
     def __post_init__(self) -> None:
         self._start = self.ts.restarted() if self.search.restarted else self.ts.initial()
+        self._start |= {
+            leaf: values.constant(self.ts.kinds[leaf], value) for leaf, value in self.search.start.items()
+        }
         self._now = self._start
+
+    def require(self, condition: Node) -> None:
+        """Search only runs in which the condition holds."""
+        self._run.add(condition)
 
     def further(self) -> Cycle:
         """Add one cycle."""
@@ -223,7 +232,7 @@ class Unrolled:
 
     def _begins(self, settled: Simplest) -> dict[str, Value]:
         """Fix every leaf before the first cycle."""
-        begun = dict(initial(self.ts.program))
+        begun = {**initial(self.ts.program), **self.search.start}
         if self.search.restarted:
             # A state adopted from an input has its value.
             of_input = {self._start[name]: begun[name] for name in self.ts.inputs}

@@ -1,0 +1,200 @@
+"""What is not proved, as text and as JSON: the claim, its run as a time line, what follows it, and what would help."""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import click
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from rcsc.compose.contract.claims import SAFE
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.consequence import MOST, Consequence, spelled_leaves, told
+from rcsc.compose.counterexample.explain import Explanation
+from rcsc.compose.counterexample.finding import Finding, TimeLineRow, beginnings, rows
+from rcsc.diagnostics.codes import Code
+
+_WIDTH = 118
+"""Columns of a time line."""
+_LONG = 33
+"""Characters of an assignment that a column has room for, whatever the others hold."""
+_HARD = "\ue000"
+"""A space at which a time line does not break, while it is laid out; of private use, since every other one may."""
+
+
+def say_explanation(
+    systems: Mapping[str, TransitionSystem], explanation: Explanation, cycles: int, further: int
+) -> None:
+    """Say what is not proved; runs of up to `cycles` cycles were searched, and followed on for up to `further`."""
+    where = f"level `{explanation.level}`" + (
+        f", table `{explanation.obligation.table}`" if explanation.obligation.table else ""
+    )
+    if explanation.bug:
+        click.echo(
+            f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run: {explanation.obligation.shown}",
+            err=True,
+        )
+    elif explanation.warns:
+        click.echo(
+            f"warning[{Code.ENDLESS.value}]: {where}: not shown: {explanation.obligation.shown}", err=True
+        )
+    else:
+        click.echo(
+            f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {explanation.obligation.shown}", err=True
+        )
+    if stated := _stated(systems, explanation):
+        click.echo(f"  = note: it says: {stated}", err=True)
+    for line in explanation.beside:
+        click.echo(f"  = note: {line}", err=True)
+    if explanation.finding is not None and not explanation.beside:
+        _say_finding(systems, explanation.finding, in_c=explanation.in_c)
+        _say_consequences(systems, explanation, further)
+    elif explanation.guessed and explanation.obligation.key == SAFE:
+        click.echo("  = note: the run that shows it meets an operation that is not defined", err=True)
+    elif explanation.guessed:
+        click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
+    elif (
+        explanation.obligation.sort.value == "assumption"
+        and explanation.obligation.name in systems[explanation.level].trusted
+    ):
+        click.echo(
+            "  = note: no first cycle can be as the tables declare, or no later one, or none that runs this table: "
+            "what rests on it says nothing",
+            err=True,
+        )
+    elif cycles and not explanation.beside:
+        click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
+    for line in explanation.helps:
+        click.echo(f"  = help: {line}", err=True)
+    if explanation.others:
+        click.echo(f"  = note: no such run shows both of lines {', '.join(explanation.others)}", err=True)
+    if explanation.log is not None:
+        folder = explanation.log.parent / "generated"
+        click.echo(f"  = log: rcsc replay {explanation.log} --generated {folder}", err=True)
+        page = explanation.log.with_suffix(".html")
+        click.echo(f"  = picture: rcsc log {explanation.log} --report {page}", err=True)
+
+
+def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> str:
+    """What a property says, as it is written; empty for what is none."""
+    if explanation.obligation.sort is not Sort.PROPERTY:
+        return ""
+    return next(
+        stated.text
+        for stated in systems[explanation.level].program.properties
+        if stated.name == explanation.obligation.name
+    )
+
+
+def _say_finding(systems: Mapping[str, TransitionSystem], finding: Finding, *, in_c: bool) -> None:
+    """Print the finding's time line."""
+    begins = ", after a restart" if finding.restarted else ""
+    legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
+    run_by = "as the interpreter, the Python and the C executors run it"
+    if finding.obligation.key == SAFE:
+        run_by = "as the interpreter runs it; executors are to run nothing that is not safe"
+    elif not in_c:
+        run_by = "as the interpreter and the Python executor run it (no C function can give what is refused)"
+    what = (
+        f"goes round from cycle {finding.lasso} to cycle {finding.broken_at}"
+        if finding.lasso
+        else f"broken in cycle {finding.broken_at}"
+    )
+    click.echo(f"  = note: {what}{begins}, {run_by}{legal}", err=True)
+    _say_time_line((*beginnings(systems, finding), *rows(systems, finding)))
+
+
+def _say_consequences(
+    systems: Mapping[str, TransitionSystem], explanation: Explanation, further: int
+) -> None:
+    """Print what follows, each with its run: only what comes after the finding's own where it begins as that does."""
+    ts = systems[explanation.level]
+    for number, then in enumerate(explanation.follows or (), 1):
+        click.echo(f"  = then {number}: {told(ts, then)}{'' if then.shared else '; its run'}", err=True)
+        _say_time_line(_further_rows(systems, then))
+    if explanation.follows is not None and len(explanation.follows) == MOST:
+        click.echo(f"  = note: no more than {MOST} such runs are looked for", err=True)
+    if explanation.follows == () and ts.links.above is not None:
+        click.echo(
+            f"  = then: nothing that `{ts.links.above.name}` takes tells of it in {further} cycles more",
+            err=True,
+        )
+
+
+def _further_rows(systems: Mapping[str, TransitionSystem], then: Consequence) -> tuple[TimeLineRow, ...]:
+    """Return the rows of a run that the finding's own does not have."""
+    every = rows(systems, then.run)
+    return every[len(every) - then.run.after :] if then.shared else (*beginnings(systems, then.run), *every)
+
+
+def _say_time_line(shown: Sequence[TimeLineRow]) -> None:
+    if not shown:
+        return
+    with io.StringIO() as text:
+        Console(file=text, width=_WIDTH, no_color=True, highlight=False).print(_time_line(shown))
+        click.echo(
+            "\n".join(f"  {line.rstrip()}" for line in text.getvalue().replace(_HARD, " ").splitlines()),
+            err=True,
+        )
+
+
+def _time_line(shown: Sequence[TimeLineRow]) -> Table:
+    """A row a cycle: the line that matched, the inputs that changed, what else changed, and what went wrong."""
+    several = len({row.level for row in shown}) > 1
+    table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
+    for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
+        table.add_column(heading, overflow="fold")
+    for row in shown:
+        takes, leaves = (
+            ", ".join(_unbroken(f"{name} = {value}") for name, value in changed.items())
+            for changed in (row.takes, row.leaves)
+        )
+        ran = f"{row.table}: {row.line}" if row.tick else row.line
+        ran += f"\n! {row.wrong}" if row.wrong else ""
+        table.add_row(str(row.tick or ""), *((row.level,) if several else ()), ran, takes, leaves)
+    return table
+
+
+def _unbroken(text: str) -> str:
+    """On one line, unless it is too long for a column: then it may break at its spaces, and not in a name."""
+    return text.replace(" ", _HARD) if len(text) <= _LONG else text
+
+
+def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> dict[str, Any]:
+    """Return what is not proved, its run, and what follows it, as JSON."""
+    finding = explanation.finding
+    return {
+        "level": explanation.level,
+        "severity": "warning" if explanation.warns else "error",
+        "what": explanation.obligation.sort.value,
+        "table": explanation.obligation.table,
+        "name": explanation.obligation.name,
+        "says": _stated(systems, explanation),
+        "lines": list(explanation.obligation.lines),
+        "reproduces": finding is not None and not explanation.beside,
+        "beside": list(explanation.beside),
+        "restarted": finding is not None and finding.restarted,
+        "lap": 0 if finding is None else finding.lasso,
+        "time_line": []
+        if finding is None
+        else [asdict(row) for row in (*beginnings(systems, finding), *rows(systems, finding))],
+        "follows": [
+            {
+                "how": then.how.value,
+                "what": told(systems[explanation.level], then),
+                "cycle": then.cycle,
+                "takes": dict(spelled_leaves(systems[explanation.level], then.report)),
+                "time_line": [
+                    asdict(row) for row in (*beginnings(systems, then.run), *rows(systems, then.run))
+                ],
+            }
+            for then in explanation.follows or ()
+        ],
+        "helps": list(explanation.helps),
+        "others": list(explanation.others),
+        "log": "" if explanation.log is None else str(explanation.log),
+    }

@@ -1,0 +1,307 @@
+"""What follows a finding, up to what the superior takes; and initial values that runs are searched from."""
+
+import json
+import re
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+import rcsc
+from rcsc.commands import run
+from rcsc.compose.contract.beginning import BadStartError, starts
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.consequence import MOST, Consequence, How, consequences, spelled_report, told
+from rcsc.compose.counterexample.cycle_run import one_cycle
+from rcsc.compose.counterexample.finding import Finding, of_trace
+from rcsc.compose.counterexample.frozen import case_breaks, read_case
+from rcsc.compose.counterexample.lasso import lassos
+from rcsc.compose.counterexample.lasso import obligation_of as obligation_to_end
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
+from rcsc.compose.proof.system import transition_systems
+from rcsc.lang.model import Value, spell
+from tests.support.programs.systems import SYSTEM, going, lower_level, small_level, small_text
+from tests.support.proved import obligation_of
+
+REPO = Path(__file__).parents[2]
+PUBLISHED = REPO / "tables" / "examples" / "published" / "system.toml"
+LAST_ECHO = REPO / "tables" / "examples" / "later" / "last_echo.toml"
+LEGAL = TraceSearch(most=4, legal=True)
+
+
+def finding_of(
+    ts: TransitionSystem, sort: Sort, table: str, name: str, search: TraceSearch = LEGAL
+) -> Finding:
+    """Return the shortest run that breaks an obligation."""
+    obligation = obligation_of(ts, sort, table, name)
+    [trace] = traces(ts, [obligation], search).values()
+    assert isinstance(trace, Trace)
+    return of_trace(ts, obligation, trace)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A finding of a level and its consequences."""
+
+    ts: TransitionSystem
+    finding: Finding
+    every: tuple[Consequence, ...]
+
+    @property
+    def ends(self) -> set[tuple[str, str, tuple[str, ...]]]:
+        """How each ends: the way, what the superior takes, and the lines that match in the last cycle."""
+        return {
+            (then.how.value, spelled_report(self.ts, then.report), then.last.matched) for then in self.every
+        }
+
+
+def followed(
+    ts: TransitionSystem, finding: Finding, search: TraceSearch = LEGAL, further: int = 4
+) -> Followed:
+    return Followed(ts, finding, consequences(ts, finding, search, further))
+
+
+@pytest.fixture(scope="module")
+def task() -> TransitionSystem:
+    return transition_systems(PUBLISHED)["task"]
+
+
+@pytest.fixture(scope="module")
+def empty(task: TransitionSystem) -> Followed:
+    """The published ACQUIRE finds its buffer empty."""
+    return followed(task, finding_of(task, Sort.DEFERRED, "", "cur_state"))
+
+
+# --- what follows ----------------------------------------------------------------------------
+
+
+def test_an_empty_buffer_ends_in_all_three_ways(empty: Followed) -> None:
+    assert {
+        ("answered", "`done` with `failure = buf`", ("8",)),
+        ("stops", "`executing` with `failure = buf`", ("14", "15")),
+        ("answered", "`failed` with `failure = buf`", ("14",)),
+    } <= empty.ends
+    assert len(empty.every) == MOST
+    assert {then.cycle for then in empty.every[:5]} == {3}
+    assert all(then.shared for then in empty.every)
+
+
+def reports_of_emove(finding: Finding) -> Iterator[dict[str, Value]]:
+    """Every report of E-MOVE that can come after the finding: of an order given so far, none older than the last echo."""
+    steps = [tick["task"] for tick in finding.ticks]
+    orders = [(step.after["to_emove.inc_command"], step.after["to_emove.input_command"]) for step in steps]
+    echoed = steps[-1].after["emove.inc_command_echo"]
+    for (number, command), status in product(orders, range(3)):
+        if int(number) >= int(echoed):
+            yield {
+                "emove.inc_command_echo": number,
+                "emove.ref_command_echo": command,
+                "emove.status_report": status,
+            }
+
+
+def test_every_way_in_the_next_cycle_is_told_and_no_other(empty: Followed) -> None:
+    """By trying each report of E-MOVE: what is told is what the interpreter does, the superior's view for view."""
+    last = empty.finding.broken
+    ends = set()
+    for report in reports_of_emove(empty.finding):
+        step = one_cycle(empty.ts, last.after, {**last.taken, **report})
+        status, reason = (
+            spell(empty.ts.kinds[leaf], step.after[leaf])
+            for leaf in ("report.status_report", "report.failure")
+        )
+        how = "stops" if step.ends_the_run else "answered" if status != "executing" else ""
+        ends |= {(how, f"`{status}` with `failure = {reason}`", step.matched)} if how else set()
+    assert len(ends) == 5
+    nearest = Followed(empty.ts, empty.finding, tuple(then for then in empty.every if then.cycle == 3))
+    assert nearest.ends == ends
+
+
+def test_a_run_is_followed_for_no_longer_than_asked(task: TransitionSystem, empty: Followed) -> None:
+    assert followed(task, empty.finding, further=0).every == ()
+    assert {then.cycle for then in followed(task, empty.finding, further=1).every} == {3}
+
+
+def test_the_superior_keeps_its_command_meanwhile(task: TransitionSystem) -> None:
+    for key in ((Sort.ANSWERED, "acquire", "new_command"), (Sort.WAITS, "", "to_emove")):
+        now = followed(task, finding_of(task, *key))
+        for then in now.every:
+            cycles = [tick["task"] for tick in then.run.ticks]
+            at = then.run.broken_at - 1
+            assert len({step.taken["command.inc_command"] for step in cycles[at:]}) == 1
+            assert then.shared == (cycles[: at + 1] == [tick["task"] for tick in now.finding.ticks][: at + 1])
+        assert {then.how for then in now.every} == {How.ANSWERED, How.STOPS, How.CHANGED}
+
+
+def test_a_command_that_is_passed_over_is_told_to_be_done(task: TransitionSystem) -> None:
+    """Nothing was ordered of E-MOVE."""
+    first, *others = followed(task, finding_of(task, Sort.ANSWERED, "acquire", "new_command")).every
+    assert told(task, first) == "in cycle 2 `workstation` takes `done` as the answer to `acquire` (number 1)"
+    assert {tick["task"].after["to_emove.inc_command"] for tick in first.run.ticks} == {0}
+    assert (
+        "in cycle 3 the answer to `acquire` (number 1) changes: `workstation` took `done`, and now takes `executing`"
+        in [told(task, other) for other in others]
+    )
+
+
+def test_where_a_cycle_stops_the_system_the_last_report_is_told(task: TransitionSystem) -> None:
+    finding = finding_of(task, Sort.ONE_LINE, "acquire", "12 and 14")
+    [then] = followed(task, finding).every
+    assert then.run is finding
+    assert told(task, then) == (
+        "in cycle 4 lines `12` and `14` both match and the system stops; "
+        "the last report to `workstation` is `executing` with `failure = buf`, of `acquire` (number 1)"
+    )
+
+
+def test_what_never_ends_is_told_as_the_superior_sees_it(tmp_path: Path) -> None:
+    """A lasso is its own consequence; a run after another finding may come to one, too."""
+    waits = lower_level(going("2", there="false"), going("3", there="true"))
+    ts = small_level(tmp_path, "lower", lower=waits)
+    found = lassos(ts, ("go",), TraceSearch(8, legal=True))["go"]
+    assert not isinstance(found, Exception)
+    finding = of_trace(ts, obligation_to_end("go"), found.trace)
+    [then] = followed(ts, replace(finding, lasso=found.first)).every
+    assert told(ts, then) == (
+        "cycles 3 to 3 can repeat for ever: `upper` takes `executing`, and `go` (number 1) is not answered"
+    )
+
+
+def test_a_level_that_nobody_commands_has_no_superior_to_tell(
+    task: TransitionSystem, empty: Followed
+) -> None:
+    alone = replace(task, links=replace(task.links, above=None))
+    assert consequences(alone, empty.finding, LEGAL, 4) == ()
+
+
+# --- other initial values ----------------------------------------------------------------------
+
+
+def test_initial_values_are_read_by_level(task: TransitionSystem) -> None:
+    systems = {"task": task}
+    assert starts(systems, "") == {}
+    assert starts(systems, "tbuffer_boxt = 3, task.obj_acquired=true,") == {
+        "task": {"tbuffer_boxt": 3, "obj_acquired": True}
+    }
+    kind = task.kinds["cur_state"]
+    [begun] = starts(systems, "cur_state = state_5").values()
+    assert {leaf: spell(kind, value) for leaf, value in begun.items()} == {
+        "cur_state": "state_5",
+        "cur_state.next": "state_5",
+    }
+    [begun] = starts(systems, "cur_state.next = f_state, cur_state = state_5").values()
+    assert spell(kind, begun["cur_state.next"]) == "f_state"
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "help_"),
+    [
+        ("tbufer_boxt = 0", "no level has a variable `tbufer_boxt`", "did you mean `tbuffer_boxt`?"),
+        ("task.tbuffer = 0", "no level has a variable `task.tbuffer`", "did you mean `task.tbuffer_boxt`?"),
+        (
+            "command = acquire",
+            "no level has a variable `command`",
+            "it is a record or an array; name a part: ",
+        ),
+        ("cur_state = f_stat", "`cur_state` cannot be `f_stat`", "did you mean `f_state`?"),
+        ("tbuffer_boxt = 1000000", "`tbuffer_boxt` cannot be `1000000`", "it is a number from 0 to "),
+        ("obj_acquired = 1", "`obj_acquired` cannot be `1`", "it is true or false"),
+        (
+            "tbuffer_boxt",
+            "`tbuffer_boxt` does not say which value a variable has",
+            "write `variable = value`",
+        ),
+        ("tbuffer_boxt = 1, task.tbuffer_boxt = 1", "`task.tbuffer_boxt` is given twice", ""),
+    ],
+)
+def test_what_runs_cannot_begin_with_is_told(
+    task: TransitionSystem, text: str, message: str, help_: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(BadStartError) as refused:
+        starts({"task": task}, text)
+    assert str(refused.value) == message
+    assert not help_ or refused.value.helps[0].startswith(help_)
+    assert run(["prove", str(PUBLISHED), "--where", text]) == 2
+    assert message in capsys.readouterr().err.replace("\n", " ")
+    with pytest.raises(rcsc.CodedError, match=re.escape(message)):
+        rcsc.prove(PUBLISHED, where=text)
+
+
+def test_a_variable_of_several_levels_needs_its_level() -> None:
+    with pytest.raises(BadStartError, match="`cur_state` is a variable of several levels") as refused:
+        starts(transition_systems(SYSTEM), "cur_state = d_state")
+    assert refused.value.helps == ("write `lower.cur_state` or `upper.cur_state`",)
+
+
+def test_values_that_an_invariant_excludes_are_refused(tmp_path: Path) -> None:
+    text = small_text("lower", ("\nlevel lower", "\ninvariant few : inc_command_seen < 9\n\nlevel lower"))
+    ts = small_level(tmp_path, "lower", lower=text)
+    with pytest.raises(BadStartError, match="invariant `few` does not hold"):
+        starts({"lower": ts}, "inc_command_seen = 9")
+    assert starts({"lower": ts}, "inc_command_seen = 8") == {"lower": {"inc_command_seen": 8}}
+
+
+# --- the command line --------------------------------------------------------------------------
+
+
+def demonstration() -> str:
+    """The command of the guide that shows what an empty buffer leads to."""
+    guide = (REPO / "tables" / "README.md").read_text(encoding="utf-8")
+    [command] = re.findall(r"^(rcsc prove \S*published/system.toml --where [^#\n]*)", guide, re.MULTILINE)
+    return str(command)
+
+
+def test_the_demonstration_shows_each_way_with_its_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From ten flags and no box top: the run is that of a box top, and is kept as a case and as logs that replay."""
+    monkeypatch.chdir(REPO)
+    words = shlex.split(demonstration())[1:]
+    kept = ["--log", str(tmp_path / "logs"), "--freeze", str(tmp_path)]
+    assert run([*words, *kept]) == 1
+    err = capsys.readouterr().err
+    [section] = [part for part in err.split("error[RCS751]") if "no state is written directly" in part]
+    assert "fbuffer_flag = 10" in section
+    for sentence, line in (
+        (
+            "`workstation` takes `done` with `failure = buf` as the answer to `acquire` (number 1)",
+            "| acquire: 8 ",
+        ),
+        ("lines `14` and `15` both match and the system stops", "| acquire: 14 and 15 "),
+        (
+            "`workstation` takes `failed` with `failure = buf` as the answer to `acquire` (number 1)",
+            "| acquire: 14 ",
+        ),
+    ):
+        _, _, after = section.partition(sentence)
+        assert line in after.partition("= then")[0], sentence
+    logs = tmp_path / "logs"
+    for number in range(1, MOST + 1):
+        log = logs / f"task_deferred_cur_state_then_{number}.mcap"
+        assert run(["replay", str(log), "--generated", str(logs / "generated")]) == 0
+    case = tmp_path / "published_task_deferred_cur_state.json"
+    assert json.loads(case.read_text(encoding="utf-8"))["start"] == {
+        "task": {"tbuffer_boxt": "0", "fbuffer_flag": "10"}
+    }
+    assert case_breaks(read_case(case))
+
+
+def test_no_verdict_depends_on_where_runs_begin(capsys: pytest.CaptureFixture[str]) -> None:
+    """Nor is a restart looked for: it would begin elsewhere."""
+    forms = []
+    for options in ([], ["--where", "to_lower.inc_command = 5", "--follow", "0"]):
+        assert run(["prove", str(LAST_ECHO), "--level", "upper", "--json", "--no-cache", *options]) == 1
+        forms.append(json.loads(capsys.readouterr().out))
+    assert [form["levels"][0]["goals"] for form in forms[:1]] == [
+        form["levels"][0]["goals"] for form in forms[1:]
+    ]
+    usual, other = (form["findings"] for form in forms)
+    assert [finding["time_line"][0]["line"] for finding in other if finding["time_line"]] == ["begins"] * len(
+        other
+    )
+    assert [finding["follows"] for finding in other] == [[]] * len(other)
+    assert any(finding["follows"] for finding in usual)
