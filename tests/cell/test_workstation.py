@@ -272,9 +272,11 @@ def test_scripts_that_cannot_be_run_are_coded_errors(
     (project / "place.csv").write_text(f"{HEAD}MOVE,,,MOON,\n", encoding="utf-8")
     (project / "columns.csv").write_text("a,b\n1,2\n", encoding="utf-8")
     (project / "latin.csv").write_bytes(HEAD.encode() + b"MOVE,\xff,,,\n")
-    for script in ("place.csv", "columns.csv", "latin.csv", "missing"):
+    for script in ("place.csv", "columns.csv", "latin.csv"):
         assert run(["run", script, *QUICK]) == 1
         assert "error[RCS723]" in capfd.readouterr().err, script
+    assert run(["run", "make_box", *QUICK]) == 2
+    assert "there is no script `make_box`; did you mean `make_boxt`?" in capfd.readouterr().err
 
 
 def test_the_scripts_are_fig_7() -> None:

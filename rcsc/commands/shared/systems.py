@@ -8,6 +8,7 @@ import click
 from rcsc.commands.shared.show import Output, show
 from rcsc.diagnostics.coded import CodedError
 from rcsc.driver.compile import compile_system, level_sources
+from rcsc.host.described import nearest
 from rcsc.host.files.read import MOST_TOML_BYTES, Malformed, text, toml_of
 from rcsc.lang.project import PROJECT_FILE
 
@@ -66,21 +67,53 @@ def meant(target: str | None, system: Path | None, script: str | None) -> tuple[
         NoSystem: There is none.
         click.UsageError: There is no such file or folder, or script or system are named twice.
     """
-    if target is None:
-        return system_path(system), script or ""
-    path = Path(target)
-    described = path.is_dir() and any((path / name).is_file() for name in PLACES)
-    if described or (path.suffix == ".toml" and not _is_script(path)):
+    if target is not None and _is_system(Path(target), folder=target.endswith("/")):
         if system is not None:
             raise click.UsageError(f"`{target}` is a system, and `--system` names another")
-        if not path.exists():
-            raise click.UsageError(f"there is no file `{target}`")
-        return system_path(path), script or ""
-    if path.is_dir() and not path.suffix and (path.parent != Path() or target.endswith("/")):
-        raise click.UsageError(f"the folder `{target}` has no system.toml")
-    if script is not None:
+        return _with_script(system_path(Path(target)), script or "")
+    if target is not None and script is not None:
         raise click.UsageError(f"`{target}` is a script, and `--script` names another")
-    return system_path(system), target
+    if target is not None and system is None and not any(Path(name).is_file() for name in PLACES):
+        raise click.UsageError(
+            f"there is no system `{target}`, and no system.toml here of which it could be a script"
+        )
+    return _with_script(system_path(system), target or script or "")
+
+
+def _is_system(path: Path, *, folder: bool) -> bool:
+    """Whether a path is a system's; a script may be called as a folder that is none.
+
+    Raises:
+        click.UsageError: It must be one, and is not there.
+    """
+    if path.is_dir():
+        described = any((path / name).is_file() for name in PLACES)
+        if not described and (folder or path.parent != Path()):
+            raise click.UsageError(f"the folder `{path}` has no system.toml")
+        return described
+    if path.suffix != ".toml" or _is_script(path):
+        return False
+    if not path.exists():
+        raise click.UsageError(f"there is no file `{path}`")
+    return True
+
+
+def _with_script(path: Path, name: str) -> tuple[Path, str]:
+    """A description and a script of it, which must be there.
+
+    Raises:
+        click.UsageError: It is not.
+    """
+    from rcsc.run.orders.script import script_path  # most commands read no script
+
+    if not name or script_path(name, path.parent).is_file():
+        return path, name
+    files = (file for folder in (path.parent / "scripts", path.parent) for file in sorted(folder.glob("*")))
+    known = [
+        file.stem for file in files if file.suffix == ".csv" or (file.suffix == ".toml" and _is_script(file))
+    ]
+    helps = nearest(name, known) or ((f"those of `{path}` are {', '.join(known)}",) if known else ())
+    raise click.UsageError("; ".join((f"there is no script `{name}`", *helps)))
 
 
 def _is_script(path: Path) -> bool:
