@@ -32,10 +32,8 @@ def test_a_template_is_proved_formatted_compiled_and_tested(
     project: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for args in (
-        ["check", "--no-cache"],
         ["fmt", "--check"],
         ["compile"],
-        ["compile", "--check"],
         ["test", "--examples", "2", "--mutants", "1", "--no-cortex"],
         *([["run", "system.toml"]] if (project / "system.toml").exists() else []),
     ):

@@ -40,7 +40,7 @@ def test_the_model_moves_by_contact_alone() -> None:
 
 
 def test_it_docks_and_leaves_again() -> None:
-    robot = rcsc.load_system(HERE / "system.toml")
+    robot = rcsc.load_system(HERE / "system.toml", executor="python")
     plate = robot.plant.data.joint("plate")
     robot.order("dock")
     assert answer(robot)["status_report"] == "done"
@@ -55,7 +55,7 @@ def test_it_docks_and_leaves_again() -> None:
 
 
 def test_dead_motors_are_reported() -> None:
-    robot = rcsc.load_system(HERE / "system.toml")
+    robot = rcsc.load_system(HERE / "system.toml", executor="python")
     robot.plant.motors_dead = True
     robot.order("dock")
     report = answer(robot)
