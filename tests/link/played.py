@@ -168,9 +168,14 @@ def by_python(
         except StateTableError as error:
             faulty = re.findall(r"level `(\w+)`", str(error))[0]
         history.append({level.name: level.executor.values() for level in running.levels})
-        states = tuple(level.sign.packed.pack(*level.executor.values()) for level in running.levels)
-        seen.append((faulty, tuple(results), states, _buffers(running)))
+        seen.append(seen_of(running, faulty, tuple(results)))
     return seen
+
+
+def seen_of(running: System, faulty: str, results: tuple[bool, ...]) -> Seen:
+    """What is compared, after a tick."""
+    states = tuple(level.sign.packed.pack(*level.executor.values()) for level in running.levels)
+    return faulty, results, states, _buffers(running)
 
 
 def _begun(running: System) -> tuple[bytes, ...]:
@@ -287,29 +292,38 @@ class CSystem:
         )
         return f"{head} {{ double got[{len(leaves)}]; const double keys[] = {{{keys}}}; seen_ask({at}, keys, got); {sets}}}\n"
 
-    def play(
-        self, ticks: Sequence[Tick], text: str | None = None, expected: Sequence[Seen] = ()
-    ) -> list[Seen] | str:
-        """What the C system does, or another text in its place; why it does not build.
+    def play(self, ticks: Sequence[Tick]) -> list[Seen]:
+        """What the C system does."""
+        return self._played(self._linked(self.text, FLAGS), ticks, self.word)
 
-        Args:
-            ticks: The script.
-            text: A mutant of the source.
-            expected: What should be seen; it is left where something else is.
-        """
-        source = self.system.generated / f"c/{self.word}.c"
-        (self.folder / "system.c").write_text(text or source.read_text(encoding="utf-8"))
-        library = self.folder / f"system{len(list(self.folder.glob('*.so')))}.so"
-        flags = FLAGS if text is None else ("-std=c99", "-O0", "-fPIC")
-        made = subprocess.run(
-            ["cc", *flags, f"-I{self.system.generated / 'c'}", "-shared", "system.c", *self._objects, "-o", library.name],
-            cwd=self.folder, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        return (
-            self._played(ctypes.CDLL(str(library)), ticks, expected) if made.returncode == 0 else made.stderr
+    @property
+    def text(self) -> str:
+        """Its source."""
+        return (self.system.generated / f"c/{self.word}.c").read_text(encoding="utf-8")
+
+    def play_mutants(
+        self, ticks: Sequence[Tick], texts: Sequence[str], expected: Sequence[Seen]
+    ) -> Iterator[list[Seen]]:
+        """What each mutant of the source does, up to where it does something else; they are built together, under other names."""
+        include, _, _ = self.text.partition('.h"\n')
+        own = re.compile(
+            rf"\b{self.word}_(?=(init|step|restart|resume|take_\w+|give_\w+|restart_\w+|resume_\w+)\()"
         )
+        bodies = (own.sub(f"mutant{at}_", text.partition('.h"\n')[2]) for at, text in enumerate(texts))
+        library = self._linked(f'{include}.h"\n{"".join(bodies)}', ("-std=c99", "-O0", "-fPIC"))
+        for at, _ in enumerate(texts):
+            yield self._played(library, ticks, f"mutant{at}", expected)
 
-    def _played(self, library: ctypes.CDLL, ticks: Sequence[Tick], expected: Sequence[Seen]) -> list[Seen]:
+    def _linked(self, text: str, flags: Sequence[str]) -> ctypes.CDLL:
+        (self.folder / "system.c").write_text(text)
+        library = self.folder / f"system{len(list(self.folder.glob('*.so')))}.so"
+        command = ["cc", *flags, f"-I{self.system.generated / 'c'}", "-shared", "system.c", *self._objects]
+        subprocess.run([*command, "-o", library.name], cwd=self.folder, check=True)
+        return ctypes.CDLL(str(library))
+
+    def _played(
+        self, library: ctypes.CDLL, ticks: Sequence[Tick], word: str, expected: Sequence[Seen] = ()
+    ) -> list[Seen]:
         count = sum(map(len, self._members)) + 1
         *places, size = list((ctypes.c_size_t * count).in_dll(library, "seen_places"))
         runs = [0]
@@ -321,7 +335,7 @@ class CSystem:
         ]
         self._hear(library)
         return _Playing(self, library, slots, ctypes.create_string_buffer(b"\xaa" * size, size)).all(
-            ticks, expected
+            ticks, word, expected
         )
 
     def _hear(self, library: ctypes.CDLL) -> None:
@@ -361,8 +375,7 @@ class _Playing:
     memory: "ctypes.Array[ctypes.c_char]"
     given: set[str] = field(default_factory=set)
 
-    def all(self, ticks: Sequence[Tick], expected: Sequence[Seen]) -> list[Seen]:
-        word = self.system.word
+    def all(self, ticks: Sequence[Tick], word: str, expected: Sequence[Seen]) -> list[Seen]:
         init, step, restart, resume = (
             getattr(self.library, f"{word}_{name}") for name in ("init", "step", "restart", "resume")
         )
