@@ -49,7 +49,7 @@ def check(*paths: PathLike, cache: bool = True) -> Report:
 
 def compile(  # noqa: A001  # as the command is called
     *paths: PathLike,
-    out: PathLike = "generated",
+    out: PathLike | None = None,
     targets: Sequence[str] = tuple(TARGETS),
     write: bool = True,
     defensive: bool = False,
@@ -57,8 +57,9 @@ def compile(  # noqa: A001  # as the command is called
     """Prove tables, then write their executors, as `rcsc compile` does; nothing is written unless everything is proved.
 
     Args:
-        paths: Files, or folders with all `*.rcs` below them; without any, the present folder.
-        out: The folder for the executors, `python` and `c` in it.
+        paths: Files, or folders with all `*.rcs` below them; without any, the present folder. Of a system, given by its `system.toml`
+            or by the folder that holds it, the C of the whole is made, too.
+        out: The folder for the executors, `python` and `c` in it; else the one that the system's description names, else `generated`.
         targets: Which to write, of `python` and `c`.
         write: False to find only whether the files are fresh.
         defensive: Whether the executors check their whole state in every cycle.
@@ -70,7 +71,9 @@ def compile(  # noqa: A001  # as the command is called
     if unknown := sorted(set(targets) - TARGETS.keys()):
         raise ValueError(f"there is no target `{unknown[0]}`; there are {', '.join(TARGETS)}")
     settings = _settings(paths, cache=False)
-    return compile_(settings, Path(out), targets, only_check=not write, defensive=defensive).report
+    return compile_(
+        settings, None if out is None else Path(out), targets, only_check=not write, defensive=defensive
+    ).report
 
 
 def _settings(paths: Sequence[PathLike], *, cache: bool) -> Settings:

@@ -1,8 +1,8 @@
 """`rcsc compile`: the executors of every proved program."""
 
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
@@ -15,35 +15,38 @@ from rcsc.emit.generated import stale, write
 from rcsc.emit.lower import lower
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import ProvedProgram
-from rcsc.lang.project import project_root
+from rcsc.lang.project import PROJECT_FILE, project_root
 from rcsc.link import emit_system, linked, outward
 from rcsc.run.description import BadDescription, description, places
 from rcsc.solvers.options import Options
 
+DESCRIPTION = "system.toml"
+"""What the description of a system is called in its folder."""
+
 
 def compile_(
     settings: Settings,
-    out: Path,
+    out: Path | None,
     targets: Collection[str],
     *,
     only_check: bool,
     defensive: bool = False,
-    systems: Sequence[Path] = (),
 ) -> Conclusion:
-    """Prove every table anew, then write the executors, or say whether they are fresh.
+    """Prove every table anew, then write the executors and the C of systems, or say whether they are fresh.
 
     Args:
-        settings: Which tables, and how they are proved.
-        out: The generated folder.
+        settings: Which tables and systems, and how they are proved. A system is given by its description, or by the folder that holds it.
+        out: The generated folder; None for the one that the systems' descriptions name, or else the usual one.
         targets: Languages, as `TARGETS` names them.
         only_check: Whether nothing is written.
         defensive: Whether the executors check their state in every cycle.
-        systems: Descriptions of systems whose levels are among the tables; their C is written with that of the levels.
 
     Raises:
-        BadDescription: A system does not fit its programs.
+        BadDescription: A system is not in order, does not fit its programs, or names another folder than another system.
     """
-    project = proved(settings)
+    systems = tuple(_systems(settings.paths))
+    folder = out or _folder(systems)
+    project = proved(replace(settings, paths=_tables(settings.paths, systems)))
     report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was written")
@@ -53,11 +56,11 @@ def compile_(
     for path in systems:
         generated.add_system(path)
     files = generated.files
-    diagnostics = generated.clashes or (stale if only_check else write)(files, str(out))
+    diagnostics = generated.clashes or (stale if only_check else write)(files, str(folder))
     report = project.report(tuple(diagnostics))
     if report.failed:
         return Conclusion(report, "" if only_check else "nothing was written")
-    return Conclusion(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {out}")
+    return Conclusion(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {folder}")
 
 
 def compile_system(path: Path) -> Conclusion:
@@ -66,22 +69,33 @@ def compile_system(path: Path) -> Conclusion:
     Raises:
         BadDescription: It is not in order.
     """
-    settings = Settings(level_sources(path), Options())
-    return compile_(settings, description(path).generated, TARGETS, only_check=False, systems=(path,))
+    return compile_(Settings((str(path),), Options()), description(path).generated, TARGETS, only_check=False)
 
 
-def level_sources(path: Path) -> tuple[str, ...]:
-    """The files of the programs of a system's levels, as far as they are there.
+def _systems(paths: Iterable[str]) -> Iterator[Path]:
+    """The descriptions of systems among the paths: those that are one, and those of folders that hold one."""
+    for path in map(Path, paths):
+        if path.suffix == ".toml" and path.name != PROJECT_FILE and path.is_file():
+            yield path
+        elif (path / DESCRIPTION).is_file():
+            yield path / DESCRIPTION
 
-    Raises:
-        BadDescription: The description is not in order.
-    """
-    tried = (places(path, spec.program) for spec in description(path).levels)
-    return tuple(
-        str(next(file for file in files if file.is_file()))
-        for files in tried
-        if any(file.is_file() for file in files)
-    )
+
+def _tables(paths: tuple[str, ...], systems: tuple[Path, ...]) -> tuple[str, ...]:
+    """The paths that tables are read from: those given that are no descriptions, and the programs of the levels, which are roots."""
+    given = [path for path in paths if Path(path) not in systems]
+    tried = (places(path, spec.program) for path in systems for spec in description(path).levels)
+    levels = (next((file for file in files if file.is_file()), None) for files in tried)
+    return tuple(dict.fromkeys([*given, *(str(file) for file in levels if file is not None)]))
+
+
+def _folder(systems: tuple[Path, ...]) -> Path:
+    """The generated folder that the systems' descriptions name, as seen from here; without systems the usual one."""
+    folders = {description(path).generated for path in systems}
+    if len(folders) > 1:
+        names = " and ".join(f"`{folder}`" for folder in sorted(folders))
+        raise BadDescription(f"the systems are to be compiled to {names}: choose one with --out")
+    return Path(os.path.relpath(folders.pop())) if folders else Path("generated")
 
 
 @dataclass(slots=True)

@@ -109,7 +109,7 @@ def test_what_does_not_fit_is_told_with_its_line(
 def test_two_systems_that_name_two_folders_need_a_choice(tmp_path: Path) -> None:
     one = written(tmp_path / "one", {"a": 10}, {"who.x": "a.x"})
     two = written(tmp_path / "two", {"b": 10}, {"who.x": "b.x"}, called="other")
-    assert run(["compile", str(one), str(two)]) == 2
+    assert run(["compile", str(one), str(two)]) == 1
     assert run(["compile", "-q", str(one), str(two), "--out", str(tmp_path / "both")]) == 0
     assert {"whole.c", "other.c", "a.c", "b.c"} <= {file.name for file in (tmp_path / "both/c").iterdir()}
 

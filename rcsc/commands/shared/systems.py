@@ -1,16 +1,14 @@
 """What the commands about a system share: which one is meant, and its executors made."""
 
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import click
 
 from rcsc.commands.shared.show import Output, show
 from rcsc.diagnostics.coded import CodedError
-from rcsc.driver.compile import compile_system, level_sources
+from rcsc.driver.compile import compile_system
 from rcsc.host.described import nearest
 from rcsc.host.files.read import MOST_TOML_BYTES, Malformed, text, toml_of
-from rcsc.lang.project import PROJECT_FILE
 
 PLACES = ("system.toml", "tables/system.toml")
 """Where a folder has its description."""
@@ -122,28 +120,6 @@ def _is_script(path: Path) -> bool:
         return "row" in toml_of(text(path, MOST_TOML_BYTES))
     except (OSError, Malformed):
         return False
-
-
-def described(paths: Iterable[str]) -> Iterator[Path]:
-    """Yield the descriptions of systems among the paths: those that are one, and those of folders that hold one."""
-    for path in map(Path, paths or (".",)):
-        if path.suffix == ".toml" and path.name != PROJECT_FILE and path.is_file():
-            yield path
-        elif (path / PLACES[0]).is_file():
-            yield path / PLACES[0]
-
-
-def sources(paths: tuple[str, ...], systems: tuple[Path, ...]) -> tuple[str, ...]:
-    """The paths that tables are read from: those given that are no descriptions, and the programs of the systems' levels.
-
-    Raises:
-        BadDescription: A description says something that cannot be.
-    """
-    if not systems:
-        return paths
-    given = list(map(Path, paths or (".",)))
-    levels = (file for path in systems if path.parent not in given for file in level_sources(path))
-    return tuple(dict.fromkeys([*(str(path) for path in given if path not in systems), *levels]))
 
 
 def compiled(path: Path, quiet: bool) -> bool:

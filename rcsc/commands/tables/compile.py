@@ -1,16 +1,13 @@
 """`rcsc compile`: the executors of proved tables."""
 
-import os
 from pathlib import Path
 
 import click
 
 from rcsc.commands.shared.options import PATHS, proving, settings_of, showing
 from rcsc.commands.shared.show import Output, finish
-from rcsc.commands.shared.systems import described, sources
 from rcsc.driver.compile import compile_
 from rcsc.emit import TARGETS
-from rcsc.run.description import description
 from rcsc.solvers.options import Options
 
 
@@ -49,25 +46,11 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     targets = tuple(name.strip() for name in target.split(",") if name.strip())
     if not targets or not set(targets) <= TARGETS.keys():
         raise click.BadParameter(f"choose from {' and '.join(TARGETS)}", param_hint="--target")
-    systems = tuple(described(paths))
     conclusion = compile_(
-        settings_of(options, use_cache, output, sources(paths, systems)),
-        out or _generated(systems),
+        settings_of(options, use_cache, output, paths),
+        out,
         targets,
         only_check=only_check,
         defensive=defensive,
-        systems=systems,
     )
     return finish(conclusion.report, "compile", output, conclusion.closing)
-
-
-def _generated(systems: tuple[Path, ...]) -> Path:
-    """The generated folder that the systems' descriptions say, from here; without systems the usual one.
-
-    Raises:
-        UsageError: They do not agree.
-    """
-    folders = {description(path).generated for path in systems}
-    if len(folders) > 1:
-        raise click.UsageError("the systems name several generated folders: choose one with --out")
-    return Path(os.path.relpath(folders.pop())) if folders else Path("generated")
