@@ -394,3 +394,36 @@ def test_what_is_no_unit_is_refused(text: str) -> None:
 def test_the_symbol_file_says_which_inputs_clamp(dock: Path) -> None:
     sign = signature(dock / "generated" / "c" / "drive.json")
     assert {leaf.name for leaf in sign.leaves if leaf.clamp} == {"travelled_mm", "lateral_mm"}
+
+
+def test_a_field_of_two_parties_is_told(dock: Path) -> None:
+    """As where an operator's order and a hand's have one name."""
+    system = (dock / "system.toml").read_text(encoding="utf-8").partition("\n[plant.mujoco]")[0]
+    edits = ('"base.bumper"', '"wall.bumper"'), ('"base.contact"', '"wall.beacon"')
+    (dock / "system.toml").write_text(edited(system, *edits), encoding="utf-8")
+    with pytest.raises(BadPlant) as caught:
+        bound(dock)
+    [diagnostic] = caught.value.diagnostics
+    assert diagnostic.message == "`beacon` of `Base` would be `base.beacon` and `wall.beacon`"
+    assert diagnostic.help == (
+        "say whom the plant stands for: `parties = [...]`",
+        "or give the class an attribute `wall` with the field in it",
+    )
+    base = (dock / "base.py").read_text(encoding="utf-8")
+    wall = "class Wall:\n    bumper: bool = False\n    beacon: bool = False\n\n\n"
+    walled = edited(base, ("class Base:", f"{wall}class Base:\n    wall: Wall"))
+    (dock / "base.py").write_text(walled, encoding="utf-8")
+    plant = bound(dock)
+    plant.plant.wall.beacon = True
+    assert plant.step(0, nothing)["wall.beacon"] == (True,)
+    assert plant.step(0, nothing)["base.beacon"] == (True,)
+    assert bound(dock).step(0, nothing)["wall.beacon"] == (False,)
+
+
+def test_a_class_that_cannot_be_made_of_its_fields_is_told(dock: Path) -> None:
+    text = RECORDS.replace("    inc_command_echo: int\n", "    weight: float\n    inc_command_echo: int\n")
+    (dock / "fleet.py").write_text(text, encoding="utf-8")
+    with pytest.raises(BadPlant) as caught:
+        load_of_fleet(dock)
+    assert "`report` cannot be made: TypeError" in str(caught.value)
+    assert "'weight'" in str(caught.value)

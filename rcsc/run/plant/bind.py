@@ -23,6 +23,8 @@ from rcsc.run.plant.values import BadValue, Link, Misfit, link, shape
 from rcsc.run.signature import Leaf, Signature, Values
 
 FieldPath = tuple[str, ...]
+PARTIES = "say whom the plant stands for: `parties = [...]`"
+"""What helps where a plant is taken to stand for somebody else, too."""
 
 
 class BadPlant(BadFile):
@@ -194,12 +196,15 @@ def bind(
         at = _bound(page, buffer, of, hints)
         if at is not None:
             links.append(at)
+    _check_twice(page, of, links)
     _check_step(page, spec, of)
     if page.faults:
         raise page.bad(BadPlant)
     plant = _constructed(page, spec, of, seed)
     for buffer, to_field in links:
-        _prepare(plant, buffer, to_field)
+        _prepare(page, plant, buffer, to_field)
+    if page.faults:
+        raise page.bad(BadPlant)
     takes = tuple((buffer, to_field) for buffer, to_field in links if not buffer.gives)
     gives = tuple((buffer, to_field) for buffer, to_field in links if buffer.gives)
     return BoundPlant(plant, takes, gives, system.tick_ms / 1000)
@@ -259,12 +264,30 @@ def _bound(page: Document, buffer: Buffer, of: type, hints: Mapping[str, Any]) -
 
 def _missing(page: Document, buffer: Buffer, owner: str, name: str, known: Sequence[str]) -> None:
     wants = "fills" if buffer.gives else "takes"
-    helps = nearest(name, known) or (
-        f"add `{name}: {_suggested(buffer.leaves)}` to the class, or name whom the plant stands for: `parties = [...]`",
-    )
-    page.wrong(
-        buffer.path, f"class `{owner}` has no field `{name}`, which {wants} `{buffer.variable}`", *helps
-    )
+    helps = nearest(name, known) or (f"add `{name}: {_suggested(buffer.leaves)}` to the class",)
+    message = f"class `{owner}` has no field `{name}`, which {wants} `{buffer.variable}`"
+    page.wrong(buffer.path, message, *helps, f"if the plant does not stand for `{_party(buffer)}`: {PARTIES}")
+
+
+def _check_twice(page: Document, of: type, links: Sequence[tuple[Buffer, Link]]) -> None:
+    """Note fields that are the end of two buffers: of two parties, which a class tells apart by an attribute for each."""
+    ends: dict[FieldPath, Buffer] = {}
+    for buffer, _ in links:
+        first = ends.setdefault(buffer.field, buffer)
+        if first is not buffer:
+            message = (
+                f"`{'.'.join(buffer.field)}` of `{of.__name__}` would be `{first.end}` and `{buffer.end}`"
+            )
+            page.wrong(
+                buffer.path,
+                message,
+                PARTIES,
+                f"or give the class an attribute `{_party(buffer)}` with the field in it",
+            )
+
+
+def _party(buffer: Buffer) -> str:
+    return buffer.end.partition(".")[0]
 
 
 def _suggested(leaves: Sequence[Leaf]) -> str:
@@ -347,13 +370,25 @@ def _constructed(page: Document, spec: PlantSpec, of: type, seed: int) -> Any:
         raise page.bad(BadPlant) from error
 
 
-def _prepare(plant: Any, buffer: Buffer, to_field: Link) -> None:
-    """Has the object itself own the field, with the variable's first value where the class gives none."""
+def _prepare(page: Document, plant: Any, buffer: Buffer, to_field: Link) -> None:
+    """Has the object itself own the field, with the variable's first value where the class gives none.
+
+    A class that cannot be made of the fields is noted here, and not found out while the system runs.
+    """
+    try:
+        first = to_field.taken(iter(leaf.initial for leaf in buffer.leaves))
+        _put_first(plant, buffer, first)
+    except Exception as error:  # noqa: BLE001  # of the user's classes
+        helps = "a class of fields is made of them, by name: all others need a default"
+        page.wrong(buffer.path, f"`{'.'.join(buffer.field)}` cannot be made: {raised(error)}", helps)
+
+
+def _put_first(plant: Any, buffer: Buffer, first: object) -> None:
     owner = plant
     for part in buffer.field[:-1]:
         owner = _own(owner, part)
     if not hasattr(owner, buffer.field[-1]):
-        setattr(owner, buffer.field[-1], to_field.taken(iter(leaf.initial for leaf in buffer.leaves)))
+        setattr(owner, buffer.field[-1], first)
     else:
         _own(owner, buffer.field[-1])
 
