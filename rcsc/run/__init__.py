@@ -15,7 +15,7 @@ True
 {'inc_command': 2}
 
 The compiler is not needed here: a program is known by the symbol file beside its executor (`signature`). C and Python
-executors are behind one interface and leave the same bytes. Trusted: `system.toml`, the generated folder and what
+executors are behind one interface and leave the same bytes. Trusted: `system.toml`, the plant that it names, the generated folder and what
 extern procedures do; logs and symbol files may come from anybody and are read within bounds. A tick copies each
 level's state; it does not depend on the number of lines.
 

@@ -412,3 +412,25 @@ def test_a_plant_answers_what_a_feed_asks(here: Path, capsys: pytest.CaptureFixt
             run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--script", "go.csv", *more])
             == 0
         )
+
+
+def test_several_levels_are_ordered_by_one_script(here: Path) -> None:
+    system = (here / "system.toml").read_text(encoding="utf-8")
+    apart = (
+        ('"supervisor.to_drive" = "drive.command"', '"pilot.order" = "drive.command"'),
+        ('"drive.report" = "supervisor.drive"', '"drive.report" = "pilot.report"'),
+    )
+    (here / "system.toml").write_text(edited(system, *apart), encoding="utf-8")
+    text = "level,command,target_mm,within\ndrive,goto,300,100\nsupervisor,stop,,20\ndrive,goto,600,100\n"
+    run_ = scripted(here, text)
+    assert [result.state for result in run_.steps(500)] == ["done"] * 3
+    assert 600 <= int(run_.system.level("drive").value("travelled_mm")) < 640
+    for rows, message in (
+        ("command\ngoto\n", "several levels can be ordered: name one under `level`: supervisor, drive"),
+        ("level,command,target_mm\nsupervisor,stop,5\n", "`target_mm` is no field of `fleet.order`"),
+        ("level,target_mm\ndrive,5\n", "`target_mm` is no field of an order, for there is no `command`"),
+        ("level,command\ndriv,goto\n", "no level `driv` is ordered from outside; did you mean `drive`?"),
+    ):
+        with pytest.raises(BadScript) as caught:
+            scripted(here, rows)
+        assert message in str(caught.value)
