@@ -133,10 +133,10 @@ void nbs_robot_init(nbs_robot_t *s);
 /* One step, every 40 ms: the levels that are due take their inputs as the step before left them, run from the top down, and give their outputs. Returns the first that faulted, whose `fault` says why; the others have run. */
 nbs_robot_level_t nbs_robot_step(nbs_robot_t *s);
 
-/* Between two steps, a level starts again with everything lost: the order that it has counts as seen and failed, and the levels below it are told to rest. Returns -1, or what its check says of the state that it would start with; then it is as after init. */
+/* Between two steps, a level starts again with everything lost: the order that it has counts as seen and failed, and the levels below it are told to rest. Returns -1, or what its check says of the state that it would start with; then it is as at first. -2: there is no such level. */
 int32_t nbs_robot_restart(nbs_robot_t *s, nbs_robot_level_t level);
 
-/* Between two steps, a level goes on from the state that it has in a copy of the system. Returns -1, or what its check says of that state; then it has kept its own. */
+/* Between two steps, a level goes on from the state that it has in a copy of the system. Returns -1, or what its check says of that state; then it has kept its own. -2: there is no such level. */
 int32_t nbs_robot_resume(nbs_robot_t *s, nbs_robot_level_t level, const nbs_robot_t *from);
 
 #ifdef __cplusplus

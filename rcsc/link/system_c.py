@@ -305,7 +305,8 @@ class _Maker:
     def _restart(self) -> Function:
         doc = (
             "Between two steps, a level starts again with everything lost: the order that it has counts as seen and failed, and the levels "
-            "below it are told to rest. Returns -1, or what its check says of the state that it would start with; then it is as after init."
+            "below it are told to rest. Returns -1, or what its check says of the state that it would start with; then it is as at first. "
+            "-2: there is no such level."
         )
         each = (
             (level, Invoke(f"{self.word}_restart_{level.member}", (Name("s"),)))
@@ -316,7 +317,7 @@ class _Maker:
     def _resume(self) -> Function:
         doc = (
             "Between two steps, a level goes on from the state that it has in a copy of the system. "
-            "Returns -1, or what its check says of that state; then it has kept its own."
+            "Returns -1, or what its check says of that state; then it has kept its own. -2: there is no such level."
         )
         each = (
             (level, Invoke(f"{self.word}_resume_{level.member}", (Name("s"), Name(f"&from->{level.member}"))))

@@ -185,11 +185,13 @@ class Signature:
         return "<" + "".join("B" if code == "?" else code for code in types)
 
     def record(self, name: str) -> range:
-        """Positions of the leaves of a variable: a record's or array's are next to each other.
+        """Positions of the leaves of a variable: a record's or array's are next to each other; the pending value of one is not its part.
 
         Raises:
             KeyError: There is no such variable.
         """
+        if name in self.index:
+            return range(self.index[name], self.index[name] + 1)
         places = [
             at
             for at, leaf in enumerate(self.leaves)

@@ -109,6 +109,7 @@ def drawn_system(folder: Path, random: Random, *, most: int = 0) -> Path:
         if random.random() < 0.5 and f"{name}.shown" not in buffers:
             buffers[f"{name}.shown"] = f"plant.shown{at}"
         buffers[f"{name}.count"] = f"plant.count[{at}]"
+        buffers[f"{name}.held"] = f"plant.held{at}"  # without its pending value
     (folder / "system.toml").write_text(
         system(names, buffers, name="drawn", generated='"generated"', tick_ms="10"), encoding="utf-8"
     )

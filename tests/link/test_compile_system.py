@@ -6,6 +6,9 @@ from pathlib import Path
 import pytest
 
 from rcsc.commands import run
+from rcsc.run.description import description
+from rcsc.run.system import signatures
+from tests.link.played import CSystem, by_python, drawing, first_difference, script
 from tests.support.programs.texts import edit_file, system
 
 STRICT = (
@@ -144,3 +147,24 @@ def test_any_word_may_be_a_name(tmp_path: Path) -> None:
     [word] = [file.stem for file in (tmp_path / "generated/c").glob("p9*.h")]
     programs = [file.stem for file in (tmp_path / "generated/c").glob("*.c") if file.stem != word]
     assert built(tmp_path, word, *programs) == ""
+
+
+def test_two_levels_of_one_program_have_a_state_each(tmp_path: Path) -> None:
+    path = written(
+        tmp_path, {"left": 10}, {"left.y": "right.x", "right.y": "left.x", "who.x": "left.given.a"}
+    )
+    text = (tmp_path / "left.rcs").read_text(encoding="utf-8")
+    (tmp_path / "limb.rcs").write_text(f"{text}level right {{ period 20 [ms] table t }}\n", encoding="utf-8")
+    (tmp_path / "left.rcs").unlink()
+    edit_file(
+        path,
+        ('name = "left"', 'name = "left"\nprogram = "limb"\n[[level]]\nname = "right"\nprogram = "limb"'),
+    )
+    assert run(["compile", "-q", str(path)]) == 0
+    assert built(tmp_path, "whole", "limb") == ""
+    described = description(path)
+    signs = signatures(described)
+    ticks = script(described, signs, drawing(3), 60)
+    assert (
+        first_difference(by_python(described, ticks), CSystem(described, signs, tmp_path).play(ticks)) == ""
+    )
