@@ -144,9 +144,9 @@ class _Generated:
         if page.faults:
             raise page.bad(BadDescription)
         source = os.path.relpath(path, project_root(str(path))).replace("\\", "/")
-        found = linked(system, plans, source)
-        if self._add(str(path), emit_system(found)):
-            self._share(str(path), "c", outward(found))
+        whole = linked(system, plans, source)
+        if self._add(str(path), emit_system(whole)):
+            self._share(str(path), "c", outward(whole))
 
     def _add(self, root: str, files: Mapping[str, str]) -> bool:
         """Adds files, if no other text goes to one of them already; types that programs share have one text."""

@@ -177,12 +177,12 @@ class _Maker:
 
     def types(self) -> dict[str, str]:
         """A header for each file that declares types: all programs that use it share them."""
-        made = {}
+        headers = {}
         for unit in dict.fromkeys(self.names.units.values()):
             files = [file for file, word in self.names.units.items() if word == unit]
-            enums = [one for one in self.program.enums if one.file in files]
-            records = [one for one in self.program.records if one.file in files]
-            needed = {self.names.units[one.file] for record in records for one in self._parts(record)}
+            enums = [enum for enum in self.program.enums if enum.file in files]
+            records = [record for record in self.program.records if record.file in files]
+            needed = {self.names.units[part.file] for record in records for part in self._parts(record)}
             view = {
                 "source": comment(self._source(files[0])),
                 "mark": self.plan.mark,
@@ -191,8 +191,8 @@ class _Maker:
                 "enums": [self._enum(enum) for enum in enums],
                 "structs": [self._record(record) for record in records],
             }
-            made[f"c/{types_header(unit)}"] = render("types.h.jinja", view)
-        return made
+            headers[f"c/{types_header(unit)}"] = render("types.h.jinja", view)
+        return headers
 
     def _source(self, file: str) -> str:
         """A file that declares types, as the first line of its header names it."""
@@ -202,16 +202,16 @@ class _Maker:
     def shared(self) -> dict[str, list[str]]:
         """Names that the header of each unit declares."""
         names = {unit: [types_header(unit), types_guard(unit)] for unit in self.names.units.values()}
-        for one in self.program.types:
-            names[self.names.units[one.file]].append(self.names.types[one.name])
+        for kind in self.program.types:
+            names[self.names.units[kind.file]].append(self.names.types[kind.name])
         for enum in self.program.enums:
             names[self.names.units[enum.file]] += self.names.constants[enum.name]
         return names
 
     def _parts(self, record: model.Record) -> Iterator[Enum | model.Record]:
         """The declared types of a record's own fields."""
-        for one in record.fields:
-            kind = one.type
+        for part in record.fields:
+            kind = part.type
             while isinstance(kind, model.Array):
                 kind = kind.element
             if isinstance(kind, Enum | model.Record):
@@ -249,11 +249,11 @@ class _Maker:
                 "" if name.endswith(f"_{line.name.upper()}") else line.name
                 for name, line in zip(names, table.lines, strict=True)
             )
-            said = f"`line`, where table {table.table.name} ran; -1 for none"
-            yield comment(said), self._numbered(names, docs)
+            doc = f"`line`, where table {table.table.name} ran; -1 for none"
+            yield comment(doc), self._numbered(names, docs)
         if self.names.assumptions:
-            said = "Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed"
-            yield said, self._numbered(self.names.assumptions, self.plan.checked)
+            doc = "Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed"
+            yield doc, self._numbered(self.names.assumptions, self.plan.checked)
         yield "`fault`, and what a cycle returns", self._numbered(self.names.faults, FAULT_DOCS)
 
     def _fields(self) -> Iterator[tuple[str, str]]:

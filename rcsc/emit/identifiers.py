@@ -242,7 +242,7 @@ def _units(program: Program, p: str, places: Mapping[str, str]) -> dict[str, str
 
     Files whose types need each other have one word, that of the first: one header declares them.
     """
-    declared = {one.name: one.file for one in program.types}
+    declared = {kind.name: kind.file for kind in program.types}
     needs = {file: {file} for file in sorted(set(declared.values()))}
     for record in program.records:
         needs[record.file] |= {declared[name] for name in _named(record)}
@@ -268,8 +268,8 @@ def _unit(program: Program, p: str, file: str, places: Mapping[str, str]) -> str
 
 def _named(record: Record) -> Iterator[str]:
     """Names of the types that a record's own fields have."""
-    for one in record.fields:
-        kind = one.type
+    for part in record.fields:
+        kind = part.type
         while isinstance(kind, Array):
             kind = kind.element
         if isinstance(kind, Enum | Record):
@@ -278,7 +278,7 @@ def _named(record: Record) -> Iterator[str]:
 
 def _types(program: Program, units: Mapping[str, str], scope: NameScope) -> dict[str, str]:
     """`UNIT_NAME_t` for each type."""
-    return {one.name: scope.fresh(f"{units[one.file]}_{_stem(one.name)}_t") for one in program.types}
+    return {kind.name: scope.fresh(f"{units[kind.file]}_{_stem(kind.name)}_t") for kind in program.types}
 
 
 def capitals(p: str) -> str:

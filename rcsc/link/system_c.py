@@ -101,20 +101,20 @@ class _Maker:
         return every
 
     def structs(self) -> Iterator[tuple[str, str, Fields]]:
-        """What is said of each struct, its name, its members."""
+        """The doc of each struct, its name, its members."""
         sides = (
             (IN, "from", "What stands outside gives: fill it before each step. Until then it is what the levels begin with."),
             (OUT, "to", "What stands outside is given: as the last step left it."),
         )  # fmt: skip
         members: Fields = []
-        for side, word, said in sides:
+        for side, word, doc in sides:
             parties: Fields = []
             for party in self.system.parties(side):
                 name = f"{self.word}_{word}_{party}_t"
                 yield f"Buffers {word} {party}.", name, self._members(side, party)
                 parties.append((f"{name} {party}", ""))
             if parties:
-                yield said, f"{self.word}_{side}_t", parties
+                yield doc, f"{self.word}_{side}_t", parties
                 members.append((f"{self.word}_{side}_t {side}", ""))
         if between := self._members(BETWEEN, ""):
             yield "What levels give each other.", f"{self.word}_{BETWEEN}_t", between
@@ -124,8 +124,8 @@ class _Maker:
                 (f"{level.program.names.program}_t {level.member}", f"level {comment(level.name)}")
             )
         members.append((f"uint64_t {TICK}", "steps done"))
-        said = "The whole system in one block: copying it is copying everything that a step depends on."
-        yield said, f"{self.word}_t", members
+        doc = "The whole system in one block: copying it is copying everything that a step depends on."
+        yield doc, f"{self.word}_t", members
 
     def _questions(self) -> Iterator[tuple[str, str]]:
         """What each function of the user's fills, and its prototype."""
@@ -140,7 +140,7 @@ class _Maker:
 
     def _members(self, side: str, party: str) -> Fields:
         buffers = (b for b in self.system.buffers if (b.side, b.party) == (side, party))
-        return [(buffer.end.declared(buffer.name), _said(buffer)) for buffer in buffers]
+        return [(buffer.end.declared(buffer.name), _doc(buffer)) for buffer in buffers]
 
     # --- functions ---
 
@@ -245,8 +245,8 @@ class _Maker:
                 yield Set(number, Cast("uint64_t", Name(f"now.{program.path(echo)}")))
                 if standing := _standing(level, at):
                     yield when(infix("!=", TICKS, FIRST), Set(number, Cast("uint64_t", Name(standing))))
-                one, many = Constant(1, "uint64_t"), Constant(NUMBERS, "uint64_t")
-                yield Set(number, infix("%", infix("+", number, one), many))
+                next_, many = Constant(1, "uint64_t"), Constant(NUMBERS, "uint64_t")
+                yield Set(number, infix("%", infix("+", number, next_), many))
                 if (greatest := _greatest(level, start)) < NUMBERS - 1:
                     yield when(infix(">", number, Constant(greatest, "uint64_t")), Set(AT, Constant(at)))
                 yield Set(place, Cast(leaf.c_type, number))
@@ -334,7 +334,7 @@ def _has_reals(program: LevelProgram) -> bool:
     return any(leaf.c_type == "double" for leaf in program.sign.leaves)
 
 
-def _said(buffer: Buffer) -> str:
+def _doc(buffer: Buffer) -> str:
     """The comment of a buffer: both ends, the range, what becomes of a reading beyond it."""
     words = [f"{buffer.wire.source} = {buffer.wire.target}", range_text(buffer.end.kind)]
     if buffer.side == IN and isinstance(buffer.end.kind, Scalar) and range_text(buffer.end.kind):
@@ -416,6 +416,6 @@ def _parts(target: Placed, source: Placed, depth: int) -> Iterator[Stmt]:
 
 def _counted(count: str, end: int, *body: Stmt) -> Stmt:
     """A loop from 0 up to the end, which is left out."""
-    name, zero, one = Name(count), Constant(0, "uint32_t"), Constant(1, "uint32_t")
+    name, zero, step = Name(count), Constant(0, "uint32_t"), Constant(1, "uint32_t")
     goes = infix("<", name, Constant(end, "uint32_t"))
-    return repeated(Set(name, zero), goes, Set(name, infix("+", name, one)), *body)
+    return repeated(Set(name, zero), goes, Set(name, infix("+", name, step)), *body)

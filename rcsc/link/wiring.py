@@ -305,7 +305,7 @@ class _Wiring:
             kind: Type = meaning.variable(variable).type
             return End(level, variable, program, "".join(names.paths[variable]), kind)
         root, *steps = re.findall(r"\w+|\[\d+\]", variable)
-        path, kind = names.roots[root], next(one.type for one in meaning.declared if one.name == root)
+        path, kind = names.roots[root], next(root_.type for root_ in meaning.declared if root_.name == root)
         for step in steps:
             if isinstance(kind, Record):
                 path = f"{path}.{names.members[kind.name][step]}"
