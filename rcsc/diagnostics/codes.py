@@ -216,6 +216,36 @@ class Code(StrEnum):
     A name has at most 1,000 characters, and so has a part of a record or an array, written out as `robot.plate[1]`: they go into symbol
     files and logs, whose readers bound what they take. Shorten the name, or nest records less deep.
     """
+    GOES_ON = """RCS116: a row or a part of a table that does not go on with anything
+
+    A row whose first cell is empty goes on with the row above it: each of its cells with the cell directly above, which has to say
+    something. A heading that comes again, with `|---|` below it, begins another part: further columns of the same lines, each named
+    again, in the same order. `rcsc fmt` writes both where a table is wider than its limit.
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | ready || go    |
+          | yes  | true  ||       |
+          |      |       || true  |
+          | no   | false || false |
+        }
+
+    error: `true` goes on with an empty cell
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | ready ||
+          |------|-------||
+          | yes  | true  ||
+          | no   | false ||
+          | line || go    |
+          |------||-------|
+          | yes  || true  |
+          | no   || false |
+        }
+    """
     UNKNOWN_NAME = """RCS201: an unknown name
 
     Nothing of this name is declared in this file or in the files it uses. Where a declared name is much alike, the message's help names it.

@@ -15,6 +15,7 @@ from rcsc.host.files import write_atomically
 from rcsc.lang.project import load
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.layout import WIDTH
 from rcsc.lang.syntax.parse import parse
 
 
@@ -35,8 +36,11 @@ class Formatted:
     changed: int
 
 
-def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool) -> Formatted:
-    """Format every file that the paths mean; used files that they do not mean are left alone."""
+def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool, width: int = WIDTH) -> Formatted:
+    """Format every file that the paths mean; used files that they do not mean are left alone.
+
+    Tables become at most `width` characters wide, where that can be.
+    """
     loaded = load(paths, stdin)
     roots = [name for name in loaded.given if name in loaded.files]
     mine = tuple(
@@ -44,7 +48,7 @@ def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool) -> For
         for diagnostic in loaded.diagnostics
         if diagnostic.code.value < "RCS2" and _of(diagnostic, loaded.given, paths)
     )
-    texts = {name: _text(name, loaded.files[name]) for name in roots}
+    texts = {name: _text(name, loaded.files[name], width) for name in roots}
     changed = {name: text for name, text in texts.items() if text != loaded.sources[name].text}
     diagnostics = list(mine)
     for name, text in changed.items():
@@ -62,13 +66,13 @@ def _of(diagnostic: Diagnostic, roots: tuple[str, ...], paths: tuple[str, ...]) 
     return file in roots or file in paths or not file.endswith(".rcs")
 
 
-def _text(name: str, before: tree.File) -> str:
+def _text(name: str, before: tree.File, width: int) -> str:
     """The file's new text, which says the same.
 
     Raises:
         RuntimeError: It does not; that is a bug.
     """
-    text = format_file(before)
+    text = format_file(before, width)
     if parse(Source(name, text)) != before:
         raise RuntimeError(f"formatting would change what {name} says")
     return text

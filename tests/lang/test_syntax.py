@@ -1,5 +1,6 @@
 """Text to tree and back: round trips, errors with a place, nothing that makes the parser raise."""
 
+import shutil
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -11,12 +12,16 @@ from hypothesis import strategies as st
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Source, Span
+from rcsc.lang.digest import Digests
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.lalr import ParseNode, Tables
 from rcsc.lang.syntax.parse import MOST_ERRORS, parse
 from rcsc.lang.syntax.spell import spell_expr
-from tests.support.programs.arbitrary import expressions, files
+from rcsc.solvers.options import Options
+from tests.support.programs.arbitrary import expressions, files, tables
+from tests.support.programs.stages import reported, shipped
+from tests.support.programs.texts import parted_and_broken
 
 REPO = Path(__file__).parents[2]
 SHIPPED = sorted((REPO / "tables").rglob("*.rcs"))
@@ -33,9 +38,26 @@ def errors(text: str) -> list[tuple[str, int]]:
 @settings(max_examples=120)
 @given(files())
 def test_formatted_trees_parse_to_themselves(file: tree.File) -> None:
-    text = format_file(file)
-    assert parse(Source("case.rcs", text)) == file, text
-    assert format_file(file) == text
+    for width in (110, 1, 10_000):
+        text = format_file(file, width)
+        assert parse(Source("case.rcs", text)) == file, text
+        assert format_file(file, width) == text
+
+
+@settings(max_examples=120)
+@given(tables(), st.randoms(use_true_random=False))
+def test_a_table_says_the_same_however_it_is_laid_out(table: tree.TableDecl, random: Random) -> None:
+    """Parted anywhere, each cell broken at any blank: what people write, not what `rcsc fmt` would."""
+    file = tree.File((table,))
+    text = parted_and_broken(format_file(file, 10_000), random)
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File), (text, parsed)
+    [again] = parsed.declarations
+    assert isinstance(again, tree.TableDecl)
+    assert sorted(c for row in again.rows for c in row.comments) == sorted(
+        c for row in table.rows for c in row.comments
+    )
+    assert again == table, text
 
 
 @settings(max_examples=200)
@@ -55,6 +77,90 @@ def test_shipped_tables_are_formatted_and_keep_their_comments(path: Path) -> Non
     parsed = parse(Source(path.name, text))
     assert isinstance(parsed, tree.File)
     assert format_file(parsed) == text
+
+
+WIDE = """
+enum place { left, middle, right }
+input new_command : bool
+input reported : place
+state counted : int 0 .. 9
+output told : place
+procedure count { counted := min(counted + 1, 9) }
+table t {
+  | line | new_    | reported   || # headings
+  |      | command |            ||
+  |------|---------|------------||
+  # the first
+  | a    | true    |            || # at its end
+  | b    | false   | in {left,  ||
+  # inside
+  |      |         | middle,    ||
+  |      |         | rihgt}     ||
+
+  | line || procedures | told  |
+  |------||------------|-------|
+  # its actions
+  | a    || count;     | left  |
+  |      || cuont      |       |
+  | b    ||            | rigth |
+}
+"""
+
+
+def test_a_finding_points_at_the_piece_and_no_comment_is_lost() -> None:
+    diagnostics = reported(WIDE, Options())
+    places = [WIDE[d.primary.span.start : d.primary.span.end] for d in diagnostics]
+    assert sorted(places) == ["cuont", "rigth", "rihgt"]
+    parsed = parse(Source("case.rcs", WIDE))
+    assert isinstance(parsed, tree.File)
+    table = parsed.declarations[-1]
+    assert isinstance(table, tree.TableDecl)
+    assert [row.comments for row in table.rows] == [
+        ("headings", "the first", "at its end", "its actions"),
+        ("inside",),
+    ]
+    assert {text for row in table.rows for text in row.comments} == {
+        line.strip(" #") for text in format_file(parsed).splitlines() if "#" in text for line in [text]
+    }
+
+
+@pytest.mark.parametrize("width", [1, 60, 10_000])
+@pytest.mark.parametrize("name", ["task/acquire", "emove/move_to_obj", "examples/approach"])
+def test_the_program_is_the_same_in_every_layout(name: str, width: int, tmp_path: Path) -> None:
+    """Headings, cells and actions are quoted in the same words, too."""
+    copied = tmp_path / "tables"
+    shutil.copytree(REPO / "tables", copied)
+    path = copied / f"{name}.rcs"
+    before = shipped(f"{name}.rcs", copied)
+    parsed = parse(Source("case.rcs", path.read_text(encoding="utf-8")))
+    assert isinstance(parsed, tree.File)
+    path.write_text(format_file(parsed, width), encoding="utf-8")
+    after = shipped(f"{name}.rcs", copied)
+    assert after == before
+    assert Digests(after).table(after.tables[0]) == Digests(before).table(before.tables[0])
+
+
+def test_a_table_is_made_narrow_where_it_is_wider_than_the_limit() -> None:
+    """Stacked headings first, then parts; a cell is broken at `,`, `;` and before `and`, never inside a comparison."""
+    text = "table t {\n  | line | a_long_name | other ||\n  |------|-------------|-------||\n  | x | (a > 1 and b < 2) | in {c, d} ||\n}\n"
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File)
+    assert format_file(parsed, 40).splitlines()[1:-1] == [
+        "  | line | a_long_name | other     ||",
+        "  |------|-------------|-----------||",
+        "  | x    | (a > 1      | in {c, d} ||",
+        "  |      | and b < 2)  |           ||",
+    ]
+    assert format_file(parsed, 26).splitlines()[1:-1] == [
+        "  | line | a_long_name ||",
+        "  |------|-------------||",
+        "  | x    | (a > 1      ||",
+        "  |      | and b < 2)  ||",
+        "",
+        "  | line | other     ||",
+        "  |------|-----------||",
+        "  | x    | in {c, d} ||",
+    ]
 
 
 def test_comments_go_with_what_they_stand_by() -> None:
@@ -110,9 +216,8 @@ def test_cell_spans_point_into_the_file() -> None:
     table = parsed.declarations[1]
     assert isinstance(table, tree.TableDecl)
     [row] = table.rows
-    start, end = row.bounds[2:4]
-    assert text[start:end] == "<= 4"
-    assert tree.absolute(Span("", 3, 4), "case.rcs", start) == Span(
+    assert text[row.cells[1].span.start : row.cells[1].span.end] == "<= 4"
+    assert tree.absolute(Span("", 3, 4), row.cells[1]) == Span(
         "case.rcs", text.index("4 ||"), text.index("4 ||") + 1
     )
 
@@ -126,6 +231,26 @@ CASES = [
     ("table t {\n | line | x | y ||\n | a | DEFAULT | 3 ||\n}", [("RCS108", 3)]),
     ("table t {\n | line | x ||\n | a | < ||\n | b | = = ||\n}", [("RCS101", 3), ("RCS101", 4)]),
     ("table t {\n | name | x ||\n}", [("RCS101", 2)]),
+    ("table t {\n | line | x_ | y ||\n | | z ||\n |--|--|--||\n}", [("RCS102", 3)]),
+    ("table t {\n | line | x | y ||\n | | z | ||\n | | a | b ||\n}", [("RCS116", 4)]),
+    ("table t {\n | line | x ||\n |--|--||\n | | 1 ||\n}", [("RCS101", 4)]),
+    ("table t {\n | line | x || a |\n | p | 1 || b |\n | | | | c |\n}", [("RCS102", 4)]),
+    ("table t {\n | line | x || a |\n | p | 1 || |\n | | || c |\n}", [("RCS116", 4)]),
+    ("table t {\n | line | x | y ||\n | p | 1 | ||\n | | | ||\n}", [("RCS116", 4)]),
+    ("table t {\n | line | x ||\n | p | 1 ||\n | line | y ||\n |--|--||\n | q | 1 ||\n}", [("RCS116", 6)]),
+    ("table t {\n | line | x ||\n | p | 1 ||\n | line | y ||\n |--|--||\n}", [("RCS116", 4)]),
+    (
+        "table t {\n | line | x ||\n | p | 1 ||\n | line || y |\n | p || 1 |\n}",
+        [("RCS102", 4), ("RCS102", 5)],
+    ),
+    (
+        "table t {\n | line | x ||\n | p | in {1, ||\n | | 2} ||\n | q | in {1, ||\n | | , 2} ||\n}",
+        [("RCS101", 6)],
+    ),
+    (
+        "table t {\n | line | x ||\n | p | 1 ||\n | line | y ||\n |--|--||\n | p | DEFAULT ||\n}",
+        [("RCS113", 6)],
+    ),
     ("input \u0430 : bool", [("RCS109", 1)]),
     ("input x : bool\0", [("RCS106", 1)]),
     *(

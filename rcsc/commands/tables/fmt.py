@@ -7,6 +7,7 @@ import click
 from rcsc.commands.shared.options import PATHS, piped, showing
 from rcsc.commands.shared.show import Output, finish
 from rcsc.driver.reformat import reformat
+from rcsc.lang.syntax.layout import WIDTH
 
 
 @click.command(
@@ -16,19 +17,22 @@ Examples:
   rcsc fmt                 align every table below this folder
   rcsc fmt --check         change nothing; 1 if something would change
   rcsc fmt --diff a.rcs    show what would change
+  rcsc fmt --width 200     tables in a wider window
   rcsc fmt - < a.rcs       from standard input to standard output""",
 )
 @PATHS
 @click.option("--check", "only_check", is_flag=True, help="Change nothing; 1 if a file would change.")
 @click.option("--diff", is_flag=True, help="Change nothing; show what would change.")
+@click.option("--width", type=click.IntRange(min=1), default=WIDTH, show_default=True,
+              help="Lay out tables that are wider in more rows and parts.")  # fmt: skip
 @showing
-def command(paths: tuple[str, ...], only_check: bool, diff: bool, output: Output) -> int:
+def command(paths: tuple[str, ...], only_check: bool, diff: bool, width: int, output: Output) -> int:
     """Align tables and lay out the rest, always in the same way.
 
     What a file says stays the same, comments included; that is checked before a file is replaced.
     """
     write = not (only_check or diff)
-    formatted = reformat(paths or (".",), piped(paths), write=write)
+    formatted = reformat(paths or (".",), piped(paths), write=write, width=width)
     if diff:
         click.echo(formatted.diff, nl=False)
         return 1 if formatted.report.failed else 0

@@ -42,6 +42,7 @@ from rcsc.lang.operator_table import (
     truth_function,
 )
 from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.rows import Cell
 
 _SMALL = 512
 
@@ -65,29 +66,29 @@ class Tests:
     meant: dict[tuple[int, tree.Condition], Test | None] = field(default_factory=dict)
     __test__ = False
 
-    def test(self, column: int, written: tree.Condition, text: str, span: Span) -> Test | None:
+    def test(self, column: int, written: tree.Condition, cell: Cell) -> Test | None:
         """The test of a cell; None where it is always true, or after an error."""
         meaning = (column, written)
         if meaning not in self.meant:
-            self.scope.cell = span
-            self.meant[meaning] = self._test(column, written, text, span)
+            self.scope.cell = cell
+            self.meant[meaning] = self._test(column, written, cell)
             self.scope.cell = None
         self.known[column, id(written)] = self.meant[meaning]
         return self.meant[meaning]
 
-    def _test(self, column: int, written: tree.Condition, text: str, span: Span) -> Test | None:
+    def _test(self, column: int, written: tree.Condition, cell: Cell) -> Test | None:
         condition = self._condition(column, written)
         if condition is None:
             return None
         value = fold(condition)
         names = tuple(sorted(set(read_by(condition)), key=self.order.__getitem__))
         box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
-        text = " ".join(text.split())
+        text = " ".join(cell.text.split())
         if value is False or box == ():
             helps = "the line could never match: mend the condition, or take the line out"
-            self.scope.report(Code.EMPTY_CONDITION, f"no value satisfies `{text}`", span, helps)
+            self.scope.report(Code.EMPTY_CONDITION, f"no value satisfies `{text}`", cell.span, helps)
             return None
-        return None if value is True else Test(text, placed(condition, span), names, box)
+        return None if value is True else Test(text, placed(condition, cell), names, box)
 
     def _condition(self, column: int, written: tree.Condition) -> Expr | None:
         scope, body = self.scope, Body()

@@ -6,7 +6,6 @@ line that has the text gets it with spans of its own, so that a finding points i
 
 from dataclasses import replace
 
-from rcsc.diagnostics.source import Span
 from rcsc.lang.leaves import rebuilt
 from rcsc.lang.model import (
     Assign,
@@ -17,21 +16,22 @@ from rcsc.lang.model import (
     ToElement,
 )
 from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.rows import Cell
 
 
-def placed(expr: Expr, cell: Span) -> Expr:
+def placed(expr: Expr, cell: Cell) -> Expr:
     """The expression with spans in the file; parts that have them already are left alone."""
     if expr.span.file:
         return expr
-    span = tree.absolute(expr.span, cell.file, cell.start)
+    span = tree.absolute(expr.span, cell)
     return replace(rebuilt(expr, lambda part: placed(part, cell)), span=span)
 
 
-def placed_statement(statement: Statement, cell: Span) -> Statement:
+def placed_statement(statement: Statement, cell: Cell) -> Statement:
     """The statement of an action cell, a call or an assignment, with spans in the file."""
     span = statement.span
     if not span.file:
-        span = tree.absolute(span, cell.file, cell.start)
+        span = tree.absolute(span, cell)
     match statement:
         case Call(procedure=procedure, args=args):
             return Call(procedure, tuple(placed(arg, cell) for arg in args), span)
@@ -41,7 +41,7 @@ def placed_statement(statement: Statement, cell: Span) -> Statement:
             return replace(statement, span=span)
 
 
-def _place(place: Place, cell: Span) -> Place:
+def _place(place: Place, cell: Cell) -> Place:
     if isinstance(place, ToElement):
         return ToElement(place.leaves, placed(place.index, cell), place.type)
     return place

@@ -21,7 +21,7 @@ from rcsc.lang.model import (
     Variable,
 )
 from rcsc.lang.syntax import tree
-from rcsc.lang.syntax.rows import CALL_UNDER
+from rcsc.lang.syntax.rows import CALL_UNDER, Cell
 
 BASE_UNITS = frozenset("m mm s ms N kg deg rad Hz A V lb".split())
 
@@ -68,7 +68,7 @@ class Scope:
     elements: dict[tuple[str, int], tuple[str, ...]] = field(default_factory=dict)
     demand: Callable[[str, tree.Name], bool] = lambda _space, _name: True
     variables: set[str] = field(default_factory=set)
-    cell: Span | None = None
+    cell: Cell | None = None
     depth: int = 0
     copied: int = 0
     no_before: str = "`was` stands in a property only"
@@ -83,7 +83,7 @@ class Scope:
         """The span in the file: nodes inside a table cell count from the start of the cell."""
         if span.file or self.cell is None:
             return span
-        return tree.absolute(span, self.cell.file, self.cell.start)
+        return tree.absolute(span, self.cell)
 
     def order(self, leaf: str) -> int:
         """The place of a leaf in declared order."""

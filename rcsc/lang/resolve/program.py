@@ -6,7 +6,6 @@ from contextlib import contextmanager
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
-from rcsc.diagnostics.source import Sources
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean
 from rcsc.lang.leaves import read_by
@@ -43,7 +42,7 @@ def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
         return wrong
     declarations = [d for file in files for d in loaded.files[file].declarations]
     with _uncollected():
-        return _Resolver(root, loaded.sources).program(declarations, loaded.files[root])
+        return _Resolver(root).program(declarations, loaded.files[root])
 
 
 @contextmanager
@@ -82,9 +81,8 @@ def closure(root: str, loaded: Loaded) -> list[str]:
 class _Resolver:
     """Works through the declarations, kind by kind, so that their order in the text is free."""
 
-    def __init__(self, root: str, sources: Sources) -> None:
+    def __init__(self, root: str) -> None:
         self.root = root
-        self.sources = sources
         self.scope = Scope()
 
     def program(self, all_: list[tree.Declaration], root: tree.File) -> Program | tuple[Diagnostic, ...]:
@@ -196,5 +194,5 @@ class _Resolver:
                 for name in declaration.assuming:
                     if name.text not in assumptions:
                         self.scope.unknown("assumption", name, list(assumptions))
-                tables.append(table(self.scope, declaration, self.sources))
+                tables.append(table(self.scope, declaration))
         return tuple(tables)

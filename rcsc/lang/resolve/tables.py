@@ -2,7 +2,6 @@
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Label
-from rcsc.diagnostics.source import Sources, Span
 from rcsc.lang.expressions.conditions import Tests
 from rcsc.lang.expressions.operators import Typed
 from rcsc.lang.expressions.placing import placed, placed_statement
@@ -24,37 +23,39 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.resolve.statements import Statements
 from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.rows import Cell
 
 
-def table(scope: Scope, written: tree.TableDecl, sources: Sources) -> Table:
+def table(scope: Scope, written: tree.TableDecl) -> Table:
     """The table; what is wrong with it has been reported."""
     order = {name: at for at, name in enumerate(scope.leaves)}
-    text = sources[written.span.file].text
     subjects = tuple(_subject(scope, heading) for heading in written.conditions)
     columns = tuple(
-        _column(heading, subject, text) for heading, subject in zip(written.conditions, subjects, strict=True)
+        _column(heading, subject) for heading, subject in zip(written.conditions, subjects, strict=True)
     )
     headings = tuple(column.heading for column in columns)
-    cells = _Cells(scope, written, text, Tests(scope, written.conditions, subjects, headings, order))
+    cells = _Cells(scope, written, Tests(scope, written.conditions, subjects, headings, order))
     lines: list[Line] = []
     default: Default | None = None
-    names: dict[str, Span] = {}
+    names: dict[str, tree.Row] = {}
     for row in written.rows:
-        name_span = cells.span(row, 0)
+        name_span = row.cells[0].span
         if row.name in names:
             scope.report(
                 Code.DUPLICATE_LINE,
                 f"two lines are called `{row.name}`",
                 name_span,
-                related=(Label(names[row.name], "the first"),),
+                related=(Label(names[row.name].cells[0].span, "the first"),),
             )
-        names.setdefault(row.name, name_span)
+        names.setdefault(row.name, row)
         if not row.default:
-            lines.append(Line(LineName(row.name), cells.tests(row), cells.actions(row), row.span, row.bounds))
+            lines.append(
+                Line(LineName(row.name), cells.tests(row), cells.actions(row), row.span, _bounds(row))
+            )
         elif default is not None:
             scope.report(Code.SEVERAL_DEFAULTS, "a table has at most one DEFAULT line", name_span)
         else:
-            default = Default(LineName(row.name), cells.actions(row), row.unreachable, cells.span(row, 1))
+            default = Default(LineName(row.name), cells.actions(row), row.unreachable, row.cells[1].span)
     read = {name for line in lines for test in line.tests if test is not None for name in test.variables}
     return Table(
         TableName(written.name.text),
@@ -73,41 +74,41 @@ def _subject(scope: Scope, heading: tree.Heading) -> Typed | None:
     """Resolve the subject of a column; None under `when`, and after an error."""
     if heading.subject is None:
         return None
-    scope.cell = heading.span
+    scope.cell = heading.cell
     subject = typed(scope, Body(), heading.subject)
     scope.cell = None
-    return None if subject is None else Typed(placed(subject.expr, heading.span), subject.bare)
+    return None if subject is None else Typed(placed(subject.expr, heading.cell), subject.bare)
 
 
-def _column(heading: tree.Heading, subject: Typed | None, text: str) -> Column:
+def _bounds(row: tree.Row) -> tuple[int, ...]:
+    """Start and end of each cell's first piece, flattened."""
+    return tuple(bound for cell in row.cells for bound in (cell.span.start, cell.span.end))
+
+
+def _column(heading: tree.Heading, subject: Typed | None) -> Column:
     expr = None if subject is None else subject.expr
     leaf = expr.name if isinstance(expr, Read) else None
-    return Column(" ".join(text[heading.span.start : heading.span.end].split()), expr, leaf, heading.span)
+    return Column(" ".join(heading.cell.text.split()), expr, leaf, heading.cell.span)
 
 
 class _Cells:
     """Reads the cells of one table's rows; each distinct cell once."""
 
-    def __init__(self, scope: Scope, written: tree.TableDecl, text: str, tests: Tests) -> None:
+    def __init__(self, scope: Scope, written: tree.TableDecl, tests: Tests) -> None:
         self.scope = scope
-        self.text = text
         self.known = tests
-        self.headings = [text[h.span.start : h.span.end] for h in written.actions]
+        self.headings = [heading.cell.text for heading in written.actions]
         self.places = [self._place(heading) for heading in written.actions]
         self.resolved: dict[tuple[int, int], list[tuple[str, Statement]]] = {}
 
-    def _place(self, heading: tree.Heading) -> tuple[Path, Span] | None:
+    def _place(self, heading: tree.Heading) -> tuple[Path, Cell] | None:
         """Resolve the target of a column of values; None for actions, and after an error."""
         if heading.subject is None:
             return None
-        self.scope.cell = heading.span
+        self.scope.cell = heading.cell
         path = Statements(self.scope).place(heading.subject, False)
         self.scope.cell = None
-        return None if path is None else (path, heading.span)
-
-    def span(self, row: tree.Row, cell: int) -> Span:
-        """The span of a cell, counted from the line's name."""
-        return Span(row.span.file, row.bounds[2 * cell], row.bounds[2 * cell + 1])
+        return None if path is None else (path, heading.cell)
 
     def tests(self, row: tree.Row) -> tuple[Test | None, ...]:
         """One test a condition column."""
@@ -121,8 +122,7 @@ class _Cells:
             if key in known:
                 result.append(known[key])
                 continue
-            span = self.span(row, column + 1)
-            result.append(self.known.test(column, written, self.text[span.start : span.end], span))
+            result.append(self.known.test(column, written, row.cells[column + 1]))
         return tuple(result)
 
     def actions(self, row: tree.Row) -> tuple[Action, ...]:
@@ -131,15 +131,15 @@ class _Cells:
         for column, written in enumerate(row.actions):
             if not written:
                 continue
-            span = self.span(row, 1 + len(row.conditions) + column)
+            cell = row.cells[1 + len(row.conditions) + column]
             key = (column, id(written))
             if key not in self.resolved:
-                self.scope.cell = span
-                self.resolved[key] = self._actions(column, written, self.text[span.start : span.end])
+                self.scope.cell = cell
+                self.resolved[key] = self._actions(column, written, cell.text)
                 self.scope.cell = None
             heading = self.headings[column]
             for text, statement in self.resolved[key]:
-                result.append(Action(heading, text, placed_statement(statement, span)))
+                result.append(Action(heading, text, placed_statement(statement, cell)))
         return tuple(result)
 
     def _actions(
@@ -160,6 +160,6 @@ class _Cells:
         return actions
 
 
-def replaced(path: Path, heading: Span) -> Path:
+def replaced(path: Path, heading: Cell) -> Path:
     """The path with the spans of its index in the file."""
     return path if path.index is None else Path(path.names, path.type, placed(path.index, heading))

@@ -22,7 +22,7 @@ A text that is wrong is diagnostics, never an exception, and reading goes on aft
 Trusted: the grammar and `build`, for what a text says. Lark makes the tables of the grammar once; `lalr` runs them in
 a third of Lark's time and is held against Lark by tests. Reading takes time linear in the text.
 
-Modules, in the order the data flows: `screen` refuses what is no text of the language, `rows` cuts tables into cells,
+Modules, in the order the data flows: `screen` refuses what is no text of the language, `rows` cuts tables into parts, lines and cells,
 `parse` reads (with `lalr`) and says by `expected` what it expected, `build` makes the `tree`, `comments` puts
-comments to their nodes; `format` lays a tree out again, `spell` its expressions.
+comments to their nodes; `format` lays a tree out again, `layout` its tables, `spell` its expressions.
 """

@@ -3,25 +3,25 @@
 Comments stand above what they belong to, doc lines directly above the declaration; tables are aligned.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 
 from rcsc.lang.operator_table import SUM
 from rcsc.lang.syntax import tree
-from rcsc.lang.syntax.rows import ACTION_WORDS
-from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_type
+from rcsc.lang.syntax.layout import WIDTH, table_rows
+from rcsc.lang.syntax.spell import spell_expr, spell_statement, spell_type
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
          tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl)  # fmt: skip
 
 
-def format_file(file: tree.File) -> str:
-    """The file's text."""
+def format_file(file: tree.File, width: int = WIDTH) -> str:
+    """The file's text; tables are at most `width` characters wide where that can be."""
     lines: list[str] = []
     before: tree.Declaration | None = None
     for declaration in file.declarations:
         if before is not None and not _together(before, declaration):
             lines.append("")
-        lines.extend(_declaration(declaration))
+        lines.extend(_declaration(declaration, width))
         before = declaration
     if file.trailing:
         lines.extend([""] if lines else [])
@@ -45,7 +45,7 @@ def _above(comments: tuple[str, ...], doc: tuple[str, ...], pad: str = "") -> It
     yield from ((f"{pad}## {text}").rstrip() for text in doc)
 
 
-def _declaration(declaration: tree.Declaration) -> Iterator[str]:
+def _declaration(declaration: tree.Declaration, width: int) -> Iterator[str]:
     yield from _above(declaration.comments, () if isinstance(declaration, tree.Use) else declaration.doc)
     match declaration:
         case tree.Use(path):
@@ -64,7 +64,7 @@ def _declaration(declaration: tree.Declaration) -> Iterator[str]:
             inside = f" {', '.join(m.text for m in members)} " if members else " "
             yield f"owner {name.text} {{{inside}}}"
         case tree.TableDecl():
-            yield from _table(declaration)
+            yield from _table(declaration, width)
         case tree.LinkDecl():
             yield from _link(declaration)
         case tree.ServesDecl() | tree.CommandsDecl():
@@ -167,7 +167,7 @@ def _statement(statement: tree.Statement, depth: int) -> Iterator[str]:
     pad = "  " * depth
     match statement:
         case tree.Assign() | tree.Call():
-            yield pad + _simple(statement)
+            yield pad + spell_statement(statement)
         case tree.Local(name, kind, value):
             yield f"{pad}local {name.text} : {spell_type(kind)}" + (
                 f" := {spell_expr(value)}" if value else ""
@@ -207,72 +207,17 @@ def _if(branch: tree.If, depth: int, lead: str) -> Iterator[str]:
         yield f"{pad}}}"
 
 
-def _simple(statement: tree.Assign | tree.Call) -> str:
-    if isinstance(statement, tree.Assign):
-        return f"{'next ' if statement.deferred else ''}{spell_expr(statement.place)} := {spell_expr(statement.value)}"
-    return statement.name.text + (
-        f"({', '.join(spell_expr(arg) for arg in statement.args)})" if statement.args else ""
-    )
-
-
 # --- tables and levels ---------------------------------------------------------------
 
 
-def _table(table: tree.TableDecl) -> Iterator[str]:
+def _table(table: tree.TableDecl, width: int) -> Iterator[str]:
     assuming = f" assuming {', '.join(name.text for name in table.assuming)}" if table.assuming else ""
     yield f"table {table.name.text}{assuming} {{"
-    left = [["line", *(_heading(h, {"when"}) for h in table.conditions)]]
-    right = [[_heading(h, ACTION_WORDS) for h in table.actions]]
-    for row in table.rows:
-        left.append([row.name, *_conditions(row, table)])
-        right.append([_action(cell) for cell in row.actions])
-    widths = _widths(left), _widths(right)
-    for number, (conditions, actions) in enumerate(zip(left, right, strict=True)):
-        if number:
-            yield from _above(table.rows[number - 1].comments, (), "  ")
-        yield "  " + _row(conditions, actions, widths)
-        if not number:
-            dashes = [["-" * width for width in side] for side in widths]
-            yield "  " + _row(dashes[0], dashes[1], widths).replace(" ", "-")
+    for row, text in table_rows(table, width):
+        if row is not None:
+            yield from _above(row.comments, (), "  ")
+        yield f"  {text}" if text else ""
     yield "}"
-
-
-def _heading(heading: tree.Heading, words: Collection[str]) -> str:
-    """A heading; a variable that is called like one of the words stands in parentheses."""
-    if heading.subject is None:
-        return heading.word
-    text = spell_expr(heading.subject)
-    return f"({text})" if text in words else text
-
-
-def _conditions(row: tree.Row, table: tree.TableDecl) -> list[str]:
-    if row.default:
-        return [
-            "DEFAULT unreachable" if row.unreachable else "DEFAULT",
-            *([""] * (len(table.conditions) - 1)),
-        ]
-    return [
-        "" if cell is None else spell_condition(cell, heading.subject is None)
-        for cell, heading in zip(row.conditions, table.conditions, strict=True)
-    ]
-
-
-def _action(cell: tuple[tree.Statement, ...] | tree.Comparison) -> str:
-    if isinstance(cell, tree.Comparison):
-        return spell_expr(cell.value)
-    return "; ".join(
-        _simple(statement) for statement in cell if isinstance(statement, tree.Assign | tree.Call)
-    )
-
-
-def _widths(rows: list[list[str]]) -> list[int]:
-    return [max(len(row[at]) for row in rows) for at in range(len(rows[0]))]
-
-
-def _row(conditions: list[str], actions: list[str], widths: tuple[list[int], list[int]]) -> str:
-    left = " | ".join(text.ljust(width) for text, width in zip(conditions, widths[0], strict=True))
-    right = " | ".join(text.ljust(width) for text, width in zip(actions, widths[1], strict=True))
-    return f"| {left} ||" + (f" {right} |" if actions else "")
 
 
 def _level(level: tree.LevelDecl) -> Iterator[str]:

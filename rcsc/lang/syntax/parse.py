@@ -3,6 +3,7 @@
 In: a `Source`. Out: a `tree.File`, or every syntax error that was found. No text makes it raise.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from importlib.resources import files as package_files
@@ -25,10 +26,14 @@ from rcsc.lang.syntax.rows import (
     CALL_UNDER,
     EMPTY_CELL,
     NAME,
+    NEW_PART,
+    PIECES,
+    SAME_LINES,
     Cell,
     Cells,
     cut,
-    is_separator,
+    joined,
+    parts,
 )
 
 MOST_ERRORS = 20
@@ -162,6 +167,28 @@ def _says_default(cell: Cell) -> bool:
     return cell.text.split() in (["DEFAULT"], ["DEFAULT", "unreachable"])
 
 
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A line of a table: its first row, from start to end, its cells of one part or of all, and its comments."""
+
+    start: int
+    end: int
+    cells: Cells
+    comments: tuple[str, ...]
+
+
+def _over(pieces: Sequence[_Line]) -> _Line:
+    """One line, of what each part says of it."""
+    first, *more = pieces
+    conditions = [cell for line in more for cell in line.cells.conditions[1:]]
+    cells = Cells(
+        (*first.cells.conditions, *conditions), tuple(cell for line in pieces for cell in line.cells.actions)
+    )
+    return _Line(
+        first.start, first.end, cells, tuple(comment for line in pieces for comment in line.comments)
+    )
+
+
 @dataclass(slots=True)
 class _Rows:
     """Parses the rows of a table; each distinct cell text once."""
@@ -175,19 +202,85 @@ class _Rows:
         self, rows: list[ParseLeaf]
     ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...]]:
         """Condition headings, action headings and lines of a table."""
-        head = self._cut(rows[0])
-        if head is None:
+        read = [self._part(groups[0], groups[1:]) for groups in parts(rows)]
+        heads = [part[0] for part in read if part is not None]
+        if len(heads) < len(read):
             return (), (), ()
-        if head.conditions[0].text != "line":
-            self._report(Code.SYNTAX, "the first heading of a table is `line`", head.conditions[0])
-        conditions = tuple(self._heading(cell, "when") for cell in head.conditions[1:])
-        actions = tuple(self._heading(cell, "") for cell in head.actions)
-        lines = [self._row(row, head, conditions, actions) for row in rows[1:] if not is_separator(str(row))]
-        return conditions, actions, tuple(line for line in lines if line is not None)
+        conditions = tuple(self._heading(cell, "when") for head in heads for cell in head.conditions[1:])
+        actions = tuple(self._heading(cell, "") for head in heads for cell in head.actions)
+        lines = self._across([part[1] for part in read if part is not None], heads)
+        return conditions, actions, tuple(self._row(line, conditions, actions) for line in lines)
+
+    def _part(self, head: list[ParseLeaf], groups: list[list[ParseLeaf]]) -> tuple[Cells, list[_Line]] | None:
+        """The heading of a part, and its lines."""
+        cells = self._whole(head)
+        if cells is None:
+            return None
+        if cells.conditions[0].text != "line":
+            self._report(Code.SYNTAX, "the first heading of a table is `line`", cells.conditions[0])
+        lines = [line for rows in groups if (line := self._line(rows, cells)) is not None]
+        return cells, lines
+
+    def _line(self, rows: list[ParseLeaf], head: Cells) -> _Line | None:
+        cells = self._whole(rows)
+        if cells is None or not self._even(rows[0], cells, head, "the heading"):
+            return None
+        if not NAME.match(cells.conditions[0].text):
+            self._report(Code.SYNTAX, "a line needs a name of letters, digits and `_`", cells.conditions[0])
+        comments = tuple(words(text) for row in rows for text in self.comments.take(row.start_pos))
+        return _Line(rows[0].start_pos, cells.all[-1].span.end, cells, comments)
+
+    def _whole(self, rows: list[ParseLeaf]) -> Cells | None:
+        """A row, with those that go on with it."""
+        cells = above = self._cut(rows[0])
+        for row in rows[1:]:
+            more = self._cut(row)
+            if cells is None or above is None or more is None:
+                return None
+            if not self._even(row, more, above, "the row above, with which it goes on,"):
+                return None
+            if not any(cell.text for cell in more.all):
+                there = Span(self.source.name, row.start_pos, row.start_pos + len(row.rstrip()))
+                self.diagnostics.append(_error(Code.GOES_ON, "this row has nothing in it", there, PIECES))
+                return None
+            whole = joined(cells, more, above)
+            if isinstance(whole, Cell):
+                self._report(
+                    Code.GOES_ON,
+                    f"`{screen.shortened(whole.text)}` goes on with an empty cell",
+                    whole,
+                    PIECES,
+                )
+                return None
+            cells, above = whole, more
+        return cells
+
+    def _across(self, read: list[list[_Line]], heads: list[Cells]) -> list[_Line]:
+        """The lines, each with its cells of all parts; none where a part names others."""
+        first = read[0]
+        names = [line.cells.conditions[0].text for line in first]
+        for head, part in zip(heads[1:], read[1:], strict=True):
+            given = [line.cells.conditions[0].text for line in part]
+            if given != names and not self.diagnostics:
+                at = next(
+                    (at for at, pair in enumerate(zip(given, names, strict=False)) if pair[0] != pair[1]),
+                    None,
+                )
+                if at is None:
+                    message = f"this part of the table has {len(given)} lines, the first has {len(names)}"
+                    self._report(Code.GOES_ON, message, head.conditions[0], SAME_LINES)
+                else:
+                    message = (
+                        f"this part of the table has the line `{given[at]}` where the first has `{names[at]}`"
+                    )
+                    self._report(Code.GOES_ON, message, part[at].cells.conditions[0], SAME_LINES)
+            if given != names:
+                return []
+        return first if len(read) == 1 else [_over(pieces) for pieces in zip(*read, strict=True)]
 
     def _cut(self, row: ParseLeaf) -> Cells | None:
         start = row.start_pos
-        cells = cut(str(row), start)
+        cells = cut(str(row), start, self.source.name)
         if isinstance(cells, str):
             there = Span(self.source.name, start, start + len(row.rstrip()))
             self.diagnostics.append(_error(Code.RAGGED_ROW, cells, there, EMPTY_CELL))
@@ -195,27 +288,16 @@ class _Rows:
         return cells
 
     def _heading(self, cell: Cell, whole: str) -> tree.Heading:
-        span = Span(self.source.name, cell.start, cell.end)
         if cell.text == whole or (not whole and cell.text in ACTION_WORDS):
-            return tree.Heading(None, cell.text, span)
+            return tree.Heading(None, cell.text, cell)
         parsed = self._parse("heading", cell)
         subject = tree.Reference(tree.Name(cell.text)) if parsed is None else parsed
-        return tree.Heading(subject, "", span)
+        return tree.Heading(subject, "", cell)
 
     def _row(
-        self,
-        row: ParseLeaf,
-        head: Cells,
-        conditions: tuple[tree.Heading, ...],
-        actions: tuple[tree.Heading, ...],
-    ) -> tree.Row | None:
-        cells = self._cut(row)
-        if cells is None or not self._even(row, cells, head):
-            return None
-        name = cells.conditions[0]
-        if not NAME.match(name.text):
-            self._report(Code.SYNTAX, "a line needs a name of letters, digits and `_`", name)
-        tests = cells.conditions[1:]
+        self, line: _Line, conditions: tuple[tree.Heading, ...], actions: tuple[tree.Heading, ...]
+    ) -> tree.Row:
+        name, *tests = line.cells.conditions
         default = bool(tests) and _says_default(tests[0])
         for cell in tests[1:]:
             if default and cell.text:
@@ -228,32 +310,34 @@ class _Rows:
             None if default else self._condition(cell, heading)
             for cell, heading in zip(tests, conditions, strict=True)
         )
-        everything = (*cells.conditions, *cells.actions)
-        start = row.start_pos
         return tree.Row(
             name.text,
             parsed,
-            tuple(self._action(cell, heading) for cell, heading in zip(cells.actions, actions, strict=True)),
+            tuple(
+                self._action(cell, heading) for cell, heading in zip(line.cells.actions, actions, strict=True)
+            ),
             default,
             default and tests[0].text.endswith("unreachable"),
-            Span(self.source.name, start, everything[-1].end),
-            tuple(bound for cell in everything for bound in (cell.start, cell.end)),
-            tuple(words(text) for text in self.comments.take(start)),
+            Span(self.source.name, line.start, line.end),
+            line.cells.all,
+            line.comments,
         )
 
-    def _even(self, row: ParseLeaf, cells: Cells, head: Cells) -> bool:
+    def _even(self, row: ParseLeaf, cells: Cells, other: Cells, called: str) -> bool:
+        """Whether a row has as many cells as another that it stands below."""
         for side, got, want in (
-            ("conditions", cells.conditions, head.conditions),
-            ("actions", cells.actions, head.actions),
+            ("conditions", cells.conditions, other.conditions),
+            ("actions", cells.actions, other.actions),
         ):
             if len(got) != len(want):
                 start = row.start_pos
+                helps = (NEW_PART,) if cells.conditions[0].text == "line" else (EMPTY_CELL,)
                 self.diagnostics.append(
                     _error(
                         Code.RAGGED_ROW,
-                        f"this row has {len(got)} cells of {side}, the heading {len(want)}",
+                        f"this row has {len(got)} cells of {side}, {called} {len(want)}",
                         Span(self.source.name, start, start + len(row.rstrip())),
-                        EMPTY_CELL,
+                        *helps,
                     )
                 )
                 return False
@@ -283,15 +367,16 @@ class _Rows:
         try:
             node = _parsed(cell.text, start)
             if _deep_in(node):
-                self.diagnostics.append(screen.too_deep(self.source, cell.start, cell.end))
+                self.diagnostics.append(screen.too_deep(self.source, cell.span.start, cell.span.end))
                 return None
             parsed = Build("", Comments(Source("", "")), None).cell(node)
         except lark.UnexpectedInput as error:
-            wrong = _syntax_error(error, self.source.name, cell.start, cell.end, cell.text)
+            wrong = _syntax_error(error, "", 0, len(cell.text), cell.text)
+            wrong = replace(wrong, primary=Label(tree.absolute(wrong.primary.span, cell)))
             self.diagnostics.append(replace(wrong, help=(helps,)) if helps else wrong)
             return None
         self.memory[start, cell.text] = parsed
         return parsed
 
     def _report(self, code: Code, message: str, cell: Cell, *helps: str) -> None:
-        self.diagnostics.append(_error(code, message, Span(self.source.name, cell.start, cell.end), *helps))
+        self.diagnostics.append(_error(code, message, cell.span, *helps))

@@ -1,32 +1,84 @@
-"""Cuts table rows into cells; which cells there are and where, not what they say.
+"""Cuts table rows into cells, and joins what goes on over several rows; which cells there are and where, not what they say.
 
-In: the text of one row and its offset. Out: `Cells`, or what is wrong with it.
+In: rows and their offsets. Out: `Cells`, or what is wrong with them. A table has two means against width:
+
+- a row whose first cell is empty goes on with the row above it, cell by cell (`joined`);
+- a heading may come again: below it stand further columns of the same lines (`parts`).
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
+
+from rcsc.diagnostics.source import Span
 
 ACTION_WORDS = frozenset({"procedures", "command_out", "status_out"})
 SEPARATOR = re.compile(r"\|[\s|:-]*-[\s|:-]*$")
+GOES_ON = re.compile(r"\|[ \t]*\|")
+AGAIN = re.compile(r"\|[ \t]*line[ \t]*\|")
 NAME = re.compile(r"[A-Za-z0-9_]+$")
 CALL = re.compile(r"(?!(?:abs|min|max|int|real|not)\b)[A-Za-z_][A-Za-z0-9_]*\s*\(|[^=]*:=")
 """What looks like a call or an assignment, and stands perhaps where a value should."""
 CALL_UNDER = "a call or an assignment stands under `procedures`, `command_out` or `status_out`"
 EMPTY_CELL = "an empty cell is `| |`, with a blank; `||` stands once in a row, between conditions and actions"
 """What helps where cells of a row are missing, or stand on the wrong side."""
+NEW_PART = "a heading that begins another part of the table has a row `|---|` below it"
+PIECES = (
+    "a row with an empty first cell goes on with the cells of the row above it; a line has its name there"
+)
+SAME_LINES = "each part of a table has a row for each line, in the same order"
+_Row = TypeVar("_Row", bound=str)
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The trimmed text of a cell and the offset of its first character in the file."""
+    """A table cell.
+
+    Attributes:
+        text: The trimmed text, pieces joined.
+        file: Name of the file.
+        start: Offset in the file of the first character.
+        further: Where each piece after the first begins: its offset in the text, and in the file.
+    """
 
     text: str
+    file: str
     start: int
+    further: tuple[tuple[int, int], ...] = ()
 
     @property
-    def end(self) -> int:
-        """The offset past its last character."""
-        return self.start + len(self.text)
+    def span(self) -> Span:
+        """The first piece, which is all of most cells."""
+        return self.at(0, len(self.text))
+
+    def at(self, start: int, end: int) -> Span:
+        """The place in the file of characters of the text: of those that stand in the piece of the first.
+
+        >>> cell = Cell("in {left, right}", "a.rcs", 40, ((10, 90),))
+        >>> cell.at(4, 8), cell.at(10, 15)
+        (Span(file='a.rcs', start=44, end=48), Span(file='a.rcs', start=90, end=95))
+        >>> cell.span
+        Span(file='a.rcs', start=40, end=49)
+        """
+        begin, place, past = 0, self.start, len(self.text)
+        for offset, there in self.further:
+            if offset > start:
+                past = len(self.text[:offset].rstrip())
+                break
+            begin, place = offset, there
+        return Span(self.file, place + start - begin, place + max(start, min(end, past)) - begin)
+
+    def with_piece(self, piece: "Cell") -> "Cell":
+        """The cell with one piece more; a blank between, but after `_` and `.`.
+
+        >>> Cell("new_", "", 3).with_piece(Cell("command", "", 30)).text
+        'new_command'
+        >>> Cell("begin;", "", 3).with_piece(Cell("nextstate(d_state)", "", 30)).text
+        'begin; nextstate(d_state)'
+        """
+        before = self.text if self.text.endswith(("_", ".")) else f"{self.text} "
+        return Cell(before + piece.text, self.file, self.start, (*self.further, (len(before), piece.start)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +88,59 @@ class Cells:
     conditions: tuple[Cell, ...]
     actions: tuple[Cell, ...]
 
+    @property
+    def all(self) -> tuple[Cell, ...]:
+        """Those of both sides."""
+        return (*self.conditions, *self.actions)
+
 
 def is_separator(row: str) -> bool:
     """Whether the row is only `|---|---|`."""
     return SEPARATOR.match(row) is not None
 
 
-def cut(row: str, start: int) -> Cells | str:
+def parts(rows: Sequence[_Row]) -> list[list[list[_Row]]]:
+    """The rows of each part of a table: first its heading's, then those of each line.
+
+    A part begins with a heading, which is the first row, and later one whose first cell is `line` with a separator below. A row
+    that goes on with the one above stands with it.
+
+    >>> parts(["| line | a ||", "|--|--||", "| x | 1 ||", "| | 2 ||", "| line || b |", "|--||--|", "| x || 3 |"])
+    [[['| line | a ||'], ['| x | 1 ||', '| | 2 ||']], [['| line || b |'], ['| x || 3 |']]]
+    """
+    found: list[list[list[_Row]]] = [[]]
+    whole = False
+    for row in rows:
+        if is_separator(row):
+            last = found[-1]
+            if len(last) > 1 and not whole and AGAIN.match(last[-1][0]):
+                found.append([last.pop()])
+            whole = True
+        elif found[-1] and not whole and GOES_ON.match(row):
+            found[-1][-1].append(row)
+        else:
+            found[-1].append([row])
+            whole = False
+    return found
+
+
+def joined(cells: Cells, more: Cells, above: Cells) -> Cells | Cell:
+    """A row with the row that goes on with it; or the piece that has nothing in the row directly `above` it.
+
+    All have as many cells.
+    """
+    for upper, piece in zip(above.all, more.all, strict=True):
+        if piece.text and not upper.text:
+            return piece
+    whole = [
+        cell.with_piece(piece) if piece.text else cell
+        for cell, piece in zip(cells.all, more.all, strict=True)
+    ]
+    split = len(cells.conditions)
+    return Cells(tuple(whole[:split]), tuple(whole[split:]))
+
+
+def cut(row: str, start: int, file: str) -> Cells | str:
     """The cells of `row`, which begins at `start`; a message where `||` does not divide it once."""
     row = row.partition("#")[0].rstrip()
     left, bar, right = row.partition("||")
@@ -50,10 +148,10 @@ def cut(row: str, start: int) -> Cells | str:
         return "a row needs `||` between its conditions and its actions"
     if "||" in right:
         return f"a row has exactly one `||`, this one has {row.count('||')}"
-    return Cells(_cells(left, start, 1), _cells(right, start + len(left) + 2, 0))
+    return Cells(_cells(left, start, 1, file), _cells(right, start + len(left) + 2, 0, file))
 
 
-def _cells(part: str, start: int, skip: int) -> tuple[Cell, ...]:
+def _cells(part: str, start: int, skip: int, file: str) -> tuple[Cell, ...]:
     """The cells of one side; `skip` leading bars; a bar at the end closes the last cell."""
     offset = start + skip
     body = part[skip:]
@@ -65,6 +163,6 @@ def _cells(part: str, start: int, skip: int) -> tuple[Cell, ...]:
     for piece in body.split("|"):
         text = piece.strip()
         lead = len(piece) - len(piece.lstrip()) if text else 0
-        cells.append(Cell(text, offset + lead))
+        cells.append(Cell(text, file, offset + lead))
         offset += len(piece) + 1
     return tuple(cells)

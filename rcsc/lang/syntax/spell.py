@@ -104,3 +104,12 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
 def _plain(value: tree.Expr) -> bool:
     """Whether `value` alone cannot be taken for DEFAULT."""
     return not (isinstance(value, tree.Reference) and value.name.text == "DEFAULT")
+
+
+def spell_statement(statement: tree.Assign | tree.Call) -> str:
+    """An assignment or a call."""
+    if isinstance(statement, tree.Assign):
+        return f"{'next ' if statement.deferred else ''}{spell_expr(statement.place)} := {spell_expr(statement.value)}"
+    return statement.name.text + (
+        f"({', '.join(spell_expr(arg) for arg in statement.args)})" if statement.args else ""
+    )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from rcsc.diagnostics.source import Span
+from rcsc.lang.syntax.rows import Cell
 
 NOWHERE = Span("", 0, 0)
 
@@ -344,8 +345,7 @@ class Row:
         actions: One entry an action column: its statements (`Call`, `Assign`), in order;
             under the heading of a variable, one `Comparison` with op `=` (the value) or
             nothing.
-        bounds: Offsets in the file: start and end of the trimmed text of every cell in
-            order (name, conditions, actions), flattened: 2 * (1 + conditions + actions).
+        cells: Where each cell stands: name, conditions, actions.
         default: Whether this is the DEFAULT line; then all conditions are None.
         unreachable: `DEFAULT unreachable`.
     """
@@ -356,7 +356,7 @@ class Row:
     default: bool = False
     unreachable: bool = False
     span: Span = at()
-    bounds: tuple[int, ...] = field(default=(), compare=False, repr=False)
+    cells: tuple[Cell, ...] = field(default=(), compare=False, repr=False)
     comments: tuple[str, ...] = ()
 
 
@@ -371,7 +371,7 @@ class Heading:
 
     subject: Expr | None
     word: str = ""
-    span: Span = at()
+    cell: Cell = field(default=Cell("", "", 0), compare=False, repr=False)
 
 
 # --- declarations --------------------------------------------------------------------
@@ -635,6 +635,6 @@ class File:
     name: str = field(default="", compare=False)
 
 
-def absolute(relative: Span, file: str, cell_start: int) -> Span:
-    """The span in the file of a node inside a table cell that starts at `cell_start`."""
-    return Span(file, cell_start + relative.start, cell_start + relative.end)
+def absolute(relative: Span, cell: Cell) -> Span:
+    """The span in the file of a node inside a table cell."""
+    return cell.at(relative.start, relative.end)

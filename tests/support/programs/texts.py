@@ -2,6 +2,12 @@
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from random import Random
+
+from rcsc.diagnostics.source import Source
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
 
 
 def edited(text: str, *edits: tuple[str, str]) -> str:
@@ -19,6 +25,13 @@ def without_row(text: str, name: str) -> str:
     """Return the text without the row of a table that has this name, of which there must be one."""
     [row] = [line for line in text.splitlines(keepends=True) if line.strip().startswith(f"| {name} ")]
     return text.replace(row, "")
+
+
+def one_row_a_line(path: Path) -> str:
+    """Return the text of a file with each line of its tables on one row, so that a row may be edited."""
+    file = parse(Source(path.name, path.read_text(encoding="utf-8")))
+    assert isinstance(file, tree.File), file
+    return format_file(file, 10_000)
 
 
 def edit_file(path: Path, *edits: tuple[str, str]) -> None:
@@ -60,3 +73,78 @@ def system(
     each = "".join(f'[[level]]\nname = "{level_name}"\n' for level_name in levels)
     wires = "".join(f'"{end}" = "{other}"\n' for end, other in (buffers or {}).items())
     return f"{keys}{each}[buffers]\n{wires}"
+
+
+def parted_and_broken(text: str, random: Random) -> str:
+    r"""Return the text of one table, of one row a line, in parts and with cells broken at blanks, both drawn.
+
+    >>> print(parted_and_broken("table t {\n| line | a ||\n|---|---||\n| x | 1 ||\n}", Random(1)))
+    table t {
+    | line | a ||
+    |-|-||
+    | x | 1 ||
+    }
+    """
+    lines = text.splitlines()
+    first = next(at for at, line in enumerate(lines) if line.lstrip().startswith("| line"))
+    rows = [line for line in lines[first:] if _is_row(line)]
+    split = [_cut(row) for row in rows]
+    wide = [(side, at) for side in (0, 1) for at in range(side == 0, len(split[0][side]))]
+    parts: list[list[tuple[int, int]]] = [[]]
+    for place in wide:
+        if parts[-1] and (parts[-1][-1][0] > place[0] or random.random() < 0.3):
+            parts.append([])
+        parts[-1].append(place)
+    shown = [_part_rows(split, part, random) for part in parts]
+    head, *below = shown[0]
+    result = [*lines[:first], *head]
+    bodies = iter(below)
+    for line in lines[first + 1 :]:
+        if _is_row(line):
+            result += next(bodies)
+        elif not line.lstrip().startswith("|") and line != "}":
+            result.append(line)
+    return "\n".join([*result, *(row for part in shown[1:] for rows in part for row in rows), "}"])
+
+
+def _is_row(line: str) -> bool:
+    return line.lstrip().startswith("|") and bool(line.strip(" |-"))
+
+
+def _cut(row: str) -> list[list[str]]:
+    """The texts of the cells on both sides."""
+    left, right = row.strip().removeprefix("|").split("||")
+    actions = right.removesuffix("|").split("|") if right else []
+    return [[cell.strip() for cell in side] for side in (left.split("|"), actions)]
+
+
+def _part_rows(split: list[list[list[str]]], part: list[tuple[int, int]], random: Random) -> list[list[str]]:
+    """The rows of the heading, with the separator, and of each line."""
+    shown = []
+    for number, row in enumerate(split):
+        pieces = [_broken(row[side][at], random) for side, at in part]
+        rows = []
+        for at in range(max(map(len, pieces))):
+            texts = [piece[at] if at < len(piece) else "" for piece in pieces]
+            sides = [
+                [text for text, (where, _) in zip(texts, part, strict=True) if where == side]
+                for side in (0, 1)
+            ]
+            left = " | ".join(["" if at else row[0][0], *sides[0]])
+            rows.append(f"| {left} ||" + (f" {' | '.join(sides[1])} |" if sides[1] else ""))
+        if not number:
+            rows.append("|-" * (1 + sum(side == 0 for side, _ in part)) + "||")
+        shown.append(rows)
+    return shown
+
+
+def _broken(text: str, random: Random) -> list[str]:
+    """A cell's text at some of its blanks: not after `_` or `.`, where none would come back, nor so that only a dash stands alone."""
+    pieces: list[str] = []
+    for word in text.split(" "):
+        dash = not word.strip("-:") or (pieces and not pieces[-1].strip("-: "))
+        if pieces and (dash or pieces[-1].endswith(("_", ".")) or random.random() < 0.6):
+            pieces[-1] += f" {word}"
+        else:
+            pieces.append(word)
+    return pieces

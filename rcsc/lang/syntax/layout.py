@@ -1,0 +1,292 @@
+"""Tables as rows of text: aligned, and no wider than a limit where that can be.
+
+In: a table. Out: its rows. What fits on one row a line is written so. What does not has three means, in this order:
+
+1. headings and cells go on in rows below (`new_` above `command`), as many as the fewest further rows need;
+2. the columns are parted, those of conditions from those of actions, then each side where it has to be;
+3. a column that is too wide even alone stands as it is.
+
+The layout follows from the tree and the limit alone, so laying out twice changes nothing. Widths are chosen greedily: the
+column that gives a character for the fewest further rows gives it, until the row fits. Each step looks at every row once.
+"""
+
+import re
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.rows import ACTION_WORDS
+from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_statement
+
+WIDTH = 110
+_INDENT = 2
+_IN_NAMES = re.compile(r"(?<=[A-Za-z0-9]_)(?=[A-Za-z])|(?<=[A-Za-z0-9_\])]\.)(?=[A-Za-z_])")
+"""Where a name in a heading may be broken: after `_` and `.`, so that no blank comes in."""
+_BLANK = re.compile(r"(?<=[^_.]) ")
+_OPERATORS = frozenset("= /= < <= > >= + - * / mod .. :=".split())
+_BEFORE = _OPERATORS | frozenset("in not was next and or xor implies".split())
+"""Words that stay with what follows them. What follows an operator, or is one, stays with what is before it, too."""
+
+
+@dataclass(slots=True)
+class _Column:
+    """A column: its heading and its cells, and how wide it is.
+
+    Attributes:
+        atoms: The pieces into which each distinct text can be broken.
+        heights: How many rows each text needs at the present width.
+        narrower: The next width below that changes something, and the heights then; None where there is none.
+    """
+
+    texts: list[str]
+    is_condition: bool
+    atoms: list[list[str]] = field(init=False)
+    width: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        known: dict[str, list[str]] = {}
+        self.atoms = [_atoms(self.texts[0], heading=True)]
+        for text in self.texts[1:]:
+            if text not in known:
+                known[text] = _atoms(text, heading=False)
+            self.atoms.append(known[text])
+        self.width = max(map(len, self.texts))
+
+    @property
+    def least(self) -> int:
+        """The least width it can have."""
+        return max((len(atom.strip()) for atoms in self.atoms for atom in atoms), default=0)
+
+    def pieces(self, width: int) -> list[list[str]]:
+        """The texts, each broken into pieces no wider than that where they can be; of a heading the last are the longest."""
+        known: dict[int, list[str]] = {id(self.atoms[0]): _filled_last(self.atoms[0], width)}
+        for atoms in self.atoms:
+            if id(atoms) not in known:
+                known[id(atoms)] = _filled(atoms, width)
+        return [known[id(atoms)] for atoms in self.atoms]
+
+    def heights(self, width: int) -> list[int]:
+        """How many rows each text needs."""
+        return list(map(len, self.pieces(width)))
+
+    def narrower(self) -> int | None:
+        """The next width at which more is broken."""
+        if self.width <= self.least:
+            return None
+        distinct = {id(pieces): pieces for pieces in self.pieces(self.width - 1)}.values()
+        return max(len(piece) for pieces in distinct for piece in pieces)
+
+
+def _atoms(text: str, *, heading: bool) -> list[str]:
+    """The parts between which a text can be broken, each with the blank after it, if any.
+
+    >>> _atoms("path_length - path_at", heading=True)
+    ['path_', 'length ', '- path_', 'at']
+    >>> _atoms("begin; set_source; nextstate(state_4)", heading=False)
+    ['begin; ', 'set_source; ', 'nextstate(state_4)']
+    >>> _atoms("/= vis_reqd or width - wanted > 2 [mm]", heading=False)
+    ['/= vis_reqd ', 'or width - wanted > 2 [mm]']
+    """
+    atoms: list[str] = []
+    words = _BLANK.split(text)
+    for at, word in enumerate(words):
+        pieces = _IN_NAMES.split(word) if heading else [word]
+        if atoms and _stays(words[at - 1], word, heading=heading):
+            atoms[-1] += f" {pieces.pop(0)}"
+        elif atoms:
+            atoms[-1] += " "
+        atoms += pieces
+    return atoms
+
+
+def _stays(before: str, word: str, *, heading: bool) -> bool:
+    """Whether a word stays on the row of the word before it."""
+    if before in _BEFORE or word.startswith("["):
+        return True
+    return not heading and word in _OPERATORS
+
+
+def _filled(atoms: Sequence[str], width: int) -> list[str]:
+    """The pieces, each as long as fits."""
+    pieces: list[str] = [""]
+    for atom in atoms:
+        if pieces[-1] and len(pieces[-1]) + len(atom.rstrip()) > width:
+            pieces[-1] = pieces[-1].rstrip()
+            pieces.append("")
+        pieces[-1] += atom
+    return pieces
+
+
+def _filled_last(atoms: Sequence[str], width: int) -> list[str]:
+    """The pieces, the last one as long as fits, then the one before it, and so on."""
+    pieces = [""]
+    for atom in reversed(atoms):
+        if pieces[0] and len(f"{atom}{pieces[0]}".rstrip()) > width:
+            pieces.insert(0, "")
+        pieces[0] = f"{atom}{pieces[0]}"
+    return [piece.rstrip() for piece in pieces]
+
+
+def table_rows(table: tree.TableDecl, width: int) -> Iterator[tuple[tree.Row | None, str]]:
+    """The rows of a table, each with the line whose comments stand above it, if any."""
+    columns = _columns(table)
+    names = ["line", *(row.name for row in table.rows)]
+    stub = max(map(len, names))
+    for number, part in enumerate(_parts(columns, width - _INDENT, stub)):
+        if number:
+            yield None, ""
+        yield from _part(names, stub, part, () if number else table.rows)
+
+
+def _columns(table: tree.TableDecl) -> list[_Column]:
+    left = [[_heading(heading, {"when"})] for heading in table.conditions]
+    right = [[_heading(heading, ACTION_WORDS)] for heading in table.actions]
+    for row in table.rows:
+        for texts, text in zip(left, _conditions(row, table), strict=True):
+            texts.append(text)
+        for texts, cell in zip(right, row.actions, strict=True):
+            texts.append(_action(cell))
+    return [_Column(texts, at < len(left)) for at, texts in enumerate((*left, *right))]
+
+
+def _heading(heading: tree.Heading, words: Collection[str]) -> str:
+    """A heading; a variable that is called like one of the words stands in parentheses."""
+    if heading.subject is None:
+        return heading.word
+    text = spell_expr(heading.subject)
+    return f"({text})" if text in words else text
+
+
+def _conditions(row: tree.Row, table: tree.TableDecl) -> list[str]:
+    if row.default:
+        return [
+            "DEFAULT unreachable" if row.unreachable else "DEFAULT",
+            *([""] * (len(table.conditions) - 1)),
+        ]
+    return [
+        "" if cell is None else spell_condition(cell, heading.subject is None)
+        for cell, heading in zip(row.conditions, table.conditions, strict=True)
+    ]
+
+
+def _action(cell: tuple[tree.Statement, ...] | tree.Comparison) -> str:
+    if isinstance(cell, tree.Comparison):
+        return spell_expr(cell.value)
+    return "; ".join(
+        spell_statement(statement) for statement in cell if isinstance(statement, tree.Assign | tree.Call)
+    )
+
+
+# --- widths --------------------------------------------------------------------------
+
+
+def _total(widths: Sequence[int], stub: int) -> int:
+    """The length of a row: each column has a bar and two blanks, and there is one bar more in `||`."""
+    return 2 + sum(width + 3 for width in (stub, *widths))
+
+
+def _length(columns: Sequence[_Column], stub: int) -> int:
+    return _total([column.width for column in columns], stub)
+
+
+def _parts(columns: list[_Column], width: int, stub: int) -> list[list[_Column]]:
+    """The columns of each part, as wide as they are written."""
+    if _length(columns, stub) <= width:
+        return [columns]
+    parted = _parted(columns, width, stub)
+    natural = [column.width for column in columns]
+    if _total([column.least for column in columns], stub) > width:
+        for part in parted:
+            _fit(part, width, stub)
+        return parted
+    _fit(columns, width, stub)
+    whole, narrow = _rows_of([columns]), [column.width for column in columns]
+    _widen(columns, natural)
+    for part in parted:
+        _fit(part, width, stub)
+    if whole <= _rows_of(parted):
+        _widen(columns, narrow)
+        return [columns]
+    return parted
+
+
+def _parted(columns: list[_Column], width: int, stub: int) -> list[list[_Column]]:
+    """The columns parted: conditions from actions, but where the rest of many conditions has room for them."""
+    conditions = list(_side([column for column in columns if column.is_condition], width, stub))
+    actions = list(_side([column for column in columns if not column.is_condition], width, stub))
+    if len(conditions) > 1 and actions:
+        both = [*conditions[-1], *actions[0]]
+        if _total([column.least for column in both], stub) <= width:
+            return [*conditions[:-1], both, *actions[1:]]
+    return [*conditions, *actions]
+
+
+def _widen(columns: Sequence[_Column], widths: Sequence[int]) -> None:
+    for column, width in zip(columns, widths, strict=True):
+        column.width = width
+
+
+def _side(columns: list[_Column], width: int, stub: int) -> Iterator[list[_Column]]:
+    """The columns of one side, in as few parts as can be: each takes what fits when all is broken."""
+    part: list[_Column] = []
+    for column in columns:
+        least = [each.least for each in (*part, column)]
+        if part and _total(least, stub) > width:
+            yield part
+            part = []
+        part.append(column)
+    if part:
+        yield part
+
+
+def _fit(columns: Sequence[_Column], width: int, stub: int) -> None:
+    """Make columns narrower until the row fits, or nothing can be broken any more."""
+    heights = _heights(columns)
+    while _length(columns, stub) > width:
+        offers = []
+        for at, column in enumerate(columns):
+            narrower = column.narrower()
+            if narrower is not None:
+                needs = column.heights(narrower)
+                more = sum(max(0, need - have) for need, have in zip(needs, heights, strict=True))
+                saved = column.width - narrower
+                offers.append((more / saved, -saved, at, narrower))
+        if not offers:
+            return
+        _, _, at, columns[at].width = min(offers)
+        heights = _heights(columns)
+
+
+def _heights(columns: Sequence[_Column]) -> list[int]:
+    """How many rows the heading and each line need."""
+    return [max(of) for of in zip(*(column.heights(column.width) for column in columns), strict=True)]
+
+
+def _rows_of(parts: Sequence[Sequence[_Column]]) -> int:
+    """How many rows all parts have, separators included."""
+    return sum(1 + sum(_heights(part)) for part in parts)
+
+
+# --- text ----------------------------------------------------------------------------
+
+
+def _part(
+    names: Sequence[str], stub: int, columns: Sequence[_Column], rows: Sequence[tree.Row]
+) -> Iterator[tuple[tree.Row | None, str]]:
+    texts = [column.pieces(column.width) for column in columns]
+    for number, name in enumerate(names):
+        pieces = [broken[number] for broken in texts]
+        above = rows[number - 1] if rows and number else None
+        for at in range(max(map(len, pieces), default=1)):
+            shown = [piece[at] if at < len(piece) else "" for piece in pieces]
+            yield above if not at else None, _row(name if not at else "", stub, shown, columns)
+        if not number:
+            dashes = ["-" * column.width for column in columns]
+            yield None, _row("-" * stub, stub, dashes, columns).replace(" ", "-")
+
+
+def _row(name: str, stub: int, texts: Sequence[str], columns: Sequence[_Column]) -> str:
+    padded = [(column, text.ljust(column.width)) for column, text in zip(columns, texts, strict=True)]
+    left = " | ".join([name.ljust(stub), *(text for column, text in padded if column.is_condition)])
+    right = " | ".join(text for column, text in padded if not column.is_condition)
+    return f"| {left} ||" + (f" {right} |" if right else "")
