@@ -44,7 +44,7 @@ from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
 from tests.support.programs.examples import WALKER
 from tests.support.programs.stages import program_of, shipped
-from tests.support.programs.texts import edit_file, edited
+from tests.support.programs.texts import edit_file, edited, one_row_a_line
 
 REPO = Path(__file__).parents[2]
 
@@ -67,6 +67,8 @@ def regions(changes: tuple[Change, ...]) -> set[tuple[str, str, tuple[str, ...]]
 
 # --- seeded edits of shipped tables ----------------------------------------------------------
 
+ACQUIRE = one_row_a_line(REPO / "tables/task/acquire.rcs")
+
 
 @pytest.fixture(scope="module")
 def task(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Program]:
@@ -75,6 +77,7 @@ def task(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Program]:
     for name in ("rcsc.toml", "vocabulary.rcs"):
         shutil.copy(REPO / "tables" / name, folder / name)
     shutil.copytree(REPO / "tables/task", folder / "task")
+    (folder / "task/acquire.rcs").write_text(ACQUIRE, encoding="utf-8")
 
     def with_edits(name: str = "acquire.rcs", *edits: tuple[str, str]) -> Program:
         path = folder / "task" / name
@@ -90,8 +93,7 @@ def task(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Program]:
 
 def line_of(name: str) -> str:
     """A line of ACQUIRE, as it stands."""
-    text = (REPO / "tables/task/acquire.rcs").read_text(encoding="utf-8")
-    return next(row for row in text.splitlines(keepends=True) if row.startswith(f"  | {name} "))
+    return next(row for row in ACQUIRE.splitlines(keepends=True) if row.startswith(f"  | {name} "))
 
 
 def acquire(
