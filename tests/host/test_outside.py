@@ -37,7 +37,7 @@ from rcsc.run.log.records import MOST_CHUNK, ChainCheck, Seal, records
 from rcsc.run.signature import signature
 from rcsc.run.system import System, assemble
 from rcsc.shell.typed_names import kind_of
-from rcsc_cell.pictures.page import quoted
+from rcsc_cell.pages.page import quoted
 from tests.support.programs.stages import emitted, shipped
 from tests.support.programs.texts import system
 

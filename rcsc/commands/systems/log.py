@@ -21,7 +21,7 @@ from rcsc.run.log.records import Seal
 from rcsc.run.log.states import begun_in_words, fault_in_words
 from rcsc.run.system import signatures
 from rcsc_cell.database.build import BadData
-from rcsc_cell.pictures.finding_page import trace
+from rcsc_cell.pages.finding_page import trace
 from rcsc_cell.pictures.scene import DrawnCell, cell, same_system
 from rcsc_cell.workstation.prepared import database_of
 

@@ -26,8 +26,8 @@ from rcsc.run.processes.serve import Factory
 from rcsc.run.processes.supervisor import Supervisor, run_processes
 from rcsc.run.signature import Signature
 from rcsc.run.system import assemble, signatures
-from rcsc_cell.pictures.report import report
-from rcsc_cell.pictures.witness import RunWitness, names
+from rcsc_cell.pages.report import report
+from rcsc_cell.pages.witness import RunWitness, names
 
 if TYPE_CHECKING:
     from rcsc_cell.live import Live

@@ -15,11 +15,11 @@ from rcsc_cell.cell.plant import Latest, Plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import depth_mm
 from rcsc_cell.database.pose import Vector, minus, pose_of
-from rcsc_cell.pictures.report import Figure, Placement, Story
+from rcsc_cell.pages.report import Figure, Placement, Story
+from rcsc_cell.pages.witness import RunWitness
 from rcsc_cell.pictures.solid import solid
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import outline
-from rcsc_cell.pictures.witness import RunWitness
 from rcsc_cell.workstation.station import RowResult, Workstation
 
 SERIES = {

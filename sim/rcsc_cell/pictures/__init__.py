@@ -1,4 +1,4 @@
-"""Pictures of the cell, all SVG text, and pages of them.
+"""Pictures of the cell, and of any model, all SVG text.
 
 No graphics driver, no browser and no script: the same state gives the same text on one machine, so that pictures can
 be compared in tests and opened anywhere.
@@ -11,10 +11,8 @@ A *solid* picture draws the faces of MuJoCo's shapes from far to near. A *stick*
 projections and a perspective, as section 10 of the paper has it; it needs nine numbers and no physics, so it can be
 drawn of a log. A *scene* is the cell as far as a log says it.
 
-Nothing here is trusted for a proof. What it costs: time by the faces that are drawn; a report keeps a picture every
-25 cycles at the least.
+Nothing here is trusted for a proof. What it costs: time by the faces that are drawn.
 
 Modules, in the order the data flows: `solid` draws a MuJoCo model (`shapes`, `order`), `stick` the stick figure
-(`views`, `things`), `plot` a value over time; `scene` finds in a log where everything is; `finding_page` and `report`
-are pages (`page`); `witness` watches any run for the report and the live page.
+(`views`, `things`), `plot` a value over time; `scene` finds in a log where everything is.
 """

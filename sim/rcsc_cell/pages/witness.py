@@ -14,7 +14,7 @@ from typing import Protocol
 from rcsc.run.levels import RunningLevel
 from rcsc.run.orders.operator import ScriptedRun
 from rcsc.run.system import System
-from rcsc_cell.pictures.report import CellPicture, Figure, Matched, ReportRow, Story
+from rcsc_cell.pages.report import CellPicture, Figure, Matched, ReportRow, Story
 
 FRAMES_APART, LONG_APART = 25, 80
 """Cycles between pictures of the filmstrip: at the least, and in the middle of a long row."""

@@ -12,7 +12,7 @@ from rcsc.host.files import write_atomically
 from rcsc.run.log.finding import LoggedFinding
 from rcsc.run.log.read import Log
 from rcsc.run.log.ticks import LoggedTick, frames
-from rcsc_cell.pictures.page import PAGES
+from rcsc_cell.pages.page import PAGES
 from rcsc_cell.pictures.scene import DrawnCell, DrawnScene
 
 

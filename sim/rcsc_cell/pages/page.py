@@ -7,7 +7,7 @@ import jinja2
 from markupsafe import Markup, escape
 
 PAGES = jinja2.Environment(
-    loader=jinja2.PackageLoader("rcsc_cell", "pictures"),
+    loader=jinja2.PackageLoader("rcsc_cell", "pages"),
     undefined=jinja2.StrictUndefined,
     trim_blocks=True,
     lstrip_blocks=True,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rcsc.host.files import write_atomically
-from rcsc_cell.pictures.page import PAGES
+from rcsc_cell.pages.page import PAGES
 from rcsc_cell.pictures.plot import plot
 
 
