@@ -42,6 +42,7 @@ SENSOR = Record(
 ACTUATOR = Record(
     {}, {"actuator": Text(), "unit": Text(), "scale": Number(), "values": Entries(Number()), "ignore": Flag()}
 )
+FAULT = Record({}, {"actuator": Text(), "control": Number(), "field": Text(), "value": Anything()})
 MODEL: Mapping[str, Kind] = {
     "model": Text(),
     "parties": Listing(Word()),
@@ -49,6 +50,7 @@ MODEL: Mapping[str, Kind] = {
     "keyframe": Text(),
     "sensors": Entries(SENSOR),
     "actuators": Entries(ACTUATOR),
+    "faults": Entries(FAULT),
 }
 
 
@@ -64,6 +66,7 @@ class PlantSpec:
         model: The file of a MuJoCo model; None where there is none.
         keyframe: From which the model starts; empty for its first state.
         sensors: What fills a buffer's field, by the far end; `actuators` what a field drives.
+        faults: By name, what a model does wrong while somebody switches it on.
         by_hand: Whether `rcsc shell` takes it when nobody says which.
         path: Where it stands in the document.
     """
@@ -76,6 +79,7 @@ class PlantSpec:
     keyframe: str = ""
     sensors: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     actuators: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    faults: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     by_hand: bool = False
     path: KeyPath = ("plant",)
 
@@ -155,6 +159,7 @@ def _spec(path: Path, document: Document, name: str, table: Mapping[str, Any], p
         str(table.get("keyframe", "")),
         _entries(table, "sensors"),
         _entries(table, "actuators"),
+        _entries(table, "faults"),
         table.get("by_hand") is True,
         place,
     )

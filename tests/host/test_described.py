@@ -36,7 +36,7 @@ from rcsc.host.described import (
 )
 from rcsc.host.files.names import MOST_FILE_CHARACTERS
 from rcsc.host.files.read import MOST_TOML_BYTES
-from rcsc.run.declared_plant import ACTUATOR, MODEL, PYTHON, SENSOR
+from rcsc.run.declared_plant import ACTUATOR, FAULT, MODEL, PYTHON, SENSOR
 from rcsc.run.description import FEED, LEVEL, SYSTEM, BadDescription, description
 from rcsc.run.orders.script import OWN
 from rcsc.run.signature import Signature
@@ -458,6 +458,7 @@ def test_the_guide_has_every_key_of_a_description(repo: Path) -> None:
         FEED,
         SENSOR,
         ACTUATOR,
+        FAULT,
         Record(PYTHON),
         Record(MODEL),
         Record(dict.fromkeys(OWN, Text())),

@@ -7,7 +7,7 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.run.description import BadDescription, description
-from rcsc.run.plant.bind import BadPlant, Buffer, PlantFailed, plant_page
+from rcsc.run.plant.bind import BadPlant, BoundPlant, Buffer, PlantFailed, plant_page
 from rcsc.run.plant.load import Staged, load
 from rcsc.run.signature import Leaf, Values
 from rcsc.run.system import signatures
@@ -114,6 +114,10 @@ MISFITS = {
     "both": (STILL, STILL.replace("value", 'sensor = "pin", value'), "needs either `sensor` or `value`", ""),
     "neither": (STILL, STILL.replace("value = false", "over = 1"), "needs either `sensor` or `value`", ""),
     "value": (STILL, STILL.replace("false", "3"), "`value` is `3`, which is no bool", ""),
+    "fault": ('{ actuator = "wheels", control = 0.0 }', '{ actuator = "wheels" }', "fault `wheels_stuck` needs", ""),
+    "fault's actuator": ('{ actuator = "wheels", c', '{ actuator = "legs", c', "the model has no actuator `legs`", ""),
+    "fault's field": ('field = "base.contact"', 'field = "base.contct"', "`base.contct` is no field", "did you mean `base.contact`?"),
+    "fault's value": ('"base.contact", value = false', '"base.contact", value = 2', "`value` is `2`, which is no bool", ""),
     "keyframe": ('keyframe = "beside"', 'keyframe = "besides"', "the model has no keyframe `besides`", ""),
     "model": ('"robot.xml"', '"robot.xlm"', "the model `robot.xlm` cannot be read: there is no such file", ""),
     "tick": ("tick_ms = 40", "tick_ms = 5", "a tick of 5 ms is 2.5 of the model's steps of 2 ms", "timestep"),
@@ -137,6 +141,10 @@ def test_what_does_not_fit_is_told_at_its_line(what: str, dock: Path) -> None:
         "tick": "model",
         "no sensor": "base.contact",
         "no actuator": "drive.speed",
+        "fault": "wheels_stuck",
+        "fault's actuator": "wheels_stuck",
+        "fault's field": "pin_dead",
+        "fault's value": "pin_dead",
     }
     assert place.get(what, before.split("=")[0].strip().strip('"')) in line
 
@@ -215,3 +223,34 @@ def test_a_model_that_flies_apart_ends_the_run(dock: Path) -> None:
 
     with pytest.raises(PlantFailed, match="the model became unstable in cycle"):
         fifty()
+
+
+def test_faults_are_switched_and_what_stood_comes_back(dock: Path) -> None:
+    [model] = stage(dock).switched
+    assert isinstance(model, BoundModel)
+    assert model.faults == ("wheels_stuck", "pin_dead")
+    for tick in range(10):
+        model.step(tick, ordered(400).get)
+    model.switch("wheels_stuck", on=True)
+    copied = copy.deepcopy(model)
+    for tick in range(10):
+        model.step(tick, ordered(400).get)
+    stuck = float(model.data.qpos[0])
+    model.switch("wheels_stuck", on=False)
+    for tick in range(10):
+        model.step(tick, ordered(400).get)
+    assert float(model.data.qpos[0]) > stuck + 0.1
+    assert copied.on == {"wheels_stuck"}
+    for dead in (True, False):
+        model.data.qpos[2] = 0.02
+        model.switch("pin_dead", on=dead)
+        assert model.step(0, ordered(0).get)["base.contact"] == (not dead,)
+
+
+def test_a_plant_in_python_is_switched_likewise(dock: Path) -> None:
+    system = description(dock / "system.toml")
+    [plant] = load(system, signatures(system)).switched
+    assert isinstance(plant, BoundPlant)
+    plant.switch("wheel_slips", on=True)
+    assert plant.faults == ("wheel_slips",)
+    assert plant.plant.wheel_slips is True

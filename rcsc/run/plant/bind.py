@@ -90,6 +90,10 @@ class BoundPlant:
         """The names of its switches, fields of type `Fault`."""
         return fields.faults(type(self.plant))
 
+    def switch(self, fault: str, *, on: bool) -> None:
+        """Switches a fault on or off."""
+        setattr(self.plant, fault, on)
+
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
         """One tick: fields from the levels, the plant's `step`, fields to the levels.
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 from rcsc.host.described import KeyPath, nearest
 from rcsc.host.files.names import BadName, within
@@ -75,6 +75,20 @@ class Resumable(Protocol):
         ...
 
 
+@runtime_checkable
+class Switched(Protocol):
+    """A plant that misbehaves where somebody switches a fault on."""
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """The names of its faults."""
+        ...
+
+    def switch(self, fault: str, *, on: bool) -> None:
+        """Switches a fault on or off."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Staged:
     """What stands outside a system, ready for its first tick.
@@ -99,6 +113,11 @@ class Staged:
     def over(self) -> bool:
         """Whether something outside says that the run is at its end."""
         return any(getattr(part, "over", False) for part in self.outside)
+
+    @property
+    def switched(self) -> tuple[Switched, ...]:
+        """The plants among them that have faults to be switched."""
+        return tuple(part for part in self.outside if isinstance(part, Switched) and part.faults)
 
     @property
     def plants(self) -> tuple[BoundPlant, ...]:

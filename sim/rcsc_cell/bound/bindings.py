@@ -76,6 +76,25 @@ class ActuatorBinding:
         return self.values[int(value)] if self.link is None else float(self.link.taken(iter((value,))))
 
 
+@dataclass(frozen=True, slots=True)
+class FaultBinding:
+    """What goes wrong while a fault is on: a control stands still, or a field from outside does.
+
+    Attributes:
+        name: Of the fault.
+        at: Of the control; -1 where it is a field.
+        control: What the control then is.
+        field: The end of the field; empty where it is a control.
+        value: What the field then holds.
+    """
+
+    name: str
+    at: int = -1
+    control: float = 0.0
+    field: str = ""
+    value: Value = 0
+
+
 @dataclass(slots=True)
 class Binder:
     """Binds fields to a model, and notes what does not fit.
@@ -91,7 +110,7 @@ class Binder:
     def sensors(self, buffer: Buffer, entries: Mapping[str, Mapping[str, Any]]) -> list[SensorBinding]:
         """What fills each leaf of a buffer from outside; those that fit."""
         bound = []
-        for end, leaf in _ends(buffer):
+        for end, leaf in ends(buffer):
             where = (*self.path, "sensors", end)
             if end not in entries:
                 self.page.wrong(
@@ -108,7 +127,7 @@ class Binder:
     def actuators(self, buffer: Buffer, entries: Mapping[str, Mapping[str, Any]]) -> list[ActuatorBinding]:
         """What each leaf of a level's buffer drives; those that drive something and fit."""
         bound = []
-        for place, (end, leaf) in enumerate(_ends(buffer)):
+        for place, (end, leaf) in enumerate(ends(buffer)):
             where = (*self.path, "actuators", end)
             if end not in entries:
                 self.page.wrong(
@@ -123,6 +142,38 @@ class Binder:
             if binding is not None:
                 bound.append(binding)
         return bound
+
+    def faults(
+        self, entries: Mapping[str, Mapping[str, Any]], filled: Mapping[str, Leaf]
+    ) -> list[FaultBinding]:
+        """The faults that fit.
+
+        Args:
+            entries: By name.
+            filled: The fields from outside, by their ends.
+        """
+        bindings = (
+            self._fault(name, entry, filled, (*self.path, "faults", name)) for name, entry in entries.items()
+        )
+        return [binding for binding in bindings if binding is not None]
+
+    def _fault(
+        self, name: str, entry: Mapping[str, Any], filled: Mapping[str, Leaf], where: KeyPath
+    ) -> FaultBinding | None:
+        if entry.keys() == {"actuator", "control"}:
+            at = self._named(mujoco.mjtObj.mjOBJ_ACTUATOR, "actuator", entry["actuator"], where)
+            return None if at is None else FaultBinding(name, at, float(entry["control"]))
+        if entry.keys() != {"field", "value"}:
+            self.page.wrong(where, f"fault `{name}` needs `actuator` and `control`, or `field` and `value`")
+            return None
+        end = str(entry["field"])
+        if end not in filled:
+            self.page.wrong(
+                (*where, "field"), f"`{end}` is no field that the model fills", *nearest(end, list(filled))
+            )
+            return None
+        still = self._still(end, filled[end], entry["value"], where)
+        return None if still is None else FaultBinding(name, field=end, value=still.value)
 
     # --- sensors ---
 
@@ -301,7 +352,7 @@ class Binder:
         return Factor(scale) if where[-2] == "sensors" else Factor(1 / scale)
 
 
-def _ends(buffer: Buffer) -> list[tuple[str, Leaf]]:
+def ends(buffer: Buffer) -> list[tuple[str, Leaf]]:
     """The far end of each leaf."""
     variable = buffer.variable.partition(".")[2]
     return [(f"{buffer.end}{leaf.name.removeprefix(variable)}", leaf) for leaf in buffer.leaves]

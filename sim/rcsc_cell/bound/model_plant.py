@@ -5,7 +5,7 @@ In: a plant of a description that names a model. Out: a `BoundModel`, which stan
 
 import copy
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,8 @@ from rcsc.host.described import Document
 from rcsc.run.plant.bind import BadPlant, PlantFailed, buffers_of, parties_of, plant_page
 from rcsc.run.plant.load import Setup, Staged
 from rcsc.run.plant.values import BadValue
-from rcsc.run.signature import Values
-from rcsc_cell.bound.bindings import ActuatorBinding, Binder, SensorBinding
+from rcsc.run.signature import Leaf, Value, Values
+from rcsc_cell.bound.bindings import ActuatorBinding, Binder, FaultBinding, SensorBinding, ends
 from rcsc_cell.pictures.solid import View, solid
 
 UNSTABLE = (
@@ -35,6 +35,7 @@ class BoundModel:
         model: An `MjModel`; `data` its `MjData`.
         steps: Of the model, in a tick.
         takes: Buffers of the levels, and what they drive; `gives` those that sensors fill.
+        wrong: What goes wrong while a fault is on, by the fault; `on` the faults that are.
     """
 
     model: Any
@@ -42,10 +43,23 @@ class BoundModel:
     steps: int
     takes: tuple[tuple[str, tuple[ActuatorBinding, ...]], ...]
     gives: tuple[tuple[str, tuple[SensorBinding, ...]], ...]
+    wrong: Mapping[str, FaultBinding] = field(default_factory=dict)
+    on: frozenset[str] = frozenset()
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """The names of the faults that the description declares."""
+        return tuple(self.wrong)
+
+    def switch(self, fault: str, *, on: bool) -> None:
+        """Switches a fault on or off."""
+        self.on = self.on | {fault} if on else self.on - {fault}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "BoundModel":
         """The model never changes, and what it is bound to neither."""
-        return BoundModel(self.model, copy.copy(self.data), self.steps, self.takes, self.gives)
+        return BoundModel(
+            self.model, copy.copy(self.data), self.steps, self.takes, self.gives, self.wrong, self.on
+        )
 
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
         """One tick.
@@ -58,13 +72,22 @@ class BoundModel:
             for actuator in actuators if values is not None else ():
                 assert values is not None
                 self.data.ctrl[actuator.at] = actuator.control(values[actuator.place])
+        wrong = [self.wrong[name] for name in sorted(self.on)]
+        for fault in wrong:
+            if fault.at >= 0:
+                self.data.ctrl[fault.at] = fault.control
         mujoco.mj_step(self.model, self.data, nstep=self.steps)
         mujoco.mj_forward(self.model, self.data)  # readings are of the end of the last step
         if any(self.data.warning[int(kind)].number for kind in UNSTABLE):
             raise PlantFailed(f"the model became unstable in cycle {tick + 1}: a shorter `timestep` may help")
-        return {name: tuple(self._read(tick, sensor) for sensor in sensors) for name, sensors in self.gives}
+        still = {fault.field: fault.value for fault in wrong}
+        return {
+            name: tuple(self._read(tick, sensor, still) for sensor in sensors) for name, sensors in self.gives
+        }
 
-    def _read(self, tick: int, sensor: SensorBinding) -> bool | int | float:
+    def _read(self, tick: int, sensor: SensorBinding, still: Mapping[str, Value]) -> Value:
+        if sensor.end in still:
+            return still[sensor.end]
         try:
             return sensor.read(self.data.sensordata)
         except BadValue as error:
@@ -87,15 +110,18 @@ def staged(setup: Setup) -> Staged:
     steps = _steps(page, setup, model)
     binder = Binder(page, setup.spec.path, model)
     takes, gives = [], []
+    filled: dict[str, Leaf] = {}
     for buffer in buffers_of(setup.system, setup.signs, parties_of(setup.system, setup.signs, setup.spec)):
         if buffer.gives:
+            filled |= dict(ends(buffer))
             gives.append((buffer.name, tuple(binder.sensors(buffer, setup.spec.sensors))))
         else:
             takes.append((buffer.name, tuple(binder.actuators(buffer, setup.spec.actuators))))
+    wrong = {fault.name: fault for fault in binder.faults(setup.spec.faults, filled)}
     if page.faults:
         raise page.bad(BadPlant)
     mujoco.mj_forward(model, data)
-    plant = BoundModel(model, data, steps, tuple(takes), tuple(gives))
+    plant = BoundModel(model, data, steps, tuple(takes), tuple(gives), wrong)
     return Staged((plant,), pictures={"solid": lambda: solid(model, plant.data, _view(model))})
 
 
