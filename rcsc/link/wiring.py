@@ -31,6 +31,8 @@ IN, OUT, BETWEEN, TICK = "in", "out", "between", "tick"
 """Members of the system's struct besides its levels."""
 OWN = ("t", "in_t", "out_t", "between_t", "level_t", "init", "step", "restart", "resume")
 """Ends of the C names that every system has."""
+DOES = ("take", "give", "restart", "resume")
+"""What is done with one level, by a function of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,6 +211,7 @@ def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linke
     members = NameScope({IN, OUT, BETWEEN, TICK}).all(
         (spec.name, c_word(spec.name)) for spec in system.levels
     )
+    wiring.scope.names |= {f"{word}_{does}_{member}" for does in DOES for member in members.values()}
     constants = NameScope({constant_word(word, "level", "none"), constant_word(word, "tick", "ms")})
     levels = tuple(
         _level(

@@ -168,3 +168,16 @@ def test_two_levels_of_one_program_have_a_state_each(tmp_path: Path) -> None:
     assert (
         first_difference(by_python(described, ticks), CSystem(described, signs, tmp_path).play(ticks)) == ""
     )
+
+
+def test_questions_of_one_name_and_other_types_are_two_functions(tmp_path: Path) -> None:
+    path = written(tmp_path, {"a": 10, "b": 10}, {"who.x": "a.x"})
+    feeds = '[[level.feed]]\ninto = "{}"\nquery = "take_a"\nkeys = ["x"]\n'
+    edit_file(path, ('name = "a"\n', f'name = "a"\n{feeds.format("given")}{feeds.format("given.a")}'))
+    edit_file(path, ('name = "b"\n', f'name = "b"\n{feeds.format("given.a")}{feeds.format("given.b")}'))
+    assert run(["compile", "-q", str(path)]) == 0
+    assert built(tmp_path, "whole", "a", "b") == ""
+    header = (tmp_path / "generated/c/whole.h").read_text(encoding="utf-8")
+    assert "extern void whole_take_a_2(uint8_t key_0, a_r_t *answer);" in header
+    assert "/* yours: a.given.a of x; b.given.a of x; asked" in header
+    assert "extern void whole_take_a_4(uint8_t key_0, bool answer[2]);" in header
