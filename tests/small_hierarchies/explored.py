@@ -12,7 +12,8 @@ from itertools import product
 from operator import itemgetter
 
 from rcsc.lang.interpret import Fault
-from rcsc.lang.model import Enum, Program, Value
+from rcsc.lang.model import Enum, Int, Kind, Program, Value, Variable
+from rcsc.lang.restart import Part, by_names
 from rcsc.run.adopt import adopt
 from rcsc.run.signature import Leaf, Signature
 from tests.small_hierarchies.level import EARLY, UNDEFINED, Key, Ran, Role, State, number_type
@@ -50,7 +51,7 @@ def adopted(
 
 
 def _signature(program: Program) -> Signature:
-    """What `adopt` is told of a program: names, kinds and members."""
+    """What `adopt` is told of a program: names, kinds, members, and what it adopts, as its declarations or its names say it."""
     leaves = tuple(
         Leaf(
             str(v.name), v.kind.value, "", "", "", v.type.members if isinstance(v.type, Enum) else (), None, None, "", v.initial, "",
@@ -58,7 +59,18 @@ def _signature(program: Program) -> Signature:
         for v in program.variables
     )  # fmt: skip
     index = {leaf.name: at for at, leaf in enumerate(leaves)}
-    return Signature(str(program.name), "", "", leaves, {}, (), (), index)
+    said = by_names({str(v.name): _part(v) for v in program.variables})
+    declared = said if program.restart is None else {str(leaf): how for leaf, how in program.restart}
+    restart = {index[leaf]: how for leaf, how in declared.items()}
+    return Signature(str(program.name), "", "", leaves, {}, (), (), index, restart=restart)
+
+
+def _part(variable: Variable) -> Part:
+    """What the name of a leaf may mean."""
+    kind = variable.type
+    members = kind.members if isinstance(kind, Enum) else ()
+    whole = (kind.low, kind.high) if isinstance(kind, Int) else None
+    return Part(variable.kind is Kind.OUTPUT, members, whole)
 
 
 @dataclass
