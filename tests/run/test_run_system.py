@@ -141,8 +141,15 @@ def test_without_a_plant_nothing_moves_but_what_the_script_sets(here: Path) -> N
     assert run_.system.level("supervisor").shown("report.status_report") == "done"
 
 
-@pytest.mark.usefixtures("here")
-def test_a_report_is_written_and_resuming_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+PICTURE = """
+    def picture(self) -> str:
+        return f'<svg xmlns="http://www.w3.org/2000/svg"><title>at {self.travelled:.2f} m</title></svg>'
+"""
+
+
+def test_a_report_is_written_and_resuming_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    base = (here / "base.py").read_text(encoding="utf-8")
+    (here / "base.py").write_text(base + PICTURE, encoding="utf-8")
     assert run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--report", "dock.html"]) == 0
     page = Path("dock.html").read_text(encoding="utf-8")
     for said in (

@@ -24,7 +24,8 @@ Before anything moves, types, ranges, units and members are held against the var
 is told at its buffer's line (RCS729). Metres become millimetres exactly, a float is rounded to a whole number, a
 record is a class with annotated attributes, an array a `list` or `tuple`, an enumeration a `Literal`, an `Enum` or a `str`.
 A method that is named as what a feed asks answers it. An attribute `over` that is true ends the run. A constructor that
-takes `seed` gets it. A field of type `Fault` makes the plant misbehave: whoever tests the system switches it.
+takes `seed` gets it. What `picture` gives, an SVG document, is shown by page and report. A field of type `Fault` makes the
+plant misbehave: whoever tests the system switches it.
 
 Trusted: the file of a plant that a description names, which is imported and run; nothing of it is trusted for a proof.
 
