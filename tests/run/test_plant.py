@@ -11,7 +11,7 @@ import pytest
 from rcsc.diagnostics.codes import Code
 from rcsc.run.description import BadDescription, description
 from rcsc.run.plant import Range, fields
-from rcsc.run.plant.bind import BadPlant, BoundPlant, PlantFailed
+from rcsc.run.plant.bind import BadPlant, BoundPlant, PlantFailed, bind
 from rcsc.run.plant.load import load
 from rcsc.run.plant.units import factor
 from rcsc.run.plant.values import BadValue, Misfit, link, shape
@@ -411,13 +411,15 @@ def test_a_field_of_two_parties_is_told(dock: Path) -> None:
     )
     base = (dock / "base.py").read_text(encoding="utf-8")
     wall = "class Wall:\n    bumper: bool = False\n    beacon: bool = False\n\n\n"
-    walled = edited(base, ("class Base:", f"{wall}class Base:\n    wall: Wall"))
+    walled = edited(base, ("class Base:", f"{wall}class Base:\n    wall: Wall = Wall()"))
     (dock / "base.py").write_text(walled, encoding="utf-8")
     plant = bound(dock)
     plant.plant.wall.beacon = True
     assert plant.step(0, nothing)["wall.beacon"] == (True,)
     assert plant.step(0, nothing)["base.beacon"] == (True,)
-    assert bound(dock).step(0, nothing)["wall.beacon"] == (False,)
+    described = description(dock / "system.toml")
+    second = bind(described, signatures(described), described.plants[0], type(plant.plant))
+    assert second.step(0, nothing)["wall.beacon"] == (False,)
 
 
 def test_a_class_that_cannot_be_made_of_its_fields_is_told(dock: Path) -> None:

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -368,13 +369,18 @@ def test_what_a_program_declares_of_its_roles_is_what_a_script_goes_by(
     declared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     system = description(declared / "system.toml")
-    [level] = served(system, signatures(system))
+    signs = signatures(system)
+    [level] = served(system, signs)
     assert (level.order, level.report, level.done, level.failed) == (
         "fleet.order",
         "supervisor.to_fleet",
         "finished",
         "broken",
     )
+    serves = signs["supervisor"].serves
+    assert serves is not None
+    other = replace(signs["supervisor"], serves=replace(serves, order="from_drive"))
+    assert served(system, {**signs, "supervisor": other}) == ()
     script = tmp_path / "day.csv"
     script.write_text("command,base.beacon,expect\ndock,,\nstop,,\ndock,false,broken\n", encoding="utf-8")
     log = tmp_path / "day.mcap"
