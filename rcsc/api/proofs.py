@@ -120,6 +120,7 @@ class Unproved:
         cycle: The cycle, from 1, that breaks it; 0 without a run.
         restarted: Whether the run begins where a restart does; then its first row, of tick 0, says where.
         helps: What would mend the tables, each proved.
+        together: What the first helps of all findings of its table do together, at the last of them.
         follows: What comes of it, each with its run.
     """
 
@@ -133,6 +134,7 @@ class Unproved:
     restarted: bool = False
     helps: tuple[str, ...] = ()
     follows: tuple["Consequence", ...] = ()
+    together: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,6 +254,7 @@ def _unproved(systems: "Mapping[str, TransitionSystem]", explanation: Explanatio
         finding.restarted,
         explanation.helps,
         tuple(_consequences(systems, explanation)),
+        explanation.together,
     )
 
 

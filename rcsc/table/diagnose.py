@@ -1,6 +1,7 @@
 """What was found of a table, as diagnostics."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from math import prod
 
 from rcsc.diagnostics.codes import Code
@@ -10,7 +11,7 @@ from rcsc.lang.model import Program, Scalar, Table, key_bounds, spell
 from rcsc.table import cells as words
 from rcsc.table.certificate import must_cover
 from rcsc.table.regions import partition
-from rcsc.table.repair import closing_line, parting_cell
+from rcsc.table.repair import closing_line, left_by, parting_cell, parting_cells
 from rcsc.table.verdict import (
     ContradictoryAssumptions,
     DeadLine,
@@ -32,6 +33,8 @@ def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[st
     table = verdict.table
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
     shown = [_overlap(program, table, overlap) for overlap in overlaps[:MOST_PAIRS]]
+    if shown and (together := _together(program, table, overlaps[:MOST_PAIRS])):
+        shown[-1] = replace(shown[-1], notes=(*shown[-1].notes, together))
     if len(overlaps) > MOST_PAIRS:
         least = "at least " if len(overlaps) == partition.MOST_PAIRS else ""
         message = (
@@ -108,6 +111,15 @@ def _overlap(program: Program, table: Table, overlap: Overlap) -> Diagnostic:
         help=(repair,) if repair else (),
         witnesses=(column,),
     )
+
+
+def _together(program: Program, table: Table, overlaps: Sequence[Overlap]) -> str:
+    """Say what the repairs of several overlaps do together; empty for fewer than two."""
+    first = [next(iter(parting_cells(program, table, overlap)), None) for overlap in overlaps]
+    chosen = [cell for cell in first if cell is not None and not cell.falls]
+    if len(chosen) < 2:
+        return ""
+    return f"the helps of these {len(chosen)} overlaps together: {left_by(program, table, chosen)}"
 
 
 # --- gaps ----------------------------------------------------------------------------

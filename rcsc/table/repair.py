@@ -5,16 +5,19 @@ In: a finding of a table. Out: a sentence, or nothing. What parts two lines is k
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interval_sets import complement, holds, meet, size
 from rcsc.lang.model import (
     Apply,
+    Bool,
     Box,
     Column,
+    Enum,
     Expr,
+    Literal,
     Program,
     Read,
     Scalar,
@@ -23,6 +26,7 @@ from rcsc.lang.model import (
     VariableName,
     key_bounds,
     key_of,
+    value_of_key,
 )
 from rcsc.lang.operator_table import OPPOSITE, Op, is_comparison
 from rcsc.table import boxes, cells
@@ -37,53 +41,135 @@ MOST_ASKED = 4_000
 """Pairs of a cell and a line that are looked at for a row across variables; a table with more gets none."""
 
 
+@dataclass(frozen=True, slots=True)
+class PartingCell:
+    """One cell, changed so that two lines no longer both match.
+
+    Attributes:
+        line: The line with the cell, by position; `other`, the line that then runs where both matched.
+        name: The column's variable; `text`, the cell as it would be; `box`, the keys that it takes.
+        lost: How many keys the cell no longer takes.
+        falls: Whether the line loses more than the other has, so that DEFAULT takes the rest.
+    """
+
+    line: int
+    other: int
+    name: VariableName
+    text: str
+    box: Box
+    lost: int
+    falls: bool
+
+    def shown(self, table: Table) -> str:
+        """Say what to write, which line then runs, and what it does otherwise than the line that does not."""
+        line, other = table.lines[self.line], table.lines[self.other]
+        does, did = ({action.heading: action.text for action in of.actions} for of in (other, line))
+        headings = [heading for heading in dict.fromkeys((*did, *does)) if heading != "procedures"]
+        instead = [
+            f"{heading} {does.get(heading, 'blank')}, not {did.get(heading, 'blank')}"
+            for heading in headings
+            if does.get(heading) != did.get(heading)
+        ]
+        beside = f" ({'; '.join(instead)})" if instead else ""
+        rest = "; DEFAULT takes what else it loses" if self.falls else ""
+        write = f"in line `{line.name}` write `{self.text}` under `{self.name}`: proved to part the two lines"
+        return f"{write}; line `{other.name}` then runs where both match{beside}{rest}"
+
+
 def parting_cell(program: Program, table: Table, overlap: Overlap) -> str | None:
-    """The smallest change of one cell that parts the two lines and leaves every input matched.
+    """Return the smallest change of one cell that parts the two lines and leaves every input matched, in words."""
+    cell = next(iter(parting_cells(program, table, overlap)), None)
+    return None if cell is None or cell.falls else cell.shown(table)
+
+
+def parting_cells(program: Program, table: Table, overlap: Overlap) -> tuple[PartingCell, ...]:
+    """Return each change of one cell that parts the two lines, the smallest first, those that leave inputs to DEFAULT last.
 
     Narrowing line A on variable v by what line B has there parts the two. What A loses is then matched by B, if on
-    every other variable B has all that A has: that is checked exactly.
+    every other variable B has all that A has: that is checked exactly. Else it falls to DEFAULT, if there is one that may be reached.
     """
     if not boxes.applies(table):
-        return None
-    best: _Change | None = None
+        return ()
     lines = boxes.lines_of(table)
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
-    for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second)):
-        for name in table.variables:
-            change = _narrowed(lines, kinds, table, line, other, name)
-            if change is not None and (best is None or change.lost < best.lost):
-                best = change
-    if best is None:
-        return None
-    return f"in line `{table.lines[best.line].name}` write `{best.cell}` under `{best.name}`: proved to part the two lines"
-
-
-@dataclass(frozen=True, slots=True)
-class _Change:
-    line: int
-    name: str
-    cell: str
-    lost: int
+    default = table.default is not None and not table.default.unreachable
+    every = (
+        _narrowed(lines, kinds, table, line, other, name)
+        for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second))
+        for name in table.variables
+    )
+    cells_ = (cell for cell in every if cell is not None and (default or not cell.falls))
+    return tuple(sorted(cells_, key=lambda cell: (cell.falls, cell.lost)))
 
 
 def _narrowed(
-    lines: list[dict[str, Box]], kinds: dict[str, Scalar], table: Table, line: int, other: int, name: str
-) -> _Change | None:
+    lines: list[dict[str, Box]],
+    kinds: dict[str, Scalar],
+    table: Table,
+    line: int,
+    other: int,
+    name: VariableName,
+) -> PartingCell | None:
     column = [c for c in table.columns if c.variable == name]
     if len(column) != 1:
         return None
     mine, theirs = lines[line], lines[other]
     whole = (key_bounds(kinds[name]),)
-    for another in table.variables:
-        everything = (key_bounds(kinds[another]),)
-        if another != name and not _within(mine.get(another, everything), theirs.get(another, everything)):
-            return None
+    everything = {another: (key_bounds(kinds[another]),) for another in table.variables}
+    falls = any(
+        another != name and not _within(mine.get(another, every), theirs.get(another, every))
+        for another, every in everything.items()
+    )
     before = mine.get(name, whole)
     left = meet(before, complement(theirs.get(name, whole), *whole[0]))
-    cell = cells.cell(kinds[name], left) if left else None
-    if not cell or meet(left, theirs.get(name, whole)):
+    text = cells.cell(kinds[name], left) if left else None
+    if not text or meet(left, theirs.get(name, whole)):
         return None
-    return _Change(line, name, cell, size(before) - size(left))
+    return PartingCell(line, other, name, text, left, size(before) - size(left), falls)
+
+
+def with_cells(program: Program, table: Table, changed: Sequence[PartingCell]) -> Table | None:
+    """Return the table with these cells; of one cell changed twice, what both take. None if a line would never match."""
+    lines = list(table.lines)
+    for cell in changed:
+        at = next(at for at, column in enumerate(table.columns) if column.variable == cell.name)
+        kind, tests = program.variable(cell.name).type, list(lines[cell.line].tests)
+        old = tests[at]
+        box = cell.box if old is None or old.box is None else meet(old.box, cell.box)
+        if not box:
+            return None
+        tests[at] = Test(cells.cell(kind, box) or cell.text, _says(cell.name, kind, box), (cell.name,), box)
+        lines[cell.line] = replace(lines[cell.line], tests=tuple(tests))
+    return replace(table, lines=tuple(lines))
+
+
+def left_by(program: Program, table: Table, changed: Sequence[PartingCell]) -> str:
+    """Say whether lines still overlap, or never match, when all these cells are changed."""
+    after = with_cells(program, table, changed)
+    if after is None:
+        return "they contradict each other: a line would never match"
+    decided = boxes.TableBoxes.of(program, after)
+    left = next(iter(decided.overlaps()), None)
+    if left is not None:
+        first, second = (table.lines[at].name for at in left)
+        return f"lines `{first}` and `{second}` still both match some input"
+    return "proved that no two lines match any more"
+
+
+def _says(name: VariableName, kind: Scalar, box: Box) -> Expr:
+    """Return the condition that a leaf has one of the keys."""
+    read = Read(name, kind)
+
+    def compared(op: Op, key: int) -> Expr:
+        return Apply(op, (read, Literal(value_of_key(kind, key), kind)), Bool())
+
+    listed = isinstance(kind, Bool | Enum)
+    parts = (
+        [compared(Op.EQ, key) for low, high in box for key in range(low, high + 1)]
+        if listed
+        else [Apply(Op.AND, (compared(Op.GE, low), compared(Op.LE, high)), Bool()) for low, high in box]
+    )
+    return reduce(lambda either, part: Apply(Op.OR, (either, part), Bool()), parts)
 
 
 def _within(inner: Box, outer: Box) -> bool:

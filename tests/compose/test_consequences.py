@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
@@ -21,11 +22,16 @@ from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.frozen import case_breaks, read_case
 from rcsc.compose.counterexample.lasso import lassos
 from rcsc.compose.counterexample.lasso import obligation_of as obligation_to_end
+from rcsc.compose.counterexample.repair import Repairs, repairs, tried
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
-from rcsc.lang.model import Value, spell
+from rcsc.lang.interpret import initial
+from rcsc.lang.model import Value, spell, value_of_text
+from rcsc.table.repair import PartingCell, left_by, parting_cells, with_cells
+from rcsc.table.verdict import Overlap
 from tests.support.programs.systems import SYSTEM, going, lower_level, small_level, small_text
-from tests.support.proved import obligation_of
+from tests.support.programs.texts import edit_file
+from tests.support.proved import obligation_of, ran
 
 REPO = Path(__file__).parents[2]
 PUBLISHED = REPO / "tables" / "examples" / "published" / "system.toml"
@@ -176,6 +182,130 @@ def test_a_level_that_nobody_commands_has_no_superior_to_tell(
 ) -> None:
     alone = replace(task, links=replace(task.links, above=None))
     assert consequences(alone, empty.finding, LEGAL, 4) == ()
+
+
+# --- what repairs break ------------------------------------------------------------------------
+
+LATER = ("10", "11", "12", "13")
+EXECUTING = "in line `14` write `/= executing` under `status_in`: proved to part the two lines"
+
+
+@pytest.fixture(scope="module")
+def mended(task: TransitionSystem) -> Repairs:
+    """What would part each pair of lines of the published table, tried."""
+    pairs = [f"{line} and 14" for line in LATER] + ["14 and 15"]
+    findings = [finding_of(task, Sort.ONE_LINE, "acquire", pair) for pair in pairs]
+    return repairs(task, findings, [], 4)
+
+
+def cells_of(ts: TransitionSystem, *wanted: tuple[str, str]) -> tuple[PartingCell, ...]:
+    """The smallest cell in a line that parts it from another."""
+    [table] = ts.program.tables
+    names = [str(line.name) for line in table.lines]
+    found = []
+    for line, other in wanted:
+        first, second = sorted((names.index(line), names.index(other)))
+        every = parting_cells(ts.program, table, Overlap(first, second, {}))
+        found.append(next(cell for cell in every if table.lines[cell.line].name == line))
+    return tuple(found)
+
+
+def test_a_repair_that_breaks_nothing_more_stands_alone(mended: Repairs) -> None:
+    for line, helps_ in zip(LATER, mended.helps, strict=False):
+        [help_] = helps_
+        assert help_ == (
+            f"in line `{line}` write `/= f_state` under `cur_state`: proved to part the two lines; "
+            "line `14` then runs where both match; no run of 4 cycles shows that it breaks more"
+        )
+
+
+def test_a_repair_that_revokes_an_answer_comes_after_one_that_does_not(mended: Repairs) -> None:
+    """What is smallest lets line 15 report *executing* after *failed*; the other only loses the reason, and says where."""
+    first, second, third = mended.helps[-1]
+    assert first.startswith("in line `15` write `/= f_state` under `cur_state`: proved to part")
+    assert "DEFAULT takes what else it loses" in first
+    assert (
+        "in cycle 2 DEFAULT runs, where new_command = true, status_in = executing, cur_state = f_state"
+        in first
+    )
+    assert "from `failed` with `failure = cmd` to `failed` with `failure = state`" in first
+    assert second.startswith(EXECUTING)
+    assert second.endswith(
+        "but in cycle 2 line `15` changes the answer to a command "
+        "from `failed` with `failure = state` to `executing` with `failure = state`"
+    )
+    assert "from `done` to `failed`" in third
+
+
+def test_the_best_repairs_are_tried_together(mended: Repairs) -> None:
+    begins = "the first help of each of these 5 findings, all together: proved that no two lines match any more; but "
+    assert mended.together.startswith(begins)
+    assert "to `executing`" not in mended.together
+
+
+def test_the_smallest_repairs_together_report_executing_after_failed(task: TransitionSystem) -> None:
+    [table] = task.program.tables
+    smallest = cells_of(task, *((line, "14") for line in LATER), ("14", "15"))
+    assert left_by(task.program, table, smallest) == "proved that no two lines match any more"
+    trial = tried(task, table, smallest, [], 4)
+    assert trial.rank[:2] == (1, 0)
+    [breaks] = trial.breaks
+    assert re.search(r"line `15` changes .* from `failed` .* to `executing`", breaks)
+
+
+def test_a_repair_does_in_the_text_what_is_said_of_it(task: TransitionSystem, tmp_path: Path) -> None:
+    """The cells are those of the edited text; and the run that is told of runs there."""
+    folder = tmp_path / "examples"
+    shutil.copytree(REPO / "tables" / "examples", folder, ignore=shutil.ignore_patterns(".rcsc-cache"))
+    shutil.copy(REPO / "tables" / "rcsc.toml", tmp_path)
+    row = "| 14   | false       |                |           | f_state   |"
+    edit_file(
+        folder / "published" / "task.rcs",
+        (row, row.replace("|           | f_state", "| /= executing | f_state")),
+    )
+    edited = transition_systems(folder / "published" / "system.toml")["task"]
+    [table], [now] = task.program.tables, edited.program.tables
+    after = with_cells(task.program, table, cells_of(task, ("14", "15")))
+    assert after is not None
+    assert [lines.tests[2] and lines.tests[2].box for lines in after.lines] == [
+        lines.tests[2] and lines.tests[2].box for lines in now.lines
+    ]
+    inputs = {name: initial(edited.program)[name] for name in edited.inputs}
+    kind = edited.kinds["emove.status_report"]
+    given = [
+        inputs | {"emove.status_report": value_of_text(kind, word) or 0} for word in ("failed", "executing")
+    ]
+    steps = ran(edited, initial(edited.program), given)
+    assert [step.line for step in steps] == ["16", "15"]
+    told_ = [spell(kind, step.after["report.status_report"]) for step in steps]
+    assert told_ == ["failed", "executing"]
+
+
+def test_what_was_proved_and_is_broken_by_a_repair_is_told_first(task: TransitionSystem) -> None:
+    """As if it had been proved that no order is replaced before its echo."""
+    [table] = task.program.tables
+    kept = [obligation_of(task, Sort.WAITS, "", "to_emove")]
+    trial = tried(task, table, cells_of(task, ("10", "14")), kept, 4)
+    assert trial.rank[0] == 1
+    assert trial.breaks[0] == f"in cycle 2 this is no longer so: {kept[0].shown}"
+
+
+def test_repairs_that_contradict_each_other_say_so(tmp_path: Path) -> None:
+    """Each alone parts two lines; together they leave the middle line nothing."""
+    rows = "\n".join(
+        f"| {name} | {cell} || {name} |" for name, cell in (("low", "<= 4"), ("all", ""), ("high", ">= 5"))
+    )
+    path = tmp_path / "a.rcs"
+    path.write_text(
+        "enum word { low, all, high }\ninput x : int 0 .. 9\noutput o : word\n"
+        f"table t {{\n| line | x || o |\n|------|---||---|\n{rows}\n}}\n"
+    )
+    *_, last = [found for found in rcsc.check(path, cache=False).diagnostics if found.code.value == "RCS402"]
+    assert "line `high` then runs where both match (o high, not all)" in last.help[0]
+    [note] = last.notes
+    assert (
+        note == "the helps of these 2 overlaps together: they contradict each other: a line would never match"
+    )
 
 
 # --- other initial values ----------------------------------------------------------------------

@@ -707,10 +707,13 @@ def test_a_case_that_cannot_be_run_says_why(
 def test_the_cell_that_parts_two_lines_is_shown(published: Looked) -> None:
     said = {key[2]: helps(published.ts, published.finding(key)) for key in HAZARDS if key[0] is Sort.ONE_LINE}
     assert said["14 and 15"] == (
-        "in line `14` write `/= executing` under `status_in`: proved to part the two lines",
+        (
+            "in line `14` write `/= executing` under `status_in`: proved to part the two lines; line `15` then runs where both match "
+            "(command_out blank, not pause; status_out executing, not fail)"
+        ),
     )
     assert said["13 and 14"] == (
-        "in line `13` write `/= f_state` under `cur_state`: proved to part the two lines",
+        "in line `13` write `/= f_state` under `cur_state`: proved to part the two lines; line `14` then runs where both match",
     )
 
 
@@ -811,7 +814,12 @@ def test_rcsc_prove_gives_findings_as_json(capsys: pytest.CaptureFixture[str]) -
     assert one["reproduces"]
     assert [row["line"] for row in one["time_line"]] == ["start", "busy and start"]
     assert one["time_line"][-1]["wrong"] == "several lines match"
-    assert one["helps"] == ["in line `busy` write `false` under `new_command`: proved to part the two lines"]
+    assert one["helps"] == [
+        (
+            "in line `busy` write `false` under `new_command`: proved to part the two lines; "
+            "line `start` then runs where both match; no run of 4 cycles shows that it breaks more"
+        )
+    ]
 
 
 def test_an_executor_that_differs_is_reported_side_by_side(

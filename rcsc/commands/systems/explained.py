@@ -70,6 +70,8 @@ def say_explanation(
         click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
     for line in explanation.helps:
         click.echo(f"  = help: {line}", err=True)
+    if explanation.together:
+        click.echo(f"  = note: {explanation.together}", err=True)
     if explanation.others:
         click.echo(f"  = note: no such run shows both of lines {', '.join(explanation.others)}", err=True)
     if explanation.log is not None:
@@ -195,6 +197,7 @@ def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Ex
             for then in explanation.follows or ()
         ],
         "helps": list(explanation.helps),
+        "helps_together": explanation.together,
         "others": list(explanation.others),
         "log": "" if explanation.log is None else str(explanation.log),
     }

@@ -103,10 +103,10 @@ def consequences(
 
 def reported(ts: TransitionSystem, leaves: Snapshot) -> Report:
     """Return what the superior takes of a report."""
-    return tuple((leaf, leaves[leaf]) for leaf in _told(ts))
+    return tuple((leaf, leaves[leaf]) for leaf in told_by(ts))
 
 
-def _told(ts: TransitionSystem) -> tuple[str, ...]:
+def told_by(ts: TransitionSystem) -> tuple[str, ...]:
     """List the leaves of the report by which answers are told apart: the status, and what is enumerated beside it."""
     above = ts.links.above
     assert above is not None
@@ -116,6 +116,20 @@ def _told(ts: TransitionSystem) -> tuple[str, ...]:
         if leaf not in {above.status, above.echo, above.echoed} and isinstance(ts.kinds[leaf], Bool | Enum)
     ]
     return (above.status, *others)
+
+
+def answered(ts: TransitionSystem, cycle: Cycle, leaves: Leaves) -> Node:
+    """Return the condition that the report in these leaves says *done* or *failed* of the command of the cycle."""
+    above = ts.links.above
+    assert above is not None
+    kind = ts.kinds[above.status]
+    members = kind.members if isinstance(kind, Enum) else ()
+    answers = values.any_of(
+        values.equal(leaves[above.status], values.constant(kind, members.index(word)))
+        for word in (above.done, above.failed)
+        if word in members
+    )
+    return values.both(values.equal(leaves[above.echo], cycle.taken[above.number]), answers)
 
 
 @dataclass(slots=True)
@@ -152,8 +166,8 @@ class _Followed:
                 self._each(how, alike)
             if not waits or len(self.results) == MOST:
                 return
-            answered = values.any_of(self._answered(cycle, cycle.after) for cycle in self.since)
-            waits = self.run.reaches(values.negation(answered))
+            told = values.any_of(answered(self.ts, cycle, cycle.after) for cycle in self.since)
+            waits = self.run.reaches(values.negation(told))
 
     def _up_to_the_finding(self) -> Node:
         """Require that the last cycle breaks the obligation; return the condition that all begins as in the finding."""
@@ -203,33 +217,20 @@ class _Followed:
         last = since[-1]
         match how:
             case How.ANSWERED:
-                now, before = (self._answered(last, leaves) for leaves in (last.after, last.before))
+                now, before = (answered(self.ts, last, leaves) for leaves in (last.after, last.before))
                 return values.all_of((last.goes_on, now, values.negation(before)))
             case How.STOPS:
                 return values.negation(last.goes_on)
             case How.CHANGED:
                 other = values.any_of(
                     values.negation(values.equal(last.before[leaf], last.after[leaf]))
-                    for leaf in _told(self.ts)
+                    for leaf in told_by(self.ts)
                 )
-                return values.all_of((last.goes_on, self._answered(last, last.before), other))
+                return values.all_of((last.goes_on, answered(self.ts, last, last.before), other))
             case How.REPEATS:
                 table = self.steps[-1].table
                 round_ = values.any_of(comes_round(self.ts, table, since[at:]) for at in range(len(since)))
-                return values.both(round_, values.negation(self._answered(last, last.after)))
-
-    def _answered(self, cycle: Cycle, leaves: Leaves) -> Node:
-        """Return the condition that the report in these leaves says *done* or *failed* of the command of the cycle."""
-        above = self.ts.links.above
-        assert above is not None
-        kind = self.ts.kinds[above.status]
-        members = kind.members if isinstance(kind, Enum) else ()
-        answers = values.any_of(
-            values.equal(leaves[above.status], values.constant(kind, members.index(word)))
-            for word in (above.done, above.failed)
-            if word in members
-        )
-        return values.both(values.equal(leaves[above.echo], cycle.taken[above.number]), answers)
+                return values.both(round_, values.negation(answered(self.ts, last, last.after)))
 
     def _alike(self, result: Consequence, cycle: Cycle) -> Node:
         """Return the condition that this cycle comes to the same as the last one of a consequence."""

@@ -15,10 +15,10 @@ from rcsc.compose.counterexample.consequence import Consequence, consequences
 from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
 from rcsc.compose.counterexample.pair import broken_together
-from rcsc.compose.counterexample.repair import helps
+from rcsc.compose.counterexample.repair import TRIED_CYCLES, helps, repairs
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_in_python, record
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, traces
-from rcsc.compose.proof.level import LevelProof, essential
+from rcsc.compose.proof.level import LevelProof, Verdict, essential
 from rcsc.compose.proof.system import SystemProof
 from rcsc.host.children import scratch
 from rcsc.run.description import Description
@@ -38,6 +38,7 @@ class Explanation:
         log: Where the run is kept.
         others: Pairs of lines of the same table that no run shows.
         in_c: Whether the C executor ran it, too; it cannot if an extern procedure has to give what no C function can.
+        together: What the first repairs of all findings of its table do together, at the last of them.
         follows: What comes of it, each with a run that the executors repeated, too; None if that was not looked for.
     """
 
@@ -51,6 +52,7 @@ class Explanation:
     others: tuple[str, ...] = field(default=())
     in_c: bool = True
     follows: tuple[Consequence, ...] | None = None
+    together: str = ""
 
     @property
     def warns(self) -> bool:
@@ -106,7 +108,7 @@ def explain(
     with scratch("findings") as kept:
         rerun = _Rerun(systems, settings, settings.log or kept)
         for level in proof.levels:
-            for explanation in _level(systems, level.level, essential(level), settings):
+            for explanation in _level(systems, level, settings):
                 yield rerun.run(explanation)
             for explanation in _together(systems, level.level, essential(level), settings):
                 yield rerun.run(explanation)
@@ -115,15 +117,13 @@ def explain(
 
 
 def _level(
-    systems: Mapping[str, TransitionSystem],
-    level: str,
-    wanted: tuple[Obligation, ...],
-    settings: TraceSettings,
+    systems: Mapping[str, TransitionSystem], proof: LevelProof, settings: TraceSettings
 ) -> Iterator[Explanation]:
+    wanted = essential(proof)
     if not settings.most:
-        yield from (Explanation(level, obligation) for obligation in wanted)
+        yield from (Explanation(proof.level, obligation) for obligation in wanted)
         return
-    ts = systems[level]
+    ts = systems[proof.level]
     every = pairs(ts.cycle(ts.havoc()))
     parted = {
         obligation.key: [part for part in every if part.table == obligation.table]
@@ -134,7 +134,8 @@ def _level(
     results = _searched(ts, asked, settings)
     for obligation in wanted:
         if obligation.key in parted:
-            yield from _pairs(ts, obligation, parted[obligation.key], results)
+            every_pair = list(_pairs(ts, obligation, parted[obligation.key], results))
+            yield from _with_repairs(ts, every_pair, proof, settings)
         else:
             yield _explanation(ts, obligation, results.get(obligation.key))
 
@@ -166,6 +167,23 @@ def _pairs(
         yield replace(
             _explanation(ts, pair, results[pair.key]), others=others if at == len(shown) - 1 else ()
         )
+
+
+def _with_repairs(
+    ts: TransitionSystem, every: list[Explanation], proof: LevelProof, settings: TraceSettings
+) -> Iterator[Explanation]:
+    """Add what would part the lines, tried; the last says what the repairs of all do together."""
+    findings = [explanation.finding for explanation in every if explanation.finding is not None]
+    if not findings or settings.altered:  # cells of a variant are not what is written
+        yield from every
+        return
+    kept = [obligation for obligation, verdict in proof.verdicts if verdict is Verdict.PROVED]
+    tries = repairs(ts, findings, kept, min(settings.most, TRIED_CYCLES))
+    left = iter(tries.helps)
+    for at, explanation in enumerate(every):
+        shown = next(left) if explanation.finding is not None else ()
+        together = tries.together if at == len(every) - 1 else ""
+        yield replace(explanation, helps=shown, together=together)
 
 
 def _explanation(ts: TransitionSystem, obligation: Obligation, result: TraceResult | None) -> Explanation:
@@ -258,8 +276,8 @@ class _Rerun:
         except ExecutorsDifferError as error:
             return replace(explanation, beside=error.beside)
         in_c = not only_in_python(finding, self.systems)
-        repairs = helps(self.systems[explanation.level], finding)
-        return replace(explanation, helps=repairs, log=path, in_c=in_c, follows=follows)
+        suggested = explanation.helps or helps(self.systems[explanation.level], finding)
+        return replace(explanation, helps=suggested, log=path, in_c=in_c, follows=follows)
 
     def _follows(self, finding: Finding) -> tuple[Consequence, ...] | None:
         """Find what comes of a finding of one level that has a superior."""

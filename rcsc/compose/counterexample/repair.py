@@ -1,25 +1,45 @@
 """Suggests repairs of a table that a run breaks: a cell, a line, or the weakest condition under which exactly one line matches.
 
 In: a transition system and a finding. Out: sentences in table words, each proved of the table as it stands; none if no small repair is
-known.
+known. A cell that parts two lines is also tried: on the changed table runs are searched in which another line runs than before and the
+answer to a command changes, or DEFAULT runs, and runs that break an obligation that was proved. What is found of each stands beside it, and
+those that break less come first. Nothing found is no proof: the runs are bounded.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 
-from rcsc.compose.contract.obligations import Sort, pause_of
-from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.counterexample.cycle_run import CycleRun, seen_by_table
+from rcsc.compose.contract.obligations import Obligation, Sort, obligations, pause_of
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.counterexample.consequence import answered, reported, spelled_report, told_by
+from rcsc.compose.counterexample.cycle_run import CycleRun, ran_on, seen_by_table
 from rcsc.compose.counterexample.finding import Finding
-from rcsc.lang.interpret import matching_lines
-from rcsc.lang.model import Box, Enum, Program, Scalar, Snapshot, Table, key_of
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, Unrolled, traces
+from rcsc.lang.interpret import UNDEFINED, matching_lines
+from rcsc.lang.model import Box, Enum, Program, Scalar, Snapshot, Table, key_of, spell
+from rcsc.solvers.sat import GaveUpError
+from rcsc.symbolic import values
+from rcsc.symbolic.values import Node
 from rcsc.table import boxes, cells
 from rcsc.table.regions.partition import BudgetError, Gaps
-from rcsc.table.repair import closing_line, parting_cell
+from rcsc.table.repair import (
+    PartingCell,
+    closing_line,
+    left_by,
+    parting_cell,
+    parting_cells,
+    with_cells,
+)
 from rcsc.table.verdict import Gap, Overlap, Region
 
 MOST_REGIONS = 3
 """Regions that a condition may exclude and still be small."""
+MOST_FINDINGS, MOST_TRIED, MOST_SHOWN = 10, 2, 3
+"""Findings of a table whose repairs are tried; cells of each line that are; repairs of a finding that are shown."""
+TRIED_CYCLES = 4
+"""Cycles of the runs in which repairs are tried."""
 
 
 def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
@@ -75,6 +95,227 @@ def _suggested(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[s
         yield f"line `{table.lines[matching[0]].name}` matches all the same, and no other"
     if (weakest := weakest_condition(ts.program, table)) and step.failed:
         yield f"exactly one line matches under no more than this: {weakest}: proved"
+
+
+# --- repairs that are tried --------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """Cells that part lines, and what else they do in runs.
+
+    Attributes:
+        cells: The cells, of one table.
+        breaks: What they break, in words.
+        rank: The less, the better: obligations broken and answers revoked; reasons changed and inputs that fall to DEFAULT; keys lost.
+    """
+
+    cells: tuple[PartingCell, ...]
+    breaks: tuple[str, ...]
+    rank: tuple[int, int, int]
+
+    def shown(self, table: Table, most: int) -> str:
+        """Say the one cell, and what it breaks in runs of up to `most` cycles."""
+        return f"{self.cells[0].shown(table)}; {self.outcome(most)}"
+
+    def outcome(self, most: int) -> str:
+        """Say what they break."""
+        return (
+            f"but {'; '.join(self.breaks)}"
+            if self.breaks
+            else f"no run of {most} cycles shows that it breaks more"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Repairs:
+    """What parts the lines of one table that both match in some run.
+
+    Attributes:
+        helps: For each finding its repairs in words, the best first.
+        together: What the best of all findings do together, in words; empty for fewer than two.
+    """
+
+    helps: tuple[tuple[str, ...], ...]
+    together: str = ""
+
+
+def repairs(
+    ts: TransitionSystem, findings: Sequence[Finding], kept: Sequence[Obligation], most: int
+) -> Repairs:
+    """Try what parts the two lines of each finding of one table, alone and together.
+
+    Args:
+        ts: The level.
+        findings: Runs in which two lines of the table match.
+        kept: Obligations that are proved, and should stay so.
+        most: The most cycles of a run.
+    """
+    table = ts.table(findings[0].broken.table)
+    shown: list[tuple[str, ...]] = []
+    best: list[PartingCell] = []
+    for finding in findings:
+        cells_ = _parting(ts, table, finding)
+        if len(shown) >= MOST_FINDINGS or not cells_:
+            shown.append(helps(ts, finding))
+            continue
+        every = _ranked(tried(ts, table, (cell,), kept, most) for cell in cells_)
+        worth = every[: 1 if not every[0].breaks else MOST_SHOWN]
+        shown.append(tuple(one.shown(table, most) for one in worth))
+        best.append(every[0].cells[0])
+    return Repairs(tuple(shown), _together(ts, table, best, kept, most))
+
+
+def _ranked(every: Iterable[Tried]) -> list[Tried]:
+    """Try one after the other, until one breaks nothing; return them, the best first."""
+    so_far: list[Tried] = []
+    for trial in every:
+        so_far.append(trial)
+        if not trial.breaks:
+            break
+    return sorted(so_far, key=lambda trial: trial.rank)
+
+
+def _parting(ts: TransitionSystem, table: Table, finding: Finding) -> tuple[PartingCell, ...]:
+    """Return the smallest cells that part the lines of a finding: of each line one or two."""
+    places = [at for at, line in enumerate(table.lines) if line.name in finding.obligation.lines]
+    if len(places) != 2:
+        return ()
+    every = parting_cells(ts.program, table, Overlap(places[0], places[1], {}))
+    tries = [cell for line in places for cell in [one for one in every if one.line == line][:MOST_TRIED]]
+    return tuple(cell for cell in every if cell in tries)
+
+
+def _together(
+    ts: TransitionSystem, table: Table, best: Sequence[PartingCell], kept: Sequence[Obligation], most: int
+) -> str:
+    if len(best) < 2:
+        return ""
+    begins = f"the first help of each of these {len(best)} findings, all together: {left_by(ts.program, table, best)}"
+    if with_cells(ts.program, table, best) is None:
+        return begins
+    return f"{begins}; {tried(ts, table, tuple(best), kept, most).outcome(most)}"
+
+
+def tried(
+    ts: TransitionSystem,
+    table: Table,
+    changed: tuple[PartingCell, ...],
+    kept: Sequence[Obligation],
+    most: int,
+) -> Tried:
+    """Search runs of the level with these cells in which they do harm."""
+    after = with_cells(ts.program, table, changed)
+    assert after is not None
+    tables = tuple(after if each is table else each for each in ts.program.tables)
+    new = ts.of(replace(ts.program, tables=tables))
+    trial = _Trial(new, table, after, changed, Unrolled(new, TraceSearch(most, legal=True)))
+    harms = trial.search(most)
+    owed = {obligation.key for obligation in obligations(new, new.cycle(new.havoc()))}
+    still = [
+        obligation for obligation in kept if obligation.key in owed
+    ]  # what no line can break is not owed
+    broken = traces(new, still, TraceSearch(most, legal=True))
+    words = [
+        f"in cycle {len(trace.steps)} this is no longer so: {obligation.shown}"
+        for obligation in still
+        if isinstance(trace := broken.get(obligation.key), Trace)
+    ]
+    grave = len(words) + (Harm.REVOKED in harms)
+    slight = len(harms) - (Harm.REVOKED in harms)
+    return Tried(changed, (*words, *harms.values()), (grave, slight, sum(cell.lost for cell in changed)))
+
+
+class Harm(StrEnum):
+    """What another line does in place of the one that ran, besides what is owed."""
+
+    REVOKED = "revoked"
+    REASON = "reason"
+    DEFAULT = "default"
+
+
+@dataclass(slots=True)
+class _Trial:
+    """The runs of a level whose table has changed cells.
+
+    Attributes:
+        table: The table as it was; `after`, as it would be.
+        changed: The cells.
+    """
+
+    ts: TransitionSystem
+    table: Table
+    after: Table
+    changed: tuple[PartingCell, ...]
+    run: Unrolled
+    harms: dict[Harm, str] = field(default_factory=dict)
+
+    def search(self, most: int) -> dict[Harm, str]:
+        """Find the shortest run to each harm; return them in words."""
+        with suppress(GaveUpError):
+            for _ in range(most):
+                cycle = self.run.further()
+                for harm in Harm:
+                    if harm not in self.harms:
+                        self._look(harm, cycle)
+        return {harm: self.harms[harm] for harm in Harm if harm in self.harms}
+
+    def _look(self, harm: Harm, cycle: Cycle) -> None:
+        wanted = values.both(self._moved(cycle), self._does(harm, cycle))
+        if not self.run.reaches(wanted):
+            return
+        start, given = self.run.inputs(wanted)
+        try:
+            steps = ran_on(self.ts, start, given)
+        except UNDEFINED:
+            return
+        if len(steps) == len(given) and (words := self._words(harm, steps)):
+            self.harms[harm] = words
+
+    def _moved(self, cycle: Cycle) -> Node:
+        """Return the condition that a line matched before, and does not with its changed cell."""
+        at = next(at for at in cycle.tables if at.table.name == self.table.name)
+        before = self.ts.matches(cycle, self.table, {})
+        lost = (
+            values.both(before[cell.line], values.negation(at.matches[cell.line])) for cell in self.changed
+        )
+        return values.all_of((at.runs, cycle.goes_on, values.any_of(lost)))
+
+    def _does(self, harm: Harm, cycle: Cycle) -> Node:
+        if harm is Harm.DEFAULT:
+            at = next(at for at in cycle.tables if at.table.name == self.table.name)
+            return at.none if at.table.default is not None else values.FALSE
+        if self.ts.links.above is None:
+            return values.FALSE
+        status, *others = (values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in told_by(self.ts))
+        if harm is Harm.REVOKED:
+            return values.both(answered(self.ts, cycle, cycle.before), values.negation(status))
+        reason = values.both(status, values.negation(values.all_of(others)))
+        return values.both(answered(self.ts, cycle, cycle.before), reason)
+
+    def _words(self, harm: Harm, steps: Sequence[CycleRun]) -> str:
+        """Say what the last cycle does; empty if the interpreter does not do so."""
+        last, at = steps[-1], len(steps)
+        if harm is Harm.DEFAULT:
+            default = self.after.default
+            seen = seen_by_table(self.ts, last)
+            if default is None or last.line != default.name or seen is None:
+                return ""
+            read = (f"{name} = {spell(self.ts.kinds[name], seen[name])}" for name in self._narrowing())
+            return f"in cycle {at} DEFAULT runs, where {', '.join(read)}"
+        before, report = (reported(self.ts, leaves) for leaves in (last.before, last.after))
+        if before == report:
+            return ""
+        then, now = (spelled_report(self.ts, each) for each in (before, report))
+        return f"in cycle {at} line `{last.line}` changes the answer to a command from {then} to {now}"
+
+    def _narrowing(self) -> tuple[str, ...]:
+        """List the leaves that the lines whose cells are changed look at."""
+        lines = [self.after.lines[at] for cell in self.changed for at in (cell.line, cell.other)]
+        read = {
+            str(name) for line in lines for test in line.tests if test is not None for name in test.variables
+        }
+        return tuple(str(name) for name in self.table.variables if name in read)
 
 
 def around(program: Program, table: Table, seen: Snapshot) -> Region:
