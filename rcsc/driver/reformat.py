@@ -11,8 +11,9 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
 from rcsc.diagnostics.printable import escape
 from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Source, Span
+from rcsc.diff.upgrade import Upgraded, upgrade
 from rcsc.host.files import write_atomically
-from rcsc.lang.project import load
+from rcsc.lang.project import load, project_root
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.layout import WIDTH
@@ -28,18 +29,22 @@ class Formatted:
         texts: Each file's new text.
         diff: How the files differ from it.
         changed: How many differ.
+        upgraded: What was upgraded and what was left, in words.
     """
 
     report: Report
     texts: dict[str, str]
     diff: str
     changed: int
+    upgraded: tuple[str, ...] = ()
 
 
-def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool, width: int = WIDTH) -> Formatted:
+def reformat(
+    paths: tuple[str, ...], stdin: bytes | None, *, write: bool, width: int = WIDTH, older: bool = False
+) -> Formatted:
     """Format every file that the paths mean; used files that they do not mean are left alone.
 
-    Tables become at most `width` characters wide, where that can be.
+    Tables become at most `width` characters wide, where that can be. Where `older` is set, older forms are rewritten first.
     """
     loaded = load(paths, stdin)
     roots = [name for name in loaded.given if name in loaded.files]
@@ -48,9 +53,10 @@ def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool, width:
         for diagnostic in loaded.diagnostics
         if diagnostic.code.value < "RCS2" and _of(diagnostic, loaded.given, paths)
     )
-    texts = {name: _text(name, loaded.files[name], width) for name in roots}
+    upgraded = _upgraded(paths, stdin, roots) if older else Upgraded({})
+    texts = {name: _text(name, upgraded.files.get(name, loaded.files[name]), width) for name in roots}
     changed = {name: text for name, text in texts.items() if text != loaded.sources[name].text}
-    diagnostics = list(mine)
+    diagnostics = [*mine, *upgraded.diagnostics]
     for name, text in changed.items():
         if not write:
             diagnostics.append(_unformatted(loaded.sources[name], text))
@@ -58,7 +64,14 @@ def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool, width:
             diagnostics += _replace(name, text)
     diff = "".join(line for name in changed for line in _diff(loaded.sources[name], texts[name]))
     report = Report(tuple(sorted(diagnostics, key=sort_key)), (), loaded.sources)
-    return Formatted(report, texts, diff, len(changed))
+    return Formatted(report, texts, diff, len(changed), (*upgraded.done, *upgraded.left))
+
+
+def _upgraded(paths: tuple[str, ...], stdin: bytes | None, names: list[str]) -> Upgraded:
+    """The files upgraded, as far as no program of their projects comes to mean something else."""
+    folders = dict.fromkeys(project_root(name) for name in names if name != "-")
+    whole = load((*paths, *folders), stdin)
+    return upgrade(whole, [name for name in names if name in whole.files])
 
 
 def _of(diagnostic: Diagnostic, roots: tuple[str, ...], paths: tuple[str, ...]) -> bool:

@@ -20,7 +20,7 @@ from rcsc.diagnostics.source import Span
 from rcsc.lang.operator_table import COMPARISONS as COMPARISONS  # noqa: PLC0414 - part of the model
 from rcsc.lang.operator_table import Op as Op  # noqa: PLC0414 - as above
 from rcsc.lang.operator_table import Operator
-from rcsc.lang.restart import Adopted
+from rcsc.lang.restart import Adopted, Part, by_names
 
 VariableName = NewType("VariableName", str)
 ProcedureName = NewType("ProcedureName", str)
@@ -227,6 +227,13 @@ class Variable:
     span: Span = at()
     safe: Value | None = None
     restart: Value | None = None
+
+    @property
+    def part(self) -> Part:
+        """What its name may mean when the program starts anew."""
+        members = self.type.members if isinstance(self.type, Enum) else ()
+        whole = (self.type.low, self.type.high) if isinstance(self.type, Int) else None
+        return Part(self.kind is Kind.OUTPUT, members, whole)
 
 
 def pending(name: str) -> VariableName:
@@ -759,6 +766,13 @@ class Program:
     def types(self) -> "tuple[Enum | Record, ...]":
         """Every declared type."""
         return (*self.enums, *self.records)
+
+    @property
+    def adopted(self) -> dict[str, Adopted]:
+        """What each leaf adopts that starts anew other than initially."""
+        if self.restart is None:
+            return by_names({str(variable.name): variable.part for variable in self.variables})
+        return {str(leaf): adopted for leaf, adopted in self.restart}
 
     def variable(self, name: str) -> Variable:
         """The leaf called `name`; KeyError if there is none."""

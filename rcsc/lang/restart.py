@@ -3,9 +3,9 @@
 In: the parts of a program, as leaves or as a symbol file has them. Out: for each leaf that starts other than initially, from what. The
 proof and the running level read the same list.
 
-A program that declares whom it serves and commands says itself what it adopts. For any other it goes by the names that the protocol's
-variables usually have: the input `command` with `inc_command`, the state `inc_command_seen`, orders `to_NAME`, and the input `NAME`
-that echoes them.
+A program that declares whom it serves and commands says itself what it adopts, and so does a variable with `restart`. For the
+rest of a program that writes the protocol by hand it goes by the names that the protocol's variables usually have: the input
+`command` with `inc_command`, the state `inc_command_seen`, orders `to_NAME`, and the input `NAME` that echoes them.
 """
 
 from collections.abc import Iterator, Mapping

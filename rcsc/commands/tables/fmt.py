@@ -18,6 +18,7 @@ Examples:
   rcsc fmt --check         change nothing; 1 if something would change
   rcsc fmt --diff a.rcs    show what would change
   rcsc fmt --width 200     tables in a wider window
+  rcsc fmt --upgrade a.rcs older forms, too, where nothing comes to mean something else
   rcsc fmt - < a.rcs       from standard input to standard output""",
 )
 @PATHS
@@ -25,14 +26,23 @@ Examples:
 @click.option("--diff", is_flag=True, help="Change nothing; show what would change.")
 @click.option("--width", type=click.IntRange(min=1), default=WIDTH, show_default=True,
               help="Lay out tables that are wider in more rows and parts.")  # fmt: skip
+@click.option(
+    "--upgrade",
+    is_flag=True,
+    help="Rewrite older forms, too, where that changes no program; say what was left.",
+)
 @showing
-def command(paths: tuple[str, ...], only_check: bool, diff: bool, width: int, output: Output) -> int:
+def command(
+    paths: tuple[str, ...], only_check: bool, diff: bool, width: int, upgrade: bool, output: Output
+) -> int:
     """Align tables and lay out the rest, always in the same way.
 
     What a file says stays the same, comments included; that is checked before a file is replaced.
     """
     write = not (only_check or diff)
-    formatted = reformat(paths or (".",), piped(paths), write=write, width=width)
+    formatted = reformat(paths or (".",), piped(paths), write=write, width=width, older=upgrade)
+    for words in formatted.upgraded:
+        click.echo(words, err=True)
     if diff:
         click.echo(formatted.diff, nl=False)
         return 1 if formatted.report.failed else 0

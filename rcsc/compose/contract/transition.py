@@ -15,7 +15,6 @@ from rcsc.lang.model import (  # fmt: skip
     Bool,
     Call,
     Default,
-    Enum,
     Int,
     Kind,
     Level,
@@ -28,9 +27,8 @@ from rcsc.lang.model import (  # fmt: skip
     Snapshot,
     Standing,
     Table,
-    Variable,
 )
-from rcsc.lang.restart import Adopted, After, Fixed, Part, SameAs, by_names
+from rcsc.lang.restart import After, Fixed, SameAs
 from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import ExternResults, State
 from rcsc.symbolic.execution import Run
@@ -145,13 +143,6 @@ def _matches(run: Run, line: Line) -> Node:
     return values.all_of(run.evaluate(test.condition) for test in line.tests if test is not None)
 
 
-def _part(variable: Variable) -> Part:
-    """What the name of a leaf may mean when the program starts anew."""
-    members = variable.type.members if isinstance(variable.type, Enum) else ()
-    whole = (variable.type.low, variable.type.high) if isinstance(variable.type, Int) else None
-    return Part(variable.kind is Kind.OUTPUT, members, whole)
-
-
 @dataclass(frozen=True, slots=True)
 class Safety:
     """Why a cycle as nodes is what the executors do: every operation is defined, and every value in range.
@@ -234,7 +225,7 @@ class TransitionSystem:
         start |= {
             name: values.variable(f"{name} before restart", self.kinds[name]) for name in sorted(self.inputs)
         }
-        for leaf, adopted in self._adopted().items():
+        for leaf, adopted in self.program.adopted.items():
             match adopted:
                 case Fixed(value):
                     start[leaf] = values.constant(self.kinds[leaf], value)
@@ -244,12 +235,6 @@ class TransitionSystem:
                     late = values.variable(f"{leaf} before restart", self.kinds[leaf])
                     start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
         return start
-
-    def _adopted(self) -> Mapping[str, Adopted]:
-        """Return what each leaf adopts that starts other than initially."""
-        if self.program.restart is not None:
-            return {str(leaf): adopted for leaf, adopted in self.program.restart}
-        return by_names({str(v.name): _part(v) for v in self.program.variables})
 
     def of(self, program: Program) -> "TransitionSystem":
         """Return the same level with another program of the same leaves."""

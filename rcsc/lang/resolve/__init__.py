@@ -20,6 +20,6 @@ enumerations, constants), `variables`, `externs`, `statements`, `procedures`, `t
 `properties`, `roles`.
 """
 
-from rcsc.lang.resolve.program import compile_text, resolve
+from rcsc.lang.resolve.program import closure, compile_text, resolve
 
-__all__ = ["compile_text", "resolve"]
+__all__ = ["closure", "compile_text", "resolve"]

@@ -19,7 +19,7 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.protocol import Flags, Parties, Party, Watched, condition, in_step
 from rcsc.lang.resolve.variables import value_given
-from rcsc.lang.restart import Adopted, After, Fixed, SameAs
+from rcsc.lang.restart import Adopted, After, Fixed, SameAs, by_names
 
 
 def roles_of(scope: Scope, parties: Parties) -> Roles | None:
@@ -51,12 +51,16 @@ def _part_of(leaf: str, record: str) -> bool:
 
 
 def restart_of(scope: Scope, parties: Parties) -> tuple[tuple[VariableName, Adopted], ...] | None:
-    """Return what leaves adopt that the protocol or a variable's `restart` says; None where neither does."""
-    adopted = dict(_protocol(scope, parties))
-    for name, leaf in scope.leaves.items():
-        if leaf.restart is not None:
-            adopted[name] = Fixed(leaf.restart)
-    return tuple((VariableName(leaf), value) for leaf, value in adopted.items()) or None
+    """Return what leaves adopt; None where neither the protocol nor a variable's `restart` says, and all goes by names.
+
+    Where only variables say, the others still go by their names: a level that numbers its orders by hand does so after a restart, too.
+    """
+    declared = {name: Fixed(leaf.restart) for name, leaf in scope.leaves.items() if leaf.restart is not None}
+    if not parties and not declared:
+        return None
+    parts = {name: leaf.part for name, leaf in scope.leaves.items()}
+    adopted = dict(_protocol(scope, parties)) if parties else by_names(parts)
+    return tuple((VariableName(leaf), value) for leaf, value in (adopted | declared).items())
 
 
 def _protocol(scope: Scope, parties: Parties) -> Iterator[tuple[str, Adopted]]:

@@ -1,0 +1,190 @@
+"""`rcsc fmt --upgrade`: what is rewritten changes no program; what could not be is said."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.driver.reformat import Formatted, reformat
+from rcsc.lang.restart import After, Fixed, SameAs
+from tests.support.programs.stages import program_of, shipped
+from tests.support.programs.texts import edited
+
+REPO = Path(__file__).parents[2]
+WORDS = """
+enum order { rest, go }
+enum status { done, executing, failed }
+enum why { none, restart }
+"""
+BY_HAND = (
+    WORDS
+    + """
+enum phase { d_state, f_state }
+record order_of { inc_command : int 0 .. 65535  input_command : order  far : int 0 .. 9 }
+record report_of { inc_command_echo : int 0 .. 65535  ref_command_echo : order  status_report : status  failure : why }
+input command : order_of
+output report : report_of
+state new_command : bool
+state inc_command_seen : int 0 .. 65535
+# The phase.
+state cur_state : phase
+state failure : why
+state other : phase
+module receive reads command, inc_command_seen writes new_command, inc_command_seen {
+  new_command := command.inc_command /= inc_command_seen
+  inc_command_seen := command.inc_command
+}
+table t {
+  | line | when ||
+  |------|------||
+  | only | true ||
+}
+level hand {
+  period 40 [ms]
+  preprocess receive
+  table t
+}
+"""
+)
+DECLARED = (
+    WORDS
+    + """
+link below {
+  command : order rest rest
+  status : status done done failed failed executing executing
+  report { reason why : why restart restart }
+}
+link above {
+  command : order rest rest
+  status : status done done failed failed executing executing
+  report { reason why : why restart restart }
+}
+serves boss : above
+commands arm : below
+enum phase { home, away }
+state phase : phase deferred until from_arm.inc_command_echo = to_arm.inc_command
+procedure phase(value : phase) { next phase := value }
+procedure executing { to_boss.status_report := executing }
+# Not as the protocol makes it.
+procedure done { to_boss.status_report := done  to_boss.why := none }
+## Why: a doc line would be lost.
+procedure failed { to_boss.status_report := failed }
+table t {
+  | line | new_command | arm.resting | arm.status || procedures  | arm  | status_out |
+  |------|-------------|-------------|------------||-------------|------|------------|
+  | wait | true        | false       |            || settle      |      |            |
+  | go   | true        | true        |            || phase(away) | go   | executing  |
+  | on   | false       |             | executing  ||             |      | executing  |
+  | end  | false       |             | done       || phase(home) | rest | done       |
+  | bad  | false       |             | failed     || phase(home) | rest | failed     |
+}
+level arm_user {
+  period 40 [ms]
+  table by boss.input_command { rest : t  go : t }
+}
+"""
+)
+
+
+def upgraded(folder: Path, text: str) -> tuple[Formatted, str]:
+    """What became of a file of its own project, and its text then."""
+    path = folder / "a.rcs"
+    path.write_text(text, encoding="utf-8")
+    (folder / "rcsc.toml").write_text("", encoding="utf-8")
+    formatted = reformat((str(path),), None, write=True, older=True)
+    return formatted, path.read_text(encoding="utf-8")
+
+
+def test_what_a_restart_gives_by_name_is_written_out(tmp_path: Path) -> None:
+    formatted, text = upgraded(tmp_path, BY_HAND)
+    assert "# The phase.\nstate cur_state : phase restart f_state\n" in text
+    assert "state failure : why restart restart\nstate other : phase\n" in text
+    assert program_of(text).adopted == program_of(BY_HAND).adopted
+    assert [words.partition(": ")[2] for words in formatted.upgraded[:2]] == [
+        "`cur_state` says `restart f_state`",
+        "`failure` says `restart restart`",
+    ]
+    again, same = upgraded(tmp_path, text)
+    assert same == text
+    assert again.changed == 0
+
+
+def test_what_a_level_could_declare_is_written_out(tmp_path: Path) -> None:
+    *_, draft = upgraded(tmp_path, BY_HAND)[0].upgraded
+    assert draft.splitlines()[2:] == [
+        "  link superior_link {",
+        "    command : order rest rest",
+        "    status : status done done failed failed executing executing",
+        "    order {",
+        "      far : int 0 .. 9",
+        "    }",
+        "    report {",
+        "      reason failure : why restart restart",
+        "    }",
+        "  }",
+        "  serves superior : superior_link",
+        "",
+        "in place of what `receive` do by hand",
+    ]
+    links = "\n".join(draft.splitlines()[2:13])
+    assert program_of(f"{WORDS}{links}").roles is not None, "a draft is text of the language"
+
+
+def test_what_the_protocol_makes_is_left_out(tmp_path: Path) -> None:
+    formatted, text = upgraded(tmp_path, DECLARED)
+    assert "state phase : phase deferred\n" in text
+    assert "procedure executing" not in text
+    assert "procedure done" in text
+    assert "procedure failed" in text
+    assert len(formatted.upgraded) == 2, formatted.upgraded
+    before, after = program_of(DECLARED), program_of(text)
+    assert after.variables == before.variables
+    assert after.tables == before.tables
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        ("= to_arm.inc_command", "= to_arm.inc_command and phase = home"),
+        ("deferred until from_arm.inc_command_echo = to_arm.inc_command", "deferred until phase = away"),
+    ],
+)
+def test_another_condition_of_deferral_stays(tmp_path: Path, edit: tuple[str, str]) -> None:
+    _, text = upgraded(tmp_path, edited(DECLARED, edit))
+    assert "deferred until" in text
+
+
+def test_a_file_that_another_program_reads_otherwise_is_left(tmp_path: Path) -> None:
+    """One by hand and one that declares its superior use the file: its names mean something only to the first."""
+    common = "enum phase { d_state, f_state }\nstate cur_state : phase\n"
+    (tmp_path / "hand.rcs").write_text("use a\ninput b : bool\n", encoding="utf-8")
+    assert "restart f_state" in upgraded(tmp_path, common)[1]
+    roles = WORDS + DECLARED[DECLARED.index("link above") : DECLARED.index("commands arm")]
+    (tmp_path / "roles.rcs").write_text(f"use a\n{roles}", encoding="utf-8")
+    assert "restart" not in upgraded(tmp_path, common)[1]
+
+
+def test_a_program_with_errors_changes_nothing(tmp_path: Path) -> None:
+    (tmp_path / "user.rcs").write_text("use a\nstate x : nowhere\n", encoding="utf-8")
+    formatted, text = upgraded(tmp_path, BY_HAND)
+    assert "restart f_state" not in text
+    assert [diagnostic.code.value for diagnostic in formatted.report.diagnostics] == ["RCS201"]
+
+
+def test_the_other_names_go_on_meaning_what_they_do(tmp_path: Path) -> None:
+    """One `restart` in a level by hand takes nothing from the others; it wins over its own name."""
+    adopted = program_of(
+        edited(BY_HAND, ("state cur_state : phase", "state cur_state : phase restart d_state"))
+    ).adopted
+    assert adopted == {
+        "cur_state": Fixed(0),
+        "failure": Fixed(1),
+        "inc_command_seen": SameAs("command.inc_command"),
+    }
+    shutil.copytree(REPO / "tables", tmp_path / "tables")
+    before = shipped("task/task.rcs", tmp_path / "tables").adopted
+    assert run(["fmt", "--quiet", "--upgrade", str(tmp_path / "tables/task")]) == 0
+    after = shipped("task/task.rcs", tmp_path / "tables")
+    assert after.adopted == before
+    assert any(isinstance(value, After) for value in before.values()) or after.roles is not None
