@@ -108,9 +108,9 @@ def test_a_path_that_is_not_there_is_raised(function: object, tmp_path: Path) ->
 def test_a_proof_says_what_the_command_says(capsys: pytest.CaptureFixture[str]) -> None:
     """Of a system that is right and of one that is not: claims, findings, runs."""
     for system, status in ((SYSTEM, 0), (LAST_ECHO, 1)):
-        assert command(["prove", "--json", "--no-cache", str(system)]) == status
+        assert command(["prove", "--json", "--no-cache", "--trace", "4", str(system)]) == status
         form = json.loads(capsys.readouterr().out)
-        proof = rcsc.prove(system, cache=False)
+        proof = rcsc.prove(system, cycles=4, cache=False)
         assert (proof.proved, proof.whole) == (form["proved"], form["whole"])
         claims = [(level["level"], goal) for level in form["levels"] for goal in level["goals"]]
         assert [(one.level, one.what, one.table, one.name, one.verdict) for one in proof.claims] == [

@@ -35,7 +35,6 @@ def test_a_template_is_proved_formatted_compiled_and_tested(
         ["fmt", "--check"],
         ["compile"],
         ["test", "--examples", "2", "--mutants", "1", "--no-cortex"],
-        *([["run", "system.toml"]] if (project / "system.toml").exists() else []),
     ):
         assert run(args) == 0, (args, capsys.readouterr().out)
     assert "error" not in capsys.readouterr().err
