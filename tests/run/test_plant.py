@@ -1,6 +1,7 @@
 """Plants in Python: what fits is bound and moves the docking robot, and everything that does not fit is told before anything moves."""
 
 import math
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -429,3 +430,14 @@ def test_a_class_that_cannot_be_made_of_its_fields_is_told(dock: Path) -> None:
         load_of_fleet(dock)
     assert "`report` cannot be made: TypeError" in str(caught.value)
     assert "'weight'" in str(caught.value)
+
+
+def test_two_systems_may_call_their_plants_alike(dock: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    shutil.copytree(dock, other)
+    base = (other / "base.py").read_text(encoding="utf-8")
+    head = "from __future__ import annotations\n\nfrom typing import Literal\n\nWord = Literal['a']\n"
+    (other / "base.py").write_text(f"{head}{base}    word: Word = 'a'\n", encoding="utf-8")
+    first = bound(other)
+    bound(dock)
+    assert first.faults == ("wheel_slips",)

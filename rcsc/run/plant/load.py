@@ -10,6 +10,7 @@ import inspect
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol, TypeAlias, runtime_checkable
@@ -253,7 +254,8 @@ def _imported(system: Description, path: Path, place: KeyPath) -> ModuleType:
         BadPlant: It cannot be.
     """
     page = plant_page(system)
-    name = f"rcsc_plant_{path.stem}"
+    place_of_file = sha256(str(path.resolve()).encode()).hexdigest()[:16]
+    name = f"rcsc_plant_{path.stem}_{place_of_file}"  # two systems may call their plants alike
     spec = importlib.util.spec_from_file_location(name, path)
     if not path.is_file() or spec is None or spec.loader is None:
         page.wrong(place, f"there is no file `{path}`")
