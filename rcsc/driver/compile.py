@@ -16,7 +16,7 @@ from rcsc.emit.lower import lower
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import PROJECT_FILE, project_root
-from rcsc.link import emit_system, linked, outward
+from rcsc.link import Linked, emit_system, linked, outward
 from rcsc.run.description import BadDescription, description, places
 from rcsc.solvers.options import Options
 
@@ -44,13 +44,13 @@ def compile_(
     Raises:
         BadDescription: A system is not in order, does not fit its programs, or names another folder than another system.
     """
-    systems = tuple(_systems(settings.paths))
+    systems = tuple(systems_in(settings.paths))
     folder = out or _folder(systems)
-    project = proved(replace(settings, paths=_tables(settings.paths, systems)))
+    project = proved(replace(settings, paths=tables_in(settings.paths, systems)))
     report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was written")
-    generated = _Generated(targets, defensive)
+    generated = Generated(targets, defensive)
     for root, program in project.executable:
         generated.add_program(root, program)
     for path in systems:
@@ -72,7 +72,7 @@ def compile_system(path: Path) -> Conclusion:
     return compile_(Settings((str(path),), Options()), description(path).generated, TARGETS, only_check=False)
 
 
-def _systems(paths: Iterable[str]) -> Iterator[Path]:
+def systems_in(paths: Iterable[str]) -> Iterator[Path]:
     """The descriptions of systems among the paths: those that are one, and those of folders that hold one."""
     for path in map(Path, paths):
         if path.suffix == ".toml" and path.name != PROJECT_FILE and path.is_file():
@@ -81,7 +81,7 @@ def _systems(paths: Iterable[str]) -> Iterator[Path]:
             yield path / DESCRIPTION
 
 
-def _tables(paths: tuple[str, ...], systems: tuple[Path, ...]) -> tuple[str, ...]:
+def tables_in(paths: tuple[str, ...], systems: tuple[Path, ...]) -> tuple[str, ...]:
     """The paths that tables are read from: those given that are no descriptions, and the programs of the levels, which are roots."""
     given = [path for path in paths if Path(path) not in systems]
     tried = (places(path, spec.program) for path in systems for spec in description(path).levels)
@@ -99,13 +99,14 @@ def _folder(systems: tuple[Path, ...]) -> Path:
 
 
 @dataclass(slots=True)
-class _Generated:
+class Generated:
     """Collects generated files.
 
     Attributes:
         files: By path under the folder.
         clashes: Files and names that would be two things.
         plans: Of each program, by its root file's real path.
+        systems: By the path of the description.
     """
 
     targets: Collection[str]
@@ -113,6 +114,7 @@ class _Generated:
     files: dict[str, str] = field(default_factory=dict)
     clashes: list[Diagnostic] = field(default_factory=list)
     plans: dict[str, Plan] = field(default_factory=dict)
+    systems: dict[Path, Linked] = field(default_factory=dict)
     _paths: dict[str, tuple[str, str]] = field(default_factory=dict)
     _names: dict[str, dict[str, tuple[str, str]]] = field(default_factory=dict)
 
@@ -144,7 +146,7 @@ class _Generated:
         if page.faults:
             raise page.bad(BadDescription)
         source = os.path.relpath(path, project_root(str(path))).replace("\\", "/")
-        whole = linked(system, plans, source)
+        whole = self.systems[path] = linked(system, plans, source)
         if self._add(str(path), emit_system(whole)):
             self._share(str(path), "c", outward(whole))
 

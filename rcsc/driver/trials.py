@@ -4,17 +4,23 @@ In: proved programs and their generated files. Out: what the suite found, and it
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
-from rcsc.driver.compile import planned
-from rcsc.driver.pipeline import proved
+from rcsc.driver.compile import Generated, planned, systems_in, tables_in
+from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import Conclusion, Settings, TestEffort
-from rcsc.emit import emitted
+from rcsc.emit import TARGETS, emitted
+from rcsc.emit.generated import write
+from rcsc.host import children
 from rcsc.host.files import write_atomically
 from rcsc.lang.model import Expr, Program, Snapshot, Table
+from rcsc.link import Linked, drawing, run_beside, script
+from rcsc.run.description import description
+from rcsc.run.executors import NotBuilt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic.encode import declared, encode
@@ -27,10 +33,18 @@ from rcsc.testing.inputs.vectors import vectors_of
 from rcsc.testing.mutants import Opinion
 from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
 
+MOST_TICKS_EACH = 5
+"""Ticks of a whole system for each example of a table."""
+
 
 def test(settings: Settings, effort: TestEffort) -> Conclusion:
-    """Prove every table, then test its executors against its meaning, and write vectors if asked."""
-    project = proved(settings)
+    """Prove every table, then test its executors against its meaning, the C of systems beside Python, and write vectors if asked.
+
+    Raises:
+        BadDescription: A system is not in order, or does not fit its programs.
+    """
+    systems = tuple(systems_in(settings.paths))
+    project = proved(replace(settings, paths=tables_in(settings.paths, systems)))
     report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was tested: not everything is proved")
@@ -41,6 +55,11 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
         failures, text = _try_out(program.program, files, settings.options, effort, settings.progress)
         diagnostics += failures
         figures.append(text)
+    for path in systems:
+        settings.progress(f"running {path}")
+        difference, text = _beside(path, project, effort)
+        diagnostics += difference
+        figures.append(text)
     if effort.vectors is not None:
         diagnostics += _write_vectors(
             [proved_program.program for _, proved_program in project.executable],
@@ -49,6 +68,45 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
         )
     settings.progress("")
     return Conclusion(project.report(tuple(diagnostics)), "\n".join(figures))
+
+
+def _beside(path: Path, project: Proved, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
+    """Run the C of a system beside the Python system; the first difference, and what was run."""
+    generated = Generated(tuple(TARGETS), defensive=False)
+    for root, program in project.executable:
+        generated.add_program(root, program)
+    generated.add_system(path)
+    if generated.clashes:
+        return tuple(generated.clashes), ""
+    whole = generated.systems[path]
+    if reason := _alone(whole):
+        return (), f"system {whole.word}: not run as a whole: {reason}"
+    with children.scratch("systems") as folder:
+        write(generated.files, str(folder))
+        described = replace(description(path), generated=folder)
+        signs = {level.name: level.program.sign for level in whole.levels}
+        ticks = script(described, signs, drawing(1), MOST_TICKS_EACH * effort.examples, wild=0.1)
+        try:
+            ran = run_beside(whole, described, ticks)
+        except NotBuilt as error:
+            return (Diagnostic(Code.NO_C_COMPILER, str(error), Label(Span(str(path), 0, 0))),), ""
+    figure = (
+        f"system {whole.word}: C and Python the same in {ran.ticks} ticks: {ran.restarts} restarts, {ran.refused} of them refused, "
+        f"{ran.faults} ticks with a fault"
+    )
+    if not ran.difference:
+        return (), figure
+    message = f"the C of system `{whole.word}` and the Python system differ: {ran.difference}"
+    return (Diagnostic(Code.EXECUTORS_DISAGREE, message, Label(Span(str(path), 0, 0))),), ""
+
+
+def _alone(system: Linked) -> str:
+    """Why a system cannot be run without what is the user's; empty where it can."""
+    if any(level.questions for level in system.levels):
+        return "its levels ask a database"
+    if any(procedure.extern for program in system.programs for procedure in program.plan.program.procedures):
+        return "its levels call extern procedures"
+    return ""
 
 
 def _try_out(

@@ -11,12 +11,25 @@ all give. Each buffer has one reader, and all are read before the first level ru
 >>> system_word("dock", ["supervisor", "drive"]), system_word("gripper", ["gripper"])
 ('dock', 'gripper_system')
 
-Trusted: all of it, for what the system's C does; tests run it beside the Python system, with restarts, refused inputs and
-periods, and compare every leaf of every cycle. What starts a level anew is asked of `rcsc.run.adopt`, as the Python system
-does. Modules: `wiring` finds the places in C that a description speaks of; `system_c` spells the files.
+Trusted: all of it, for what the system's C does; `rcsc test` runs it beside the Python system, with restarts and refused
+inputs, and compares every leaf of every cycle. What starts a level anew is asked of `rcsc.run.adopt`, as the Python system
+does. Modules: `wiring` finds the places in C that a description speaks of; `system_c` spells the files; `drawn_script` draws what happens
+to a system, and `beside` has its C and the Python system do it, tick by tick.
 """
 
+from rcsc.link.beside import Beside, run_beside
+from rcsc.link.drawn_script import drawing, script
 from rcsc.link.system_c import emit_system, outward
 from rcsc.link.wiring import Linked, linked, system_word
 
-__all__ = ["Linked", "emit_system", "linked", "outward", "system_word"]
+__all__ = [
+    "Beside",
+    "Linked",
+    "drawing",
+    "emit_system",
+    "linked",
+    "outward",
+    "run_beside",
+    "script",
+    "system_word",
+]

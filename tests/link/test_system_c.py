@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.driver.compile import compile_system
+from rcsc.link.drawn_script import Tick, drawing, script
 from rcsc.run.description import description
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.schema import outside_wires
@@ -15,7 +16,7 @@ from rcsc.run.system import System, signatures
 from rcsc_cell.cell.ready import plant
 from rcsc_cell.workstation.prepared import prepare
 from tests.link.drawn_systems import drawn_system
-from tests.link.played import CSystem, Seen, Tick, by_python, drawing, first_difference, script, seen_of
+from tests.link.played import CSystem, Seen, by_python, first_difference, seen_of
 from tests.support.cells import SYSTEM, database
 
 

@@ -17,6 +17,7 @@ from rcsc.solvers.options import Options
 Examples:
   rcsc test tables/task             interpreter = Python = C, every line reached
   rcsc test --deep acquire.rcs      also prove the C, and mutate it; minutes
+  rcsc test robot/system.toml       a system's levels, and the C of the whole beside the Python system
   rcsc test --vectors v.json a.rcs  also write test vectors for each condition""",
 )
 @PATHS
@@ -43,7 +44,9 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
 
     Inputs lean on the edges of the declarations. Every line is reached, and the C matcher's masks are checked
     against the table for every value of every variable. That takes seconds; --deep takes minutes. What a tool
-    could not decide is a figure and no failure. Extern procedures are stand-ins, and nothing of the user's is
+    could not decide is a figure and no failure. Of a system, given by its system.toml or its folder, also the C of the whole is run
+    beside the Python system, with outside values at the edges of their ranges, restarts and refused inputs: every value after
+    every tick is compared. Extern procedures are stand-ins, and nothing of the user's is
     imported or linked. Needs a C compiler.
     """
     esbmc_s = (60.0 if deep else 0.0) if esbmc is None else esbmc
