@@ -76,6 +76,7 @@ def test_the_operator_meant_covers_the_place_and_is_the_longest_there(text: str,
         ("input x : int 0 .. 9 Clamp\n", "Clamp", "clamp"),
         ("level l { Period 40 [ms] table t }\n", "Period", "period"),
         ("Quokka x : bool\n", "Quokka", ""),
+        ("input column column : bool\n", "column", ""),
     ],
 )
 def test_a_word_in_the_wrong_case_or_misspelled_is_named(text: str, at: str, meant: str) -> None:

@@ -53,6 +53,11 @@ _CLASSES = {
     "_REAL": ("real",),
 }
 """The words of the terminals that are not called as their one word is."""
+_SYMBOLS = frozenset(
+    "NAME INT REAL STRING ROW COMPARE ADD_OP MUL_OP LBRACE RBRACE LPAR RPAR LSQB RSQB COLON COMMA SEMICOLON SLASH STAR CIRCUMFLEX DOT"
+    " EQUAL MINUS".split()
+)
+"""Terminals that are no words, whatever they are called."""
 ELSEWHERE = {
     "===": "=", "!==": "/=", "==": "=", "!=": "/=", "<>": "/=", "&&": "and", "||": "or", "=>": "implies", "->": "implies",
     "=<": "<=", "&": "and", "!": "not", "~": "not", "%": "mod",
@@ -91,6 +96,7 @@ def operator_meant(text: str, at: int) -> tuple[int, str] | None:
 
 def word_meant(word: str, terminals: Iterable[str]) -> str:
     """The word of the language that was meant, of those that could stand there; empty where none is much like it."""
-    known = {one for name in terminals for one in _CLASSES.get(name, (name.lower(),)) if one.isalpha()}
+    words = (one for name in set(terminals) - _SYMBOLS for one in _CLASSES.get(name, (name.lower(),)))
+    known = {one for one in words if one.isalpha()}
     near = [word.lower()] if word.lower() in known else get_close_matches(word.lower(), sorted(known), 1, 0.8)
     return near[0] if near and word.isidentifier() else ""
