@@ -6,6 +6,7 @@ assumptions, invariants, levels. So when one table changes, its neighbours are n
 """
 
 import hashlib
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -27,6 +28,7 @@ from rcsc.table.verdict import DeadLine, Gap, SolversDisagree, TableVerdict, Und
 
 WORTH_A_PROCESS = 20_000
 """Cells of a program's tables from which several processes are quicker than one."""
+_CLOSING = re.compile(r"^[ \t]*\}", re.MULTILINE)
 
 
 def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: Cache | None) -> Proof:
@@ -105,7 +107,7 @@ class _Memory:
         kept = self.cache.load(_Kept, *self._key(table))
         if kept is None:
             return None
-        place = _extent(table)
+        place = self._place(table)
         notes = tuple(_moved(note, place.start, place.file) for note in kept.notes)
         return _Kept(replace(kept.report, file=table.file, cached=True), notes)
 
@@ -113,7 +115,7 @@ class _Memory:
         """Keep the tables just proved, and that the rest is right if no finding is about it."""
         rest = set(findings)
         for verdict in verdicts:
-            place = _extent(verdict.table)
+            place = self._place(verdict.table)
             notes = [
                 diagnostic
                 for diagnostic in findings
@@ -132,17 +134,19 @@ class _Memory:
         if not rest:
             self.cache.store(_Rest(), self.common)
 
+    def _place(self, table: Table) -> Span:
+        return _extent(table, self.loaded.sources[table.span.file].text)
+
     def _key(self, table: Table) -> tuple[str, ...]:
-        place = _extent(table)
-        text = self.loaded.sources[place.file].slice(place)
+        text = self.loaded.sources[table.span.file].slice(self._place(table))
         own = next(declared for declared in self.program.tables if declared.name == table.name)
         return (self.common, digest(own), text)
 
 
-def _extent(table: Table) -> Span:
-    """From the table's name to the end of its last line."""
-    spans = [line.span for line in table.lines] + ([table.default.span] if table.default else [])
-    return Span(table.span.file, table.span.start, max([table.span.end, *(span.end for span in spans)]))
+def _extent(table: Table, text: str) -> Span:
+    """From the table's name to the brace that closes it, which begins a line: rows begin with a bar."""
+    closing = _CLOSING.search(text, table.span.end)
+    return Span(table.span.file, table.span.start, closing.end() if closing else len(text))
 
 
 def _inside(span: Span, place: Span) -> bool:

@@ -428,6 +428,37 @@ def test_an_unchanged_table_is_not_proved_again_when_its_neighbour_changes(rcsc:
     assert "(earlier run)" not in shown.split("two.rcs")[1]
 
 
+PARTED = """
+input width : int 0 .. 110
+state worst : int 0 .. 110
+output wide : bool
+procedure keep { worst := max(worst, width) }
+table grip {
+  | line | width   ||
+  |------|---------||
+  | low  | < 40    ||
+  | rest | DEFAULT ||
+
+  | line || procedures | wide  |
+  |------||------------|-------|
+  | low  || keep       | false |
+  | rest || keep       | true  |
+}
+"""
+
+
+def test_a_table_in_parts_is_kept_with_what_is_said_of_it(rcsc: Rcsc) -> None:
+    write("grip.rcs", PARTED)
+    first = rcsc("check")
+    assert (first.status, "note[RCS4" in first.out) == (0, True)
+    write("grip.rcs", f"# moved\n{PARTED}")
+    again = rcsc("check").out
+    assert "(earlier run)" in again
+    assert "grip.rcs:11:" in again
+    write("grip.rcs", edited(PARTED, ("keep       | false", "keep       | true ")))
+    assert "(earlier run)" not in rcsc("check").out
+
+
 # --- compile, fmt, certify, new ------------------------------------------------------
 
 

@@ -233,7 +233,7 @@ CASES = [
     ("table t {\n | name | x ||\n}", [("RCS101", 2)]),
     ("table t {\n | line | x_ | y ||\n | | z ||\n |--|--|--||\n}", [("RCS102", 3)]),
     ("table t {\n | line | x | y ||\n | | z | ||\n | | a | b ||\n}", [("RCS116", 4)]),
-    ("table t {\n | line | x ||\n |--|--||\n | | 1 ||\n}", [("RCS101", 4)]),
+    ("table t {\n | line | x_ ||\n |--|--||\n | | y ||\n}", [("RCS101", 4)]),
     ("table t {\n | line | x || a |\n | p | 1 || b |\n | | | | c |\n}", [("RCS102", 4)]),
     ("table t {\n | line | x || a |\n | p | 1 || |\n | | || c |\n}", [("RCS116", 4)]),
     ("table t {\n | line | x | y ||\n | p | 1 | ||\n | | | ||\n}", [("RCS116", 4)]),
