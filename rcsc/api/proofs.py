@@ -261,7 +261,7 @@ def _unproved(systems: "Mapping[str, TransitionSystem]", explanation: Explanatio
 def _consequences(
     systems: "Mapping[str, TransitionSystem]", explanation: Explanation
 ) -> Iterator[Consequence]:
-    ts = systems[explanation.level]
     for then in explanation.follows or ():
+        ts = systems[then.level]
         run = (*beginnings(systems, then.run), *rows(systems, then.run))
         yield Consequence(then.how.value, told(ts, then), dict(spelled_leaves(ts, then.report)), run)

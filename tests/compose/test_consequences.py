@@ -22,6 +22,7 @@ from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.frozen import case_breaks, read_case
 from rcsc.compose.counterexample.lasso import lassos
 from rcsc.compose.counterexample.lasso import obligation_of as obligation_to_end
+from rcsc.compose.counterexample.pair import followed_together
 from rcsc.compose.counterexample.repair import Repairs, repairs, tried
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
@@ -175,6 +176,18 @@ def test_what_never_ends_is_told_as_the_superior_sees_it(tmp_path: Path) -> None
     assert told(ts, then) == (
         "cycles 3 to 3 can repeat for ever: `upper` takes `executing`, and `go` (number 1) is not answered"
     )
+
+
+def test_two_levels_are_followed_on_to_the_answer_of_the_upper_one() -> None:
+    """Both orders get one number: the drill is told to be done, and the lower level never took it for new."""
+    systems = transition_systems(LAST_ECHO)
+    upper, lower = systems["upper"], systems["lower"]
+    finding, [then] = followed_together(upper, lower, upper.links.below[0], TraceSearch(8), further=4)
+    assert isinstance(finding, Finding)
+    assert (finding.level, then.level, then.shared) == ("lower", "upper", True)
+    assert told(upper, then) == "in cycle 3 `station` takes `done` as the answer to `drill` (number 2)"
+    assert not any(tick["lower"].line == "start" for tick in then.run.ticks if "lower" in tick)
+    assert followed_together(upper, lower, upper.links.below[0], TraceSearch(8)) == (finding, ())
 
 
 def test_a_level_that_nobody_commands_has_no_superior_to_tell(
@@ -410,6 +423,7 @@ def test_the_demonstration_shows_each_way_with_its_run(
         _, _, after = section.partition(sentence)
         assert line in after.partition("= then")[0], sentence
     logs = tmp_path / "logs"
+    assert f"N from 1 to {MOST}: {logs / 'task_deferred_cur_state_then_N.mcap'}" in section
     for number in range(1, MOST + 1):
         log = logs / f"task_deferred_cur_state_then_{number}.mcap"
         assert run(["replay", str(log), "--generated", str(logs / "generated")]) == 0

@@ -74,11 +74,21 @@ def say_explanation(
         click.echo(f"  = note: {explanation.together}", err=True)
     if explanation.others:
         click.echo(f"  = note: no such run shows both of lines {', '.join(explanation.others)}", err=True)
-    if explanation.log is not None:
-        folder = explanation.log.parent / "generated"
-        click.echo(f"  = log: rcsc replay {explanation.log} --generated {folder}", err=True)
-        page = explanation.log.with_suffix(".html")
-        click.echo(f"  = picture: rcsc log {explanation.log} --report {page}", err=True)
+    _say_logs(explanation)
+
+
+def _say_logs(explanation: Explanation) -> None:
+    """Say where the runs are kept, if they are."""
+    log = explanation.log
+    if log is None:
+        return
+    click.echo(f"  = log: rcsc replay {log} --generated {log.parent / 'generated'}", err=True)
+    click.echo(f"  = picture: rcsc log {log} --report {log.with_suffix('.html')}", err=True)
+    if explanation.follows:
+        then = log.with_name(f"{log.stem}_then_N{log.suffix}")
+        click.echo(
+            f"  = note: the runs of what follows, N from 1 to {len(explanation.follows)}: {then}", err=True
+        )
 
 
 def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> str:
@@ -116,7 +126,10 @@ def _say_consequences(
     """Print what follows, each with its run: only what comes after the finding's own where it begins as that does."""
     ts = systems[explanation.level]
     for number, then in enumerate(explanation.follows or (), 1):
-        click.echo(f"  = then {number}: {told(ts, then)}{'' if then.shared else '; its run'}", err=True)
+        click.echo(
+            f"  = then {number}: {told(systems[then.level], then)}{'' if then.shared else '; its run'}",
+            err=True,
+        )
         _say_time_line(_further_rows(systems, then))
     if explanation.follows is not None and len(explanation.follows) == MOST:
         click.echo(f"  = note: no more than {MOST} such runs are looked for", err=True)
@@ -130,7 +143,8 @@ def _say_consequences(
 def _further_rows(systems: Mapping[str, TransitionSystem], then: Consequence) -> tuple[TimeLineRow, ...]:
     """Return the rows of a run that the finding's own does not have."""
     every = rows(systems, then.run)
-    return every[len(every) - then.run.after :] if then.shared else (*beginnings(systems, then.run), *every)
+    later = tuple(row for row in every if row.tick > then.run.broken_at)
+    return later if then.shared else (*beginnings(systems, then.run), *every)
 
 
 def _say_time_line(shown: Sequence[TimeLineRow]) -> None:
@@ -187,9 +201,9 @@ def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Ex
         "follows": [
             {
                 "how": then.how.value,
-                "what": told(systems[explanation.level], then),
+                "what": told(systems[then.level], then),
                 "cycle": then.cycle,
-                "takes": dict(spelled_leaves(systems[explanation.level], then.report)),
+                "takes": dict(spelled_leaves(systems[then.level], then.report)),
                 "time_line": [
                     asdict(row) for row in (*beginnings(systems, then.run), *rows(systems, then.run))
                 ],

@@ -56,6 +56,7 @@ class Consequence:
         run: The run; its `after` counts the cycles since the obligation is broken.
         first: The cycle, from 1, before which all is as at the end; 0 unless the run repeats.
         shared: Whether it begins as the run that shows the finding.
+        reports: The level whose report it is; empty if it is the level of the finding.
     """
 
     how: How
@@ -64,6 +65,12 @@ class Consequence:
     run: Finding
     first: int = 0
     shared: bool = True
+    reports: str = ""
+
+    @property
+    def level(self) -> str:
+        """The level whose superior takes the report."""
+        return self.reports or self.run.level
 
     @property
     def cycle(self) -> int:
@@ -73,7 +80,7 @@ class Consequence:
     @property
     def last(self) -> CycleRun:
         """The same cycle, as it ran."""
-        return self.run.ticks[-1][self.run.level]
+        return self.run.ticks[-1][self.level]
 
 
 def consequences(

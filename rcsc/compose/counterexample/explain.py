@@ -14,7 +14,7 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.consequence import Consequence, consequences
 from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
-from rcsc.compose.counterexample.pair import broken_together
+from rcsc.compose.counterexample.pair import followed_together
 from rcsc.compose.counterexample.repair import TRIED_CYCLES, helps, repairs
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_in_python, record
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, traces
@@ -218,11 +218,16 @@ def _together(
     for upper, lower in ends if settings.most else []:
         if upper in systems and lower in systems:
             below = next(neighbour for neighbour in systems[upper].links.below if neighbour.name == lower)
-            result = broken_together(
-                systems[upper], systems[lower], below, TraceSearch(settings.most), settings.starts
+            result, follows = followed_together(
+                systems[upper],
+                systems[lower],
+                below,
+                TraceSearch(settings.most),
+                settings.starts,
+                settings.further,
             )
             if isinstance(result, Finding):
-                yield Explanation(result.level, result.obligation, result)
+                yield Explanation(result.level, result.obligation, result, follows=follows or None)
             elif result is not None:
                 yield Explanation(lower, wanted[0], beside=(str(result),), guessed=result.guessed)
 
@@ -267,7 +272,7 @@ class _Rerun:
         self._ready |= programs.keys()
         name = self._named(finding)
         path = None if self.settings.log is None else self.folder / f"{name}.mcap"
-        follows = self._follows(finding)
+        follows = explanation.follows or self._follows(finding)
         try:
             record(finding, self.systems, system, path, altered=self.settings.altered)
             for number, then in enumerate(follows or (), 1):

@@ -9,6 +9,7 @@ for a while sees values late, misses some, and sees others again. All else keeps
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -16,7 +17,8 @@ from rcsc.compose.contract.beginning import Starts
 from rcsc.compose.contract.environment import Below, leaves_under
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
-from rcsc.compose.counterexample.cycle_run import CycleRun, broken, one_cycle
+from rcsc.compose.counterexample.consequence import MOST, Consequence, How, answered, reported
+from rcsc.compose.counterexample.cycle_run import CycleRun, as_cycle, broken, one_cycle
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.simplest import Bounded, Simplest
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch, in_order
@@ -65,20 +67,35 @@ def broken_together(
     search: TraceSearch,
     begins: Starts = MappingProxyType({}),
 ) -> Finding | NotReproducedError | None:
+    """Return the first of `followed_together`, without what follows it."""
+    return followed_together(upper, lower, below, search, begins)[0]
+
+
+def followed_together(
+    upper: TransitionSystem,
+    lower: TransitionSystem,
+    below: Below,
+    search: TraceSearch,
+    begins: Starts = MappingProxyType({}),
+    further: int = 0,
+) -> tuple[Finding | NotReproducedError | None, tuple[Consequence, ...]]:
     """Find the shortest run of both levels in which one breaks what the other assumes; None if none is found.
 
     That is: the lower level takes another order under the number that it took last, or a report misstates the last order of the upper
-    one, within `search.most` ticks. `begins` has, for each level, what begins with other values than the initial ones.
+    one, within `search.most` ticks. `begins` has, for each level, what begins with other values than the initial ones. Also find the
+    shortest runs, up to `further` ticks longer, after which the superior of the upper level takes an answer to the command that stands.
     """
     pair = _Together(upper, lower, below, begins)
-    try:
+    finding: Finding | NotReproducedError | None = None
+    with suppress(GaveUpError):
         for tick in range(1, search.most + 1):
             for obligation in pair.further(tick):
                 if (finding := pair.reproduced(obligation)) is not None:
-                    return finding
-    except GaveUpError:
-        pass
-    return None
+                    follows = (
+                        pair.answers(finding, obligation, further) if isinstance(finding, Finding) else ()
+                    )
+                    return finding, tuple(follows)
+    return finding, ()
 
 
 @dataclass(slots=True)
@@ -173,6 +190,63 @@ class _Together:
         if level not in ticks[-1] or not broken(ts, obligation, ticks[-1][level]):
             return NotReproducedError(obligation.shown, guessed=self._run.guessed)
         return Finding(level, replace(obligation, holds=values.FALSE), ticks)
+
+    def answers(self, finding: Finding, obligation: Obligation, further: int) -> list[Consequence]:
+        """Find how the upper level answers the command that stands when the obligation is broken, each answer once."""
+        results: list[Consequence] = []
+        if self.upper.links.above is None or not further:
+            return results
+        self._run.add(values.negation(obligation.holds))
+        with suppress(GaveUpError):
+            for more in range(further + 1):
+                if more:
+                    before = self.sides[0].now
+                    self.further(len(finding.ticks) + more)
+                    self._run.add(self._command_stays(before))
+                self._answered(finding, results)
+        return results
+
+    def _command_stays(self, before: Leaves) -> Node:
+        """Return the condition that the upper level, if it runs, takes the same command as before."""
+        above, side = self.upper.links.above, self.sides[0]
+        assert above is not None
+        return values.follows(side.runs[-1], values.equal(before[above.number], side.taken[-1][above.number]))
+
+    def _answered(self, finding: Finding, results: list[Consequence]) -> None:
+        """Add each answer that the upper level can give in the last tick."""
+        side = self.sides[0]
+        cycle = side.cycles[-1]
+        late = values.negation(answered(side.ts, cycle, cycle.before))
+        wanted = values.all_of((side.runs[-1], answered(side.ts, cycle, cycle.after), late))
+        while True:
+            for result in results:
+                alike = (
+                    values.equal(cycle.after[leaf], values.constant(side.ts.kinds[leaf], value))
+                    for leaf, value in result.report
+                )
+                wanted = values.both(wanted, values.negation(values.all_of(alike)))
+            literal = self._run.literal(wanted)
+            if len(results) == MOST or not self._run.holds([literal]):
+                return
+            result_ = self._answer(finding, tuple(self._ran(Simplest(self._run, [literal]))))
+            if result_ is None:
+                return
+            results.append(result_)
+
+    def _answer(self, finding: Finding, ticks: tuple[dict[str, CycleRun], ...]) -> Consequence | None:
+        """Return what comes of a run; None if the interpreter does not answer, or does not break the obligation."""
+        name, at = self.sides[0].name, finding.broken_at - 1
+        ts = self.upper if finding.level == name else self.lower
+        step = ticks[-1].get(name)
+        if len(ticks) != len(self.sides[0].runs) or step is None or finding.level not in ticks[at]:
+            return None
+        answers = answered(self.upper, now := as_cycle(self.upper, step), now.after)
+        if not (answers.known and answers.low and broken(ts, finding.obligation, ticks[at][finding.level])):
+            return None
+        before, report = (reported(self.upper, leaves) for leaves in (step.before, step.after))
+        run = replace(finding, ticks=ticks, after=len(ticks) - finding.broken_at)
+        shared = ticks[: at + 1] == finding.ticks[: at + 1]
+        return Consequence(How.ANSWERED, before, report, run, shared=shared, reports=name)
 
     def _ran(self, settled: Simplest) -> Iterator[dict[str, CycleRun]]:
         now = {side.name: {**initial(side.ts.program), **side.begins} for side in self.sides}
