@@ -51,7 +51,7 @@ Examples:
 @click.option("-o", "--output", type=_TO, default=None, metavar="PICTURE", help="Where: .svg, .png or .pdf.")
 @click.option("--report", type=_TO, default=None, metavar="PAGE",
               help="Write a page about a finding of `rcsc prove --log`: its levels and the cell, cycle by cycle.")  # fmt: skip
-@click.option("--system", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
+@click.option("--system", type=click.Path(exists=True, path_type=Path), default=None, metavar="SYSTEM",
               help="For --report: the system whose cell is drawn; else system.toml here or in tables/, if it is the log's.")  # fmt: skip
 @told
 def command(  # noqa: PLR0913  # as many as there are options

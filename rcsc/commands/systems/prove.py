@@ -60,6 +60,7 @@ _WORTH_PROCESSES = 40
     epilog="""\b
 Examples:
   rcsc prove                                   the system in system.toml, here or in tables/
+  rcsc prove my_robot                          the system in a folder
   rcsc prove tables/system.toml --level task   one level in its environment
   rcsc prove --certificate proof               the invariants as SMT-LIB, for another solver
   rcsc prove --level task --without-deferral   what section 9 warns of: the shortest trace
@@ -67,9 +68,7 @@ Examples:
   rcsc prove --where "stock = 0"               traces that begin with an empty stock
   rcsc prove --case tests/found/a.json         a frozen finding, again""",
 )
-@click.argument(
-    "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
-)
+@click.argument("system", required=False, type=click.Path(exists=True, path_type=Path), metavar="[SYSTEM]")
 @click.option("--level", "only", multiple=True, metavar="NAME", help="Only this level (repeatable).")
 @steps_option(80, " All questions about one level get 50 times as many together.")
 @click.option("--jobs", "-j", type=click.IntRange(min=1), default=None, show_default="2, or 1 for small levels",
