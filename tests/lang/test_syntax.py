@@ -17,6 +17,7 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.lalr import ParseNode, Tables
 from rcsc.lang.syntax.parse import MOST_ERRORS, parse
+from rcsc.lang.syntax.rows import PIECES
 from rcsc.lang.syntax.spell import spell_expr
 from rcsc.solvers.options import Options
 from tests.support.programs.arbitrary import expressions, files, tables
@@ -273,6 +274,15 @@ CASES = [
 @pytest.mark.parametrize(("text", "expected"), CASES, ids=lambda value: repr(value)[:40])
 def test_syntax_errors_have_a_code_and_a_line(text: str, expected: list[tuple[str, int]]) -> None:
     assert errors(text) == expected
+
+
+def test_a_line_whose_name_was_forgotten_is_no_longer_line() -> None:
+    """Where its cells could go on with those above, it is said what an empty first cell means."""
+    parsed = parse(Source("case.rcs", "table t {\n | line | x ||\n | a | 1 ||\n | | 2 ||\n}"))
+    assert not isinstance(parsed, tree.File)
+    [finding] = parsed
+    assert finding.message == "expected an operator, `..` or the end, found `2`"
+    assert PIECES in finding.help
 
 
 def test_expectations_are_words_and_few() -> None:

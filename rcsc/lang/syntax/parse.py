@@ -373,6 +373,8 @@ class _Rows:
         except lark.UnexpectedInput as error:
             wrong = _syntax_error(error, "", 0, len(cell.text), cell.text)
             wrong = replace(wrong, primary=Label(tree.absolute(wrong.primary.span, cell)))
+            if cell.further:
+                wrong = replace(wrong, help=(*wrong.help, PIECES))
             self.diagnostics.append(replace(wrong, help=(helps,)) if helps else wrong)
             return None
         self.memory[start, cell.text] = parsed
