@@ -207,8 +207,9 @@ def _draft(root: str, loaded: Loaded, program: Program, names: Sequence[str]) ->
     level = program.levels[0].name
     head = f"{root}: level `{level}` writes its protocol by hand, which stays as it is. It could declare"
     hand = ", ".join(f"`{name}`" for name in _written_by_hand(declarations))
-    tail = [f"in place of what {hand} do by hand"] if hand else []
-    return "\n".join([head, "", *(f"  {line}" for line in lines), "", *tail]).rstrip()
+    once = "A link stands once, in a file that both its levels use"
+    tail = [f"in place of what {hand} do by hand. {once}" if hand else once]
+    return "\n".join([head, "", *(f"  {line}" for line in lines), "", *tail])
 
 
 def _buffers(declarations: Sequence[tree.Declaration]) -> Iterator[_Buffer]:
@@ -267,10 +268,11 @@ def _link(
 
 
 def _field(side: str, part: tree.FieldDecl, members: Mapping[str, tuple[str, ...]]) -> str:
-    """A field of a link; what may be `restart` says why a command failed."""
+    """A field of a link; an enumeration whose first member is `none`, or with `restart`, says why a command failed."""
     kind = spell_type(part.type)
-    if side == "report" and "restart" in members.get(kind, ()):
-        return f"reason {part.name.text} : {kind} restart restart"
+    own = members.get(kind, ())
+    if side == "report" and ("restart" in own or own[:1] == ("none",)):
+        return f"reason {part.name.text} : {kind}" + (" restart restart" if "restart" in own else "")
     return f"{part.name.text} : {kind}"
 
 

@@ -59,7 +59,7 @@ def reformat(
     diagnostics = [*mine, *upgraded.diagnostics]
     for name, text in changed.items():
         if not write:
-            diagnostics.append(_unformatted(loaded.sources[name], text))
+            diagnostics.append(_unformatted(loaded.sources[name], text, name in upgraded.files))
         elif stdin is None or name != "-":
             diagnostics += _replace(name, text)
     diff = "".join(line for name in changed for line in _diff(loaded.sources[name], texts[name]))
@@ -91,12 +91,15 @@ def _text(name: str, before: tree.File, width: int) -> str:
     return text
 
 
-def _unformatted(source: Source, text: str) -> Diagnostic:
+def _unformatted(source: Source, text: str, older: bool) -> Diagnostic:
     """At the first place that would change."""
     start = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(source.text, text, strict=False)))
     place = Span(source.name, min(start, len(source.text)), min(start + 1, len(source.text)))
     return Diagnostic(
-        Code.NOT_FORMATTED, f"`{source.name}` is not formatted", Label(place), help=("run `rcsc fmt` on it",)
+        Code.NOT_FORMATTED,
+        f"`{source.name}` is not formatted",
+        Label(place),
+        help=(f"run `rcsc fmt{' --upgrade' if older else ''}` on it",),
     )
 
 

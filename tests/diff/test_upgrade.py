@@ -125,7 +125,7 @@ def test_what_a_level_could_declare_is_written_out(tmp_path: Path) -> None:
         "  }",
         "  serves superior : superior_link",
         "",
-        "in place of what `receive` do by hand",
+        "in place of what `receive` do by hand. A link stands once, in a file that both its levels use",
     ]
     links = "\n".join(draft.splitlines()[2:13])
     assert program_of(f"{WORDS}{links}").roles is not None, "a draft is text of the language"
@@ -163,6 +163,15 @@ def test_a_file_that_another_program_reads_otherwise_is_left(tmp_path: Path) -> 
     roles = WORDS + DECLARED[DECLARED.index("link above") : DECLARED.index("commands arm")]
     (tmp_path / "roles.rcs").write_text(f"use a\n{roles}", encoding="utf-8")
     assert "restart" not in upgraded(tmp_path, common)[1]
+
+
+def test_a_check_says_how_it_is_mended(tmp_path: Path) -> None:
+    path = tmp_path / "a.rcs"
+    path.write_text(BY_HAND, encoding="utf-8")
+    for older, command in ((False, "rcsc fmt"), (True, "rcsc fmt --upgrade")):
+        [finding] = reformat((str(path),), None, write=False, older=older).report.diagnostics
+        assert finding.help == (f"run `{command}` on it",)
+    assert path.read_text(encoding="utf-8") == BY_HAND
 
 
 def test_a_program_with_errors_changes_nothing(tmp_path: Path) -> None:
