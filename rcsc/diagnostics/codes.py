@@ -1354,8 +1354,8 @@ class Code(StrEnum):
     table. Where none is printed, either no run of that length does, or no invariant that rcsc looks for says why it holds; `--trace N`
     looks further, and `--where "variable = value"` begins elsewhere. *then* says what follows, each with its run: what the superior takes,
     up to `--follow N` cycles later. A *help* was tried in short runs, and says what else it breaks; that no run shows more is no proof:
-    prove the changed table. A table's assumption that is not proved stays monitored. What *rests on* it is found so only if it holds; what is
-    *not looked at* could not be stated, and is never proved: the manual has every verdict under "What a verdict says". `--log DIR`
+    prove the changed table. A table's assumption that is not proved stays monitored. What *rests on* it is found so only if it holds;
+    what is *not looked at* could not be stated, and is never proved: the manual has every verdict under "What a verdict says". `--log DIR`
     keeps each trace as a log for `rcsc replay`, `--freeze DIR` as a case that `--case FILE` runs again. `rcsc check` repeats it as a
     warning, as long as nothing that was looked at has changed: the tables by themselves may well be proved.
     """
