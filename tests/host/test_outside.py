@@ -57,7 +57,7 @@ FORMATS_OF_OURS = {
     "rcsc/testing/executors/externs.py",  # doubles as bits
     "rcsc/run/signature.py", "rcsc/run/executors.py", "rcsc/run/log/read.py", "rcsc/run/log/recorder.py",  # `FORMATS` by checked types
     "rcsc/run/log/records.py", "rcsc/run/log/replay.py", "rcsc/run/processes/memory.py", "rcsc/run/processes/block.py",
-    "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py",
+    "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py", "rcsc/link/beside.py",
     "sim/rcsc_cell/workstation/stopped.py", "rcsc/certify", "sim/rcsc_cell/episodes/loop.py", "sim/rcsc_cell/campaign/work.py",
 }  # fmt: skip
 """Who may name `struct`: their formats are written in them, or taken from `FORMATS` for a type that was checked."""
@@ -726,7 +726,8 @@ def test_a_field_is_matched_to_its_end() -> None:
 SCRATCH = (
     "rcsc/compose/counterexample/rerun.py", "rcsc/shell/reload/sources.py", "rcsc/run/executors.py",
     "rcsc/diff/revision.py", "rcsc/testing/executors/native.py", "rcsc/testing/cortex.py", "rcsc/testing/esbmc.py",
-    "rcsc/testing/matchers/matcher.py", "rcsc/host/tools.py", "rcsc/testing/code_mutants.py", "sim/rcsc_cell/episodes/processes.py",
+    "rcsc/testing/matchers/matcher.py", "rcsc/host/tools.py", "rcsc/testing/code_mutants.py", "rcsc/run/orders/together.py",
+    "rcsc/link/beside.py",
     "sim/rcsc_cell/episodes/setting.py",
 )  # fmt: skip
 """Who writes into temporary folders that end with the process."""

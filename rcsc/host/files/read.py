@@ -233,6 +233,28 @@ def rows_of(text: str, columns: Sequence[str]) -> list[dict[str, str]]:
         raise Malformed(f"is no CSV file: {error}") from error
 
 
+def table_of(content: str) -> list[dict[str, str]]:
+    """Return the rows of a CSV text with any heading, by column, without cells that are empty.
+
+    Raises:
+        Malformed: It is no CSV, has no heading, or a row is longer than that.
+    """
+    try:
+        table = csv.reader(io.StringIO(content, newline=""), strict=True)
+        lines = [[cell.strip() for cell in line] for line in table if any(cell.strip() for cell in line)]
+    except csv.Error as error:
+        raise Malformed(f"is no CSV file: {error}") from error
+    if not lines:
+        raise Malformed("has no heading: the first line names the columns")
+    heading = lines[0]
+    if twice := next((name for name in heading if heading.count(name) > 1), None):
+        raise Malformed(f"has two columns `{twice}`")
+    for number, line in enumerate(lines[1:], 1):
+        if len(line) > len(heading):
+            raise Malformed(f"row {number} has {len(line)} cells, and the heading {len(heading)}")
+    return [{name: cell for name, cell in zip(heading, line, strict=False) if cell} for line in lines[1:]]
+
+
 def _check_depth(marks: Iterator[re.Match[str]], deepest: int) -> None:
     depth = 0
     for match in marks:

@@ -13,8 +13,6 @@ the field that has the command), the end of a buffer from outside (`base.bumper`
     goto,20000,failed
 """
 
-import csv
-import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,7 +21,7 @@ from pathlib import Path
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.described import nearest
-from rcsc.host.files.read import MIB, Malformed, text, toml_of
+from rcsc.host.files.read import MIB, Malformed, table_of, text, toml_of
 from rcsc.run.description import Description
 from rcsc.run.orders.roles import DONE, PROTOCOL, Served, field_of, served
 from rcsc.run.signature import Leaf, Signature, Value
@@ -121,7 +119,7 @@ def read_script(path: Path, system: Description, signs: Mapping[str, Signature])
     """
     try:
         content = text(path, MIB)
-        lines = _toml_rows(content) if path.suffix == ".toml" else _csv_rows(content)
+        lines = _toml_rows(content) if path.suffix == ".toml" else table_of(content)
     except OSError as error:
         raise BadScript(f"{path} cannot be read: {error.strerror}") from error
     except Malformed as error:
@@ -139,23 +137,6 @@ def read_script(path: Path, system: Description, signs: Mapping[str, Signature])
     if wrong:
         raise BadScript("\n".join(wrong))
     return tuple(rows)
-
-
-def _csv_rows(content: str) -> list[dict[str, str]]:
-    try:
-        table = csv.reader(io.StringIO(content, newline=""), strict=True)
-        lines = [[cell.strip() for cell in line] for line in table if any(cell.strip() for cell in line)]
-    except csv.Error as error:
-        raise Malformed(f"is no CSV file: {error}") from error
-    if not lines:
-        raise Malformed("has no heading: the first line names the columns")
-    heading = lines[0]
-    if twice := next((name for name in heading if heading.count(name) > 1), None):
-        raise Malformed(f"has two columns `{twice}`")
-    for number, line in enumerate(lines[1:], 1):
-        if len(line) > len(heading):
-            raise Malformed(f"row {number} has {len(line)} cells, and the heading {len(heading)}")
-    return [{name: cell for name, cell in zip(heading, line, strict=False) if cell} for line in lines[1:]]
 
 
 def _toml_rows(content: str) -> list[dict[str, str]]:
