@@ -352,7 +352,8 @@ COMPILER = {
 @pytest.mark.parametrize(
     ("loads", "never"),
     [
-        ("rcsc.run.processes.serve, rcsc_cell.episodes.processes", COMPILER | {"numpy", "mujoco"}),  # a level
+        ("rcsc.run.processes.serve, rcsc.run.plant.staging", COMPILER | {"numpy", "mujoco"}),  # a level
+        ("rcsc_cell.episodes.stage", COMPILER | {"numpy", "mujoco"}),  # what answers its feeds in the cell
         ("rcsc_cell.campaign.work", COMPILER | {"mujoco"}),  # episodes by kinematics
     ],
 )
