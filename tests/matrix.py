@@ -23,6 +23,7 @@ from rcsc_cell.episodes.episode import Episode, EpisodeFinding, FaultSpec, Inter
 from rcsc_cell.episodes.loop import Loop
 from rcsc_cell.properties import PROPERTIES
 from tests.support.programs.stages import emitted
+from tests.support.programs.texts import one_row_a_line
 
 REPO = Path(__file__).parents[1]
 TBOX = (PartSpec("tbox", "buffer", 20.0, -30.0, 10.0),)
@@ -171,7 +172,7 @@ def seed(bug: Bug, folder: Path) -> bool:
         ValueError: The text to be changed is not there once.
     """
     path = folder / bug.file
-    text = path.read_text(encoding="utf-8")
+    text = one_row_a_line(path) if path.suffix == ".rcs" else path.read_text(encoding="utf-8")
     if bug.old and text.count(bug.old) != 1:
         raise ValueError(f"{bug.name}: {bug.file} has the text {text.count(bug.old)} times")
     path.write_text(text.replace(bug.old, bug.new) if bug.old else text + bug.new, encoding="utf-8")

@@ -20,6 +20,7 @@ from rcsc_cell.workstation.interlocks import CellState, after, refusal
 from rcsc_cell.workstation.prepared import prepare
 from rcsc_cell.workstation.script import ScriptRow, read_script
 from tests.support.cells import REPO, SYSTEM
+from tests.support.programs.texts import one_row_a_line
 
 PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object")
 DATA = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
@@ -401,7 +402,7 @@ def test_a_part_that_was_not_picked_up_is_counted_on_the_buffer_again() -> None:
 
 def test_a_level_whose_proof_fails_does_not_run(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
     file = project / "tables/gripper/gripper.rcs"
-    text = file.read_text(encoding="utf-8")
+    text = one_row_a_line(file)
     line = next(
         one
         for one in text.splitlines()

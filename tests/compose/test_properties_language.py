@@ -38,7 +38,7 @@ from rcsc.solvers.smtlib import cvc5_refutes
 from rcsc.table.program import prove_program
 from tests.support.programs.stages import emitted, program_of, refused
 from tests.support.programs.systems import alone, small_level, small_text
-from tests.support.programs.texts import edit_file, edited
+from tests.support.programs.texts import edit_file, edited, one_row_a_line
 from tests.support.proved import ran, shortest, time_line
 
 REPO = Path(__file__).parents[2]
@@ -647,7 +647,7 @@ def test_where_a_shipped_table_breaks_a_property_it_is_not_proved(fault: str, tm
         SHIPPED.parent, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache")
     )
     path = next(tmp_path.rglob(f"{level}.rcs"))
-    text = path.read_text(encoding="utf-8")
+    text = one_row_a_line(path)
     lines = [line for line in text.split("\n") if new != "//" or not line.strip().startswith(old)]
     path.write_text("\n".join(lines).replace(old, new), encoding="utf-8")
     assert path.read_text(encoding="utf-8") != text

@@ -19,6 +19,7 @@ from tests.faults import (
     shipped,
 )
 from tests.support.faults_made import KINDS, LEVELS, Fault, faults, sample, tables
+from tests.support.programs.texts import one_row_a_line
 
 TABLES = Path(__file__).parents[2] / "tables"
 
@@ -41,7 +42,7 @@ def test_every_fault_is_one_change_in_one_line() -> None:
     for level in LEVELS:
         for kind, found in faults(TABLES, level).items():
             for fault in found[:20]:
-                before = (TABLES / fault.file).read_text(encoding="utf-8").split("\n")
+                before = one_row_a_line(TABLES / fault.file).split("\n")
                 after = fault.text.split("\n")
                 assert before[fault.number - 1] == fault.old, kind
                 assert before[: fault.number - 1] == after[: fault.number - 1]
@@ -67,7 +68,7 @@ def test_a_sample_hangs_on_its_seed_alone() -> None:
 
 
 def test_a_table_is_read_with_its_head_and_its_lines() -> None:
-    lines = (TABLES / "gripper" / "gripper.rcs").read_text(encoding="utf-8").split("\n")
+    lines = one_row_a_line(TABLES / "gripper" / "gripper.rcs").split("\n")
     position, grasp, pause = tables(lines)
     assert [len(position), len(grasp), len(pause)] == [8, 7, 2]
     assert [name.strip() for name in grasp[0].actions] == ["procedures", "command_out", "status_out"]

@@ -11,6 +11,8 @@ from itertools import chain, zip_longest
 from pathlib import Path
 from random import Random
 
+from tests.support.programs.texts import one_row_a_line
+
 LEVELS = ("vision", "gripper", "primitive", "emove", "task")
 
 
@@ -246,7 +248,7 @@ def faults(tables_folder: Path, level: str) -> dict[str, list[Fault]]:
     """Every fault of a level by its kind."""
     found: dict[str, list[Fault]] = {kind: [] for kind in KINDS}
     for path in sorted((tables_folder / level).glob("*.rcs")):
-        lines = path.read_text(encoding="utf-8").split("\n")
+        lines = one_row_a_line(path).split("\n")
         for kind, edits in KINDS.items():
             for at, new in dict.fromkeys(edits(lines)):
                 text = "\n".join([*lines[:at], *([new] if new else []), *lines[at + 1 :]])
