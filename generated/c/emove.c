@@ -82,26 +82,10 @@ static inline uint8_t emove_u8_of_i64(int64_t a)
     return (uint8_t)a;
 }
 
-/* Procedure receive. */
-static void emove_do_receive(emove_t *s)
+/* Procedure look_below. */
+static void emove_do_look_below(emove_t *s)
 {
-    if (((int64_t)s->command.inc_command != (int64_t)s->inc_command_seen)) {
-        s->inc_command_seen = (uint16_t)(int64_t)s->command.inc_command;
-        s->new_command = true;
-        s->begun = false;
-        s->failure = (uint8_t)INT64_C(0);
-    } else {
-        if (((s->begun && ((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command)) && ((int64_t)s->vision.inc_command_echo == (int64_t)s->to_vision.inc_command))) {
-            s->new_command = false;
-        }
-    }
-    if ((((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->vision.inc_command_echo == (int64_t)s->to_vision.inc_command))) {
-        s->ref_command_in = (uint8_t)(int64_t)s->primitive.ref_command_echo;
-        s->status_in = (uint8_t)(int64_t)s->primitive.status_report;
-        s->ref_vision_in = (uint8_t)(int64_t)s->vision.ref_command_echo;
-        s->vision_status_in = (uint8_t)(int64_t)s->vision.status_report;
-    }
-    s->idle = ((((((((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) && ((int64_t)s->vision_status_in == INT64_C(0))) && (s->begun || (((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->vision.inc_command_echo == (int64_t)s->to_vision.inc_command)))) && ((int64_t)s->here == (int64_t)s->here_asked)) && ((int64_t)s->here_sector == (int64_t)s->here_sector_asked));
+    s->idle = (((s->primitive.resting && s->vision.resting) && ((int64_t)s->here == (int64_t)s->here_asked)) && ((int64_t)s->here_sector == (int64_t)s->here_sector_asked));
 }
 
 /* How long the path would be that begins now; whether the part is still there. */
@@ -110,45 +94,14 @@ static void emove_do_measure(emove_t *s)
     if (s->new_command) {
         s->path_length = emove_u8_of_i64(((int64_t)s->origin.depart_count + (int64_t)s->target.approach_count));
     }
-    if (((!s->begun) || (((int64_t)s->old_order.input_command == INT64_C(1)) || ((int64_t)s->old_order.input_command == INT64_C(2))))) {
-        s->lost = ((((int64_t)s->command.gripped_obj_ptr == INT64_C(1)) || ((int64_t)s->command.gripped_obj_ptr == INT64_C(2)) || ((int64_t)s->command.gripped_obj_ptr == INT64_C(3)) || ((int64_t)s->command.gripped_obj_ptr == INT64_C(4))) && (!s->primitive.holds));
+    if (((!s->answered) || (((int64_t)s->last_primitive.input_command == INT64_C(1)) || ((int64_t)s->last_primitive.input_command == INT64_C(2))))) {
+        s->lost = ((((int64_t)s->task.gripped_obj_ptr == INT64_C(1)) || ((int64_t)s->task.gripped_obj_ptr == INT64_C(2)) || ((int64_t)s->task.gripped_obj_ptr == INT64_C(3)) || ((int64_t)s->task.gripped_obj_ptr == INT64_C(4))) && (!s->from_primitive.holds));
     }
-    if (((int64_t)s->command.input_command == INT64_C(2))) {
+    if (((int64_t)s->task.input_command == INT64_C(2))) {
         s->lift_mm = s->object_data.lift_mm + 0.0;
     } else {
         s->lift_mm = s->held_data.lift_mm + 0.0;
     }
-}
-
-/* A new order takes the next number. */
-static void emove_do_send(emove_t *s)
-{
-    if (((((((((((int64_t)s->to_primitive.input_command != (int64_t)s->old_order.input_command) || ((int64_t)s->to_primitive.obj_ptr != (int64_t)s->old_order.obj_ptr)) || ((int64_t)s->to_primitive.grasp != (int64_t)s->old_order.grasp)) || ((int64_t)s->to_primitive.pose_ptr != (int64_t)s->old_order.pose_ptr)) || (s->to_primitive.displaced.x != s->old_order.displaced.x)) || (s->to_primitive.displaced.y != s->old_order.displaced.y)) || (s->to_primitive.displaced.z != s->old_order.displaced.z)) || (s->to_primitive.displaced.c != s->old_order.displaced.c)) || (s->to_primitive.displaced.s != s->old_order.displaced.s))) {
-        s->to_primitive.inc_command = emove_u16_of_i64((((int64_t)s->to_primitive.inc_command + INT64_C(1)) % INT64_C(65536)));
-    }
-    s->old_order.input_command = (uint8_t)(int64_t)s->to_primitive.input_command;
-    s->old_order.obj_ptr = (uint8_t)(int64_t)s->to_primitive.obj_ptr;
-    s->old_order.grasp = (uint8_t)(int64_t)s->to_primitive.grasp;
-    s->old_order.pose_ptr = (uint16_t)(int64_t)s->to_primitive.pose_ptr;
-    s->old_order.displaced.x = s->to_primitive.displaced.x + 0.0;
-    s->old_order.displaced.y = s->to_primitive.displaced.y + 0.0;
-    s->old_order.displaced.z = s->to_primitive.displaced.z + 0.0;
-    s->old_order.displaced.c = s->to_primitive.displaced.c + 0.0;
-    s->old_order.displaced.s = s->to_primitive.displaced.s + 0.0;
-    if ((((int64_t)s->to_vision.input_command != (int64_t)s->old_vision.input_command) || ((int64_t)s->to_vision.obj_ptr != (int64_t)s->old_vision.obj_ptr))) {
-        s->to_vision.inc_command = emove_u16_of_i64((((int64_t)s->to_vision.inc_command + INT64_C(1)) % INT64_C(65536)));
-    }
-    s->old_vision.input_command = (uint8_t)(int64_t)s->to_vision.input_command;
-    s->old_vision.obj_ptr = (uint8_t)(int64_t)s->to_vision.obj_ptr;
-}
-
-/* Procedure answer. */
-static void emove_do_answer(emove_t *s)
-{
-    s->report.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->report.ref_command_echo = (uint8_t)(int64_t)s->command.input_command;
-    s->report.status_report = (uint8_t)(int64_t)s->status_report;
-    s->report.failure = (uint8_t)(int64_t)s->failure;
 }
 
 /* Behind the table: the next cycle's question. */
@@ -158,64 +111,34 @@ static void emove_do_asked(emove_t *s)
     s->here_sector_asked = (uint8_t)(int64_t)s->here_sector;
 }
 
-/* This line answers the new command. */
-static void emove_do_begin(emove_t *s)
-{
-    s->begun = true;
-}
-
-/* A new command finds a level below at work: pause both first. */
-static void emove_do_settle(emove_t *s)
-{
-    s->begun = false;
-}
-
 /* Procedure nextstate. */
 static void emove_do_nextstate(emove_t *s, int64_t v_value)
 {
     s->cur_state_next = (uint8_t)v_value;
 }
 
-/* Procedure executing. */
-static void emove_do_executing(emove_t *s)
-{
-    s->status_report = (uint8_t)INT64_C(1);
-}
-
-/* Procedure done. */
-static void emove_do_done(emove_t *s)
-{
-    s->status_report = (uint8_t)INT64_C(0);
-}
-
-/* Procedure fail. */
-static void emove_do_fail(emove_t *s)
-{
-    s->status_report = (uint8_t)INT64_C(2);
-}
-
 /* Procedure no_place. */
 static void emove_do_no_place(emove_t *s)
 {
-    s->failure = (uint8_t)INT64_C(7);
+    s->to_task.failure = (uint8_t)INT64_C(7);
 }
 
 /* What PRIMITIVE says went wrong. */
 static void emove_do_primitive_failure(emove_t *s)
 {
-    s->failure = (uint8_t)(int64_t)s->primitive.failure;
+    s->to_task.failure = (uint8_t)(int64_t)s->primitive.failure;
 }
 
 /* The fingers are not where the part would keep them. */
 static void emove_do_part_lost(emove_t *s)
 {
-    s->failure = (uint8_t)INT64_C(11);
+    s->to_task.failure = (uint8_t)INT64_C(11);
 }
 
 /* What vision says went wrong. */
 static void emove_do_vision_failure(emove_t *s)
 {
-    s->failure = (uint8_t)(int64_t)s->vision.failure;
+    s->to_task.failure = (uint8_t)(int64_t)s->vision.failure;
 }
 
 /* Procedure pause. */
@@ -240,8 +163,8 @@ static void emove_do_gothru(emove_t *s)
 /* Procedure approach_position_fingers. */
 static void emove_do_approach_position_fingers(emove_t *s)
 {
-    s->to_primitive.obj_ptr = (uint8_t)(int64_t)s->command.obj_ptr;
-    s->to_primitive.grasp = (uint8_t)(int64_t)s->command.grasp;
+    s->to_primitive.obj_ptr = (uint8_t)(int64_t)s->task.obj_ptr;
+    s->to_primitive.grasp = (uint8_t)(int64_t)s->task.grasp;
     s->to_primitive.input_command = (uint8_t)INT64_C(3);
     s->to_vision.input_command = (uint8_t)INT64_C(0);
 }
@@ -249,16 +172,16 @@ static void emove_do_approach_position_fingers(emove_t *s)
 /* Procedure departure_position_fingers. */
 static void emove_do_departure_position_fingers(emove_t *s)
 {
-    s->to_primitive.obj_ptr = (uint8_t)(int64_t)s->command.obj_ptr;
-    s->to_primitive.grasp = (uint8_t)(int64_t)s->command.grasp;
+    s->to_primitive.obj_ptr = (uint8_t)(int64_t)s->task.obj_ptr;
+    s->to_primitive.grasp = (uint8_t)(int64_t)s->task.grasp;
     s->to_primitive.input_command = (uint8_t)INT64_C(4);
 }
 
 /* Procedure immed_grasp. */
 static void emove_do_immed_grasp(emove_t *s)
 {
-    s->to_primitive.obj_ptr = (uint8_t)(int64_t)s->command.obj_ptr;
-    s->to_primitive.grasp = (uint8_t)(int64_t)s->command.grasp;
+    s->to_primitive.obj_ptr = (uint8_t)(int64_t)s->task.obj_ptr;
+    s->to_primitive.grasp = (uint8_t)(int64_t)s->task.grasp;
     s->to_primitive.input_command = (uint8_t)INT64_C(5);
 }
 
@@ -266,7 +189,7 @@ static void emove_do_immed_grasp(emove_t *s)
 static void emove_do_flood_flash(emove_t *s)
 {
     emove_do_pause(s);
-    s->to_vision.obj_ptr = (uint8_t)(int64_t)s->command.obj_ptr;
+    s->to_vision.obj_ptr = (uint8_t)(int64_t)s->task.obj_ptr;
     s->to_vision.expected_range_mm = s->object_data.expected_range_mm + 0.0;
     s->to_vision.input_command = (uint8_t)INT64_C(1);
 }
@@ -331,11 +254,11 @@ static void emove_do_aim_last(emove_t *s)
     emove_do_aim(s, emove_min_i64(((int64_t)s->path_at + INT64_C(1)), INT64_C(62)));
 }
 
-/* The robot is at the location of the command. */
+/* The robot is at the location of the task. */
 static void emove_do_arrived(emove_t *s)
 {
-    s->here_next = (uint8_t)(int64_t)s->command.locpt_ptr;
-    s->here_sector = (uint8_t)(int64_t)s->command.sector;
+    s->here_next = (uint8_t)(int64_t)s->task.locpt_ptr;
+    s->here_sector = (uint8_t)(int64_t)s->task.sector;
     s->displaced_here.x = 0.0 + 0.0;
     s->displaced_here.y = 0.0 + 0.0;
 }
@@ -346,8 +269,8 @@ static void emove_do_aim_view(emove_t *s)
     s->to_vision.input_command = (uint8_t)INT64_C(0);
     emove_do_no_displacement(s);
     s->to_primitive.pose_ptr = (uint16_t)(int64_t)s->target.view_point;
-    s->to_primitive.displaced.x = s->vision.x_mm + 0.0;
-    s->to_primitive.displaced.y = s->vision.y_mm + 0.0;
+    s->to_primitive.displaced.x = s->from_vision.x_mm + 0.0;
+    s->to_primitive.displaced.y = s->from_vision.y_mm + 0.0;
     s->here_next = (uint8_t)INT64_C(0);
 }
 
@@ -355,11 +278,11 @@ static void emove_do_aim_view(emove_t *s)
 static void emove_do_aim_above(emove_t *s)
 {
     s->to_primitive.pose_ptr = (uint16_t)(int64_t)s->target.hover_point;
-    s->to_primitive.displaced.x = s->vision.x_mm + 0.0;
-    s->to_primitive.displaced.y = s->vision.y_mm + 0.0;
+    s->to_primitive.displaced.x = s->from_vision.x_mm + 0.0;
+    s->to_primitive.displaced.y = s->from_vision.y_mm + 0.0;
     s->to_primitive.displaced.z = 0.0 + 0.0;
-    s->to_primitive.displaced.c = s->vision.c + 0.0;
-    s->to_primitive.displaced.s = s->vision.s + 0.0;
+    s->to_primitive.displaced.c = s->from_vision.c + 0.0;
+    s->to_primitive.displaced.s = s->from_vision.s + 0.0;
     s->here_next = (uint8_t)INT64_C(0);
 }
 
@@ -367,16 +290,97 @@ static void emove_do_aim_above(emove_t *s)
 static void emove_do_aim_at_part(emove_t *s)
 {
     s->to_primitive.pose_ptr = (uint16_t)(int64_t)s->target.grasp_point;
-    s->to_primitive.displaced.z = emove_max_f64((-500.0), emove_min_f64(500.0, (s->object_data.grip_range_mm - s->vision.range_mm))) + 0.0;
+    s->to_primitive.displaced.z = emove_max_f64((-500.0), emove_min_f64(500.0, (s->object_data.grip_range_mm - s->from_vision.range_mm))) + 0.0;
 }
 
 /* Procedure located. */
 static void emove_do_located(emove_t *s)
 {
-    s->here_next = (uint8_t)(int64_t)s->command.locpt_ptr;
-    s->here_sector = (uint8_t)(int64_t)s->command.sector;
+    s->here_next = (uint8_t)(int64_t)s->task.locpt_ptr;
+    s->here_sector = (uint8_t)(int64_t)s->task.sector;
     s->displaced_here.x = s->to_primitive.displaced.x + 0.0;
     s->displaced_here.y = s->to_primitive.displaced.y + 0.0;
+}
+
+/* Procedure take_orders. */
+static void emove_do_take_orders(emove_t *s)
+{
+    s->echoed = (((int64_t)s->from_primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->from_vision.inc_command_echo == (int64_t)s->to_vision.inc_command));
+    if (((int64_t)s->task.inc_command != (int64_t)s->inc_command_seen)) {
+        s->inc_command_seen = (uint16_t)(int64_t)s->task.inc_command;
+        s->new_command = true;
+        s->answered = false;
+        s->to_task.status_report = (uint8_t)INT64_C(1);
+        s->to_task.failure = (uint8_t)INT64_C(0);
+    } else {
+        if ((s->answered && s->echoed)) {
+            s->new_command = false;
+        }
+    }
+    s->settling = false;
+    if (s->echoed) {
+        s->primitive.command = (uint8_t)(int64_t)s->from_primitive.ref_command_echo;
+        s->primitive.status = (uint8_t)(int64_t)s->from_primitive.status_report;
+        s->primitive.failure = (uint8_t)(int64_t)s->from_primitive.failure;
+        s->vision.command = (uint8_t)(int64_t)s->from_vision.ref_command_echo;
+        s->vision.status = (uint8_t)(int64_t)s->from_vision.status_report;
+        s->vision.failure = (uint8_t)(int64_t)s->from_vision.failure;
+    }
+    s->primitive.resting = ((((int64_t)s->primitive.command == INT64_C(0)) && ((int64_t)s->primitive.status == INT64_C(0))) && (s->answered || s->echoed));
+    s->vision.resting = ((((int64_t)s->vision.command == INT64_C(0)) && ((int64_t)s->vision.status == INT64_C(0))) && (s->answered || s->echoed));
+}
+
+/* Procedure give_orders. */
+static void emove_do_give_orders(emove_t *s)
+{
+    if ((s->new_command && (!s->settling))) {
+        s->answered = true;
+    }
+    s->to_task.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
+    s->to_task.ref_command_echo = (uint8_t)(int64_t)s->task.input_command;
+    if (((((((((((int64_t)s->to_primitive.input_command != (int64_t)s->last_primitive.input_command) || ((int64_t)s->to_primitive.obj_ptr != (int64_t)s->last_primitive.obj_ptr)) || ((int64_t)s->to_primitive.grasp != (int64_t)s->last_primitive.grasp)) || ((int64_t)s->to_primitive.pose_ptr != (int64_t)s->last_primitive.pose_ptr)) || (s->to_primitive.displaced.x != s->last_primitive.displaced.x)) || (s->to_primitive.displaced.y != s->last_primitive.displaced.y)) || (s->to_primitive.displaced.z != s->last_primitive.displaced.z)) || (s->to_primitive.displaced.c != s->last_primitive.displaced.c)) || (s->to_primitive.displaced.s != s->last_primitive.displaced.s))) {
+        s->to_primitive.inc_command = emove_u16_of_i64((((int64_t)s->to_primitive.inc_command + INT64_C(1)) % INT64_C(65536)));
+    }
+    s->last_primitive.input_command = (uint8_t)(int64_t)s->to_primitive.input_command;
+    s->last_primitive.obj_ptr = (uint8_t)(int64_t)s->to_primitive.obj_ptr;
+    s->last_primitive.grasp = (uint8_t)(int64_t)s->to_primitive.grasp;
+    s->last_primitive.pose_ptr = (uint16_t)(int64_t)s->to_primitive.pose_ptr;
+    s->last_primitive.displaced.x = s->to_primitive.displaced.x + 0.0;
+    s->last_primitive.displaced.y = s->to_primitive.displaced.y + 0.0;
+    s->last_primitive.displaced.z = s->to_primitive.displaced.z + 0.0;
+    s->last_primitive.displaced.c = s->to_primitive.displaced.c + 0.0;
+    s->last_primitive.displaced.s = s->to_primitive.displaced.s + 0.0;
+    if ((((int64_t)s->to_vision.input_command != (int64_t)s->last_vision.input_command) || ((int64_t)s->to_vision.obj_ptr != (int64_t)s->last_vision.obj_ptr))) {
+        s->to_vision.inc_command = emove_u16_of_i64((((int64_t)s->to_vision.inc_command + INT64_C(1)) % INT64_C(65536)));
+    }
+    s->last_vision.input_command = (uint8_t)(int64_t)s->to_vision.input_command;
+    s->last_vision.obj_ptr = (uint8_t)(int64_t)s->to_vision.obj_ptr;
+}
+
+/* A new command finds a level below at work: let it rest first. */
+static void emove_do_settle(emove_t *s)
+{
+    s->settling = true;
+    s->to_primitive.input_command = (uint8_t)INT64_C(0);
+    s->to_vision.input_command = (uint8_t)INT64_C(0);
+}
+
+/* Procedure done. */
+static void emove_do_done(emove_t *s)
+{
+    s->to_task.status_report = (uint8_t)INT64_C(0);
+}
+
+/* Procedure executing. */
+static void emove_do_executing(emove_t *s)
+{
+    s->to_task.status_report = (uint8_t)INT64_C(1);
+}
+
+/* Procedure failed. */
+static void emove_do_failed(emove_t *s)
+{
+    s->to_task.status_report = (uint8_t)INT64_C(2);
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
@@ -390,200 +394,200 @@ static void emove_admit(emove_t *s)
     if (!emove_exact()) {
         s->fault = 7;
     }
-    if (((int64_t)s->command.input_command > INT64_C(5))) {
+    if (((int64_t)s->task.input_command > INT64_C(5))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 1;
         }
     }
-    if (((int64_t)s->command.obj_ptr > INT64_C(6))) {
+    if (((int64_t)s->task.obj_ptr > INT64_C(6))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 2;
         }
     }
-    if (((int64_t)s->command.grasp > INT64_C(9))) {
+    if (((int64_t)s->task.grasp > INT64_C(9))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 3;
         }
     }
-    if (((int64_t)s->command.sector > INT64_C(99))) {
+    if (((int64_t)s->task.sector > INT64_C(99))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 5;
         }
     }
-    if (((int64_t)s->command.gripped_obj_ptr > INT64_C(6))) {
+    if (((int64_t)s->task.gripped_obj_ptr > INT64_C(6))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 7;
         }
     }
-    if (((int64_t)s->primitive.ref_command_echo > INT64_C(5))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 9;
-        }
-    }
-    if (((int64_t)s->primitive.status_report > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 10;
-        }
-    }
-    if (((int64_t)s->primitive.failure > INT64_C(15))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 11;
-        }
-    }
-    if (((int64_t)s->vision.ref_command_echo > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 14;
-        }
-    }
-    if (((int64_t)s->vision.status_report > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 15;
-        }
-    }
-    if (((int64_t)s->vision.failure > INT64_C(15))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 16;
-        }
-    }
-    if (!((s->vision.x_mm >= (-500.0)) && (s->vision.x_mm <= 500.0))) {
+    if (((int64_t)s->from_primitive.ref_command_echo > INT64_C(5))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 17;
         }
-    } else {
-        s->vision.x_mm = s->vision.x_mm + 0.0;
     }
-    if (!((s->vision.y_mm >= (-500.0)) && (s->vision.y_mm <= 500.0))) {
+    if (((int64_t)s->from_primitive.status_report > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 18;
         }
-    } else {
-        s->vision.y_mm = s->vision.y_mm + 0.0;
     }
-    if (!((s->vision.c >= (-1.0)) && (s->vision.c <= 1.0))) {
+    if (((int64_t)s->from_primitive.failure > INT64_C(15))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 19;
         }
-    } else {
-        s->vision.c = s->vision.c + 0.0;
     }
-    if (!((s->vision.s >= (-1.0)) && (s->vision.s <= 1.0))) {
+    if (((int64_t)s->from_vision.ref_command_echo > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 20;
+            s->fault_at = 45;
         }
-    } else {
-        s->vision.s = s->vision.s + 0.0;
     }
-    if (!((s->vision.range_mm >= 0.0) && (s->vision.range_mm <= 2000.0))) {
+    if (((int64_t)s->from_vision.status_report > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 21;
+            s->fault_at = 46;
+        }
+    }
+    if (((int64_t)s->from_vision.failure > INT64_C(15))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 47;
+        }
+    }
+    if (!((s->from_vision.x_mm >= (-500.0)) && (s->from_vision.x_mm <= 500.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 48;
         }
     } else {
-        s->vision.range_mm = s->vision.range_mm + 0.0;
+        s->from_vision.x_mm = s->from_vision.x_mm + 0.0;
+    }
+    if (!((s->from_vision.y_mm >= (-500.0)) && (s->from_vision.y_mm <= 500.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 49;
+        }
+    } else {
+        s->from_vision.y_mm = s->from_vision.y_mm + 0.0;
+    }
+    if (!((s->from_vision.c >= (-1.0)) && (s->from_vision.c <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 50;
+        }
+    } else {
+        s->from_vision.c = s->from_vision.c + 0.0;
+    }
+    if (!((s->from_vision.s >= (-1.0)) && (s->from_vision.s <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 51;
+        }
+    } else {
+        s->from_vision.s = s->from_vision.s + 0.0;
+    }
+    if (!((s->from_vision.range_mm >= 0.0) && (s->from_vision.range_mm <= 2000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 52;
+        }
+    } else {
+        s->from_vision.range_mm = s->from_vision.range_mm + 0.0;
     }
     if (((int64_t)s->origin.depart_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 23;
+            s->fault_at = 64;
         }
     }
     if (((int64_t)s->origin.depart_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 24;
+            s->fault_at = 65;
         }
     }
     if (((int64_t)s->origin.approach_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 25;
+            s->fault_at = 66;
         }
     }
     if (((int64_t)s->origin.approach_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 26;
+            s->fault_at = 67;
         }
     }
     if (((int64_t)s->origin.hover_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 27;
+            s->fault_at = 68;
         }
     }
     if (((int64_t)s->origin.grasp_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 28;
+            s->fault_at = 69;
         }
     }
     if (((int64_t)s->origin.view_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 29;
+            s->fault_at = 70;
         }
     }
     if (((int64_t)s->target.depart_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 31;
+            s->fault_at = 72;
         }
     }
     if (((int64_t)s->target.depart_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 32;
+            s->fault_at = 73;
         }
     }
     if (((int64_t)s->target.approach_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 33;
+            s->fault_at = 74;
         }
     }
     if (((int64_t)s->target.approach_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 34;
+            s->fault_at = 75;
         }
     }
     if (((int64_t)s->target.hover_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 35;
+            s->fault_at = 76;
         }
     }
     if (((int64_t)s->target.grasp_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 36;
+            s->fault_at = 77;
         }
     }
     if (((int64_t)s->target.view_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 37;
+            s->fault_at = 78;
         }
     }
     if (!((s->object_data.expected_range_mm >= 0.0) && (s->object_data.expected_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 39;
+            s->fault_at = 80;
         }
     } else {
         s->object_data.expected_range_mm = s->object_data.expected_range_mm + 0.0;
@@ -591,7 +595,7 @@ static void emove_admit(emove_t *s)
     if (!((s->object_data.grip_range_mm >= 0.0) && (s->object_data.grip_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 40;
+            s->fault_at = 81;
         }
     } else {
         s->object_data.grip_range_mm = s->object_data.grip_range_mm + 0.0;
@@ -599,7 +603,7 @@ static void emove_admit(emove_t *s)
     if (!((s->object_data.lift_mm >= (-500.0)) && (s->object_data.lift_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 41;
+            s->fault_at = 82;
         }
     } else {
         s->object_data.lift_mm = s->object_data.lift_mm + 0.0;
@@ -607,7 +611,7 @@ static void emove_admit(emove_t *s)
     if (!((s->held_data.expected_range_mm >= 0.0) && (s->held_data.expected_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 43;
+            s->fault_at = 84;
         }
     } else {
         s->held_data.expected_range_mm = s->held_data.expected_range_mm + 0.0;
@@ -615,7 +619,7 @@ static void emove_admit(emove_t *s)
     if (!((s->held_data.grip_range_mm >= 0.0) && (s->held_data.grip_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 44;
+            s->fault_at = 85;
         }
     } else {
         s->held_data.grip_range_mm = s->held_data.grip_range_mm + 0.0;
@@ -623,7 +627,7 @@ static void emove_admit(emove_t *s)
     if (!((s->held_data.lift_mm >= (-500.0)) && (s->held_data.lift_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 45;
+            s->fault_at = 86;
         }
     } else {
         s->held_data.lift_mm = s->held_data.lift_mm + 0.0;
@@ -640,9 +644,9 @@ static void emove_admit(emove_t *s)
 /* Deferred variables take their next values, all at once. */
 static void emove_settle(emove_t *s)
 {
-    const bool ready0 = (((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->vision.inc_command_echo == (int64_t)s->to_vision.inc_command));
-    const bool ready1 = ((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command);
-    const bool ready2 = ((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command);
+    const bool ready0 = (((int64_t)s->from_primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->from_vision.inc_command_echo == (int64_t)s->to_vision.inc_command));
+    const bool ready1 = ((int64_t)s->from_primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command);
+    const bool ready2 = ((int64_t)s->from_primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command);
     if (ready0) {
         s->cur_state = s->cur_state_next;
     }
@@ -657,13 +661,9 @@ static void emove_settle(emove_t *s)
 /* Matches table locate and runs the line. */
 static void emove_run_locate(emove_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
+    /* locate_in_step */
+    if (!(((!(!s->new_command)) || ((((((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(0))) || ((int64_t)s->cur_state == INT64_C(1))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->primitive.command == INT64_C(4)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(1)))) || (((((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->primitive.command == INT64_C(1))) && ((int64_t)s->vision.command == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(9)) && ((int64_t)s->primitive.command == INT64_C(3))) && ((int64_t)s->vision.command == INT64_C(0))))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* locate_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(6)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(8)) || ((int64_t)s->cur_state == INT64_C(9)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
     }
     s->line = emove_locate_line(s);
     switch (s->line) {
@@ -673,13 +673,11 @@ static void emove_run_locate(emove_t *s)
         emove_do_executing(s);
         break;
     case 1: /* emove/locate.rcs line 1 */
-        emove_do_begin(s);
         emove_do_no_place(s);
         emove_do_nextstate(s, INT64_C(1));
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 2: /* emove/locate.rcs line 2 */
-        emove_do_begin(s);
         emove_do_nextstate(s, INT64_C(5));
         emove_do_departure_position_fingers(s);
         emove_do_executing(s);
@@ -731,17 +729,17 @@ static void emove_run_locate(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 12: /* emove/locate.rcs line 11 */
         emove_do_vision_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 13: /* emove/locate.rcs line 12 */
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 14: /* emove/locate.rcs line 13 */
         emove_do_executing(s);
@@ -753,7 +751,7 @@ static void emove_run_locate(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -768,13 +766,9 @@ static void emove_run_locate(emove_t *s)
 /* Matches table move_to and runs the line. */
 static void emove_run_move_to(emove_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* move_to_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(2)) || ((int64_t)s->cur_state == INT64_C(3)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 2u);
+    /* move_to_in_step */
+    if (!(((!(!s->new_command)) || ((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->primitive.command == INT64_C(0))) || ((int64_t)s->cur_state == INT64_C(1))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->primitive.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->primitive.command == INT64_C(1))))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
     }
     s->line = emove_move_to_line(s);
     switch (s->line) {
@@ -784,26 +778,22 @@ static void emove_run_move_to(emove_t *s)
         emove_do_executing(s);
         break;
     case 1: /* emove/move_to.rcs line 1 */
-        emove_do_begin(s);
         emove_do_no_place(s);
         emove_do_nextstate(s, INT64_C(1));
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 2: /* emove/move_to.rcs line 2 */
-        emove_do_begin(s);
         emove_do_no_place(s);
         emove_do_nextstate(s, INT64_C(1));
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 3: /* emove/move_to.rcs line 3 */
-        emove_do_begin(s);
         emove_do_aim_first(s);
         emove_do_nextstate(s, INT64_C(3));
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
     case 4: /* emove/move_to.rcs line 4 */
-        emove_do_begin(s);
         emove_do_aim_first(s);
         emove_do_nextstate(s, INT64_C(2));
         emove_do_gothru(s);
@@ -831,7 +821,7 @@ static void emove_run_move_to(emove_t *s)
         emove_do_part_lost(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 9: /* emove/move_to.rcs line 8 */
         emove_do_pause(s);
@@ -841,11 +831,11 @@ static void emove_run_move_to(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 11: /* emove/move_to.rcs line 10 */
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 12: /* emove/move_to.rcs line 11 */
         emove_do_executing(s);
@@ -854,7 +844,7 @@ static void emove_run_move_to(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -869,13 +859,9 @@ static void emove_run_move_to(emove_t *s)
 /* Matches table move_to_obj and runs the line. */
 static void emove_run_move_to_obj(emove_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* move_to_obj_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(2)) || ((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(4)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 3u);
+    /* move_to_obj_in_step */
+    if (!(((!(!s->new_command)) || (((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->primitive.command == INT64_C(0))) || ((int64_t)s->cur_state == INT64_C(1))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->primitive.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->primitive.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->primitive.command == INT64_C(3))))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 2u);
     }
     s->line = emove_move_to_obj_line(s);
     switch (s->line) {
@@ -885,19 +871,16 @@ static void emove_run_move_to_obj(emove_t *s)
         emove_do_executing(s);
         break;
     case 1: /* emove/move_to_obj.rcs line 1 */
-        emove_do_begin(s);
         emove_do_no_place(s);
         emove_do_nextstate(s, INT64_C(1));
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 2: /* emove/move_to_obj.rcs line 2 */
-        emove_do_begin(s);
         emove_do_no_place(s);
         emove_do_nextstate(s, INT64_C(1));
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 3: /* emove/move_to_obj.rcs line 3 */
-        emove_do_begin(s);
         emove_do_nextstate(s, INT64_C(4));
         emove_do_approach_position_fingers(s);
         emove_do_executing(s);
@@ -940,11 +923,11 @@ static void emove_run_move_to_obj(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 11: /* emove/move_to_obj.rcs line 11 */
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 12: /* emove/move_to_obj.rcs line 12 */
         emove_do_executing(s);
@@ -953,7 +936,7 @@ static void emove_run_move_to_obj(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -971,12 +954,12 @@ static void emove_run_pause_emove(emove_t *s)
     s->line = emove_pause_emove_line(s);
     switch (s->line) {
     case 0: /* emove/pause.rcs line 1 */
-        emove_do_begin(s);
         emove_do_nextstate(s, INT64_C(0));
         emove_do_pause(s);
         emove_do_done(s);
         break;
     case 1: /* emove/pause.rcs line 2 */
+        emove_do_settle(s);
         emove_do_nextstate(s, INT64_C(0));
         emove_do_pause(s);
         emove_do_executing(s);
@@ -994,13 +977,9 @@ static void emove_run_pause_emove(emove_t *s)
 /* Matches table pickup and runs the line. */
 static void emove_run_pickup(emove_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* pickup_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(12)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 4u);
+    /* pickup_in_step */
+    if (!(((!(!s->new_command)) || (((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->primitive.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->primitive.command == INT64_C(5))))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 3u);
     }
     s->line = emove_pickup_line(s);
     switch (s->line) {
@@ -1010,7 +989,6 @@ static void emove_run_pickup(emove_t *s)
         emove_do_executing(s);
         break;
     case 1: /* emove/pickup.rcs line 1 */
-        emove_do_begin(s);
         emove_do_nextstate(s, INT64_C(12));
         emove_do_immed_grasp(s);
         emove_do_executing(s);
@@ -1028,11 +1006,11 @@ static void emove_run_pickup(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 5: /* emove/pickup.rcs line 5 */
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 6: /* emove/pickup.rcs line 6 */
         emove_do_executing(s);
@@ -1041,7 +1019,7 @@ static void emove_run_pickup(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -1056,13 +1034,9 @@ static void emove_run_pickup(emove_t *s)
 /* Matches table release_part and runs the line. */
 static void emove_run_release_part(emove_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* release_part_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(13)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 5u);
+    /* release_part_in_step */
+    if (!(((!(!s->new_command)) || (((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->primitive.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(13)) && ((int64_t)s->primitive.command == INT64_C(4))))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 4u);
     }
     s->line = emove_release_part_line(s);
     switch (s->line) {
@@ -1072,17 +1046,15 @@ static void emove_run_release_part(emove_t *s)
         emove_do_executing(s);
         break;
     case 1: /* emove/release.rcs line 1 */
-        emove_do_begin(s);
         emove_do_nextstate(s, INT64_C(13));
         emove_do_departure_position_fingers(s);
         emove_do_executing(s);
         break;
     case 2: /* emove/release.rcs line 1a */
-        emove_do_begin(s);
         emove_do_part_lost(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 3: /* emove/release.rcs line 2 */
         emove_do_nextstate(s, INT64_C(0));
@@ -1097,11 +1069,11 @@ static void emove_run_release_part(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 6: /* emove/release.rcs line 5 */
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case 7: /* emove/release.rcs line 6 */
         emove_do_executing(s);
@@ -1110,7 +1082,7 @@ static void emove_run_release_part(emove_t *s)
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
-        emove_do_fail(s);
+        emove_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -1129,28 +1101,69 @@ void emove_init(emove_t *s)
     s->fault = 0;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->command.inc_command = (uint16_t)INT64_C(0);
-    s->command.input_command = (uint8_t)INT64_C(0);
-    s->command.obj_ptr = (uint8_t)INT64_C(0);
-    s->command.grasp = (uint8_t)INT64_C(0);
-    s->command.locpt_ptr = (uint8_t)INT64_C(0);
-    s->command.sector = (uint8_t)INT64_C(0);
-    s->command.apoint_pos_flag = false;
-    s->command.gripped_obj_ptr = (uint8_t)INT64_C(0);
-    s->primitive.inc_command_echo = (uint16_t)INT64_C(0);
-    s->primitive.ref_command_echo = (uint8_t)INT64_C(0);
-    s->primitive.status_report = (uint8_t)INT64_C(0);
+    s->task.inc_command = (uint16_t)INT64_C(0);
+    s->task.input_command = (uint8_t)INT64_C(0);
+    s->task.obj_ptr = (uint8_t)INT64_C(0);
+    s->task.grasp = (uint8_t)INT64_C(0);
+    s->task.locpt_ptr = (uint8_t)INT64_C(0);
+    s->task.sector = (uint8_t)INT64_C(0);
+    s->task.apoint_pos_flag = false;
+    s->task.gripped_obj_ptr = (uint8_t)INT64_C(0);
+    s->to_task.inc_command_echo = (uint16_t)INT64_C(0);
+    s->to_task.ref_command_echo = (uint8_t)INT64_C(0);
+    s->to_task.status_report = (uint8_t)INT64_C(0);
+    s->to_task.failure = (uint8_t)INT64_C(0);
+    s->new_command = false;
+    s->answered = false;
+    s->settling = false;
+    s->inc_command_seen = (uint16_t)INT64_C(0);
+    s->from_primitive.inc_command_echo = (uint16_t)INT64_C(0);
+    s->from_primitive.ref_command_echo = (uint8_t)INT64_C(0);
+    s->from_primitive.status_report = (uint8_t)INT64_C(0);
+    s->from_primitive.failure = (uint8_t)INT64_C(0);
+    s->from_primitive.holds = false;
+    s->to_primitive.inc_command = (uint16_t)INT64_C(0);
+    s->to_primitive.input_command = (uint8_t)INT64_C(0);
+    s->to_primitive.obj_ptr = (uint8_t)INT64_C(0);
+    s->to_primitive.grasp = (uint8_t)INT64_C(0);
+    s->to_primitive.pose_ptr = (uint16_t)INT64_C(0);
+    s->to_primitive.displaced.x = (-500.0);
+    s->to_primitive.displaced.y = (-500.0);
+    s->to_primitive.displaced.z = (-500.0);
+    s->to_primitive.displaced.c = (-1.0);
+    s->to_primitive.displaced.s = (-1.0);
+    s->primitive.command = (uint8_t)INT64_C(0);
+    s->primitive.status = (uint8_t)INT64_C(0);
+    s->primitive.resting = false;
     s->primitive.failure = (uint8_t)INT64_C(0);
-    s->primitive.holds = false;
-    s->vision.inc_command_echo = (uint16_t)INT64_C(0);
-    s->vision.ref_command_echo = (uint8_t)INT64_C(0);
-    s->vision.status_report = (uint8_t)INT64_C(0);
+    s->last_primitive.input_command = (uint8_t)INT64_C(0);
+    s->last_primitive.obj_ptr = (uint8_t)INT64_C(0);
+    s->last_primitive.grasp = (uint8_t)INT64_C(0);
+    s->last_primitive.pose_ptr = (uint16_t)INT64_C(0);
+    s->last_primitive.displaced.x = (-500.0);
+    s->last_primitive.displaced.y = (-500.0);
+    s->last_primitive.displaced.z = (-500.0);
+    s->last_primitive.displaced.c = (-1.0);
+    s->last_primitive.displaced.s = (-1.0);
+    s->from_vision.inc_command_echo = (uint16_t)INT64_C(0);
+    s->from_vision.ref_command_echo = (uint8_t)INT64_C(0);
+    s->from_vision.status_report = (uint8_t)INT64_C(0);
+    s->from_vision.failure = (uint8_t)INT64_C(0);
+    s->from_vision.x_mm = (-500.0);
+    s->from_vision.y_mm = (-500.0);
+    s->from_vision.c = (-1.0);
+    s->from_vision.s = (-1.0);
+    s->from_vision.range_mm = 0.0;
+    s->to_vision.inc_command = (uint16_t)INT64_C(0);
+    s->to_vision.input_command = (uint8_t)INT64_C(0);
+    s->to_vision.obj_ptr = (uint8_t)INT64_C(0);
+    s->to_vision.expected_range_mm = 0.0;
+    s->vision.command = (uint8_t)INT64_C(0);
+    s->vision.status = (uint8_t)INT64_C(0);
+    s->vision.resting = false;
     s->vision.failure = (uint8_t)INT64_C(0);
-    s->vision.x_mm = (-500.0);
-    s->vision.y_mm = (-500.0);
-    s->vision.c = (-1.0);
-    s->vision.s = (-1.0);
-    s->vision.range_mm = 0.0;
+    s->last_vision.input_command = (uint8_t)INT64_C(0);
+    s->last_vision.obj_ptr = (uint8_t)INT64_C(0);
     s->origin.known = false;
     s->origin.depart_first = (uint16_t)INT64_C(0);
     s->origin.depart_count = (uint8_t)INT64_C(0);
@@ -1175,13 +1188,6 @@ void emove_init(emove_t *s)
     s->held_data.expected_range_mm = 0.0;
     s->held_data.grip_range_mm = 0.0;
     s->held_data.lift_mm = (-500.0);
-    s->new_command = false;
-    s->begun = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
-    s->ref_command_in = (uint8_t)INT64_C(0);
-    s->status_in = (uint8_t)INT64_C(0);
-    s->ref_vision_in = (uint8_t)INT64_C(0);
-    s->vision_status_in = (uint8_t)INT64_C(0);
     s->idle = true;
     s->cur_state = (uint8_t)INT64_C(0);
     s->cur_state_next = (uint8_t)INT64_C(0);
@@ -1202,219 +1208,195 @@ void emove_init(emove_t *s)
     s->displaced_here.s = (-1.0);
     s->lift_mm = (-500.0);
     s->lost = false;
-    s->old_order.inc_command = (uint16_t)INT64_C(0);
-    s->old_order.input_command = (uint8_t)INT64_C(0);
-    s->old_order.obj_ptr = (uint8_t)INT64_C(0);
-    s->old_order.grasp = (uint8_t)INT64_C(0);
-    s->old_order.pose_ptr = (uint16_t)INT64_C(0);
-    s->old_order.displaced.x = (-500.0);
-    s->old_order.displaced.y = (-500.0);
-    s->old_order.displaced.z = (-500.0);
-    s->old_order.displaced.c = (-1.0);
-    s->old_order.displaced.s = (-1.0);
-    s->old_vision.inc_command = (uint16_t)INT64_C(0);
-    s->old_vision.input_command = (uint8_t)INT64_C(0);
-    s->old_vision.obj_ptr = (uint8_t)INT64_C(0);
-    s->old_vision.expected_range_mm = 0.0;
-    s->status_report = (uint8_t)INT64_C(0);
-    s->failure = (uint8_t)INT64_C(0);
-    s->to_primitive.inc_command = (uint16_t)INT64_C(0);
-    s->to_primitive.input_command = (uint8_t)INT64_C(0);
-    s->to_primitive.obj_ptr = (uint8_t)INT64_C(0);
-    s->to_primitive.grasp = (uint8_t)INT64_C(0);
-    s->to_primitive.pose_ptr = (uint16_t)INT64_C(0);
-    s->to_primitive.displaced.x = (-500.0);
-    s->to_primitive.displaced.y = (-500.0);
-    s->to_primitive.displaced.z = (-500.0);
-    s->to_primitive.displaced.c = (-1.0);
-    s->to_primitive.displaced.s = (-1.0);
-    s->to_vision.inc_command = (uint16_t)INT64_C(0);
-    s->to_vision.input_command = (uint8_t)INT64_C(0);
-    s->to_vision.obj_ptr = (uint8_t)INT64_C(0);
-    s->to_vision.expected_range_mm = 0.0;
-    s->report.inc_command_echo = (uint16_t)INT64_C(0);
-    s->report.ref_command_echo = (uint8_t)INT64_C(0);
-    s->report.status_report = (uint8_t)INT64_C(0);
-    s->report.failure = (uint8_t)INT64_C(0);
+    s->echoed = false;
 }
 
 /* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t emove_check(const emove_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && ((*(const uint8_t *)&s->command.apoint_pos_flag) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->task.apoint_pos_flag) > 1u)) {
         at = 6;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->primitive.holds) > 1u)) {
-        at = 12;
+    if ((at < 0) && (((int64_t)s->to_task.ref_command_echo > INT64_C(5)))) {
+        at = 9;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->origin.known) > 1u)) {
-        at = 22;
+    if ((at < 0) && (((int64_t)s->to_task.status_report > INT64_C(2)))) {
+        at = 10;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->target.known) > 1u)) {
-        at = 30;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->object_data.known) > 1u)) {
-        at = 38;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->held_data.known) > 1u)) {
-        at = 42;
+    if ((at < 0) && (((int64_t)s->to_task.failure > INT64_C(15)))) {
+        at = 11;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
-        at = 46;
+        at = 12;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->begun) > 1u)) {
-        at = 47;
+    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+        at = 13;
     }
-    if ((at < 0) && (((int64_t)s->ref_command_in > INT64_C(5)))) {
-        at = 49;
+    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+        at = 14;
     }
-    if ((at < 0) && (((int64_t)s->status_in > INT64_C(2)))) {
-        at = 50;
-    }
-    if ((at < 0) && (((int64_t)s->ref_vision_in > INT64_C(2)))) {
-        at = 51;
-    }
-    if ((at < 0) && (((int64_t)s->vision_status_in > INT64_C(2)))) {
-        at = 52;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
-        at = 53;
-    }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(13)))) {
-        at = 54;
-    }
-    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(13)))) {
-        at = 55;
-    }
-    if ((at < 0) && (((int64_t)s->path_at > INT64_C(62)))) {
-        at = 56;
-    }
-    if ((at < 0) && (((int64_t)s->path_at_next > INT64_C(62)))) {
-        at = 57;
-    }
-    if ((at < 0) && (((int64_t)s->here_sector > INT64_C(99)))) {
-        at = 60;
-    }
-    if ((at < 0) && (((int64_t)s->here_sector_asked > INT64_C(99)))) {
-        at = 62;
-    }
-    if ((at < 0) && (((int64_t)s->depart_first > INT64_C(9999)))) {
-        at = 63;
-    }
-    if ((at < 0) && (((int64_t)s->depart_count > INT64_C(31)))) {
-        at = 64;
-    }
-    if ((at < 0) && (((int64_t)s->path_length > INT64_C(62)))) {
-        at = 65;
-    }
-    if ((at < 0) && (!((s->displaced_here.x >= (-500.0)) && (s->displaced_here.x <= 500.0)))) {
-        at = 66;
-    }
-    if ((at < 0) && (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0)))) {
-        at = 67;
-    }
-    if ((at < 0) && (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0)))) {
-        at = 68;
-    }
-    if ((at < 0) && (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0)))) {
-        at = 69;
-    }
-    if ((at < 0) && (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0)))) {
-        at = 70;
-    }
-    if ((at < 0) && (!((s->lift_mm >= (-500.0)) && (s->lift_mm <= 500.0)))) {
-        at = 71;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->lost) > 1u)) {
-        at = 72;
-    }
-    if ((at < 0) && (((int64_t)s->old_order.input_command > INT64_C(5)))) {
-        at = 74;
-    }
-    if ((at < 0) && (((int64_t)s->old_order.obj_ptr > INT64_C(6)))) {
-        at = 75;
-    }
-    if ((at < 0) && (((int64_t)s->old_order.grasp > INT64_C(9)))) {
-        at = 76;
-    }
-    if ((at < 0) && (((int64_t)s->old_order.pose_ptr > INT64_C(9999)))) {
-        at = 77;
-    }
-    if ((at < 0) && (!((s->old_order.displaced.x >= (-500.0)) && (s->old_order.displaced.x <= 500.0)))) {
-        at = 78;
-    }
-    if ((at < 0) && (!((s->old_order.displaced.y >= (-500.0)) && (s->old_order.displaced.y <= 500.0)))) {
-        at = 79;
-    }
-    if ((at < 0) && (!((s->old_order.displaced.z >= (-500.0)) && (s->old_order.displaced.z <= 500.0)))) {
-        at = 80;
-    }
-    if ((at < 0) && (!((s->old_order.displaced.c >= (-1.0)) && (s->old_order.displaced.c <= 1.0)))) {
-        at = 81;
-    }
-    if ((at < 0) && (!((s->old_order.displaced.s >= (-1.0)) && (s->old_order.displaced.s <= 1.0)))) {
-        at = 82;
-    }
-    if ((at < 0) && (((int64_t)s->old_vision.input_command > INT64_C(2)))) {
-        at = 84;
-    }
-    if ((at < 0) && (((int64_t)s->old_vision.obj_ptr > INT64_C(6)))) {
-        at = 85;
-    }
-    if ((at < 0) && (!((s->old_vision.expected_range_mm >= 0.0) && (s->old_vision.expected_range_mm <= 2000.0)))) {
-        at = 86;
-    }
-    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
-        at = 87;
-    }
-    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
-        at = 88;
+    if ((at < 0) && ((*(const uint8_t *)&s->from_primitive.holds) > 1u)) {
+        at = 20;
     }
     if ((at < 0) && (((int64_t)s->to_primitive.input_command > INT64_C(5)))) {
-        at = 90;
+        at = 22;
     }
     if ((at < 0) && (((int64_t)s->to_primitive.obj_ptr > INT64_C(6)))) {
-        at = 91;
+        at = 23;
     }
     if ((at < 0) && (((int64_t)s->to_primitive.grasp > INT64_C(9)))) {
-        at = 92;
+        at = 24;
     }
     if ((at < 0) && (((int64_t)s->to_primitive.pose_ptr > INT64_C(9999)))) {
-        at = 93;
+        at = 25;
     }
     if ((at < 0) && (!((s->to_primitive.displaced.x >= (-500.0)) && (s->to_primitive.displaced.x <= 500.0)))) {
-        at = 94;
+        at = 26;
     }
     if ((at < 0) && (!((s->to_primitive.displaced.y >= (-500.0)) && (s->to_primitive.displaced.y <= 500.0)))) {
-        at = 95;
+        at = 27;
     }
     if ((at < 0) && (!((s->to_primitive.displaced.z >= (-500.0)) && (s->to_primitive.displaced.z <= 500.0)))) {
-        at = 96;
+        at = 28;
     }
     if ((at < 0) && (!((s->to_primitive.displaced.c >= (-1.0)) && (s->to_primitive.displaced.c <= 1.0)))) {
-        at = 97;
+        at = 29;
     }
     if ((at < 0) && (!((s->to_primitive.displaced.s >= (-1.0)) && (s->to_primitive.displaced.s <= 1.0)))) {
-        at = 98;
+        at = 30;
+    }
+    if ((at < 0) && (((int64_t)s->primitive.command > INT64_C(5)))) {
+        at = 31;
+    }
+    if ((at < 0) && (((int64_t)s->primitive.status > INT64_C(2)))) {
+        at = 32;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->primitive.resting) > 1u)) {
+        at = 33;
+    }
+    if ((at < 0) && (((int64_t)s->primitive.failure > INT64_C(15)))) {
+        at = 34;
+    }
+    if ((at < 0) && (((int64_t)s->last_primitive.input_command > INT64_C(5)))) {
+        at = 35;
+    }
+    if ((at < 0) && (((int64_t)s->last_primitive.obj_ptr > INT64_C(6)))) {
+        at = 36;
+    }
+    if ((at < 0) && (((int64_t)s->last_primitive.grasp > INT64_C(9)))) {
+        at = 37;
+    }
+    if ((at < 0) && (((int64_t)s->last_primitive.pose_ptr > INT64_C(9999)))) {
+        at = 38;
+    }
+    if ((at < 0) && (!((s->last_primitive.displaced.x >= (-500.0)) && (s->last_primitive.displaced.x <= 500.0)))) {
+        at = 39;
+    }
+    if ((at < 0) && (!((s->last_primitive.displaced.y >= (-500.0)) && (s->last_primitive.displaced.y <= 500.0)))) {
+        at = 40;
+    }
+    if ((at < 0) && (!((s->last_primitive.displaced.z >= (-500.0)) && (s->last_primitive.displaced.z <= 500.0)))) {
+        at = 41;
+    }
+    if ((at < 0) && (!((s->last_primitive.displaced.c >= (-1.0)) && (s->last_primitive.displaced.c <= 1.0)))) {
+        at = 42;
+    }
+    if ((at < 0) && (!((s->last_primitive.displaced.s >= (-1.0)) && (s->last_primitive.displaced.s <= 1.0)))) {
+        at = 43;
     }
     if ((at < 0) && (((int64_t)s->to_vision.input_command > INT64_C(2)))) {
-        at = 100;
+        at = 54;
     }
     if ((at < 0) && (((int64_t)s->to_vision.obj_ptr > INT64_C(6)))) {
-        at = 101;
+        at = 55;
     }
     if ((at < 0) && (!((s->to_vision.expected_range_mm >= 0.0) && (s->to_vision.expected_range_mm <= 2000.0)))) {
+        at = 56;
+    }
+    if ((at < 0) && (((int64_t)s->vision.command > INT64_C(2)))) {
+        at = 57;
+    }
+    if ((at < 0) && (((int64_t)s->vision.status > INT64_C(2)))) {
+        at = 58;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->vision.resting) > 1u)) {
+        at = 59;
+    }
+    if ((at < 0) && (((int64_t)s->vision.failure > INT64_C(15)))) {
+        at = 60;
+    }
+    if ((at < 0) && (((int64_t)s->last_vision.input_command > INT64_C(2)))) {
+        at = 61;
+    }
+    if ((at < 0) && (((int64_t)s->last_vision.obj_ptr > INT64_C(6)))) {
+        at = 62;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->origin.known) > 1u)) {
+        at = 63;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->target.known) > 1u)) {
+        at = 71;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->object_data.known) > 1u)) {
+        at = 79;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->held_data.known) > 1u)) {
+        at = 83;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
+        at = 87;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(13)))) {
+        at = 88;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(13)))) {
+        at = 89;
+    }
+    if ((at < 0) && (((int64_t)s->path_at > INT64_C(62)))) {
+        at = 90;
+    }
+    if ((at < 0) && (((int64_t)s->path_at_next > INT64_C(62)))) {
+        at = 91;
+    }
+    if ((at < 0) && (((int64_t)s->here_sector > INT64_C(99)))) {
+        at = 94;
+    }
+    if ((at < 0) && (((int64_t)s->here_sector_asked > INT64_C(99)))) {
+        at = 96;
+    }
+    if ((at < 0) && (((int64_t)s->depart_first > INT64_C(9999)))) {
+        at = 97;
+    }
+    if ((at < 0) && (((int64_t)s->depart_count > INT64_C(31)))) {
+        at = 98;
+    }
+    if ((at < 0) && (((int64_t)s->path_length > INT64_C(62)))) {
+        at = 99;
+    }
+    if ((at < 0) && (!((s->displaced_here.x >= (-500.0)) && (s->displaced_here.x <= 500.0)))) {
+        at = 100;
+    }
+    if ((at < 0) && (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0)))) {
+        at = 101;
+    }
+    if ((at < 0) && (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0)))) {
         at = 102;
     }
-    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(5)))) {
+    if ((at < 0) && (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0)))) {
+        at = 103;
+    }
+    if ((at < 0) && (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0)))) {
         at = 104;
     }
-    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+    if ((at < 0) && (!((s->lift_mm >= (-500.0)) && (s->lift_mm <= 500.0)))) {
         at = 105;
     }
-    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->lost) > 1u)) {
         at = 106;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+        at = 107;
     }
     return at;
 }
@@ -1425,17 +1407,14 @@ int32_t emove_locate_line(const emove_t *s)
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
         uint32_t t0[2];
-        uint32_t t1[2];
-        uint32_t t2[6];
+        uint32_t t1[6];
+        uint32_t t2[3];
         uint32_t t3[3];
         uint32_t t4[3];
-        uint32_t t5[3];
+        uint32_t t5[2];
         uint32_t t6[2];
         uint32_t t7[14];
     } t = {
-        {
-            0xfffbu, 0xfffdu
-        },
         {
             0xfff8u, 0x7u
         },
@@ -1452,6 +1431,9 @@ int32_t emove_locate_line(const emove_t *s)
             0x6fffu, 0xefafu, 0x7fafu
         },
         {
+            0xfffbu, 0xfffdu
+        },
+        {
             0xfff9u, 0xfffeu
         },
         {
@@ -1459,7 +1441,7 @@ int32_t emove_locate_line(const emove_t *s)
             0x4907u, 0x4a07u, 0x7u, 0x7u
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->target.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->ref_command_in] & (uint32_t)t.t3[s->status_in] & (uint32_t)t.t4[s->ref_vision_in] & (uint32_t)t.t5[s->vision_status_in] & (uint32_t)t.t6[(s->idle ? 1u : 0u)] & (uint32_t)t.t7[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[s->vision.command] & (uint32_t)t.t4[s->vision.status] & (uint32_t)t.t5[(s->target.known ? 1u : 0u)] & (uint32_t)t.t6[(s->idle ? 1u : 0u)] & (uint32_t)t.t7[s->cur_state];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x10000u);
     line = several ? (-2) : line;
@@ -1481,9 +1463,9 @@ int32_t emove_move_to_line(const emove_t *s)
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
         uint16_t t0[2];
-        uint16_t t1[2];
-        uint16_t t2[6];
-        uint16_t t3[3];
+        uint16_t t1[6];
+        uint16_t t2[3];
+        uint16_t t3[2];
         uint16_t t4[2];
         uint16_t t5[14];
         uint16_t t6[63];
@@ -1492,9 +1474,6 @@ int32_t emove_move_to_line(const emove_t *s)
         uint16_t t9[2];
     } t = {
         {
-            0x1fe3u, 0x1ffdu
-        },
-        {
             0x1fe0u, 0x1fu
         },
         {
@@ -1502,6 +1481,9 @@ int32_t emove_move_to_line(const emove_t *s)
         },
         {
             0xbffu, 0x1a1fu, 0xe1fu
+        },
+        {
+            0x1fe3u, 0x1ffdu
         },
         {
             0x1fe1u, 0x1ffeu
@@ -1529,7 +1511,7 @@ int32_t emove_move_to_line(const emove_t *s)
             0x1fbfu, 0x1fffu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->target.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->ref_command_in] & (uint32_t)t.t3[s->status_in] & (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[(s->lost ? 1u : 0u)] & (uint32_t)t.t8[((((int64_t)s->path_length - (int64_t)s->path_at) > INT64_C(2)) ? 1u : 0u)] & (uint32_t)t.t9[((((int64_t)s->path_length - (int64_t)s->path_at) <= INT64_C(2)) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->target.known ? 1u : 0u)] & (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[(s->lost ? 1u : 0u)] & (uint32_t)t.t8[((((int64_t)s->path_length - (int64_t)s->path_at) > INT64_C(2)) ? 1u : 0u)] & (uint32_t)t.t9[((((int64_t)s->path_length - (int64_t)s->path_at) <= INT64_C(2)) ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x2000u);
     line = several ? (-2) : line;
@@ -1551,18 +1533,15 @@ int32_t emove_move_to_obj_line(const emove_t *s)
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
         uint16_t t0[2];
-        uint16_t t1[2];
-        uint16_t t2[6];
-        uint16_t t3[3];
+        uint16_t t1[6];
+        uint16_t t2[3];
+        uint16_t t3[2];
         uint16_t t4[2];
         uint16_t t5[14];
         uint16_t t6[63];
         uint16_t t7[2];
         uint16_t t8[2];
     } t = {
-        {
-            0x1ff3u, 0x1ffdu
-        },
         {
             0x1ff0u, 0xfu
         },
@@ -1571,6 +1550,9 @@ int32_t emove_move_to_obj_line(const emove_t *s)
         },
         {
             0xbffu, 0x1a0fu, 0xe0fu
+        },
+        {
+            0x1ff3u, 0x1ffdu
         },
         {
             0x1ff1u, 0x1ffeu
@@ -1595,7 +1577,7 @@ int32_t emove_move_to_obj_line(const emove_t *s)
             0x1f7fu, 0x1fffu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->target.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->ref_command_in] & (uint32_t)t.t3[s->status_in] & (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[((((int64_t)s->path_length - (int64_t)s->path_at) > INT64_C(2)) ? 1u : 0u)] & (uint32_t)t.t8[((((int64_t)s->path_length - (int64_t)s->path_at) <= INT64_C(2)) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->target.known ? 1u : 0u)] & (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[((((int64_t)s->path_length - (int64_t)s->path_at) > INT64_C(2)) ? 1u : 0u)] & (uint32_t)t.t8[((((int64_t)s->path_length - (int64_t)s->path_at) <= INT64_C(2)) ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x2000u);
     line = several ? (-2) : line;
@@ -1666,7 +1648,7 @@ int32_t emove_pickup_line(const emove_t *s)
             0xbu, 0x23u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x57u, 0x3u
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->ref_command_in] & (uint32_t)t.t2[s->status_in] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1714,7 +1696,7 @@ int32_t emove_release_part_line(const emove_t *s)
             0xfbu, 0xfdu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->ref_command_in] & (uint32_t)t.t2[s->status_in] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->lost ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->lost ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x100u);
     line = several ? (-2) : line;
@@ -1803,13 +1785,16 @@ int32_t emove_emove_cycle(emove_t *s)
     if (s->fault == 0) {
         emove_settle(s);
         if (s->fault == 0) {
-            emove_do_receive(s);
+            emove_do_take_orders(s);
+        }
+        if (s->fault == 0) {
+            emove_do_look_below(s);
         }
         if (s->fault == 0) {
             emove_do_measure(s);
         }
         if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->command.input_command;
+            const int64_t chosen = (int64_t)s->task.input_command;
             if (chosen == INT64_C(0)) {
                 emove_run_pause_emove(s);
             } else if (chosen == INT64_C(1)) {
@@ -1830,10 +1815,7 @@ int32_t emove_emove_cycle(emove_t *s)
             emove_do_asked(s);
         }
         if (s->fault == 0) {
-            emove_do_send(s);
-        }
-        if (s->fault == 0) {
-            emove_do_answer(s);
+            emove_do_give_orders(s);
         }
     }
     return s->fault;

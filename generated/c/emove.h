@@ -102,12 +102,11 @@ enum {
 
 /* Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed. */
 enum {
-    EMOVE_ASSUMPTION_IN_STEP = 0, /* in_step: only told in locate, move_to, move_to_obj, pickup, release_part */
-    EMOVE_ASSUMPTION_LOCATE_STATES = 1, /* locate_states: only told in locate */
-    EMOVE_ASSUMPTION_MOVE_TO_STATES = 2, /* move_to_states: only told in move_to */
-    EMOVE_ASSUMPTION_MOVE_TO_OBJ_STATES = 3, /* move_to_obj_states: only told in move_to_obj */
-    EMOVE_ASSUMPTION_PICKUP_STATES = 4, /* pickup_states: only told in pickup */
-    EMOVE_ASSUMPTION_RELEASE_PART_STATES = 5 /* release_part_states: only told in release_part */
+    EMOVE_ASSUMPTION_LOCATE_IN_STEP = 0, /* locate_in_step: only told in locate */
+    EMOVE_ASSUMPTION_MOVE_TO_IN_STEP = 1, /* move_to_in_step: only told in move_to */
+    EMOVE_ASSUMPTION_MOVE_TO_OBJ_IN_STEP = 2, /* move_to_obj_in_step: only told in move_to_obj */
+    EMOVE_ASSUMPTION_PICKUP_IN_STEP = 3, /* pickup_in_step: only told in pickup */
+    EMOVE_ASSUMPTION_RELEASE_PART_IN_STEP = 4 /* release_part_in_step: only told in release_part */
 };
 
 /* `fault`, and what a cycle returns. */
@@ -124,43 +123,41 @@ enum {
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    vocabulary_emove_order_t command; /* 0 to 7: input; From TASK. */
-    vocabulary_primitive_report_t primitive; /* 8 to 12: input; From PRIMITIVE. */
-    vocabulary_vision_report_t vision; /* 13 to 21: input; From vision. */
-    emove_common_route_t origin; /* 22 to 29: input; From the database: where the robot is. */
-    emove_common_route_t target; /* 30 to 37: input; From the database: the location of the command. */
-    emove_common_part_t object_data; /* 38 to 41: input; From the database: the part of the command. */
-    emove_common_part_t held_data; /* 42 to 45: input; From the database: the part in the gripper. */
-    bool new_command; /* 46: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
-    bool begun; /* 47: state; This level has answered the new command; pausing the levels below first is no answer. */
-    uint16_t inc_command_seen; /* 48: state; 0 .. 65535; Number of the command now being worked on; echoed to TASK. */
-    vocabulary_primitive_command_t ref_command_in; /* 49: state; Command that PRIMITIVE last echoed. */
-    vocabulary_level_status_t status_in; /* 50: state; Status that PRIMITIVE reports. */
-    vocabulary_vision_command_t ref_vision_in; /* 51: state; Command that vision last echoed. */
-    vocabulary_level_status_t vision_status_in; /* 52: state; Status that vision reports. */
-    bool idle; /* 53: state; Both levels below rest, and what they say answers this level's last orders. */
-    emove_common_emove_state_t cur_state; /* 54: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
-    emove_common_emove_state_t cur_state_next; /* 55: state; the deferred next value of cur_state */
-    uint8_t path_at; /* 56: state; 0 .. 62; Which point of the path is under way. */
-    uint8_t path_at_next; /* 57: state; the deferred next value of path_at */
-    uint8_t here; /* 58: state; 0 .. 255; Where the robot is; 0 while it moves. */
-    uint8_t here_next; /* 59: state; the deferred next value of here */
-    uint8_t here_sector; /* 60: state; 0 .. 99 */
-    uint8_t here_asked; /* 61: state; 0 .. 255; What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before. */
-    uint8_t here_sector_asked; /* 62: state; 0 .. 99 */
-    uint16_t depart_first; /* 63: state; 0 .. 9999; The departure of the path under way, kept because `here` is forgotten as soon as the robot moves. */
-    uint8_t depart_count; /* 64: state; 0 .. 31 */
-    uint8_t path_length; /* 65: state; 0 .. 62; How many points the path has. */
-    vocabulary_shift_t displaced_here; /* 66 to 70: state; How far the part that was located here was displaced: the departure is displaced as far. */
-    double lift_mm; /* 71: state; -500.0 .. 500.0 mm; How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height. */
-    bool lost; /* 72: state; A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed. */
-    vocabulary_primitive_order_t old_order; /* 73 to 82: state; The orders that were last numbered. */
-    vocabulary_vision_order_t old_vision; /* 83 to 86: state */
-    vocabulary_level_status_t status_report; /* 87: state; What the command does, to be reported. */
-    vocabulary_reason_t failure; /* 88: state; Why the command failed. */
-    vocabulary_primitive_order_t to_primitive; /* 89 to 98: output; To PRIMITIVE. */
-    vocabulary_vision_order_t to_vision; /* 99 to 102: output; To vision. */
-    vocabulary_emove_report_t report; /* 103 to 106: output; To TASK. */
+    vocabulary_emove_order_t task; /* 0 to 7: input; Orders of task. */
+    vocabulary_emove_report_t to_task; /* 8 to 11: output; Reports to task. */
+    bool new_command; /* 12: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool answered; /* 13: state; A line has answered the new command. */
+    bool settling; /* 14: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    uint16_t inc_command_seen; /* 15: state; 0 .. 65535; Number of the order that was taken last. */
+    vocabulary_primitive_report_t from_primitive; /* 16 to 20: input; Reports of primitive, as they come. */
+    vocabulary_primitive_order_t to_primitive; /* 21 to 30: output; Orders to primitive. */
+    emove_common_primitive_held_t primitive; /* 31 to 34: state; What primitive says of the last orders, held until they are echoed. */
+    emove_common_primitive_last_t last_primitive; /* 35 to 43: state; The order to primitive that was numbered last. */
+    vocabulary_vision_report_t from_vision; /* 44 to 52: input; Reports of vision, as they come. */
+    vocabulary_vision_order_t to_vision; /* 53 to 56: output; Orders to vision. */
+    emove_common_vision_held_t vision; /* 57 to 60: state; What vision says of the last orders, held until they are echoed. */
+    emove_common_vision_last_t last_vision; /* 61 to 62: state; The order to vision that was numbered last. */
+    emove_common_route_t origin; /* 63 to 70: input; From the database: where the robot is. */
+    emove_common_route_t target; /* 71 to 78: input; From the database: the location of the task. */
+    emove_common_part_t object_data; /* 79 to 82: input; From the database: the part of the task. */
+    emove_common_part_t held_data; /* 83 to 86: input; From the database: the part in the gripper. */
+    bool idle; /* 87: state; Both levels below rest, and what they say answers this level's last orders. */
+    emove_common_emove_state_t cur_state; /* 88: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
+    emove_common_emove_state_t cur_state_next; /* 89: state; the deferred next value of cur_state */
+    uint8_t path_at; /* 90: state; 0 .. 62; Which point of the path is under way. */
+    uint8_t path_at_next; /* 91: state; the deferred next value of path_at */
+    uint8_t here; /* 92: state; 0 .. 255; Where the robot is; 0 while it moves. */
+    uint8_t here_next; /* 93: state; the deferred next value of here */
+    uint8_t here_sector; /* 94: state; 0 .. 99 */
+    uint8_t here_asked; /* 95: state; 0 .. 255; What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before. */
+    uint8_t here_sector_asked; /* 96: state; 0 .. 99 */
+    uint16_t depart_first; /* 97: state; 0 .. 9999; The departure of the path under way, kept because `here` is forgotten as soon as the robot moves. */
+    uint8_t depart_count; /* 98: state; 0 .. 31 */
+    uint8_t path_length; /* 99: state; 0 .. 62; How many points the path has. */
+    vocabulary_shift_t displaced_here; /* 100 to 104: state; How far the part that was located here was displaced: the departure is displaced as far. */
+    double lift_mm; /* 105: state; -500.0 .. 500.0 mm; How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height. */
+    bool lost; /* 106: state; A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed. */
+    bool echoed; /* 107: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */

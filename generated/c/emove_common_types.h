@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "vocabulary_types.h"
+
 /* enum emove_state */
 typedef uint8_t emove_common_emove_state_t;
 enum {
@@ -41,5 +43,32 @@ typedef struct {
     double grip_range_mm; /* 0.0 .. 2000.0 mm */
     double lift_mm; /* -500.0 .. 500.0 mm */
 } emove_common_part_t;
+
+typedef struct {
+    vocabulary_primitive_command_t command;
+    vocabulary_level_status_t status;
+    bool resting;
+    vocabulary_reason_t failure;
+} emove_common_primitive_held_t;
+
+typedef struct {
+    vocabulary_primitive_command_t input_command;
+    vocabulary_object_t obj_ptr;
+    uint8_t grasp; /* 0 .. 9 */
+    uint16_t pose_ptr; /* 0 .. 9999 */
+    vocabulary_shift_t displaced;
+} emove_common_primitive_last_t;
+
+typedef struct {
+    vocabulary_vision_command_t command;
+    vocabulary_level_status_t status;
+    bool resting;
+    vocabulary_reason_t failure;
+} emove_common_vision_held_t;
+
+typedef struct {
+    vocabulary_vision_command_t input_command;
+    vocabulary_object_t obj_ptr;
+} emove_common_vision_last_t;
 
 #endif

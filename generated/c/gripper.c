@@ -64,33 +64,21 @@ static inline uint8_t gripper_u8_of_i64(int64_t a)
     return (uint8_t)a;
 }
 
-/* Procedure receive. */
-static void gripper_do_receive(gripper_t *s)
-{
-    s->new_command = ((int64_t)s->command.inc_command != (int64_t)s->inc_command_seen);
-    if (s->new_command) {
-        s->failure = (uint8_t)INT64_C(0);
-        s->waited = (uint8_t)INT64_C(0);
-    }
-    s->inc_command_seen = (uint16_t)(int64_t)s->command.inc_command;
-}
-
 /* Within half a millimetre; the force met but for a twentieth: fingers come to rest a little before they push all of it. */
 static void gripper_do_measure(gripper_t *s)
 {
-    s->at_opening = (gripper_abs_f64((s->hand.opening_mm - s->command.opening_mm)) <= 0.5);
-    s->forced = (s->hand.force_n >= (0.95 * s->command.force_n));
-    s->closing = (s->command.opening_mm < s->hand.opening_mm);
+    if (s->new_command) {
+        s->waited = (uint8_t)INT64_C(0);
+    }
+    s->at_opening = (gripper_abs_f64((s->hand.opening_mm - s->primitive.opening_mm)) <= 0.5);
+    s->forced = (s->hand.force_n >= (0.95 * s->primitive.force_n));
+    s->closing = (s->primitive.opening_mm < s->hand.opening_mm);
 }
 
-/* Procedure answer. */
-static void gripper_do_answer(gripper_t *s)
+/* Procedure show_opening. */
+static void gripper_do_show_opening(gripper_t *s)
 {
-    s->report.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->report.ref_command_echo = (uint8_t)(int64_t)s->command.input_command;
-    s->report.status_report = (uint8_t)(int64_t)s->status_report;
-    s->report.failure = (uint8_t)(int64_t)s->failure;
-    s->report.opening_mm = s->hand.opening_mm + 0.0;
+    s->to_primitive.opening_mm = s->hand.opening_mm + 0.0;
 }
 
 /* Lets go of nothing: the fingers stay as they are, with the force that they have. */
@@ -103,9 +91,9 @@ static void gripper_do_hold(gripper_t *s)
 static void gripper_do_drive(gripper_t *s)
 {
     s->to_hand.drive = true;
-    s->to_hand.opening_mm = s->command.opening_mm + 0.0;
-    s->to_hand.force_n = s->command.force_n + 0.0;
-    s->to_hand.speed_mm_s = s->command.speed_mm_s + 0.0;
+    s->to_hand.opening_mm = s->primitive.opening_mm + 0.0;
+    s->to_hand.force_n = s->primitive.force_n + 0.0;
+    s->to_hand.speed_mm_s = s->primitive.speed_mm_s + 0.0;
 }
 
 /* Procedure state. */
@@ -117,7 +105,7 @@ static void gripper_do_state(gripper_t *s, int64_t v_value)
 /* Procedure grip_failure. */
 static void gripper_do_grip_failure(gripper_t *s)
 {
-    s->failure = (uint8_t)INT64_C(10);
+    s->to_primitive.failure = (uint8_t)INT64_C(10);
 }
 
 /* Procedure wait. */
@@ -128,22 +116,49 @@ static void gripper_do_wait(gripper_t *s)
     }
 }
 
-/* Procedure executing. */
-static void gripper_do_executing(gripper_t *s)
+/* Procedure take_orders. */
+static void gripper_do_take_orders(gripper_t *s)
 {
-    s->status_report = (uint8_t)INT64_C(1);
+    if (((int64_t)s->primitive.inc_command != (int64_t)s->inc_command_seen)) {
+        s->inc_command_seen = (uint16_t)(int64_t)s->primitive.inc_command;
+        s->new_command = true;
+        s->answered = false;
+        s->to_primitive.status_report = (uint8_t)INT64_C(1);
+        s->to_primitive.failure = (uint8_t)INT64_C(0);
+    } else {
+        if ((s->answered && true)) {
+            s->new_command = false;
+        }
+    }
+    s->settling = false;
+}
+
+/* Procedure give_orders. */
+static void gripper_do_give_orders(gripper_t *s)
+{
+    if ((s->new_command && (!s->settling))) {
+        s->answered = true;
+    }
+    s->to_primitive.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
+    s->to_primitive.ref_command_echo = (uint8_t)(int64_t)s->primitive.input_command;
 }
 
 /* Procedure done. */
 static void gripper_do_done(gripper_t *s)
 {
-    s->status_report = (uint8_t)INT64_C(0);
+    s->to_primitive.status_report = (uint8_t)INT64_C(0);
 }
 
-/* Procedure fail. */
-static void gripper_do_fail(gripper_t *s)
+/* Procedure executing. */
+static void gripper_do_executing(gripper_t *s)
 {
-    s->status_report = (uint8_t)INT64_C(2);
+    s->to_primitive.status_report = (uint8_t)INT64_C(1);
+}
+
+/* Procedure failed. */
+static void gripper_do_failed(gripper_t *s)
+{
+    s->to_primitive.status_report = (uint8_t)INT64_C(2);
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
@@ -157,35 +172,35 @@ static void gripper_admit(gripper_t *s)
     if (!gripper_exact()) {
         s->fault = 7;
     }
-    if (((int64_t)s->command.input_command > INT64_C(2))) {
+    if (((int64_t)s->primitive.input_command > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 1;
         }
     }
-    if (!((s->command.opening_mm >= 0.0) && (s->command.opening_mm <= 200.0))) {
+    if (!((s->primitive.opening_mm >= 0.0) && (s->primitive.opening_mm <= 200.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 2;
         }
     } else {
-        s->command.opening_mm = s->command.opening_mm + 0.0;
+        s->primitive.opening_mm = s->primitive.opening_mm + 0.0;
     }
-    if (!((s->command.force_n >= 0.0) && (s->command.force_n <= 1000.0))) {
+    if (!((s->primitive.force_n >= 0.0) && (s->primitive.force_n <= 1000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 3;
         }
     } else {
-        s->command.force_n = s->command.force_n + 0.0;
+        s->primitive.force_n = s->primitive.force_n + 0.0;
     }
-    if (!((s->command.speed_mm_s >= 0.0) && (s->command.speed_mm_s <= 500.0))) {
+    if (!((s->primitive.speed_mm_s >= 0.0) && (s->primitive.speed_mm_s <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 4;
         }
     } else {
-        s->command.speed_mm_s = s->command.speed_mm_s + 0.0;
+        s->primitive.speed_mm_s = s->primitive.speed_mm_s + 0.0;
     }
     if (s->hand.opening_mm < 0.0) {
         s->hand.opening_mm = 0.0;
@@ -197,7 +212,7 @@ static void gripper_admit(gripper_t *s)
     if (!((s->hand.opening_mm >= 0.0) && (s->hand.opening_mm <= 200.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 5;
+            s->fault_at = 14;
         }
     } else {
         s->hand.opening_mm = s->hand.opening_mm + 0.0;
@@ -212,7 +227,7 @@ static void gripper_admit(gripper_t *s)
     if (!((s->hand.force_n >= 0.0) && (s->hand.force_n <= 1000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 6;
+            s->fault_at = 15;
         }
     } else {
         s->hand.force_n = s->hand.force_n + 0.0;
@@ -251,7 +266,7 @@ static void gripper_run_position(gripper_t *s)
         gripper_do_grip_failure(s);
         gripper_do_state(s, INT64_C(1));
         gripper_do_hold(s);
-        gripper_do_fail(s);
+        gripper_do_failed(s);
         break;
     case 3: /* gripper/gripper.rcs line 4 */
         gripper_do_wait(s);
@@ -262,7 +277,7 @@ static void gripper_run_position(gripper_t *s)
         gripper_do_grip_failure(s);
         gripper_do_state(s, INT64_C(1));
         gripper_do_hold(s);
-        gripper_do_fail(s);
+        gripper_do_failed(s);
         break;
     case 5: /* gripper/gripper.rcs line 6 */
         gripper_do_hold(s);
@@ -270,7 +285,7 @@ static void gripper_run_position(gripper_t *s)
         break;
     case 6: /* gripper/gripper.rcs line 7 */
         gripper_do_hold(s);
-        gripper_do_fail(s);
+        gripper_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -306,7 +321,7 @@ static void gripper_run_grasp(gripper_t *s)
         gripper_do_grip_failure(s);
         gripper_do_state(s, INT64_C(1));
         gripper_do_hold(s);
-        gripper_do_fail(s);
+        gripper_do_failed(s);
         break;
     case 4: /* gripper/gripper.rcs line 5 */
         gripper_do_drive(s);
@@ -314,7 +329,7 @@ static void gripper_run_grasp(gripper_t *s)
         break;
     case 5: /* gripper/gripper.rcs line 6 */
         gripper_do_hold(s);
-        gripper_do_fail(s);
+        gripper_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -353,83 +368,83 @@ void gripper_init(gripper_t *s)
     s->fault = 0;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->command.inc_command = (uint16_t)INT64_C(0);
-    s->command.input_command = (uint8_t)INT64_C(0);
-    s->command.opening_mm = 0.0;
-    s->command.force_n = 0.0;
-    s->command.speed_mm_s = 0.0;
+    s->primitive.inc_command = (uint16_t)INT64_C(0);
+    s->primitive.input_command = (uint8_t)INT64_C(0);
+    s->primitive.opening_mm = 0.0;
+    s->primitive.force_n = 0.0;
+    s->primitive.speed_mm_s = 0.0;
+    s->to_primitive.inc_command_echo = (uint16_t)INT64_C(0);
+    s->to_primitive.ref_command_echo = (uint8_t)INT64_C(0);
+    s->to_primitive.status_report = (uint8_t)INT64_C(0);
+    s->to_primitive.failure = (uint8_t)INT64_C(0);
+    s->to_primitive.opening_mm = 0.0;
+    s->new_command = false;
+    s->answered = false;
+    s->settling = false;
+    s->inc_command_seen = (uint16_t)INT64_C(0);
     s->hand.opening_mm = 0.0;
     s->hand.force_n = 0.0;
-    s->new_command = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
     s->cur_state = (uint8_t)INT64_C(0);
     s->at_opening = false;
     s->forced = false;
     s->closing = false;
     s->waited = (uint8_t)INT64_C(0);
-    s->status_report = (uint8_t)INT64_C(0);
-    s->failure = (uint8_t)INT64_C(0);
     s->to_hand.drive = false;
     s->to_hand.opening_mm = 0.0;
     s->to_hand.force_n = 0.0;
     s->to_hand.speed_mm_s = 0.0;
-    s->report.inc_command_echo = (uint16_t)INT64_C(0);
-    s->report.ref_command_echo = (uint8_t)INT64_C(0);
-    s->report.status_report = (uint8_t)INT64_C(0);
-    s->report.failure = (uint8_t)INT64_C(0);
-    s->report.opening_mm = 0.0;
 }
 
 /* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t gripper_check(const gripper_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+    if ((at < 0) && (((int64_t)s->to_primitive.ref_command_echo > INT64_C(2)))) {
+        at = 6;
+    }
+    if ((at < 0) && (((int64_t)s->to_primitive.status_report > INT64_C(2)))) {
         at = 7;
     }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(2)))) {
+    if ((at < 0) && (((int64_t)s->to_primitive.failure > INT64_C(15)))) {
+        at = 8;
+    }
+    if ((at < 0) && (!((s->to_primitive.opening_mm >= 0.0) && (s->to_primitive.opening_mm <= 200.0)))) {
         at = 9;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->at_opening) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
         at = 10;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->forced) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
         at = 11;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->closing) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
         at = 12;
     }
-    if ((at < 0) && (((int64_t)s->waited > INT64_C(150)))) {
-        at = 13;
-    }
-    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
-        at = 14;
-    }
-    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
-        at = 15;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->to_hand.drive) > 1u)) {
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(2)))) {
         at = 16;
     }
-    if ((at < 0) && (!((s->to_hand.opening_mm >= 0.0) && (s->to_hand.opening_mm <= 200.0)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->at_opening) > 1u)) {
         at = 17;
     }
-    if ((at < 0) && (!((s->to_hand.force_n >= 0.0) && (s->to_hand.force_n <= 1000.0)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->forced) > 1u)) {
         at = 18;
     }
-    if ((at < 0) && (!((s->to_hand.speed_mm_s >= 0.0) && (s->to_hand.speed_mm_s <= 500.0)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->closing) > 1u)) {
         at = 19;
     }
-    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(2)))) {
+    if ((at < 0) && (((int64_t)s->waited > INT64_C(150)))) {
+        at = 20;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->to_hand.drive) > 1u)) {
         at = 21;
     }
-    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+    if ((at < 0) && (!((s->to_hand.opening_mm >= 0.0) && (s->to_hand.opening_mm <= 200.0)))) {
         at = 22;
     }
-    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
+    if ((at < 0) && (!((s->to_hand.force_n >= 0.0) && (s->to_hand.force_n <= 1000.0)))) {
         at = 23;
     }
-    if ((at < 0) && (!((s->report.opening_mm >= 0.0) && (s->report.opening_mm <= 200.0)))) {
+    if ((at < 0) && (!((s->to_hand.speed_mm_s >= 0.0) && (s->to_hand.speed_mm_s <= 500.0)))) {
         at = 24;
     }
     return at;
@@ -608,13 +623,13 @@ int32_t gripper_gripper_cycle(gripper_t *s)
     if (s->fault == 0) {
         gripper_settle(s);
         if (s->fault == 0) {
-            gripper_do_receive(s);
+            gripper_do_take_orders(s);
         }
         if (s->fault == 0) {
             gripper_do_measure(s);
         }
         if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->command.input_command;
+            const int64_t chosen = (int64_t)s->primitive.input_command;
             if (chosen == INT64_C(0)) {
                 gripper_run_pause_gripper(s);
             } else if (chosen == INT64_C(1)) {
@@ -626,7 +641,10 @@ int32_t gripper_gripper_cycle(gripper_t *s)
             }
         }
         if (s->fault == 0) {
-            gripper_do_answer(s);
+            gripper_do_show_opening(s);
+        }
+        if (s->fault == 0) {
+            gripper_do_give_orders(s);
         }
     }
     return s->fault;

@@ -52,19 +52,19 @@ enum {
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    vocabulary_gripper_order_t command; /* 0 to 4: input; From PRIMITIVE. */
-    gripper_hand_report_t hand; /* 5 to 6: input; From the hand; a reading beyond the range is pulled to it. */
-    bool new_command; /* 7: state; True in the cycle in which a new command comes. */
-    uint16_t inc_command_seen; /* 8: state; 0 .. 65535 */
-    gripper_gripper_state_t cur_state; /* 9: state */
-    bool at_opening; /* 10: state; The fingers are at the commanded opening; the force on them is met; they are to close, so that a force is one against them: fingers that let go of a part still feel it for some cycles. */
-    bool forced; /* 11: state */
-    bool closing; /* 12: state */
-    uint8_t waited; /* 13: state; 0 .. 150 */
-    vocabulary_level_status_t status_report; /* 14: state */
-    vocabulary_reason_t failure; /* 15: state */
-    gripper_hand_order_t to_hand; /* 16 to 19: output; To the hand. */
-    vocabulary_gripper_report_t report; /* 20 to 24: output; To PRIMITIVE. */
+    vocabulary_gripper_order_t primitive; /* 0 to 4: input; Orders of primitive. */
+    vocabulary_gripper_report_t to_primitive; /* 5 to 9: output; Reports to primitive. */
+    bool new_command; /* 10: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool answered; /* 11: state; A line has answered the new command. */
+    bool settling; /* 12: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    uint16_t inc_command_seen; /* 13: state; 0 .. 65535; Number of the order that was taken last. */
+    gripper_hand_report_t hand; /* 14 to 15: input; From the hand; a reading beyond the range is pulled to it. */
+    gripper_gripper_state_t cur_state; /* 16: state */
+    bool at_opening; /* 17: state; The fingers are at the commanded opening; the force on them is met; they are to close, so that a force is one against them: fingers that let go of a part still feel it for some cycles. */
+    bool forced; /* 18: state */
+    bool closing; /* 19: state */
+    uint8_t waited; /* 20: state; 0 .. 150 */
+    gripper_hand_order_t to_hand; /* 21 to 24: output; To the hand. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */

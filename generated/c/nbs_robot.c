@@ -4,11 +4,11 @@
 /* Level task takes its inputs. */
 static void nbs_robot_take_task(nbs_robot_t *s)
 {
-    s->task.command = s->in.workstation.order;
-    s->task.emove = s->between.emove_report;
-    const uint8_t k0_0 = s->task.command.source_locpt;
-    const uint8_t k1_0 = s->task.command.dest_locpt;
-    const uint8_t k2_0 = s->task.command.end_at_locpt;
+    s->task.workstation = s->in.workstation.order;
+    s->task.from_emove = s->between.emove_to_task;
+    const uint8_t k0_0 = s->task.workstation.source_locpt;
+    const uint8_t k1_0 = s->task.workstation.dest_locpt;
+    const uint8_t k2_0 = s->task.workstation.end_at_locpt;
     const uint8_t k3_0 = s->task.current_loc;
     nbs_robot_place(k0_0, &s->task.source);
     nbs_robot_place(k1_0, &s->task.dest);
@@ -19,7 +19,7 @@ static void nbs_robot_take_task(nbs_robot_t *s)
 /* Level task gives its outputs. */
 static void nbs_robot_give_task(nbs_robot_t *s)
 {
-    s->out.workstation.report = s->task.report;
+    s->out.workstation.report = s->task.to_workstation;
     s->between.task_to_emove = s->task.to_emove;
 }
 
@@ -36,18 +36,18 @@ static int32_t nbs_robot_restart_task(nbs_robot_t *s)
     s->task.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_task(s);
     now = s->task;
-    now.status_report = (uint8_t)INT64_C(2);
-    now.failure = (uint8_t)INT64_C(15);
-    now.cur_state = (uint8_t)INT64_C(1);
-    now.cur_state_next = (uint8_t)INT64_C(1);
-    now.inc_command_seen = now.command.inc_command;
-    number = (uint64_t)now.emove.inc_command_echo;
+    now.inc_command_seen = now.workstation.inc_command;
+    now.to_workstation.status_report = (uint8_t)INT64_C(2);
+    now.to_workstation.failure = (uint8_t)INT64_C(15);
+    now.to_emove.input_command = (uint8_t)INT64_C(0);
+    number = (uint64_t)now.from_emove.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.task_to_emove.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_emove.inc_command = (uint16_t)number;
-    now.to_emove.input_command = (uint8_t)INT64_C(0);
+    now.cur_state = (uint8_t)INT64_C(1);
+    now.cur_state_next = (uint8_t)INT64_C(1);
     at = task_check(&now);
     if (at < 0) {
         s->task = now;
@@ -73,15 +73,15 @@ static int32_t nbs_robot_resume_task(nbs_robot_t *s, const task_t *from)
 /* Level emove takes its inputs. */
 static void nbs_robot_take_emove(nbs_robot_t *s)
 {
-    s->emove.command = s->between.task_to_emove;
-    s->emove.primitive = s->between.primitive_report;
-    s->emove.vision = s->between.vision_report;
+    s->emove.task = s->between.task_to_emove;
+    s->emove.from_primitive = s->between.primitive_to_emove;
+    s->emove.from_vision = s->between.vision_to_emove;
     const uint8_t k0_0 = s->emove.here;
     const uint8_t k0_1 = s->emove.here_sector;
-    const uint8_t k1_0 = s->emove.command.locpt_ptr;
-    const uint8_t k1_1 = s->emove.command.sector;
-    const vocabulary_object_t k2_0 = s->emove.command.obj_ptr;
-    const vocabulary_object_t k3_0 = s->emove.command.gripped_obj_ptr;
+    const uint8_t k1_0 = s->emove.task.locpt_ptr;
+    const uint8_t k1_1 = s->emove.task.sector;
+    const vocabulary_object_t k2_0 = s->emove.task.obj_ptr;
+    const vocabulary_object_t k3_0 = s->emove.task.gripped_obj_ptr;
     nbs_robot_route(k0_0, k0_1, &s->emove.origin);
     nbs_robot_route(k1_0, k1_1, &s->emove.target);
     nbs_robot_part(k2_0, &s->emove.object_data);
@@ -91,7 +91,7 @@ static void nbs_robot_take_emove(nbs_robot_t *s)
 /* Level emove gives its outputs. */
 static void nbs_robot_give_emove(nbs_robot_t *s)
 {
-    s->between.emove_report = s->emove.report;
+    s->between.emove_to_task = s->emove.to_task;
     s->between.emove_to_primitive = s->emove.to_primitive;
     s->between.emove_to_vision = s->emove.to_vision;
 }
@@ -109,25 +109,25 @@ static int32_t nbs_robot_restart_emove(nbs_robot_t *s)
     s->emove.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_emove(s);
     now = s->emove;
-    now.status_report = (uint8_t)INT64_C(2);
-    now.failure = (uint8_t)INT64_C(15);
-    now.cur_state = (uint8_t)INT64_C(1);
-    now.cur_state_next = (uint8_t)INT64_C(1);
-    now.inc_command_seen = now.command.inc_command;
-    number = (uint64_t)now.primitive.inc_command_echo;
+    now.inc_command_seen = now.task.inc_command;
+    now.to_task.status_report = (uint8_t)INT64_C(2);
+    now.to_task.failure = (uint8_t)INT64_C(15);
+    now.to_primitive.input_command = (uint8_t)INT64_C(0);
+    number = (uint64_t)now.from_primitive.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.emove_to_primitive.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_primitive.inc_command = (uint16_t)number;
-    now.to_primitive.input_command = (uint8_t)INT64_C(0);
-    number = (uint64_t)now.vision.inc_command_echo;
+    now.to_vision.input_command = (uint8_t)INT64_C(0);
+    number = (uint64_t)now.from_vision.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.emove_to_vision.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_vision.inc_command = (uint16_t)number;
-    now.to_vision.input_command = (uint8_t)INT64_C(0);
+    now.cur_state = (uint8_t)INT64_C(1);
+    now.cur_state_next = (uint8_t)INT64_C(1);
     at = emove_check(&now);
     if (at < 0) {
         s->emove = now;
@@ -153,14 +153,14 @@ static int32_t nbs_robot_resume_emove(nbs_robot_t *s, const emove_t *from)
 /* Level vision takes its inputs. */
 static void nbs_robot_take_vision(nbs_robot_t *s)
 {
-    s->vision.command = s->between.emove_to_vision;
+    s->vision.emove = s->between.emove_to_vision;
     s->vision.camera = s->in.camera.picture;
 }
 
 /* Level vision gives its outputs. */
 static void nbs_robot_give_vision(nbs_robot_t *s)
 {
-    s->between.vision_report = s->vision.report;
+    s->between.vision_to_emove = s->vision.to_emove;
     s->out.camera.order = s->vision.to_camera;
 }
 
@@ -177,10 +177,10 @@ static int32_t nbs_robot_restart_vision(nbs_robot_t *s)
     s->vision.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_vision(s);
     now = s->vision;
-    now.status_report = (uint8_t)INT64_C(2);
-    now.failure = (uint8_t)INT64_C(15);
+    now.inc_command_seen = now.emove.inc_command;
+    now.to_emove.status_report = (uint8_t)INT64_C(2);
+    now.to_emove.failure = (uint8_t)INT64_C(15);
     now.cur_state = (uint8_t)INT64_C(1);
-    now.inc_command_seen = now.command.inc_command;
     number = (uint64_t)now.camera.number;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->out.camera.order.number;
@@ -212,12 +212,12 @@ static int32_t nbs_robot_resume_vision(nbs_robot_t *s, const vision_t *from)
 /* Level primitive takes its inputs. */
 static void nbs_robot_take_primitive(nbs_robot_t *s)
 {
-    s->primitive.command = s->between.emove_to_primitive;
-    s->primitive.robot = s->in.robot.report;
-    s->primitive.gripper = s->between.gripper_report;
-    const uint16_t k0_0 = s->primitive.command.pose_ptr;
-    const vocabulary_object_t k1_0 = s->primitive.command.obj_ptr;
-    const uint8_t k1_1 = s->primitive.command.grasp;
+    s->primitive.emove = s->between.emove_to_primitive;
+    s->primitive.from_robot = s->in.robot.report;
+    s->primitive.from_gripper = s->between.gripper_to_primitive;
+    const uint16_t k0_0 = s->primitive.emove.pose_ptr;
+    const vocabulary_object_t k1_0 = s->primitive.emove.obj_ptr;
+    const uint8_t k1_1 = s->primitive.emove.grasp;
     nbs_robot_point(k0_0, &s->primitive.goal);
     nbs_robot_fingers(k1_0, k1_1, &s->primitive.fingers);
 }
@@ -225,7 +225,7 @@ static void nbs_robot_take_primitive(nbs_robot_t *s)
 /* Level primitive gives its outputs. */
 static void nbs_robot_give_primitive(nbs_robot_t *s)
 {
-    s->between.primitive_report = s->primitive.report;
+    s->between.primitive_to_emove = s->primitive.to_emove;
     s->out.robot.order = s->primitive.to_robot;
     s->between.primitive_to_gripper = s->primitive.to_gripper;
 }
@@ -243,25 +243,25 @@ static int32_t nbs_robot_restart_primitive(nbs_robot_t *s)
     s->primitive.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_primitive(s);
     now = s->primitive;
-    now.status_report = (uint8_t)INT64_C(2);
-    now.failure = (uint8_t)INT64_C(15);
-    now.cur_state = (uint8_t)INT64_C(1);
-    now.cur_state_next = (uint8_t)INT64_C(1);
-    now.inc_command_seen = now.command.inc_command;
-    number = (uint64_t)now.robot.inc_command_echo;
+    now.inc_command_seen = now.emove.inc_command;
+    now.to_emove.status_report = (uint8_t)INT64_C(2);
+    now.to_emove.failure = (uint8_t)INT64_C(15);
+    now.to_robot.input_command = (uint8_t)INT64_C(0);
+    number = (uint64_t)now.from_robot.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->out.robot.order.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_robot.inc_command = (uint16_t)number;
-    now.to_robot.input_command = (uint8_t)INT64_C(0);
-    number = (uint64_t)now.gripper.inc_command_echo;
+    now.to_gripper.input_command = (uint8_t)INT64_C(0);
+    number = (uint64_t)now.from_gripper.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.primitive_to_gripper.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_gripper.inc_command = (uint16_t)number;
-    now.to_gripper.input_command = (uint8_t)INT64_C(0);
+    now.cur_state = (uint8_t)INT64_C(1);
+    now.cur_state_next = (uint8_t)INT64_C(1);
     at = primitive_check(&now);
     if (at < 0) {
         s->primitive = now;
@@ -287,14 +287,14 @@ static int32_t nbs_robot_resume_primitive(nbs_robot_t *s, const primitive_t *fro
 /* Level gripper takes its inputs. */
 static void nbs_robot_take_gripper(nbs_robot_t *s)
 {
-    s->gripper.command = s->between.primitive_to_gripper;
+    s->gripper.primitive = s->between.primitive_to_gripper;
     s->gripper.hand = s->in.hand.report;
 }
 
 /* Level gripper gives its outputs. */
 static void nbs_robot_give_gripper(nbs_robot_t *s)
 {
-    s->between.gripper_report = s->gripper.report;
+    s->between.gripper_to_primitive = s->gripper.to_primitive;
     s->out.hand.order = s->gripper.to_hand;
 }
 
@@ -310,10 +310,10 @@ static int32_t nbs_robot_restart_gripper(nbs_robot_t *s)
     s->gripper.assumptions_failed = now.assumptions_failed;
     nbs_robot_take_gripper(s);
     now = s->gripper;
-    now.status_report = (uint8_t)INT64_C(2);
-    now.failure = (uint8_t)INT64_C(15);
+    now.inc_command_seen = now.primitive.inc_command;
+    now.to_primitive.status_report = (uint8_t)INT64_C(2);
+    now.to_primitive.failure = (uint8_t)INT64_C(15);
     now.cur_state = (uint8_t)INT64_C(1);
-    now.inc_command_seen = now.command.inc_command;
     at = gripper_check(&now);
     if (at < 0) {
         s->gripper = now;
@@ -344,18 +344,18 @@ void nbs_robot_init(nbs_robot_t *s)
     vision_init(&s->vision);
     primitive_init(&s->primitive);
     gripper_init(&s->gripper);
-    s->in.workstation.order = s->task.command;
-    s->out.workstation.report = s->task.report;
-    s->between.task_to_emove = s->emove.command;
-    s->between.emove_report = s->task.emove;
-    s->between.emove_to_primitive = s->primitive.command;
-    s->between.primitive_report = s->emove.primitive;
-    s->between.emove_to_vision = s->vision.command;
-    s->between.vision_report = s->emove.vision;
+    s->in.workstation.order = s->task.workstation;
+    s->out.workstation.report = s->task.to_workstation;
+    s->between.task_to_emove = s->emove.task;
+    s->between.emove_to_task = s->task.from_emove;
+    s->between.emove_to_primitive = s->primitive.emove;
+    s->between.primitive_to_emove = s->emove.from_primitive;
+    s->between.emove_to_vision = s->vision.emove;
+    s->between.vision_to_emove = s->emove.from_vision;
     s->out.robot.order = s->primitive.to_robot;
-    s->in.robot.report = s->primitive.robot;
-    s->between.primitive_to_gripper = s->gripper.command;
-    s->between.gripper_report = s->primitive.gripper;
+    s->in.robot.report = s->primitive.from_robot;
+    s->between.primitive_to_gripper = s->gripper.primitive;
+    s->between.gripper_to_primitive = s->primitive.from_gripper;
     s->out.hand.order = s->gripper.to_hand;
     s->in.hand.report = s->gripper.hand;
     s->out.camera.order = s->vision.to_camera;

@@ -33,12 +33,12 @@ enum {
 
 /* Buffers from workstation. */
 typedef struct {
-    vocabulary_task_order_t order; /* workstation.order = task.command */
+    vocabulary_task_order_t order; /* workstation.order = task.workstation */
 } nbs_robot_from_workstation_t;
 
 /* Buffers from robot. */
 typedef struct {
-    vocabulary_robot_report_t report; /* robot.report = primitive.robot */
+    vocabulary_robot_report_t report; /* robot.report = primitive.from_robot */
 } nbs_robot_from_robot_t;
 
 /* Buffers from hand. */
@@ -61,7 +61,7 @@ typedef struct {
 
 /* Buffers to workstation. */
 typedef struct {
-    vocabulary_task_report_t report; /* task.report = workstation.report */
+    vocabulary_task_report_t report; /* task.to_workstation = workstation.report */
 } nbs_robot_to_workstation_t;
 
 /* Buffers to robot. */
@@ -89,14 +89,14 @@ typedef struct {
 
 /* What levels give each other. */
 typedef struct {
-    vocabulary_emove_order_t task_to_emove; /* task.to_emove = emove.command */
-    vocabulary_emove_report_t emove_report; /* emove.report = task.emove */
-    vocabulary_primitive_order_t emove_to_primitive; /* emove.to_primitive = primitive.command */
-    vocabulary_primitive_report_t primitive_report; /* primitive.report = emove.primitive */
-    vocabulary_vision_order_t emove_to_vision; /* emove.to_vision = vision.command */
-    vocabulary_vision_report_t vision_report; /* vision.report = emove.vision */
-    vocabulary_gripper_order_t primitive_to_gripper; /* primitive.to_gripper = gripper.command */
-    vocabulary_gripper_report_t gripper_report; /* gripper.report = primitive.gripper */
+    vocabulary_emove_order_t task_to_emove; /* task.to_emove = emove.task */
+    vocabulary_emove_report_t emove_to_task; /* emove.to_task = task.from_emove */
+    vocabulary_primitive_order_t emove_to_primitive; /* emove.to_primitive = primitive.emove */
+    vocabulary_primitive_report_t primitive_to_emove; /* primitive.to_emove = emove.from_primitive */
+    vocabulary_vision_order_t emove_to_vision; /* emove.to_vision = vision.emove */
+    vocabulary_vision_report_t vision_to_emove; /* vision.to_emove = emove.from_vision */
+    vocabulary_gripper_order_t primitive_to_gripper; /* primitive.to_gripper = gripper.primitive */
+    vocabulary_gripper_report_t gripper_to_primitive; /* gripper.to_primitive = primitive.from_gripper */
 } nbs_robot_between_t;
 
 /* The whole system in one block: copying it is copying everything that a step depends on. */
@@ -112,19 +112,19 @@ typedef struct {
     uint64_t tick; /* steps done */
 } nbs_robot_t;
 
-/* yours: task.source of command.source_locpt; task.dest of command.dest_locpt; task.end_at of command.end_at_locpt; task.here of current_loc; asked in every cycle, so that the same keys must always get the same answer */
+/* yours: task.source of workstation.source_locpt; task.dest of workstation.dest_locpt; task.end_at of workstation.end_at_locpt; task.here of current_loc; asked in every cycle, so that the same keys must always get the same answer */
 extern void nbs_robot_place(uint8_t key_0, task_common_place_t *answer);
 
-/* yours: emove.origin of here, here_sector; emove.target of command.locpt_ptr, command.sector; asked in every cycle, so that the same keys must always get the same answer */
+/* yours: emove.origin of here, here_sector; emove.target of task.locpt_ptr, task.sector; asked in every cycle, so that the same keys must always get the same answer */
 extern void nbs_robot_route(uint8_t key_0, uint8_t key_1, emove_common_route_t *answer);
 
-/* yours: emove.object_data of command.obj_ptr; emove.held_data of command.gripped_obj_ptr; asked in every cycle, so that the same keys must always get the same answer */
+/* yours: emove.object_data of task.obj_ptr; emove.held_data of task.gripped_obj_ptr; asked in every cycle, so that the same keys must always get the same answer */
 extern void nbs_robot_part(vocabulary_object_t key_0, emove_common_part_t *answer);
 
-/* yours: primitive.goal of command.pose_ptr; asked in every cycle, so that the same keys must always get the same answer */
+/* yours: primitive.goal of emove.pose_ptr; asked in every cycle, so that the same keys must always get the same answer */
 extern void nbs_robot_point(uint16_t key_0, primitive_common_goal_point_t *answer);
 
-/* yours: primitive.fingers of command.obj_ptr, command.grasp; asked in every cycle, so that the same keys must always get the same answer */
+/* yours: primitive.fingers of emove.obj_ptr, emove.grasp; asked in every cycle, so that the same keys must always get the same answer */
 extern void nbs_robot_fingers(vocabulary_object_t key_0, uint8_t key_1, primitive_common_end_effector_t *answer);
 
 /* Every level's initial state; each buffer holds what its reader begins with. */

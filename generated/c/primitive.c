@@ -82,27 +82,13 @@ static inline uint8_t primitive_u8_of_i64(int64_t a)
     return (uint8_t)a;
 }
 
-/* Procedure receive. */
-static void primitive_do_receive(primitive_t *s)
+/* Procedure start_waiting. */
+static void primitive_do_start_waiting(primitive_t *s)
 {
-    if (((int64_t)s->command.inc_command != (int64_t)s->inc_command_seen)) {
-        s->inc_command_seen = (uint16_t)(int64_t)s->command.inc_command;
-        s->new_command = true;
-        s->begun = false;
-        s->failure = (uint8_t)INT64_C(0);
+    if ((s->new_command && (!s->answered))) {
         s->waited = (uint8_t)INT64_C(0);
-    } else {
-        if (((s->begun && ((int64_t)s->robot.inc_command_echo == (int64_t)s->to_robot.inc_command)) && ((int64_t)s->gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command))) {
-            s->new_command = false;
-        }
     }
-    if ((((int64_t)s->robot.inc_command_echo == (int64_t)s->to_robot.inc_command) && ((int64_t)s->gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command))) {
-        s->ref_robot_in = (uint8_t)(int64_t)s->robot.ref_command_echo;
-        s->robot_status_in = (uint8_t)(int64_t)s->robot.status_report;
-        s->ref_gripper_in = (uint8_t)(int64_t)s->gripper.ref_command_echo;
-        s->gripper_status_in = (uint8_t)(int64_t)s->gripper.status_report;
-    }
-    s->idle = (((((((int64_t)s->ref_robot_in == INT64_C(0)) && ((int64_t)s->robot_status_in == INT64_C(0))) && ((int64_t)s->ref_gripper_in == INT64_C(0))) && ((int64_t)s->gripper_status_in == INT64_C(0))) && ((int64_t)s->robot.inc_command_echo == (int64_t)s->to_robot.inc_command)) && ((int64_t)s->gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command));
+    s->idle = ((s->robot.resting && s->gripper.resting) && s->echoed);
 }
 
 /* Procedure measure. */
@@ -111,48 +97,22 @@ static void primitive_do_measure(primitive_t *s)
     int64_t v_i = INT64_C(0);
     s->near_ = ((s->length_mm - s->travelled_mm) <= s->goal.breakpoint_mm);
     s->there = (s->travelled_mm >= s->length_mm);
-    if (((int64_t)s->old_robot == INT64_C(1))) {
+    if (((int64_t)s->last_robot.input_command == INT64_C(1))) {
         s->settled = true;
         for (v_i = INT64_C(0); (v_i <= INT64_C(8)); v_i = v_i + INT64_C(1)) {
-            s->settled = (s->settled && (primitive_abs_f64((s->robot.plate[v_i] - s->to[v_i])) <= 1.5));
+            s->settled = (s->settled && (primitive_abs_f64((s->from_robot.plate[v_i] - s->to[v_i])) <= 1.5));
         }
     }
-    if ((((int64_t)s->robot.inc_command_echo == (int64_t)s->to_robot.inc_command) && ((int64_t)s->gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command))) {
-        s->fits = (primitive_abs_f64((s->gripper.opening_mm - s->fingers.grip_mm)) <= s->fingers.tolerance_mm);
-        s->closed = (s->gripper.opening_mm < 1.0);
+    if (s->echoed) {
+        s->fits = (primitive_abs_f64((s->from_gripper.opening_mm - s->fingers.grip_mm)) <= s->fingers.tolerance_mm);
+        s->closed = (s->from_gripper.opening_mm < 1.0);
     }
 }
 
-/* A new order takes the next number; the robot's poses follow one another under the number of `follow`. */
-static void primitive_do_send(primitive_t *s)
+/* Procedure hold_part. */
+static void primitive_do_hold_part(primitive_t *s)
 {
-    if (((int64_t)s->to_robot.input_command != (int64_t)s->old_robot)) {
-        s->to_robot.inc_command = primitive_u16_of_i64((((int64_t)s->to_robot.inc_command + INT64_C(1)) % INT64_C(65536)));
-    }
-    s->old_robot = (uint8_t)(int64_t)s->to_robot.input_command;
-    if ((((((int64_t)s->to_gripper.input_command != (int64_t)s->old_gripper.input_command) || (s->to_gripper.opening_mm != s->old_gripper.opening_mm)) || (s->to_gripper.force_n != s->old_gripper.force_n)) || (s->to_gripper.speed_mm_s != s->old_gripper.speed_mm_s))) {
-        s->to_gripper.inc_command = primitive_u16_of_i64((((int64_t)s->to_gripper.inc_command + INT64_C(1)) % INT64_C(65536)));
-    }
-    s->old_gripper.input_command = (uint8_t)(int64_t)s->to_gripper.input_command;
-    s->old_gripper.opening_mm = s->to_gripper.opening_mm + 0.0;
-    s->old_gripper.force_n = s->to_gripper.force_n + 0.0;
-    s->old_gripper.speed_mm_s = s->to_gripper.speed_mm_s + 0.0;
-}
-
-/* Procedure answer. */
-static void primitive_do_answer(primitive_t *s)
-{
-    s->report.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->report.ref_command_echo = (uint8_t)(int64_t)s->command.input_command;
-    s->report.status_report = (uint8_t)(int64_t)s->status_report;
-    s->report.failure = (uint8_t)(int64_t)s->failure;
-    s->report.holds = (s->fits && (!s->closed));
-}
-
-/* This line answers the new command. */
-static void primitive_do_begin(primitive_t *s)
-{
-    s->begun = true;
+    s->to_emove.holds = (s->fits && (!s->closed));
 }
 
 /* Procedure nextstate. */
@@ -161,49 +121,31 @@ static void primitive_do_nextstate(primitive_t *s, int64_t v_value)
     s->cur_state_next = (uint8_t)v_value;
 }
 
-/* Procedure executing. */
-static void primitive_do_executing(primitive_t *s)
-{
-    s->status_report = (uint8_t)INT64_C(1);
-}
-
-/* Procedure done. */
-static void primitive_do_done(primitive_t *s)
-{
-    s->status_report = (uint8_t)INT64_C(0);
-}
-
-/* Procedure fail. */
-static void primitive_do_fail(primitive_t *s)
-{
-    s->status_report = (uint8_t)INT64_C(2);
-}
-
 /* Procedure no_pose. */
 static void primitive_do_no_pose(primitive_t *s)
 {
-    s->failure = (uint8_t)INT64_C(8);
+    s->to_emove.failure = (uint8_t)INT64_C(8);
 }
 
 /* Procedure robot_failure. */
 static void primitive_do_robot_failure(primitive_t *s)
 {
-    s->failure = (uint8_t)INT64_C(9);
+    s->to_emove.failure = (uint8_t)INT64_C(9);
 }
 
 /* Procedure grip_failure. */
 static void primitive_do_grip_failure(primitive_t *s)
 {
-    s->failure = (uint8_t)INT64_C(10);
+    s->to_emove.failure = (uint8_t)INT64_C(10);
 }
 
 /* The spacing is not that of the part. */
 static void primitive_do_misfit_failure(primitive_t *s)
 {
     if (s->closed) {
-        s->failure = (uint8_t)INT64_C(11);
+        s->to_emove.failure = (uint8_t)INT64_C(11);
     } else {
-        s->failure = (uint8_t)INT64_C(12);
+        s->to_emove.failure = (uint8_t)INT64_C(12);
     }
 }
 
@@ -295,9 +237,9 @@ static void primitive_do_start(primitive_t *s)
     v_v = 0.0;
     v_east = 0.0;
     v_north = 0.0;
-    if (((int64_t)s->old_robot != INT64_C(1))) {
+    if (((int64_t)s->last_robot.input_command != INT64_C(1))) {
         for (v_i = INT64_C(0); (v_i <= INT64_C(8)); v_i = v_i + INT64_C(1)) {
-            s->to_robot.plate[v_i] = s->robot.plate[v_i] + 0.0;
+            s->to_robot.plate[v_i] = s->from_robot.plate[v_i] + 0.0;
         }
         s->speed_mm_s = 0.0 + 0.0;
     }
@@ -306,15 +248,15 @@ static void primitive_do_start(primitive_t *s)
     }
     v_east = ((s->goal.plate[6] - s->goal.plate[0]) / 100.0) + 0.0;
     v_north = ((s->goal.plate[7] - s->goal.plate[1]) / 100.0) + 0.0;
-    primitive_do_within(s, INT64_C(0), ((s->goal.plate[0] + (s->command.displaced.x * v_east)) - (s->command.displaced.y * v_north)) + 0.0);
-    primitive_do_within(s, INT64_C(1), ((s->goal.plate[1] + (s->command.displaced.x * v_north)) + (s->command.displaced.y * v_east)) + 0.0);
-    primitive_do_within(s, INT64_C(2), (s->goal.plate[2] + s->command.displaced.z) + 0.0);
+    primitive_do_within(s, INT64_C(0), ((s->goal.plate[0] + (s->emove.displaced.x * v_east)) - (s->emove.displaced.y * v_north)) + 0.0);
+    primitive_do_within(s, INT64_C(1), ((s->goal.plate[1] + (s->emove.displaced.x * v_north)) + (s->emove.displaced.y * v_east)) + 0.0);
+    primitive_do_within(s, INT64_C(2), (s->goal.plate[2] + s->emove.displaced.z) + 0.0);
     for (v_k = INT64_C(1); (v_k <= INT64_C(2)); v_k = v_k + INT64_C(1)) {
         v_u = (s->goal.plate[(INT64_C(3) * v_k)] - s->goal.plate[0]) + 0.0;
         v_v = (s->goal.plate[((INT64_C(3) * v_k) + INT64_C(1))] - s->goal.plate[1]) + 0.0;
-        primitive_do_within(s, (INT64_C(3) * v_k), ((s->to[0] + (s->command.displaced.c * v_u)) - (s->command.displaced.s * v_v)) + 0.0);
-        primitive_do_within(s, ((INT64_C(3) * v_k) + INT64_C(1)), ((s->to[1] + (s->command.displaced.s * v_u)) + (s->command.displaced.c * v_v)) + 0.0);
-        primitive_do_within(s, ((INT64_C(3) * v_k) + INT64_C(2)), (s->goal.plate[((INT64_C(3) * v_k) + INT64_C(2))] + s->command.displaced.z) + 0.0);
+        primitive_do_within(s, (INT64_C(3) * v_k), ((s->to[0] + (s->emove.displaced.c * v_u)) - (s->emove.displaced.s * v_v)) + 0.0);
+        primitive_do_within(s, ((INT64_C(3) * v_k) + INT64_C(1)), ((s->to[1] + (s->emove.displaced.s * v_u)) + (s->emove.displaced.c * v_v)) + 0.0);
+        primitive_do_within(s, ((INT64_C(3) * v_k) + INT64_C(2)), (s->goal.plate[((INT64_C(3) * v_k) + INT64_C(2))] + s->emove.displaced.z) + 0.0);
     }
     s->travelled_mm = 0.0 + 0.0;
     primitive_do_measure_length(s);
@@ -356,6 +298,81 @@ static void primitive_do_stop(primitive_t *s)
     s->speed_mm_s = 0.0 + 0.0;
 }
 
+/* Procedure take_orders. */
+static void primitive_do_take_orders(primitive_t *s)
+{
+    s->echoed = (((int64_t)s->from_robot.inc_command_echo == (int64_t)s->to_robot.inc_command) && ((int64_t)s->from_gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command));
+    if (((int64_t)s->emove.inc_command != (int64_t)s->inc_command_seen)) {
+        s->inc_command_seen = (uint16_t)(int64_t)s->emove.inc_command;
+        s->new_command = true;
+        s->answered = false;
+        s->to_emove.status_report = (uint8_t)INT64_C(1);
+        s->to_emove.failure = (uint8_t)INT64_C(0);
+    } else {
+        if ((s->answered && s->echoed)) {
+            s->new_command = false;
+        }
+    }
+    s->settling = false;
+    if (s->echoed) {
+        s->robot.command = (uint8_t)(int64_t)s->from_robot.ref_command_echo;
+        s->robot.status = (uint8_t)(int64_t)s->from_robot.status_report;
+        s->robot.failure = (uint8_t)(int64_t)s->from_robot.failure;
+        s->gripper.command = (uint8_t)(int64_t)s->from_gripper.ref_command_echo;
+        s->gripper.status = (uint8_t)(int64_t)s->from_gripper.status_report;
+        s->gripper.failure = (uint8_t)(int64_t)s->from_gripper.failure;
+    }
+    s->robot.resting = ((((int64_t)s->robot.command == INT64_C(0)) && ((int64_t)s->robot.status == INT64_C(0))) && (s->answered || s->echoed));
+    s->gripper.resting = ((((int64_t)s->gripper.command == INT64_C(0)) && ((int64_t)s->gripper.status == INT64_C(0))) && (s->answered || s->echoed));
+}
+
+/* Procedure give_orders. */
+static void primitive_do_give_orders(primitive_t *s)
+{
+    if ((s->new_command && (!s->settling))) {
+        s->answered = true;
+    }
+    s->to_emove.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
+    s->to_emove.ref_command_echo = (uint8_t)(int64_t)s->emove.input_command;
+    if (((int64_t)s->to_robot.input_command != (int64_t)s->last_robot.input_command)) {
+        s->to_robot.inc_command = primitive_u16_of_i64((((int64_t)s->to_robot.inc_command + INT64_C(1)) % INT64_C(65536)));
+    }
+    s->last_robot.input_command = (uint8_t)(int64_t)s->to_robot.input_command;
+    if ((((((int64_t)s->to_gripper.input_command != (int64_t)s->last_gripper.input_command) || (s->to_gripper.opening_mm != s->last_gripper.opening_mm)) || (s->to_gripper.force_n != s->last_gripper.force_n)) || (s->to_gripper.speed_mm_s != s->last_gripper.speed_mm_s))) {
+        s->to_gripper.inc_command = primitive_u16_of_i64((((int64_t)s->to_gripper.inc_command + INT64_C(1)) % INT64_C(65536)));
+    }
+    s->last_gripper.input_command = (uint8_t)(int64_t)s->to_gripper.input_command;
+    s->last_gripper.opening_mm = s->to_gripper.opening_mm + 0.0;
+    s->last_gripper.force_n = s->to_gripper.force_n + 0.0;
+    s->last_gripper.speed_mm_s = s->to_gripper.speed_mm_s + 0.0;
+}
+
+/* A new command finds a level below at work: let it rest first. */
+static void primitive_do_settle(primitive_t *s)
+{
+    s->settling = true;
+    s->to_robot.input_command = (uint8_t)INT64_C(0);
+    s->to_gripper.input_command = (uint8_t)INT64_C(0);
+}
+
+/* Procedure done. */
+static void primitive_do_done(primitive_t *s)
+{
+    s->to_emove.status_report = (uint8_t)INT64_C(0);
+}
+
+/* Procedure executing. */
+static void primitive_do_executing(primitive_t *s)
+{
+    s->to_emove.status_report = (uint8_t)INT64_C(1);
+}
+
+/* Procedure failed. */
+static void primitive_do_failed(primitive_t *s)
+{
+    s->to_emove.status_report = (uint8_t)INT64_C(2);
+}
+
 /* Admits every input; a refused one leaves everything else as it was. */
 static void primitive_admit(primitive_t *s)
 {
@@ -367,190 +384,190 @@ static void primitive_admit(primitive_t *s)
     if (!primitive_exact()) {
         s->fault = 7;
     }
-    if (((int64_t)s->command.input_command > INT64_C(5))) {
+    if (((int64_t)s->emove.input_command > INT64_C(5))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 1;
         }
     }
-    if (((int64_t)s->command.obj_ptr > INT64_C(6))) {
+    if (((int64_t)s->emove.obj_ptr > INT64_C(6))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 2;
         }
     }
-    if (((int64_t)s->command.grasp > INT64_C(9))) {
+    if (((int64_t)s->emove.grasp > INT64_C(9))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 3;
         }
     }
-    if (((int64_t)s->command.pose_ptr > INT64_C(9999))) {
+    if (((int64_t)s->emove.pose_ptr > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 4;
         }
     }
-    if (!((s->command.displaced.x >= (-500.0)) && (s->command.displaced.x <= 500.0))) {
+    if (!((s->emove.displaced.x >= (-500.0)) && (s->emove.displaced.x <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 5;
         }
     } else {
-        s->command.displaced.x = s->command.displaced.x + 0.0;
+        s->emove.displaced.x = s->emove.displaced.x + 0.0;
     }
-    if (!((s->command.displaced.y >= (-500.0)) && (s->command.displaced.y <= 500.0))) {
+    if (!((s->emove.displaced.y >= (-500.0)) && (s->emove.displaced.y <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 6;
         }
     } else {
-        s->command.displaced.y = s->command.displaced.y + 0.0;
+        s->emove.displaced.y = s->emove.displaced.y + 0.0;
     }
-    if (!((s->command.displaced.z >= (-500.0)) && (s->command.displaced.z <= 500.0))) {
+    if (!((s->emove.displaced.z >= (-500.0)) && (s->emove.displaced.z <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 7;
         }
     } else {
-        s->command.displaced.z = s->command.displaced.z + 0.0;
+        s->emove.displaced.z = s->emove.displaced.z + 0.0;
     }
-    if (!((s->command.displaced.c >= (-1.0)) && (s->command.displaced.c <= 1.0))) {
+    if (!((s->emove.displaced.c >= (-1.0)) && (s->emove.displaced.c <= 1.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 8;
         }
     } else {
-        s->command.displaced.c = s->command.displaced.c + 0.0;
+        s->emove.displaced.c = s->emove.displaced.c + 0.0;
     }
-    if (!((s->command.displaced.s >= (-1.0)) && (s->command.displaced.s <= 1.0))) {
+    if (!((s->emove.displaced.s >= (-1.0)) && (s->emove.displaced.s <= 1.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 9;
         }
     } else {
-        s->command.displaced.s = s->command.displaced.s + 0.0;
+        s->emove.displaced.s = s->emove.displaced.s + 0.0;
     }
-    if (((int64_t)s->robot.ref_command_echo > INT64_C(1))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 11;
-        }
-    }
-    if (((int64_t)s->robot.status_report > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 12;
-        }
-    }
-    if (((int64_t)s->robot.failure > INT64_C(15))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 13;
-        }
-    }
-    if (!((s->robot.plate[0] >= (-4000.0)) && (s->robot.plate[0] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 14;
-        }
-    } else {
-        s->robot.plate[0] = s->robot.plate[0] + 0.0;
-    }
-    if (!((s->robot.plate[1] >= (-4000.0)) && (s->robot.plate[1] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 15;
-        }
-    } else {
-        s->robot.plate[1] = s->robot.plate[1] + 0.0;
-    }
-    if (!((s->robot.plate[2] >= (-4000.0)) && (s->robot.plate[2] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 16;
-        }
-    } else {
-        s->robot.plate[2] = s->robot.plate[2] + 0.0;
-    }
-    if (!((s->robot.plate[3] >= (-4000.0)) && (s->robot.plate[3] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 17;
-        }
-    } else {
-        s->robot.plate[3] = s->robot.plate[3] + 0.0;
-    }
-    if (!((s->robot.plate[4] >= (-4000.0)) && (s->robot.plate[4] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 18;
-        }
-    } else {
-        s->robot.plate[4] = s->robot.plate[4] + 0.0;
-    }
-    if (!((s->robot.plate[5] >= (-4000.0)) && (s->robot.plate[5] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 19;
-        }
-    } else {
-        s->robot.plate[5] = s->robot.plate[5] + 0.0;
-    }
-    if (!((s->robot.plate[6] >= (-4000.0)) && (s->robot.plate[6] <= 4000.0))) {
+    if (((int64_t)s->from_robot.ref_command_echo > INT64_C(1))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 20;
         }
-    } else {
-        s->robot.plate[6] = s->robot.plate[6] + 0.0;
     }
-    if (!((s->robot.plate[7] >= (-4000.0)) && (s->robot.plate[7] <= 4000.0))) {
+    if (((int64_t)s->from_robot.status_report > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 21;
         }
-    } else {
-        s->robot.plate[7] = s->robot.plate[7] + 0.0;
     }
-    if (!((s->robot.plate[8] >= (-4000.0)) && (s->robot.plate[8] <= 4000.0))) {
+    if (((int64_t)s->from_robot.failure > INT64_C(15))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 22;
         }
-    } else {
-        s->robot.plate[8] = s->robot.plate[8] + 0.0;
     }
-    if (((int64_t)s->gripper.ref_command_echo > INT64_C(2))) {
+    if (!((s->from_robot.plate[0] >= (-4000.0)) && (s->from_robot.plate[0] <= 4000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 23;
+        }
+    } else {
+        s->from_robot.plate[0] = s->from_robot.plate[0] + 0.0;
+    }
+    if (!((s->from_robot.plate[1] >= (-4000.0)) && (s->from_robot.plate[1] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 24;
         }
+    } else {
+        s->from_robot.plate[1] = s->from_robot.plate[1] + 0.0;
     }
-    if (((int64_t)s->gripper.status_report > INT64_C(2))) {
+    if (!((s->from_robot.plate[2] >= (-4000.0)) && (s->from_robot.plate[2] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 25;
         }
+    } else {
+        s->from_robot.plate[2] = s->from_robot.plate[2] + 0.0;
     }
-    if (((int64_t)s->gripper.failure > INT64_C(15))) {
+    if (!((s->from_robot.plate[3] >= (-4000.0)) && (s->from_robot.plate[3] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 26;
         }
+    } else {
+        s->from_robot.plate[3] = s->from_robot.plate[3] + 0.0;
     }
-    if (!((s->gripper.opening_mm >= 0.0) && (s->gripper.opening_mm <= 200.0))) {
+    if (!((s->from_robot.plate[4] >= (-4000.0)) && (s->from_robot.plate[4] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 27;
         }
     } else {
-        s->gripper.opening_mm = s->gripper.opening_mm + 0.0;
+        s->from_robot.plate[4] = s->from_robot.plate[4] + 0.0;
+    }
+    if (!((s->from_robot.plate[5] >= (-4000.0)) && (s->from_robot.plate[5] <= 4000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 28;
+        }
+    } else {
+        s->from_robot.plate[5] = s->from_robot.plate[5] + 0.0;
+    }
+    if (!((s->from_robot.plate[6] >= (-4000.0)) && (s->from_robot.plate[6] <= 4000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 29;
+        }
+    } else {
+        s->from_robot.plate[6] = s->from_robot.plate[6] + 0.0;
+    }
+    if (!((s->from_robot.plate[7] >= (-4000.0)) && (s->from_robot.plate[7] <= 4000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 30;
+        }
+    } else {
+        s->from_robot.plate[7] = s->from_robot.plate[7] + 0.0;
+    }
+    if (!((s->from_robot.plate[8] >= (-4000.0)) && (s->from_robot.plate[8] <= 4000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 31;
+        }
+    } else {
+        s->from_robot.plate[8] = s->from_robot.plate[8] + 0.0;
+    }
+    if (((int64_t)s->from_gripper.ref_command_echo > INT64_C(2))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 49;
+        }
+    }
+    if (((int64_t)s->from_gripper.status_report > INT64_C(2))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 50;
+        }
+    }
+    if (((int64_t)s->from_gripper.failure > INT64_C(15))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 51;
+        }
+    }
+    if (!((s->from_gripper.opening_mm >= 0.0) && (s->from_gripper.opening_mm <= 200.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 52;
+        }
+    } else {
+        s->from_gripper.opening_mm = s->from_gripper.opening_mm + 0.0;
     }
     if (!((s->goal.plate[0] >= (-4000.0)) && (s->goal.plate[0] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 29;
+            s->fault_at = 67;
         }
     } else {
         s->goal.plate[0] = s->goal.plate[0] + 0.0;
@@ -558,7 +575,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.plate[1] >= (-4000.0)) && (s->goal.plate[1] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 30;
+            s->fault_at = 68;
         }
     } else {
         s->goal.plate[1] = s->goal.plate[1] + 0.0;
@@ -566,7 +583,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.plate[2] >= (-4000.0)) && (s->goal.plate[2] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 31;
+            s->fault_at = 69;
         }
     } else {
         s->goal.plate[2] = s->goal.plate[2] + 0.0;
@@ -574,7 +591,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.plate[3] >= (-4000.0)) && (s->goal.plate[3] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 32;
+            s->fault_at = 70;
         }
     } else {
         s->goal.plate[3] = s->goal.plate[3] + 0.0;
@@ -582,7 +599,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.plate[4] >= (-4000.0)) && (s->goal.plate[4] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 33;
+            s->fault_at = 71;
         }
     } else {
         s->goal.plate[4] = s->goal.plate[4] + 0.0;
@@ -590,7 +607,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.plate[5] >= (-4000.0)) && (s->goal.plate[5] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 34;
+            s->fault_at = 72;
         }
     } else {
         s->goal.plate[5] = s->goal.plate[5] + 0.0;
@@ -598,7 +615,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.plate[6] >= (-4000.0)) && (s->goal.plate[6] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 35;
+            s->fault_at = 73;
         }
     } else {
         s->goal.plate[6] = s->goal.plate[6] + 0.0;
@@ -606,7 +623,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.plate[7] >= (-4000.0)) && (s->goal.plate[7] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 36;
+            s->fault_at = 74;
         }
     } else {
         s->goal.plate[7] = s->goal.plate[7] + 0.0;
@@ -614,7 +631,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.plate[8] >= (-4000.0)) && (s->goal.plate[8] <= 4000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 37;
+            s->fault_at = 75;
         }
     } else {
         s->goal.plate[8] = s->goal.plate[8] + 0.0;
@@ -622,7 +639,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.speed_mm_s >= 1.0) && (s->goal.speed_mm_s <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 38;
+            s->fault_at = 76;
         }
     } else {
         s->goal.speed_mm_s = s->goal.speed_mm_s + 0.0;
@@ -630,7 +647,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.accel_mm_s2 >= 10.0) && (s->goal.accel_mm_s2 <= 10000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 39;
+            s->fault_at = 77;
         }
     } else {
         s->goal.accel_mm_s2 = s->goal.accel_mm_s2 + 0.0;
@@ -638,7 +655,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->goal.breakpoint_mm >= 0.0) && (s->goal.breakpoint_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 40;
+            s->fault_at = 78;
         }
     } else {
         s->goal.breakpoint_mm = s->goal.breakpoint_mm + 0.0;
@@ -646,7 +663,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.approach_mm >= 0.0) && (s->fingers.approach_mm <= 200.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 42;
+            s->fault_at = 80;
         }
     } else {
         s->fingers.approach_mm = s->fingers.approach_mm + 0.0;
@@ -654,7 +671,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.departure_mm >= 0.0) && (s->fingers.departure_mm <= 200.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 43;
+            s->fault_at = 81;
         }
     } else {
         s->fingers.departure_mm = s->fingers.departure_mm + 0.0;
@@ -662,7 +679,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.grip_mm >= 0.0) && (s->fingers.grip_mm <= 200.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 44;
+            s->fault_at = 82;
         }
     } else {
         s->fingers.grip_mm = s->fingers.grip_mm + 0.0;
@@ -670,7 +687,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.tolerance_mm >= 0.0) && (s->fingers.tolerance_mm <= 50.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 45;
+            s->fault_at = 83;
         }
     } else {
         s->fingers.tolerance_mm = s->fingers.tolerance_mm + 0.0;
@@ -678,7 +695,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.force_n >= 0.0) && (s->fingers.force_n <= 1000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 46;
+            s->fault_at = 84;
         }
     } else {
         s->fingers.force_n = s->fingers.force_n + 0.0;
@@ -686,7 +703,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.speed_mm_s >= 0.0) && (s->fingers.speed_mm_s <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 47;
+            s->fault_at = 85;
         }
     } else {
         s->fingers.speed_mm_s = s->fingers.speed_mm_s + 0.0;
@@ -703,7 +720,7 @@ static void primitive_admit(primitive_t *s)
 /* Deferred variables take their next values, all at once. */
 static void primitive_settle(primitive_t *s)
 {
-    const bool ready0 = (((int64_t)s->robot.inc_command_echo == (int64_t)s->to_robot.inc_command) && ((int64_t)s->gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command));
+    const bool ready0 = (((int64_t)s->from_robot.inc_command_echo == (int64_t)s->to_robot.inc_command) && ((int64_t)s->from_gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command));
     if (ready0) {
         s->cur_state = s->cur_state_next;
     }
@@ -712,28 +729,22 @@ static void primitive_settle(primitive_t *s)
 /* Matches table approach_position_fingers and runs the line. */
 static void primitive_run_approach_position_fingers(primitive_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((!((int64_t)s->cur_state == INT64_C(2))) || (((int64_t)s->ref_robot_in == INT64_C(1)) && ((int64_t)s->ref_gripper_in == INT64_C(0)))) && ((!((int64_t)s->cur_state == INT64_C(3))) || (((int64_t)s->ref_robot_in == INT64_C(0)) && (((int64_t)s->ref_gripper_in == INT64_C(1)) || ((int64_t)s->ref_gripper_in == INT64_C(2))))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* approach_states */
+    /* approach_position_fingers_in_step */
     if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(3)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
     }
     s->line = primitive_approach_position_fingers_line(s);
     switch (s->line) {
     case 0: /* primitive/approach_position_fingers.rcs line 1 */
-        primitive_do_begin(s);
         primitive_do_nextstate(s, INT64_C(3));
         primitive_do_position(s, s->fingers.approach_mm + 0.0);
         primitive_do_executing(s);
         break;
     case 1: /* primitive/approach_position_fingers.rcs line 2 */
-        primitive_do_begin(s);
         primitive_do_grip_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 2: /* primitive/approach_position_fingers.rcs line 3 */
         primitive_do_executing(s);
@@ -746,20 +757,20 @@ static void primitive_run_approach_position_fingers(primitive_t *s)
         primitive_do_grip_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 5: /* primitive/approach_position_fingers.rcs line 6 */
         primitive_do_done(s);
         break;
     case 6: /* primitive/approach_position_fingers.rcs line 7 */
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 7: /* primitive/approach_position_fingers.rcs line 8 */
         primitive_do_grip_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -774,28 +785,22 @@ static void primitive_run_approach_position_fingers(primitive_t *s)
 /* Matches table departure_position_fingers and runs the line. */
 static void primitive_run_departure_position_fingers(primitive_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((!((int64_t)s->cur_state == INT64_C(2))) || (((int64_t)s->ref_robot_in == INT64_C(1)) && ((int64_t)s->ref_gripper_in == INT64_C(0)))) && ((!((int64_t)s->cur_state == INT64_C(3))) || (((int64_t)s->ref_robot_in == INT64_C(0)) && (((int64_t)s->ref_gripper_in == INT64_C(1)) || ((int64_t)s->ref_gripper_in == INT64_C(2))))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* departure_states */
+    /* departure_position_fingers_in_step */
     if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(3)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 2u);
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
     }
     s->line = primitive_departure_position_fingers_line(s);
     switch (s->line) {
     case 0: /* primitive/departure_position_fingers.rcs line 1 */
-        primitive_do_begin(s);
         primitive_do_nextstate(s, INT64_C(3));
         primitive_do_position(s, s->fingers.departure_mm + 0.0);
         primitive_do_executing(s);
         break;
     case 1: /* primitive/departure_position_fingers.rcs line 2 */
-        primitive_do_begin(s);
         primitive_do_grip_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 2: /* primitive/departure_position_fingers.rcs line 3 */
         primitive_do_executing(s);
@@ -808,20 +813,20 @@ static void primitive_run_departure_position_fingers(primitive_t *s)
         primitive_do_grip_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 5: /* primitive/departure_position_fingers.rcs line 6 */
         primitive_do_done(s);
         break;
     case 6: /* primitive/departure_position_fingers.rcs line 7 */
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 7: /* primitive/departure_position_fingers.rcs line 8 */
         primitive_do_grip_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -836,29 +841,23 @@ static void primitive_run_departure_position_fingers(primitive_t *s)
 /* Matches table goto and runs the line. */
 static void primitive_run_goto_(primitive_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((!((int64_t)s->cur_state == INT64_C(2))) || (((int64_t)s->ref_robot_in == INT64_C(1)) && ((int64_t)s->ref_gripper_in == INT64_C(0)))) && ((!((int64_t)s->cur_state == INT64_C(3))) || (((int64_t)s->ref_robot_in == INT64_C(0)) && (((int64_t)s->ref_gripper_in == INT64_C(1)) || ((int64_t)s->ref_gripper_in == INT64_C(2))))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* goto_states */
+    /* goto_in_step */
     if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(2)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 3u);
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 2u);
     }
     s->line = primitive_goto__line(s);
     switch (s->line) {
     case 0: /* primitive/goto.rcs line 1 */
-        primitive_do_begin(s);
         primitive_do_start(s);
         primitive_do_nextstate(s, INT64_C(2));
         primitive_do_follow(s);
         primitive_do_executing(s);
         break;
     case 1: /* primitive/goto.rcs line 2 */
-        primitive_do_begin(s);
         primitive_do_no_pose(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 2: /* primitive/goto.rcs line 3 */
         primitive_do_advance(s);
@@ -873,7 +872,7 @@ static void primitive_run_goto_(primitive_t *s)
         primitive_do_robot_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 5: /* primitive/goto.rcs line 6 */
         primitive_do_stop(s);
@@ -889,26 +888,26 @@ static void primitive_run_goto_(primitive_t *s)
         primitive_do_robot_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 8: /* primitive/goto.rcs line 7 */
         primitive_do_robot_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 9: /* primitive/goto.rcs line 8 */
         primitive_do_done(s);
         break;
     case 10: /* primitive/goto.rcs line 9 */
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 11: /* primitive/goto.rcs line 10 */
         primitive_do_robot_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -923,29 +922,23 @@ static void primitive_run_goto_(primitive_t *s)
 /* Matches table gothru and runs the line. */
 static void primitive_run_gothru(primitive_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((!((int64_t)s->cur_state == INT64_C(2))) || (((int64_t)s->ref_robot_in == INT64_C(1)) && ((int64_t)s->ref_gripper_in == INT64_C(0)))) && ((!((int64_t)s->cur_state == INT64_C(3))) || (((int64_t)s->ref_robot_in == INT64_C(0)) && (((int64_t)s->ref_gripper_in == INT64_C(1)) || ((int64_t)s->ref_gripper_in == INT64_C(2))))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* gothru_states */
+    /* gothru_in_step */
     if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(2)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 4u);
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 3u);
     }
     s->line = primitive_gothru_line(s);
     switch (s->line) {
     case 0: /* primitive/gothru.rcs line 1 */
-        primitive_do_begin(s);
         primitive_do_start(s);
         primitive_do_nextstate(s, INT64_C(2));
         primitive_do_follow(s);
         primitive_do_executing(s);
         break;
     case 1: /* primitive/gothru.rcs line 2 */
-        primitive_do_begin(s);
         primitive_do_no_pose(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 2: /* primitive/gothru.rcs line 3 */
         primitive_do_advance_thru(s);
@@ -964,17 +957,17 @@ static void primitive_run_gothru(primitive_t *s)
         primitive_do_robot_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 6: /* primitive/gothru.rcs line 7 */
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 7: /* primitive/gothru.rcs line 8 */
         primitive_do_robot_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -989,28 +982,22 @@ static void primitive_run_gothru(primitive_t *s)
 /* Matches table immed_grasp and runs the line. */
 static void primitive_run_immed_grasp(primitive_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((!((int64_t)s->cur_state == INT64_C(2))) || (((int64_t)s->ref_robot_in == INT64_C(1)) && ((int64_t)s->ref_gripper_in == INT64_C(0)))) && ((!((int64_t)s->cur_state == INT64_C(3))) || (((int64_t)s->ref_robot_in == INT64_C(0)) && (((int64_t)s->ref_gripper_in == INT64_C(1)) || ((int64_t)s->ref_gripper_in == INT64_C(2))))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* grasp_states */
+    /* immed_grasp_in_step */
     if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(3)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 5u);
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 4u);
     }
     s->line = primitive_immed_grasp_line(s);
     switch (s->line) {
     case 0: /* primitive/immed_grasp.rcs line 1 */
-        primitive_do_begin(s);
         primitive_do_nextstate(s, INT64_C(3));
         primitive_do_grasp(s);
         primitive_do_executing(s);
         break;
     case 1: /* primitive/immed_grasp.rcs line 2 */
-        primitive_do_begin(s);
         primitive_do_grip_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 2: /* primitive/immed_grasp.rcs line 3 */
         primitive_do_executing(s);
@@ -1023,26 +1010,26 @@ static void primitive_run_immed_grasp(primitive_t *s)
         primitive_do_misfit_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 5: /* primitive/immed_grasp.rcs line 6 */
         primitive_do_grip_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 6: /* primitive/immed_grasp.rcs line 7 */
         primitive_do_done(s);
         break;
     case 7: /* primitive/immed_grasp.rcs line 8 */
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case 8: /* primitive/immed_grasp.rcs line 9 */
         primitive_do_grip_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
-        primitive_do_fail(s);
+        primitive_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -1060,12 +1047,12 @@ static void primitive_run_pause_primitive(primitive_t *s)
     s->line = primitive_pause_primitive_line(s);
     switch (s->line) {
     case 0: /* primitive/pause.rcs line 1 */
-        primitive_do_begin(s);
         primitive_do_nextstate(s, INT64_C(0));
         primitive_do_pause(s);
         primitive_do_done(s);
         break;
     case 1: /* primitive/pause.rcs line 2 */
+        primitive_do_settle(s);
         primitive_do_nextstate(s, INT64_C(0));
         primitive_do_pause(s);
         primitive_do_executing(s);
@@ -1087,34 +1074,72 @@ void primitive_init(primitive_t *s)
     s->fault = 0;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->command.inc_command = (uint16_t)INT64_C(0);
-    s->command.input_command = (uint8_t)INT64_C(0);
-    s->command.obj_ptr = (uint8_t)INT64_C(0);
-    s->command.grasp = (uint8_t)INT64_C(0);
-    s->command.pose_ptr = (uint16_t)INT64_C(0);
-    s->command.displaced.x = (-500.0);
-    s->command.displaced.y = (-500.0);
-    s->command.displaced.z = (-500.0);
-    s->command.displaced.c = (-1.0);
-    s->command.displaced.s = (-1.0);
-    s->robot.inc_command_echo = (uint16_t)INT64_C(0);
-    s->robot.ref_command_echo = (uint8_t)INT64_C(0);
-    s->robot.status_report = (uint8_t)INT64_C(0);
+    s->emove.inc_command = (uint16_t)INT64_C(0);
+    s->emove.input_command = (uint8_t)INT64_C(0);
+    s->emove.obj_ptr = (uint8_t)INT64_C(0);
+    s->emove.grasp = (uint8_t)INT64_C(0);
+    s->emove.pose_ptr = (uint16_t)INT64_C(0);
+    s->emove.displaced.x = (-500.0);
+    s->emove.displaced.y = (-500.0);
+    s->emove.displaced.z = (-500.0);
+    s->emove.displaced.c = (-1.0);
+    s->emove.displaced.s = (-1.0);
+    s->to_emove.inc_command_echo = (uint16_t)INT64_C(0);
+    s->to_emove.ref_command_echo = (uint8_t)INT64_C(0);
+    s->to_emove.status_report = (uint8_t)INT64_C(0);
+    s->to_emove.failure = (uint8_t)INT64_C(0);
+    s->to_emove.holds = false;
+    s->new_command = false;
+    s->answered = false;
+    s->settling = false;
+    s->inc_command_seen = (uint16_t)INT64_C(0);
+    s->from_robot.inc_command_echo = (uint16_t)INT64_C(0);
+    s->from_robot.ref_command_echo = (uint8_t)INT64_C(0);
+    s->from_robot.status_report = (uint8_t)INT64_C(0);
+    s->from_robot.failure = (uint8_t)INT64_C(0);
+    s->from_robot.plate[0] = (-4000.0);
+    s->from_robot.plate[1] = (-4000.0);
+    s->from_robot.plate[2] = (-4000.0);
+    s->from_robot.plate[3] = (-4000.0);
+    s->from_robot.plate[4] = (-4000.0);
+    s->from_robot.plate[5] = (-4000.0);
+    s->from_robot.plate[6] = (-4000.0);
+    s->from_robot.plate[7] = (-4000.0);
+    s->from_robot.plate[8] = (-4000.0);
+    s->to_robot.inc_command = (uint16_t)INT64_C(0);
+    s->to_robot.input_command = (uint8_t)INT64_C(0);
+    s->to_robot.plate[0] = (-4000.0);
+    s->to_robot.plate[1] = (-4000.0);
+    s->to_robot.plate[2] = (-4000.0);
+    s->to_robot.plate[3] = (-4000.0);
+    s->to_robot.plate[4] = (-4000.0);
+    s->to_robot.plate[5] = (-4000.0);
+    s->to_robot.plate[6] = (-4000.0);
+    s->to_robot.plate[7] = (-4000.0);
+    s->to_robot.plate[8] = (-4000.0);
+    s->robot.command = (uint8_t)INT64_C(0);
+    s->robot.status = (uint8_t)INT64_C(0);
+    s->robot.resting = false;
     s->robot.failure = (uint8_t)INT64_C(0);
-    s->robot.plate[0] = (-4000.0);
-    s->robot.plate[1] = (-4000.0);
-    s->robot.plate[2] = (-4000.0);
-    s->robot.plate[3] = (-4000.0);
-    s->robot.plate[4] = (-4000.0);
-    s->robot.plate[5] = (-4000.0);
-    s->robot.plate[6] = (-4000.0);
-    s->robot.plate[7] = (-4000.0);
-    s->robot.plate[8] = (-4000.0);
-    s->gripper.inc_command_echo = (uint16_t)INT64_C(0);
-    s->gripper.ref_command_echo = (uint8_t)INT64_C(0);
-    s->gripper.status_report = (uint8_t)INT64_C(0);
+    s->last_robot.input_command = (uint8_t)INT64_C(0);
+    s->from_gripper.inc_command_echo = (uint16_t)INT64_C(0);
+    s->from_gripper.ref_command_echo = (uint8_t)INT64_C(0);
+    s->from_gripper.status_report = (uint8_t)INT64_C(0);
+    s->from_gripper.failure = (uint8_t)INT64_C(0);
+    s->from_gripper.opening_mm = 0.0;
+    s->to_gripper.inc_command = (uint16_t)INT64_C(0);
+    s->to_gripper.input_command = (uint8_t)INT64_C(0);
+    s->to_gripper.opening_mm = 0.0;
+    s->to_gripper.force_n = 0.0;
+    s->to_gripper.speed_mm_s = 0.0;
+    s->gripper.command = (uint8_t)INT64_C(0);
+    s->gripper.status = (uint8_t)INT64_C(0);
+    s->gripper.resting = false;
     s->gripper.failure = (uint8_t)INT64_C(0);
-    s->gripper.opening_mm = 0.0;
+    s->last_gripper.input_command = (uint8_t)INT64_C(0);
+    s->last_gripper.opening_mm = 0.0;
+    s->last_gripper.force_n = 0.0;
+    s->last_gripper.speed_mm_s = 0.0;
     s->goal.known = false;
     s->goal.plate[0] = (-4000.0);
     s->goal.plate[1] = (-4000.0);
@@ -1135,13 +1160,6 @@ void primitive_init(primitive_t *s)
     s->fingers.tolerance_mm = 0.0;
     s->fingers.force_n = 0.0;
     s->fingers.speed_mm_s = 0.0;
-    s->new_command = false;
-    s->begun = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
-    s->ref_robot_in = (uint8_t)INT64_C(0);
-    s->robot_status_in = (uint8_t)INT64_C(0);
-    s->ref_gripper_in = (uint8_t)INT64_C(0);
-    s->gripper_status_in = (uint8_t)INT64_C(0);
     s->idle = true;
     s->cur_state = (uint8_t)INT64_C(0);
     s->cur_state_next = (uint8_t)INT64_C(0);
@@ -1172,233 +1190,217 @@ void primitive_init(primitive_t *s)
     s->fits = false;
     s->closed = false;
     s->waited = (uint8_t)INT64_C(0);
-    s->old_robot = (uint8_t)INT64_C(0);
-    s->old_gripper.inc_command = (uint16_t)INT64_C(0);
-    s->old_gripper.input_command = (uint8_t)INT64_C(0);
-    s->old_gripper.opening_mm = 0.0;
-    s->old_gripper.force_n = 0.0;
-    s->old_gripper.speed_mm_s = 0.0;
-    s->status_report = (uint8_t)INT64_C(0);
-    s->failure = (uint8_t)INT64_C(0);
-    s->to_robot.inc_command = (uint16_t)INT64_C(0);
-    s->to_robot.input_command = (uint8_t)INT64_C(0);
-    s->to_robot.plate[0] = (-4000.0);
-    s->to_robot.plate[1] = (-4000.0);
-    s->to_robot.plate[2] = (-4000.0);
-    s->to_robot.plate[3] = (-4000.0);
-    s->to_robot.plate[4] = (-4000.0);
-    s->to_robot.plate[5] = (-4000.0);
-    s->to_robot.plate[6] = (-4000.0);
-    s->to_robot.plate[7] = (-4000.0);
-    s->to_robot.plate[8] = (-4000.0);
-    s->to_gripper.inc_command = (uint16_t)INT64_C(0);
-    s->to_gripper.input_command = (uint8_t)INT64_C(0);
-    s->to_gripper.opening_mm = 0.0;
-    s->to_gripper.force_n = 0.0;
-    s->to_gripper.speed_mm_s = 0.0;
-    s->report.inc_command_echo = (uint16_t)INT64_C(0);
-    s->report.ref_command_echo = (uint8_t)INT64_C(0);
-    s->report.status_report = (uint8_t)INT64_C(0);
-    s->report.failure = (uint8_t)INT64_C(0);
-    s->report.holds = false;
     s->display = (uint8_t)INT64_C(0);
+    s->echoed = false;
 }
 
 /* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t primitive_check(const primitive_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && ((*(const uint8_t *)&s->goal.known) > 1u)) {
-        at = 28;
+    if ((at < 0) && (((int64_t)s->to_emove.ref_command_echo > INT64_C(5)))) {
+        at = 11;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->fingers.known) > 1u)) {
-        at = 41;
+    if ((at < 0) && (((int64_t)s->to_emove.status_report > INT64_C(2)))) {
+        at = 12;
+    }
+    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(15)))) {
+        at = 13;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->to_emove.holds) > 1u)) {
+        at = 14;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
-        at = 48;
+        at = 15;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->begun) > 1u)) {
-        at = 49;
+    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+        at = 16;
     }
-    if ((at < 0) && (((int64_t)s->ref_robot_in > INT64_C(1)))) {
-        at = 51;
-    }
-    if ((at < 0) && (((int64_t)s->robot_status_in > INT64_C(2)))) {
-        at = 52;
-    }
-    if ((at < 0) && (((int64_t)s->ref_gripper_in > INT64_C(2)))) {
-        at = 53;
-    }
-    if ((at < 0) && (((int64_t)s->gripper_status_in > INT64_C(2)))) {
-        at = 54;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
-        at = 55;
-    }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(3)))) {
-        at = 56;
-    }
-    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(3)))) {
-        at = 57;
-    }
-    if ((at < 0) && (!((s->from[0] >= (-4000.0)) && (s->from[0] <= 4000.0)))) {
-        at = 58;
-    }
-    if ((at < 0) && (!((s->from[1] >= (-4000.0)) && (s->from[1] <= 4000.0)))) {
-        at = 59;
-    }
-    if ((at < 0) && (!((s->from[2] >= (-4000.0)) && (s->from[2] <= 4000.0)))) {
-        at = 60;
-    }
-    if ((at < 0) && (!((s->from[3] >= (-4000.0)) && (s->from[3] <= 4000.0)))) {
-        at = 61;
-    }
-    if ((at < 0) && (!((s->from[4] >= (-4000.0)) && (s->from[4] <= 4000.0)))) {
-        at = 62;
-    }
-    if ((at < 0) && (!((s->from[5] >= (-4000.0)) && (s->from[5] <= 4000.0)))) {
-        at = 63;
-    }
-    if ((at < 0) && (!((s->from[6] >= (-4000.0)) && (s->from[6] <= 4000.0)))) {
-        at = 64;
-    }
-    if ((at < 0) && (!((s->from[7] >= (-4000.0)) && (s->from[7] <= 4000.0)))) {
-        at = 65;
-    }
-    if ((at < 0) && (!((s->from[8] >= (-4000.0)) && (s->from[8] <= 4000.0)))) {
-        at = 66;
-    }
-    if ((at < 0) && (!((s->to[0] >= (-4000.0)) && (s->to[0] <= 4000.0)))) {
-        at = 67;
-    }
-    if ((at < 0) && (!((s->to[1] >= (-4000.0)) && (s->to[1] <= 4000.0)))) {
-        at = 68;
-    }
-    if ((at < 0) && (!((s->to[2] >= (-4000.0)) && (s->to[2] <= 4000.0)))) {
-        at = 69;
-    }
-    if ((at < 0) && (!((s->to[3] >= (-4000.0)) && (s->to[3] <= 4000.0)))) {
-        at = 70;
-    }
-    if ((at < 0) && (!((s->to[4] >= (-4000.0)) && (s->to[4] <= 4000.0)))) {
-        at = 71;
-    }
-    if ((at < 0) && (!((s->to[5] >= (-4000.0)) && (s->to[5] <= 4000.0)))) {
-        at = 72;
-    }
-    if ((at < 0) && (!((s->to[6] >= (-4000.0)) && (s->to[6] <= 4000.0)))) {
-        at = 73;
-    }
-    if ((at < 0) && (!((s->to[7] >= (-4000.0)) && (s->to[7] <= 4000.0)))) {
-        at = 74;
-    }
-    if ((at < 0) && (!((s->to[8] >= (-4000.0)) && (s->to[8] <= 4000.0)))) {
-        at = 75;
-    }
-    if ((at < 0) && (!((s->length_mm >= 1.0) && (s->length_mm <= 30000.0)))) {
-        at = 76;
-    }
-    if ((at < 0) && (!((s->travelled_mm >= 0.0) && (s->travelled_mm <= 30000.0)))) {
-        at = 77;
-    }
-    if ((at < 0) && (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0)))) {
-        at = 78;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->near_) > 1u)) {
-        at = 79;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->there) > 1u)) {
-        at = 80;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->settled) > 1u)) {
-        at = 81;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
-        at = 82;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->closed) > 1u)) {
-        at = 83;
-    }
-    if ((at < 0) && (((int64_t)s->waited > INT64_C(250)))) {
-        at = 84;
-    }
-    if ((at < 0) && (((int64_t)s->old_robot > INT64_C(1)))) {
-        at = 85;
-    }
-    if ((at < 0) && (((int64_t)s->old_gripper.input_command > INT64_C(2)))) {
-        at = 87;
-    }
-    if ((at < 0) && (!((s->old_gripper.opening_mm >= 0.0) && (s->old_gripper.opening_mm <= 200.0)))) {
-        at = 88;
-    }
-    if ((at < 0) && (!((s->old_gripper.force_n >= 0.0) && (s->old_gripper.force_n <= 1000.0)))) {
-        at = 89;
-    }
-    if ((at < 0) && (!((s->old_gripper.speed_mm_s >= 0.0) && (s->old_gripper.speed_mm_s <= 500.0)))) {
-        at = 90;
-    }
-    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
-        at = 91;
-    }
-    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
-        at = 92;
+    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+        at = 17;
     }
     if ((at < 0) && (((int64_t)s->to_robot.input_command > INT64_C(1)))) {
-        at = 94;
+        at = 33;
     }
     if ((at < 0) && (!((s->to_robot.plate[0] >= (-4000.0)) && (s->to_robot.plate[0] <= 4000.0)))) {
-        at = 95;
+        at = 34;
     }
     if ((at < 0) && (!((s->to_robot.plate[1] >= (-4000.0)) && (s->to_robot.plate[1] <= 4000.0)))) {
-        at = 96;
+        at = 35;
     }
     if ((at < 0) && (!((s->to_robot.plate[2] >= (-4000.0)) && (s->to_robot.plate[2] <= 4000.0)))) {
-        at = 97;
+        at = 36;
     }
     if ((at < 0) && (!((s->to_robot.plate[3] >= (-4000.0)) && (s->to_robot.plate[3] <= 4000.0)))) {
-        at = 98;
+        at = 37;
     }
     if ((at < 0) && (!((s->to_robot.plate[4] >= (-4000.0)) && (s->to_robot.plate[4] <= 4000.0)))) {
-        at = 99;
+        at = 38;
     }
     if ((at < 0) && (!((s->to_robot.plate[5] >= (-4000.0)) && (s->to_robot.plate[5] <= 4000.0)))) {
-        at = 100;
+        at = 39;
     }
     if ((at < 0) && (!((s->to_robot.plate[6] >= (-4000.0)) && (s->to_robot.plate[6] <= 4000.0)))) {
-        at = 101;
+        at = 40;
     }
     if ((at < 0) && (!((s->to_robot.plate[7] >= (-4000.0)) && (s->to_robot.plate[7] <= 4000.0)))) {
-        at = 102;
+        at = 41;
     }
     if ((at < 0) && (!((s->to_robot.plate[8] >= (-4000.0)) && (s->to_robot.plate[8] <= 4000.0)))) {
-        at = 103;
+        at = 42;
+    }
+    if ((at < 0) && (((int64_t)s->robot.command > INT64_C(1)))) {
+        at = 43;
+    }
+    if ((at < 0) && (((int64_t)s->robot.status > INT64_C(2)))) {
+        at = 44;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->robot.resting) > 1u)) {
+        at = 45;
+    }
+    if ((at < 0) && (((int64_t)s->robot.failure > INT64_C(15)))) {
+        at = 46;
+    }
+    if ((at < 0) && (((int64_t)s->last_robot.input_command > INT64_C(1)))) {
+        at = 47;
     }
     if ((at < 0) && (((int64_t)s->to_gripper.input_command > INT64_C(2)))) {
-        at = 105;
+        at = 54;
     }
     if ((at < 0) && (!((s->to_gripper.opening_mm >= 0.0) && (s->to_gripper.opening_mm <= 200.0)))) {
-        at = 106;
+        at = 55;
     }
     if ((at < 0) && (!((s->to_gripper.force_n >= 0.0) && (s->to_gripper.force_n <= 1000.0)))) {
-        at = 107;
+        at = 56;
     }
     if ((at < 0) && (!((s->to_gripper.speed_mm_s >= 0.0) && (s->to_gripper.speed_mm_s <= 500.0)))) {
+        at = 57;
+    }
+    if ((at < 0) && (((int64_t)s->gripper.command > INT64_C(2)))) {
+        at = 58;
+    }
+    if ((at < 0) && (((int64_t)s->gripper.status > INT64_C(2)))) {
+        at = 59;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->gripper.resting) > 1u)) {
+        at = 60;
+    }
+    if ((at < 0) && (((int64_t)s->gripper.failure > INT64_C(15)))) {
+        at = 61;
+    }
+    if ((at < 0) && (((int64_t)s->last_gripper.input_command > INT64_C(2)))) {
+        at = 62;
+    }
+    if ((at < 0) && (!((s->last_gripper.opening_mm >= 0.0) && (s->last_gripper.opening_mm <= 200.0)))) {
+        at = 63;
+    }
+    if ((at < 0) && (!((s->last_gripper.force_n >= 0.0) && (s->last_gripper.force_n <= 1000.0)))) {
+        at = 64;
+    }
+    if ((at < 0) && (!((s->last_gripper.speed_mm_s >= 0.0) && (s->last_gripper.speed_mm_s <= 500.0)))) {
+        at = 65;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->goal.known) > 1u)) {
+        at = 66;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->fingers.known) > 1u)) {
+        at = 79;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
+        at = 86;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(3)))) {
+        at = 87;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(3)))) {
+        at = 88;
+    }
+    if ((at < 0) && (!((s->from[0] >= (-4000.0)) && (s->from[0] <= 4000.0)))) {
+        at = 89;
+    }
+    if ((at < 0) && (!((s->from[1] >= (-4000.0)) && (s->from[1] <= 4000.0)))) {
+        at = 90;
+    }
+    if ((at < 0) && (!((s->from[2] >= (-4000.0)) && (s->from[2] <= 4000.0)))) {
+        at = 91;
+    }
+    if ((at < 0) && (!((s->from[3] >= (-4000.0)) && (s->from[3] <= 4000.0)))) {
+        at = 92;
+    }
+    if ((at < 0) && (!((s->from[4] >= (-4000.0)) && (s->from[4] <= 4000.0)))) {
+        at = 93;
+    }
+    if ((at < 0) && (!((s->from[5] >= (-4000.0)) && (s->from[5] <= 4000.0)))) {
+        at = 94;
+    }
+    if ((at < 0) && (!((s->from[6] >= (-4000.0)) && (s->from[6] <= 4000.0)))) {
+        at = 95;
+    }
+    if ((at < 0) && (!((s->from[7] >= (-4000.0)) && (s->from[7] <= 4000.0)))) {
+        at = 96;
+    }
+    if ((at < 0) && (!((s->from[8] >= (-4000.0)) && (s->from[8] <= 4000.0)))) {
+        at = 97;
+    }
+    if ((at < 0) && (!((s->to[0] >= (-4000.0)) && (s->to[0] <= 4000.0)))) {
+        at = 98;
+    }
+    if ((at < 0) && (!((s->to[1] >= (-4000.0)) && (s->to[1] <= 4000.0)))) {
+        at = 99;
+    }
+    if ((at < 0) && (!((s->to[2] >= (-4000.0)) && (s->to[2] <= 4000.0)))) {
+        at = 100;
+    }
+    if ((at < 0) && (!((s->to[3] >= (-4000.0)) && (s->to[3] <= 4000.0)))) {
+        at = 101;
+    }
+    if ((at < 0) && (!((s->to[4] >= (-4000.0)) && (s->to[4] <= 4000.0)))) {
+        at = 102;
+    }
+    if ((at < 0) && (!((s->to[5] >= (-4000.0)) && (s->to[5] <= 4000.0)))) {
+        at = 103;
+    }
+    if ((at < 0) && (!((s->to[6] >= (-4000.0)) && (s->to[6] <= 4000.0)))) {
+        at = 104;
+    }
+    if ((at < 0) && (!((s->to[7] >= (-4000.0)) && (s->to[7] <= 4000.0)))) {
+        at = 105;
+    }
+    if ((at < 0) && (!((s->to[8] >= (-4000.0)) && (s->to[8] <= 4000.0)))) {
+        at = 106;
+    }
+    if ((at < 0) && (!((s->length_mm >= 1.0) && (s->length_mm <= 30000.0)))) {
+        at = 107;
+    }
+    if ((at < 0) && (!((s->travelled_mm >= 0.0) && (s->travelled_mm <= 30000.0)))) {
         at = 108;
     }
-    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(5)))) {
+    if ((at < 0) && (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0)))) {
+        at = 109;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->near_) > 1u)) {
         at = 110;
     }
-    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->there) > 1u)) {
         at = 111;
     }
-    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->settled) > 1u)) {
         at = 112;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->report.holds) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
         at = 113;
     }
-    if ((at < 0) && (((int64_t)s->display > INT64_C(1)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->closed) > 1u)) {
         at = 114;
+    }
+    if ((at < 0) && (((int64_t)s->waited > INT64_C(250)))) {
+        at = 115;
+    }
+    if ((at < 0) && (((int64_t)s->display > INT64_C(1)))) {
+        at = 116;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+        at = 117;
     }
     return at;
 }
@@ -1409,13 +1411,10 @@ int32_t primitive_approach_position_fingers_line(const primitive_t *s)
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
         uint8_t t0[2];
-        uint8_t t1[2];
-        uint8_t t2[3];
+        uint8_t t1[3];
+        uint8_t t2[2];
         uint8_t t3[4];
     } t = {
-        {
-            0x7eu, 0x7du
-        },
         {
             0x7cu, 0x3u
         },
@@ -1423,10 +1422,13 @@ int32_t primitive_approach_position_fingers_line(const primitive_t *s)
             0x6bu, 0x67u, 0x73u
         },
         {
+            0x7eu, 0x7du
+        },
+        {
             0x23u, 0x43u, 0x3u, 0x1fu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->gripper_status_in] & (uint32_t)t.t3[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] & (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1448,13 +1450,10 @@ int32_t primitive_departure_position_fingers_line(const primitive_t *s)
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
         uint8_t t0[2];
-        uint8_t t1[2];
-        uint8_t t2[3];
+        uint8_t t1[3];
+        uint8_t t2[2];
         uint8_t t3[4];
     } t = {
-        {
-            0x7eu, 0x7du
-        },
         {
             0x7cu, 0x3u
         },
@@ -1462,10 +1461,13 @@ int32_t primitive_departure_position_fingers_line(const primitive_t *s)
             0x6bu, 0x67u, 0x73u
         },
         {
+            0x7eu, 0x7du
+        },
+        {
             0x23u, 0x43u, 0x3u, 0x1fu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->gripper_status_in] & (uint32_t)t.t3[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] & (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1487,21 +1489,21 @@ int32_t primitive_goto__line(const primitive_t *s)
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
         uint16_t t0[2];
-        uint16_t t1[2];
-        uint16_t t2[3];
+        uint16_t t1[3];
+        uint16_t t2[2];
         uint16_t t3[4];
         uint16_t t4[2];
         uint16_t t5[2];
         uint16_t t6[251];
     } t = {
         {
-            0x7feu, 0x7fdu
-        },
-        {
             0x7fcu, 0x3u
         },
         {
             0x6e7u, 0x61fu, 0x703u
+        },
+        {
+            0x7feu, 0x7fdu
         },
         {
             0x203u, 0x403u, 0x1ffu, 0x3u
@@ -1541,7 +1543,7 @@ int32_t primitive_goto__line(const primitive_t *s)
             0x7b7u
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->robot_status_in] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->there ? 1u : 0u)] & (uint32_t)t.t5[(s->settled ? 1u : 0u)] & (uint32_t)t.t6[s->waited];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->robot.status] & (uint32_t)t.t2[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->there ? 1u : 0u)] & (uint32_t)t.t5[(s->settled ? 1u : 0u)] & (uint32_t)t.t6[s->waited];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x800u);
     line = several ? (-2) : line;
@@ -1563,19 +1565,19 @@ int32_t primitive_gothru_line(const primitive_t *s)
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
         uint8_t t0[2];
-        uint8_t t1[2];
-        uint8_t t2[3];
+        uint8_t t1[3];
+        uint8_t t2[2];
         uint8_t t3[4];
         uint8_t t4[2];
     } t = {
-        {
-            0x7eu, 0x7du
-        },
         {
             0x7cu, 0x3u
         },
         {
             0x5fu, 0x5fu, 0x63u
+        },
+        {
+            0x7eu, 0x7du
         },
         {
             0x33u, 0x43u, 0x2fu, 0x3u
@@ -1584,7 +1586,7 @@ int32_t primitive_gothru_line(const primitive_t *s)
             0x77u, 0x7bu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->robot_status_in] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->near_ ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->robot.status] & (uint32_t)t.t2[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->near_ ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1606,19 +1608,19 @@ int32_t primitive_immed_grasp_line(const primitive_t *s)
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
         uint16_t t0[2];
-        uint16_t t1[2];
-        uint16_t t2[3];
+        uint16_t t1[3];
+        uint16_t t2[2];
         uint16_t t3[4];
         uint16_t t4[2];
     } t = {
-        {
-            0xfeu, 0xfdu
-        },
         {
             0xfcu, 0x3u
         },
         {
             0xdbu, 0xc7u, 0xe3u
+        },
+        {
+            0xfeu, 0xfdu
         },
         {
             0x43u, 0x83u, 0x3u, 0x3fu
@@ -1627,7 +1629,7 @@ int32_t primitive_immed_grasp_line(const primitive_t *s)
             0xf7u, 0xefu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->gripper_status_in] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->fits ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] & (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->fits ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x100u);
     line = several ? (-2) : line;
@@ -1744,13 +1746,16 @@ int32_t primitive_primitive_cycle(primitive_t *s)
     if (s->fault == 0) {
         primitive_settle(s);
         if (s->fault == 0) {
-            primitive_do_receive(s);
+            primitive_do_take_orders(s);
+        }
+        if (s->fault == 0) {
+            primitive_do_start_waiting(s);
         }
         if (s->fault == 0) {
             primitive_do_measure(s);
         }
         if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->command.input_command;
+            const int64_t chosen = (int64_t)s->emove.input_command;
             if (chosen == INT64_C(0)) {
                 primitive_run_pause_primitive(s);
             } else if (chosen == INT64_C(1)) {
@@ -1768,10 +1773,10 @@ int32_t primitive_primitive_cycle(primitive_t *s)
             }
         }
         if (s->fault == 0) {
-            primitive_do_send(s);
+            primitive_do_hold_part(s);
         }
         if (s->fault == 0) {
-            primitive_do_answer(s);
+            primitive_do_give_orders(s);
         }
     }
     return s->fault;

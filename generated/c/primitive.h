@@ -85,12 +85,11 @@ enum {
 
 /* Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed. */
 enum {
-    PRIMITIVE_ASSUMPTION_IN_STEP = 0, /* in_step: only told in approach_position_fingers, departure_position_fingers, goto, gothru, immed_grasp */
-    PRIMITIVE_ASSUMPTION_APPROACH_STATES = 1, /* approach_states: only told in approach_position_fingers */
-    PRIMITIVE_ASSUMPTION_DEPARTURE_STATES = 2, /* departure_states: only told in departure_position_fingers */
-    PRIMITIVE_ASSUMPTION_GOTO_STATES = 3, /* goto_states: only told in goto */
-    PRIMITIVE_ASSUMPTION_GOTHRU_STATES = 4, /* gothru_states: only told in gothru */
-    PRIMITIVE_ASSUMPTION_GRASP_STATES = 5 /* grasp_states: only told in immed_grasp */
+    PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP = 0, /* approach_position_fingers_in_step: only told in approach_position_fingers */
+    PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP = 1, /* departure_position_fingers_in_step: only told in departure_position_fingers */
+    PRIMITIVE_ASSUMPTION_GOTO_IN_STEP = 2, /* goto_in_step: only told in goto */
+    PRIMITIVE_ASSUMPTION_GOTHRU_IN_STEP = 3, /* gothru_in_step: only told in gothru */
+    PRIMITIVE_ASSUMPTION_IMMED_GRASP_IN_STEP = 4 /* immed_grasp_in_step: only told in immed_grasp */
 };
 
 /* `fault`, and what a cycle returns. */
@@ -107,40 +106,38 @@ enum {
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    vocabulary_primitive_order_t command; /* 0 to 9: input; From E-MOVE. */
-    vocabulary_robot_report_t robot; /* 10 to 22: input; From the robot controller. */
-    vocabulary_gripper_report_t gripper; /* 23 to 27: input; From the gripper controller. */
-    primitive_common_goal_point_t goal; /* 28 to 40: input; From the database: the point of the command. */
-    primitive_common_end_effector_t fingers; /* 41 to 47: input; From the database: how the part of the command is gripped. */
-    bool new_command; /* 48: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
-    bool begun; /* 49: state; This level has answered the new command. */
-    uint16_t inc_command_seen; /* 50: state; 0 .. 65535; Number of the command now being worked on; echoed to E-MOVE. */
-    vocabulary_robot_command_t ref_robot_in; /* 51: state; Command that the robot controller last echoed, and its status. */
-    vocabulary_level_status_t robot_status_in; /* 52: state */
-    vocabulary_gripper_command_t ref_gripper_in; /* 53: state; Command that the gripper controller last echoed, and its status. */
-    vocabulary_level_status_t gripper_status_in; /* 54: state */
-    bool idle; /* 55: state; Both controllers rest. */
-    primitive_common_primitive_state_t cur_state; /* 56: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
-    primitive_common_primitive_state_t cur_state_next; /* 57: state; the deferred next value of cur_state */
-    double from[9]; /* 58 to 66: state; -4000.0 .. 4000.0 mm; The straight line under way. */
-    double to[9]; /* 67 to 75: state; -4000.0 .. 4000.0 mm */
-    double length_mm; /* 76: state; 1.0 .. 30000.0 mm */
-    double travelled_mm; /* 77: state; 0.0 .. 30000.0 mm */
-    double speed_mm_s; /* 78: state; 0.0 .. 2000.0 mm*s^-1 */
-    bool near_; /* 79: state; The end of the line is within the breakpoint distance; the line is at its end. */
-    bool there; /* 80: state */
-    bool settled; /* 81: state; The robot says that it is at the end of the line: its status may be that of an earlier pose. Looked at while it follows. */
-    bool fits; /* 82: state; The finger spacing is that of the part; the fingers touch each other. */
-    bool closed; /* 83: state */
-    uint8_t waited; /* 84: state; 0 .. 250; Cycles that the robot has been waited for. */
-    vocabulary_robot_command_t old_robot; /* 85: state; The orders that were last numbered. */
-    vocabulary_gripper_order_t old_gripper; /* 86 to 90: state */
-    vocabulary_level_status_t status_report; /* 91: state; What the command does, to be reported. */
-    vocabulary_reason_t failure; /* 92: state; Why the command failed. */
-    vocabulary_robot_order_t to_robot; /* 93 to 103: output; To the robot controller. */
-    vocabulary_gripper_order_t to_gripper; /* 104 to 108: output; To the gripper controller. */
-    vocabulary_primitive_report_t report; /* 109 to 113: output; To E-MOVE. */
-    primitive_common_display_t display; /* 114: output; To whoever looks. */
+    vocabulary_primitive_order_t emove; /* 0 to 9: input; Orders of emove. */
+    vocabulary_primitive_report_t to_emove; /* 10 to 14: output; Reports to emove. */
+    bool new_command; /* 15: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool answered; /* 16: state; A line has answered the new command. */
+    bool settling; /* 17: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    uint16_t inc_command_seen; /* 18: state; 0 .. 65535; Number of the order that was taken last. */
+    vocabulary_robot_report_t from_robot; /* 19 to 31: input; Reports of robot, as they come. */
+    vocabulary_robot_order_t to_robot; /* 32 to 42: output; Orders to robot. */
+    primitive_common_robot_held_t robot; /* 43 to 46: state; What robot says of the last orders, held until they are echoed. */
+    primitive_common_robot_last_t last_robot; /* 47: state; The order to robot that was numbered last. */
+    vocabulary_gripper_report_t from_gripper; /* 48 to 52: input; Reports of gripper, as they come. */
+    vocabulary_gripper_order_t to_gripper; /* 53 to 57: output; Orders to gripper. */
+    primitive_common_gripper_held_t gripper; /* 58 to 61: state; What gripper says of the last orders, held until they are echoed. */
+    primitive_common_gripper_last_t last_gripper; /* 62 to 65: state; The order to gripper that was numbered last. */
+    primitive_common_goal_point_t goal; /* 66 to 78: input; From the database: the point of the command. */
+    primitive_common_end_effector_t fingers; /* 79 to 85: input; From the database: how the part of the command is gripped. */
+    bool idle; /* 86: state; Both controllers rest. */
+    primitive_common_primitive_state_t cur_state; /* 87: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
+    primitive_common_primitive_state_t cur_state_next; /* 88: state; the deferred next value of cur_state */
+    double from[9]; /* 89 to 97: state; -4000.0 .. 4000.0 mm; The straight line under way. */
+    double to[9]; /* 98 to 106: state; -4000.0 .. 4000.0 mm */
+    double length_mm; /* 107: state; 1.0 .. 30000.0 mm */
+    double travelled_mm; /* 108: state; 0.0 .. 30000.0 mm */
+    double speed_mm_s; /* 109: state; 0.0 .. 2000.0 mm*s^-1 */
+    bool near_; /* 110: state; The end of the line is within the breakpoint distance; the line is at its end. */
+    bool there; /* 111: state */
+    bool settled; /* 112: state; The robot says that it is at the end of the line: its status may be that of an earlier pose. Looked at while it follows. */
+    bool fits; /* 113: state; The finger spacing is that of the part; the fingers touch each other. */
+    bool closed; /* 114: state */
+    uint8_t waited; /* 115: state; 0 .. 250; Cycles that the robot has been waited for. */
+    primitive_common_display_t display; /* 116: output; To whoever looks. */
+    bool echoed; /* 117: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */

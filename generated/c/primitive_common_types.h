@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "vocabulary_types.h"
+
 /* enum primitive_state */
 typedef uint8_t primitive_common_primitive_state_t;
 enum {
@@ -38,5 +40,30 @@ typedef struct {
     double force_n; /* 0.0 .. 1000.0 N */
     double speed_mm_s; /* 0.0 .. 500.0 mm*s^-1 */
 } primitive_common_end_effector_t;
+
+typedef struct {
+    vocabulary_robot_command_t command;
+    vocabulary_level_status_t status;
+    bool resting;
+    vocabulary_reason_t failure;
+} primitive_common_robot_held_t;
+
+typedef struct {
+    vocabulary_robot_command_t input_command;
+} primitive_common_robot_last_t;
+
+typedef struct {
+    vocabulary_gripper_command_t command;
+    vocabulary_level_status_t status;
+    bool resting;
+    vocabulary_reason_t failure;
+} primitive_common_gripper_held_t;
+
+typedef struct {
+    vocabulary_gripper_command_t input_command;
+    double opening_mm; /* 0.0 .. 200.0 mm */
+    double force_n; /* 0.0 .. 1000.0 N */
+    double speed_mm_s; /* 0.0 .. 500.0 mm*s^-1 */
+} primitive_common_gripper_last_t;
 
 #endif

@@ -37,26 +37,6 @@ static inline uint8_t task_u8_of_i64(int64_t a)
     return (uint8_t)a;
 }
 
-/* A new number sets the flag; it falls when this level's own answer is echoed. What E-MOVE says of an order that another has replaced is not looked at: until the last one is echoed the level sees what it saw when it gave it. */
-static void task_do_receive(task_t *s)
-{
-    if (((int64_t)s->command.inc_command != (int64_t)s->inc_command_seen)) {
-        s->inc_command_seen = (uint16_t)(int64_t)s->command.inc_command;
-        s->new_command = true;
-        s->begun = false;
-        s->failure = (uint8_t)INT64_C(0);
-    } else {
-        if ((s->begun && ((int64_t)s->emove.inc_command_echo == (int64_t)s->to_emove.inc_command))) {
-            s->new_command = false;
-        }
-    }
-    if (((int64_t)s->emove.inc_command_echo == (int64_t)s->to_emove.inc_command)) {
-        s->ref_command_in = (uint8_t)(int64_t)s->emove.ref_command_echo;
-        s->status_in = (uint8_t)(int64_t)s->emove.status_report;
-    }
-    s->idle = ((((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0))) && (s->begun || ((int64_t)s->emove.inc_command_echo == (int64_t)s->to_emove.inc_command)));
-}
-
 /* The table test variables that the command and the database give (section 8.1). */
 static void task_do_test_variables(task_t *s)
 {
@@ -65,44 +45,15 @@ static void task_do_test_variables(task_t *s)
     } else {
         s->loc_of_obj = (uint8_t)INT64_C(1);
     }
-    s->source_spec = (((int64_t)s->command.source_locpt != INT64_C(0)) && s->source.known);
-    s->dest_spec = (((int64_t)s->command.dest_locpt != INT64_C(0)) && s->dest.known);
-    s->names_known = (((((int64_t)s->command.source_locpt == INT64_C(0)) || s->source.known) && (((int64_t)s->command.dest_locpt == INT64_C(0)) || s->dest.known)) && (((int64_t)s->command.end_at_locpt == INT64_C(0)) || s->end_at.known));
+    s->source_spec = (((int64_t)s->workstation.source_locpt != INT64_C(0)) && s->source.known);
+    s->dest_spec = (((int64_t)s->workstation.dest_locpt != INT64_C(0)) && s->dest.known);
+    s->names_known = (((((int64_t)s->workstation.source_locpt == INT64_C(0)) || s->source.known) && (((int64_t)s->workstation.dest_locpt == INT64_C(0)) || s->dest.known)) && (((int64_t)s->workstation.end_at_locpt == INT64_C(0)) || s->end_at.known));
 }
 
-/* A new order takes the next number. */
-static void task_do_send(task_t *s)
+/* The WORKSTATION is told what is in the gripper. */
+static void task_do_tell_gripped(task_t *s)
 {
-    if (((((((int64_t)s->to_emove.input_command != (int64_t)s->old_order.input_command) || ((int64_t)s->to_emove.obj_ptr != (int64_t)s->old_order.obj_ptr)) || ((int64_t)s->to_emove.locpt_ptr != (int64_t)s->old_order.locpt_ptr)) || ((int64_t)s->to_emove.sector != (int64_t)s->old_order.sector)) || ((int64_t)s->to_emove.grasp != (int64_t)s->old_order.grasp))) {
-        s->to_emove.inc_command = task_u16_of_i64((((int64_t)s->to_emove.inc_command + INT64_C(1)) % INT64_C(65536)));
-    }
-    s->old_order.input_command = (uint8_t)(int64_t)s->to_emove.input_command;
-    s->old_order.obj_ptr = (uint8_t)(int64_t)s->to_emove.obj_ptr;
-    s->old_order.locpt_ptr = (uint8_t)(int64_t)s->to_emove.locpt_ptr;
-    s->old_order.sector = (uint8_t)(int64_t)s->to_emove.sector;
-    s->old_order.grasp = (uint8_t)(int64_t)s->to_emove.grasp;
-}
-
-/* What the WORKSTATION sees. */
-static void task_do_answer(task_t *s)
-{
-    s->report.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->report.ref_command_echo = (uint8_t)(int64_t)s->command.input_command;
-    s->report.status_report = (uint8_t)(int64_t)s->status_report;
-    s->report.status_parameter = (uint8_t)(int64_t)s->obj_now_in_gripper;
-    s->report.failure = (uint8_t)(int64_t)s->failure;
-}
-
-/* This line answers the new command. */
-static void task_do_begin(task_t *s)
-{
-    s->begun = true;
-}
-
-/* A new command finds the level below at work: pause it first. */
-static void task_do_settle(task_t *s)
-{
-    s->begun = false;
+    s->to_workstation.status_parameter = (uint8_t)(int64_t)s->obj_now_in_gripper;
 }
 
 /* Procedure nextstate. */
@@ -114,22 +65,22 @@ static void task_do_nextstate(task_t *s, int64_t v_value)
 /* Procedure set_source. */
 static void task_do_set_source(task_t *s)
 {
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->command.obj;
-    s->to_emove.grasp = (uint8_t)(int64_t)s->command.grasp;
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->command.source_locpt;
-    s->to_emove.sector = (uint8_t)(int64_t)s->command.sector;
-    s->remember_current_loc = (uint8_t)(int64_t)s->command.source_locpt;
+    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
+    s->to_emove.grasp = (uint8_t)(int64_t)s->workstation.grasp;
+    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->workstation.source_locpt;
+    s->to_emove.sector = (uint8_t)(int64_t)s->workstation.sector;
+    s->remember_current_loc = (uint8_t)(int64_t)s->workstation.source_locpt;
     s->current_loc = (uint8_t)INT64_C(0);
 }
 
 /* Procedure vupos_setup. */
 static void task_do_vupos_setup(task_t *s)
 {
-    s->to_emove.sector = (uint8_t)(int64_t)s->command.sector;
+    s->to_emove.sector = (uint8_t)(int64_t)s->workstation.sector;
     s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->source.vupos;
-    s->remember_current_loc = (uint8_t)(int64_t)s->command.source_locpt;
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->command.obj;
-    s->to_emove.grasp = (uint8_t)(int64_t)s->command.grasp;
+    s->remember_current_loc = (uint8_t)(int64_t)s->workstation.source_locpt;
+    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
+    s->to_emove.grasp = (uint8_t)(int64_t)s->workstation.grasp;
     s->to_emove.apoint_pos_flag = false;
     s->current_loc = (uint8_t)INT64_C(0);
 }
@@ -137,8 +88,8 @@ static void task_do_vupos_setup(task_t *s)
 /* Procedure locate. */
 static void task_do_locate(task_t *s)
 {
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->command.obj;
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->command.source_locpt;
+    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
+    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->workstation.source_locpt;
     s->to_emove.input_command = (uint8_t)INT64_C(3);
 }
 
@@ -151,8 +102,8 @@ static void task_do_move_to(task_t *s)
 /* Procedure move_to_obj. */
 static void task_do_move_to_obj(task_t *s)
 {
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->command.obj;
-    s->to_emove.grasp = (uint8_t)(int64_t)s->command.grasp;
+    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
+    s->to_emove.grasp = (uint8_t)(int64_t)s->workstation.grasp;
     s->to_emove.input_command = (uint8_t)INT64_C(2);
 }
 
@@ -167,18 +118,18 @@ static void task_do_none_acquired(task_t *s)
 /* Nothing of that type is on the buffer: fail, and let the robot rest. */
 static void task_do_buffer_empty(task_t *s)
 {
-    s->failure = (uint8_t)INT64_C(6);
+    s->to_workstation.failure = (uint8_t)INT64_C(6);
     task_do_none_acquired(s);
     s->to_emove.input_command = (uint8_t)INT64_C(0);
     s->cur_state_next = (uint8_t)INT64_C(1);
 }
 
-/* Counts once: the line matches again until PICKUP is echoed, and by then PICKUP is the old command. */
+/* Counts once: the line matches again until PICKUP is echoed, and by then PICKUP is the old workstation. */
 static void task_do_remove_from_buffer_db(task_t *s)
 {
-    if ((s->source.buffer && ((int64_t)s->old_order.input_command != INT64_C(4)))) {
+    if ((s->source.buffer && ((int64_t)s->last_emove.input_command != INT64_C(4)))) {
         {
-            const int64_t subject = (int64_t)s->command.obj;
+            const int64_t subject = (int64_t)s->workstation.obj;
             if ((subject == INT64_C(1))) {
                 if (((int64_t)s->tbuffer_boxt > INT64_C(0))) {
                     s->tbuffer_boxt = task_u8_of_i64(((int64_t)s->tbuffer_boxt - INT64_C(1)));
@@ -213,34 +164,28 @@ static void task_do_remove_from_buffer_db(task_t *s)
 /* Takes one part off the count of the buffer, or gives up: nothing to pick up. */
 static void task_do_pickup(task_t *s)
 {
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->command.obj;
+    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
     s->to_emove.input_command = (uint8_t)INT64_C(4);
     s->obj_acquired = true;
-    s->obj_now_in_gripper = (uint8_t)(int64_t)s->command.obj;
-    s->grasp_now = (uint8_t)(int64_t)s->command.grasp;
-    s->to_emove.gripped_obj_ptr = (uint8_t)(int64_t)s->command.obj;
-    s->current_loc = (uint8_t)(int64_t)s->command.source_locpt;
-    s->current_sector = (uint8_t)(int64_t)s->command.sector;
+    s->obj_now_in_gripper = (uint8_t)(int64_t)s->workstation.obj;
+    s->grasp_now = (uint8_t)(int64_t)s->workstation.grasp;
+    s->to_emove.gripped_obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
+    s->current_loc = (uint8_t)(int64_t)s->workstation.source_locpt;
+    s->current_sector = (uint8_t)(int64_t)s->workstation.sector;
     task_do_remove_from_buffer_db(s);
-}
-
-/* Procedure pause. */
-static void task_do_pause(task_t *s)
-{
-    s->to_emove.input_command = (uint8_t)INT64_C(0);
 }
 
 /* Procedure cmd_failure. */
 static void task_do_cmd_failure(task_t *s)
 {
-    s->failure = (uint8_t)INT64_C(1);
+    s->to_workstation.failure = (uint8_t)INT64_C(1);
 }
 
 /* E-MOVE found that the part is not between the fingers any more. */
 static void task_do_lost_on_the_way(task_t *s)
 {
     if (((int64_t)s->emove.failure == INT64_C(11))) {
-        s->failure = (uint8_t)INT64_C(11);
+        s->to_workstation.failure = (uint8_t)INT64_C(11);
         task_do_none_acquired(s);
     }
 }
@@ -248,7 +193,7 @@ static void task_do_lost_on_the_way(task_t *s)
 /* Procedure move_failure. */
 static void task_do_move_failure(task_t *s)
 {
-    s->failure = (uint8_t)INT64_C(2);
+    s->to_workstation.failure = (uint8_t)INT64_C(2);
     s->remember_current_loc = (uint8_t)INT64_C(0);
     task_do_lost_on_the_way(s);
 }
@@ -256,7 +201,7 @@ static void task_do_move_failure(task_t *s)
 /* Procedure loc_failure. */
 static void task_do_loc_failure(task_t *s)
 {
-    s->failure = (uint8_t)INT64_C(3);
+    s->to_workstation.failure = (uint8_t)INT64_C(3);
 }
 
 /* One part more on the buffer table. */
@@ -289,15 +234,15 @@ static void task_do_add_to_buffer_db(task_t *s, int64_t v_what)
 /* What was counted off and could not be picked up lies there still; once: the order that follows is no PICKUP. */
 static void task_do_back_to_buffer_db(task_t *s)
 {
-    if ((s->source.buffer && ((int64_t)s->old_order.input_command == INT64_C(4)))) {
-        task_do_add_to_buffer_db(s, (int64_t)s->command.obj);
+    if ((s->source.buffer && ((int64_t)s->last_emove.input_command == INT64_C(4)))) {
+        task_do_add_to_buffer_db(s, (int64_t)s->workstation.obj);
     }
 }
 
 /* Nothing, or a part of the wrong size, is in the gripper. */
 static void task_do_pic_failure(task_t *s)
 {
-    s->failure = (uint8_t)INT64_C(4);
+    s->to_workstation.failure = (uint8_t)INT64_C(4);
     task_do_back_to_buffer_db(s);
     task_do_none_acquired(s);
     if (((int64_t)s->emove.failure == INT64_C(12))) {
@@ -310,40 +255,22 @@ static void task_do_pic_failure(task_t *s)
 /* Procedure state_failure. */
 static void task_do_state_failure(task_t *s)
 {
-    s->failure = (uint8_t)INT64_C(5);
+    s->to_workstation.failure = (uint8_t)INT64_C(5);
 }
 
-/* Procedure executing. */
-static void task_do_executing(task_t *s)
-{
-    s->status_report = (uint8_t)INT64_C(1);
-}
-
-/* Procedure done. */
-static void task_do_done(task_t *s)
-{
-    s->status_report = (uint8_t)INT64_C(0);
-}
-
-/* Procedure fail. */
-static void task_do_fail(task_t *s)
-{
-    s->status_report = (uint8_t)INT64_C(2);
-}
-
-/* The destination of the command. */
+/* The destination of the workstation. */
 static void task_do_set_dest(task_t *s)
 {
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->command.dest_locpt;
-    s->to_emove.sector = (uint8_t)(int64_t)s->command.sector;
+    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->workstation.dest_locpt;
+    s->to_emove.sector = (uint8_t)(int64_t)s->workstation.sector;
     s->current_loc = (uint8_t)INT64_C(0);
 }
 
 /* The robot is at the destination. */
 static void task_do_arrived(task_t *s)
 {
-    s->current_loc = (uint8_t)(int64_t)s->command.dest_locpt;
-    s->current_sector = (uint8_t)(int64_t)s->command.sector;
+    s->current_loc = (uint8_t)(int64_t)s->workstation.dest_locpt;
+    s->current_sector = (uint8_t)(int64_t)s->workstation.sector;
 }
 
 /* Opens the gripper where it is. */
@@ -366,8 +293,8 @@ static void task_do_released(task_t *s)
 /* Where to end: as the command says, else at the safe position of the place where the robot is. */
 static void task_do_set_end(task_t *s)
 {
-    if (((int64_t)s->command.end_at_locpt != INT64_C(0))) {
-        s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->command.end_at_locpt;
+    if (((int64_t)s->workstation.end_at_locpt != INT64_C(0))) {
+        s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->workstation.end_at_locpt;
     } else {
         s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->here.safe;
     }
@@ -384,8 +311,81 @@ static void task_do_ended(task_t *s)
 /* Opening the gripper failed: what it holds is not known. */
 static void task_do_release_failure(task_t *s)
 {
-    s->failure = (uint8_t)(int64_t)s->emove.failure;
+    s->to_workstation.failure = (uint8_t)(int64_t)s->emove.failure;
     task_do_lost_on_the_way(s);
+}
+
+/* Procedure take_orders. */
+static void task_do_take_orders(task_t *s)
+{
+    s->echoed = ((int64_t)s->from_emove.inc_command_echo == (int64_t)s->to_emove.inc_command);
+    if (((int64_t)s->workstation.inc_command != (int64_t)s->inc_command_seen)) {
+        s->inc_command_seen = (uint16_t)(int64_t)s->workstation.inc_command;
+        s->new_command = true;
+        s->answered = false;
+        s->to_workstation.status_report = (uint8_t)INT64_C(1);
+        s->to_workstation.failure = (uint8_t)INT64_C(0);
+    } else {
+        if ((s->answered && s->echoed)) {
+            s->new_command = false;
+        }
+    }
+    s->settling = false;
+    if (s->echoed) {
+        s->emove.command = (uint8_t)(int64_t)s->from_emove.ref_command_echo;
+        s->emove.status = (uint8_t)(int64_t)s->from_emove.status_report;
+        s->emove.failure = (uint8_t)(int64_t)s->from_emove.failure;
+    }
+    s->emove.resting = ((((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0))) && (s->answered || s->echoed));
+}
+
+/* Procedure give_orders. */
+static void task_do_give_orders(task_t *s)
+{
+    if ((s->new_command && (!s->settling))) {
+        s->answered = true;
+    }
+    s->to_workstation.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
+    s->to_workstation.ref_command_echo = (uint8_t)(int64_t)s->workstation.input_command;
+    if (((((((int64_t)s->to_emove.input_command != (int64_t)s->last_emove.input_command) || ((int64_t)s->to_emove.obj_ptr != (int64_t)s->last_emove.obj_ptr)) || ((int64_t)s->to_emove.grasp != (int64_t)s->last_emove.grasp)) || ((int64_t)s->to_emove.locpt_ptr != (int64_t)s->last_emove.locpt_ptr)) || ((int64_t)s->to_emove.sector != (int64_t)s->last_emove.sector))) {
+        s->to_emove.inc_command = task_u16_of_i64((((int64_t)s->to_emove.inc_command + INT64_C(1)) % INT64_C(65536)));
+    }
+    s->last_emove.input_command = (uint8_t)(int64_t)s->to_emove.input_command;
+    s->last_emove.obj_ptr = (uint8_t)(int64_t)s->to_emove.obj_ptr;
+    s->last_emove.grasp = (uint8_t)(int64_t)s->to_emove.grasp;
+    s->last_emove.locpt_ptr = (uint8_t)(int64_t)s->to_emove.locpt_ptr;
+    s->last_emove.sector = (uint8_t)(int64_t)s->to_emove.sector;
+}
+
+/* A new command finds a level below at work: let it rest first. */
+static void task_do_settle(task_t *s)
+{
+    s->settling = true;
+    s->to_emove.input_command = (uint8_t)INT64_C(0);
+}
+
+/* Procedure done. */
+static void task_do_done(task_t *s)
+{
+    s->to_workstation.status_report = (uint8_t)INT64_C(0);
+}
+
+/* Procedure executing. */
+static void task_do_executing(task_t *s)
+{
+    s->to_workstation.status_report = (uint8_t)INT64_C(1);
+}
+
+/* Procedure failed. */
+static void task_do_failed(task_t *s)
+{
+    s->to_workstation.status_report = (uint8_t)INT64_C(2);
+}
+
+/* Procedure pause. */
+static void task_do_pause(task_t *s)
+{
+    s->to_emove.input_command = (uint8_t)INT64_C(0);
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
@@ -396,46 +396,46 @@ static void task_admit(task_t *s)
     s->fault = 0;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    if (((int64_t)s->command.input_command > INT64_C(5))) {
+    if (((int64_t)s->workstation.input_command > INT64_C(5))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 1;
         }
     }
-    if (((int64_t)s->command.obj > INT64_C(6))) {
+    if (((int64_t)s->workstation.obj > INT64_C(6))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 2;
         }
     }
-    if (((int64_t)s->command.grasp > INT64_C(9))) {
+    if (((int64_t)s->workstation.grasp > INT64_C(9))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 3;
         }
     }
-    if (((int64_t)s->command.sector > INT64_C(99))) {
+    if (((int64_t)s->workstation.sector > INT64_C(99))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 7;
         }
     }
-    if (((int64_t)s->emove.ref_command_echo > INT64_C(5))) {
+    if (((int64_t)s->from_emove.ref_command_echo > INT64_C(5))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 9;
+            s->fault_at = 18;
         }
     }
-    if (((int64_t)s->emove.status_report > INT64_C(2))) {
+    if (((int64_t)s->from_emove.status_report > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 10;
+            s->fault_at = 19;
         }
     }
-    if (((int64_t)s->emove.failure > INT64_C(15))) {
+    if (((int64_t)s->from_emove.failure > INT64_C(15))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 11;
+            s->fault_at = 20;
         }
     }
     if (s->fault != 0) {
@@ -450,7 +450,7 @@ static void task_admit(task_t *s)
 /* Deferred variables take their next values, all at once. */
 static void task_settle(task_t *s)
 {
-    const bool ready0 = ((int64_t)s->emove.inc_command_echo == (int64_t)s->to_emove.inc_command);
+    const bool ready0 = ((int64_t)s->from_emove.inc_command_echo == (int64_t)s->to_emove.inc_command);
     if (ready0) {
         s->cur_state = s->cur_state_next;
     }
@@ -459,17 +459,13 @@ static void task_settle(task_t *s)
 /* Matches table acquire and runs the line. */
 static void task_run_acquire(task_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((((((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->ref_command_in == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(1)) && ((int64_t)s->ref_command_in == INT64_C(0)))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->ref_command_in == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->ref_command_in == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->ref_command_in == INT64_C(4)))) || (((int64_t)s->cur_state == INT64_C(6)) && (((int64_t)s->ref_command_in == INT64_C(1)) || ((int64_t)s->ref_command_in == INT64_C(2))))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(5)))) || (((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(1))))))) {
+    /* acquire_in_step */
+    if (!(((!(!s->new_command)) || ((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->emove.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->emove.command == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->emove.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->emove.command == INT64_C(4))))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
     }
-    /* resting */
-    if (!(((!s->idle) || (((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0)))))) {
+    /* acquire_resting */
+    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
-    }
-    /* acquire_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(2)) || ((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(5)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 2u);
     }
     s->line = task_acquire_line(s);
     switch (s->line) {
@@ -479,26 +475,22 @@ static void task_run_acquire(task_t *s)
         task_do_executing(s);
         break;
     case 1: /* task/acquire.rcs line 1 */
-        task_do_begin(s);
         task_do_set_source(s);
         task_do_nextstate(s, INT64_C(4));
         task_do_move_to_obj(s);
         task_do_executing(s);
         break;
     case 2: /* task/acquire.rcs line 2 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 3: /* task/acquire.rcs line 3 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 4: /* task/acquire.rcs line 4 */
-        task_do_begin(s);
         task_do_vupos_setup(s);
         task_do_nextstate(s, INT64_C(2));
         task_do_move_to(s);
@@ -532,29 +524,29 @@ static void task_run_acquire(task_t *s)
         task_do_move_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 11: /* task/acquire.rcs line 11 */
         task_do_move_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 12: /* task/acquire.rcs line 12 */
         task_do_loc_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 13: /* task/acquire.rcs line 13 */
         task_do_pic_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 14: /* task/acquire.rcs line 14 */
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 15: /* task/acquire.rcs line 15 */
         task_do_executing(s);
@@ -563,7 +555,7 @@ static void task_run_acquire(task_t *s)
         task_do_state_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -578,16 +570,12 @@ static void task_run_acquire(task_t *s)
 /* Matches table clear and runs the line. */
 static void task_run_clear(task_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((((((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->ref_command_in == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(1)) && ((int64_t)s->ref_command_in == INT64_C(0)))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->ref_command_in == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->ref_command_in == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->ref_command_in == INT64_C(4)))) || (((int64_t)s->cur_state == INT64_C(6)) && (((int64_t)s->ref_command_in == INT64_C(1)) || ((int64_t)s->ref_command_in == INT64_C(2))))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(5)))) || (((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(1))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
+    /* clear_in_step */
+    if (!(((!(!s->new_command)) || ((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(6)) || ((int64_t)s->cur_state == INT64_C(8))) && ((int64_t)s->emove.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->emove.command == INT64_C(5))))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 2u);
     }
-    /* resting */
-    if (!(((!s->idle) || (((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
-    }
-    /* clear_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(6)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(8)))))) {
+    /* clear_resting */
+    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 3u);
     }
     s->line = task_clear_line(s);
@@ -598,25 +586,21 @@ static void task_run_clear(task_t *s)
         task_do_executing(s);
         break;
     case 1: /* task/clear.rcs line 1 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 2: /* task/clear.rcs line 2 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 3: /* task/clear.rcs line 3 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 4: /* task/clear.rcs line 4 */
-        task_do_begin(s);
         task_do_set_dest(s);
         task_do_nextstate(s, INT64_C(6));
         task_do_move_to(s);
@@ -649,17 +633,17 @@ static void task_run_clear(task_t *s)
         task_do_move_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 10: /* task/clear.rcs line 10 */
         task_do_release_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 11: /* task/clear.rcs line 11 */
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 12: /* task/clear.rcs line 12 */
         task_do_executing(s);
@@ -668,7 +652,7 @@ static void task_run_clear(task_t *s)
         task_do_state_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -683,17 +667,13 @@ static void task_run_clear(task_t *s)
 /* Matches table move and runs the line. */
 static void task_run_move(task_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((((((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->ref_command_in == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(1)) && ((int64_t)s->ref_command_in == INT64_C(0)))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->ref_command_in == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->ref_command_in == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->ref_command_in == INT64_C(4)))) || (((int64_t)s->cur_state == INT64_C(6)) && (((int64_t)s->ref_command_in == INT64_C(1)) || ((int64_t)s->ref_command_in == INT64_C(2))))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(5)))) || (((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(1))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
-    }
-    /* resting */
-    if (!(((!s->idle) || (((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
-    }
-    /* move_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(2)) || ((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(6)))))) {
+    /* move_in_step */
+    if (!(((!(!s->new_command)) || (((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->emove.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->emove.command == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->emove.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->emove.command == INT64_C(4)))) || (((int64_t)s->cur_state == INT64_C(6)) && (((int64_t)s->emove.command == INT64_C(1)) || ((int64_t)s->emove.command == INT64_C(2)))))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 4u);
+    }
+    /* move_resting */
+    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 5u);
     }
     s->line = task_move_line(s);
     switch (s->line) {
@@ -703,56 +683,48 @@ static void task_run_move(task_t *s)
         task_do_executing(s);
         break;
     case 1: /* task/move.rcs line 1 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 2: /* task/move.rcs line 2 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 3: /* task/move.rcs line 3 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 4: /* task/move.rcs line 4 */
-        task_do_begin(s);
         task_do_set_source(s);
         task_do_nextstate(s, INT64_C(4));
         task_do_move_to_obj(s);
         task_do_executing(s);
         break;
     case 5: /* task/move.rcs line 5 */
-        task_do_begin(s);
         task_do_vupos_setup(s);
         task_do_nextstate(s, INT64_C(2));
         task_do_move_to(s);
         task_do_executing(s);
         break;
     case 6: /* task/move.rcs line 6 */
-        task_do_begin(s);
         task_do_set_dest(s);
         task_do_nextstate(s, INT64_C(6));
         task_do_move_to(s);
         task_do_executing(s);
         break;
     case 7: /* task/move.rcs line 7 */
-        task_do_begin(s);
         task_do_set_dest(s);
         task_do_nextstate(s, INT64_C(6));
         task_do_move_to_obj(s);
         task_do_executing(s);
         break;
     case 8: /* task/move.rcs line 8 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 9: /* task/move.rcs line 9 */
         task_do_nextstate(s, INT64_C(3));
@@ -789,23 +761,23 @@ static void task_run_move(task_t *s)
         task_do_move_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 16: /* task/move.rcs line 16 */
         task_do_loc_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 17: /* task/move.rcs line 17 */
         task_do_pic_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 18: /* task/move.rcs line 18 */
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 19: /* task/move.rcs line 19 */
         task_do_executing(s);
@@ -814,7 +786,7 @@ static void task_run_move(task_t *s)
         task_do_state_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -832,12 +804,12 @@ static void task_run_pause_task(task_t *s)
     s->line = task_pause_task_line(s);
     switch (s->line) {
     case 0: /* task/pause.rcs line 1 */
-        task_do_begin(s);
         task_do_nextstate(s, INT64_C(0));
         task_do_pause(s);
         task_do_done(s);
         break;
     case 1: /* task/pause.rcs line 2 */
+        task_do_settle(s);
         task_do_nextstate(s, INT64_C(0));
         task_do_pause(s);
         task_do_executing(s);
@@ -855,17 +827,13 @@ static void task_run_pause_task(task_t *s)
 /* Matches table release_part and runs the line. */
 static void task_run_release_part(task_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((((((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->ref_command_in == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(1)) && ((int64_t)s->ref_command_in == INT64_C(0)))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->ref_command_in == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->ref_command_in == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->ref_command_in == INT64_C(4)))) || (((int64_t)s->cur_state == INT64_C(6)) && (((int64_t)s->ref_command_in == INT64_C(1)) || ((int64_t)s->ref_command_in == INT64_C(2))))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(5)))) || (((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(1))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
+    /* release_part_in_step */
+    if (!(((!(!s->new_command)) || ((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->emove.command == INT64_C(5)))) || (((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->emove.command == INT64_C(1))))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 6u);
     }
-    /* resting */
-    if (!(((!s->idle) || (((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
-    }
-    /* release_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(8)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 5u);
+    /* release_part_resting */
+    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 7u);
     }
     s->line = task_release_part_line(s);
     switch (s->line) {
@@ -875,19 +843,16 @@ static void task_run_release_part(task_t *s)
         task_do_executing(s);
         break;
     case 1: /* task/release.rcs line 1 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 2: /* task/release.rcs line 2 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 3: /* task/release.rcs line 3 */
-        task_do_begin(s);
         task_do_nextstate(s, INT64_C(7));
         task_do_release(s);
         task_do_executing(s);
@@ -913,17 +878,17 @@ static void task_run_release_part(task_t *s)
         task_do_release_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 8: /* task/release.rcs line 8 */
         task_do_move_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 9: /* task/release.rcs line 9 */
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 10: /* task/release.rcs line 10 */
         task_do_executing(s);
@@ -932,7 +897,7 @@ static void task_run_release_part(task_t *s)
         task_do_state_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -947,13 +912,13 @@ static void task_run_release_part(task_t *s)
 /* Matches table transfer and runs the line. */
 static void task_run_transfer(task_t *s)
 {
-    /* in_step */
-    if (!(((!(!s->new_command)) || (((((((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->ref_command_in == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(1)) && ((int64_t)s->ref_command_in == INT64_C(0)))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->ref_command_in == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->ref_command_in == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->ref_command_in == INT64_C(4)))) || (((int64_t)s->cur_state == INT64_C(6)) && (((int64_t)s->ref_command_in == INT64_C(1)) || ((int64_t)s->ref_command_in == INT64_C(2))))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(5)))) || (((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(1))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
+    /* transfer_in_step */
+    if (!(((!(!s->new_command)) || (((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) || ((int64_t)s->cur_state == INT64_C(6)) || ((int64_t)s->cur_state == INT64_C(8))) && ((int64_t)s->emove.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->emove.command == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->emove.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->emove.command == INT64_C(4)))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->emove.command == INT64_C(5))))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 8u);
     }
-    /* resting */
-    if (!(((!s->idle) || (((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
+    /* transfer_resting */
+    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
+        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 9u);
     }
     s->line = task_transfer_line(s);
     switch (s->line) {
@@ -963,49 +928,42 @@ static void task_run_transfer(task_t *s)
         task_do_executing(s);
         break;
     case 1: /* task/transfer.rcs line 1 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 2: /* task/transfer.rcs line 2 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 3: /* task/transfer.rcs line 3 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 4: /* task/transfer.rcs line 4 */
-        task_do_begin(s);
         task_do_set_source(s);
         task_do_nextstate(s, INT64_C(4));
         task_do_move_to_obj(s);
         task_do_executing(s);
         break;
     case 5: /* task/transfer.rcs line 5 */
-        task_do_begin(s);
         task_do_vupos_setup(s);
         task_do_nextstate(s, INT64_C(2));
         task_do_move_to(s);
         task_do_executing(s);
         break;
     case 6: /* task/transfer.rcs line 6 */
-        task_do_begin(s);
         task_do_set_dest(s);
         task_do_nextstate(s, INT64_C(6));
         task_do_move_to(s);
         task_do_executing(s);
         break;
     case 7: /* task/transfer.rcs line 7 */
-        task_do_begin(s);
         task_do_cmd_failure(s);
         task_do_nextstate(s, INT64_C(1));
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 8: /* task/transfer.rcs line 8 */
         task_do_nextstate(s, INT64_C(3));
@@ -1055,29 +1013,29 @@ static void task_run_transfer(task_t *s)
         task_do_move_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 17: /* task/transfer.rcs line 17 */
         task_do_loc_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 18: /* task/transfer.rcs line 18 */
         task_do_pic_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 19: /* task/transfer.rcs line 19 */
         task_do_release_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 20: /* task/transfer.rcs line 20 */
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case 21: /* task/transfer.rcs line 21 */
         task_do_executing(s);
@@ -1086,7 +1044,7 @@ static void task_run_transfer(task_t *s)
         task_do_state_failure(s);
         task_do_nextstate(s, INT64_C(1));
         task_do_pause(s);
-        task_do_fail(s);
+        task_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -1105,18 +1063,44 @@ void task_init(task_t *s)
     s->fault = 0;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->command.inc_command = (uint16_t)INT64_C(0);
-    s->command.input_command = (uint8_t)INT64_C(0);
-    s->command.obj = (uint8_t)INT64_C(0);
-    s->command.grasp = (uint8_t)INT64_C(0);
-    s->command.source_locpt = (uint8_t)INT64_C(0);
-    s->command.dest_locpt = (uint8_t)INT64_C(0);
-    s->command.end_at_locpt = (uint8_t)INT64_C(0);
-    s->command.sector = (uint8_t)INT64_C(0);
-    s->emove.inc_command_echo = (uint16_t)INT64_C(0);
-    s->emove.ref_command_echo = (uint8_t)INT64_C(0);
-    s->emove.status_report = (uint8_t)INT64_C(0);
+    s->workstation.inc_command = (uint16_t)INT64_C(0);
+    s->workstation.input_command = (uint8_t)INT64_C(0);
+    s->workstation.obj = (uint8_t)INT64_C(0);
+    s->workstation.grasp = (uint8_t)INT64_C(0);
+    s->workstation.source_locpt = (uint8_t)INT64_C(0);
+    s->workstation.dest_locpt = (uint8_t)INT64_C(0);
+    s->workstation.end_at_locpt = (uint8_t)INT64_C(0);
+    s->workstation.sector = (uint8_t)INT64_C(0);
+    s->to_workstation.inc_command_echo = (uint16_t)INT64_C(0);
+    s->to_workstation.ref_command_echo = (uint8_t)INT64_C(0);
+    s->to_workstation.status_report = (uint8_t)INT64_C(0);
+    s->to_workstation.status_parameter = (uint8_t)INT64_C(0);
+    s->to_workstation.failure = (uint8_t)INT64_C(0);
+    s->new_command = false;
+    s->answered = false;
+    s->settling = false;
+    s->inc_command_seen = (uint16_t)INT64_C(0);
+    s->from_emove.inc_command_echo = (uint16_t)INT64_C(0);
+    s->from_emove.ref_command_echo = (uint8_t)INT64_C(0);
+    s->from_emove.status_report = (uint8_t)INT64_C(0);
+    s->from_emove.failure = (uint8_t)INT64_C(0);
+    s->to_emove.inc_command = (uint16_t)INT64_C(0);
+    s->to_emove.input_command = (uint8_t)INT64_C(0);
+    s->to_emove.obj_ptr = (uint8_t)INT64_C(0);
+    s->to_emove.grasp = (uint8_t)INT64_C(0);
+    s->to_emove.locpt_ptr = (uint8_t)INT64_C(0);
+    s->to_emove.sector = (uint8_t)INT64_C(0);
+    s->to_emove.apoint_pos_flag = false;
+    s->to_emove.gripped_obj_ptr = (uint8_t)INT64_C(0);
+    s->emove.command = (uint8_t)INT64_C(0);
+    s->emove.status = (uint8_t)INT64_C(0);
+    s->emove.resting = false;
     s->emove.failure = (uint8_t)INT64_C(0);
+    s->last_emove.input_command = (uint8_t)INT64_C(0);
+    s->last_emove.obj_ptr = (uint8_t)INT64_C(0);
+    s->last_emove.grasp = (uint8_t)INT64_C(0);
+    s->last_emove.locpt_ptr = (uint8_t)INT64_C(0);
+    s->last_emove.sector = (uint8_t)INT64_C(0);
     s->source.known = false;
     s->source.vision = false;
     s->source.buffer = false;
@@ -1137,12 +1121,6 @@ void task_init(task_t *s)
     s->here.buffer = false;
     s->here.vupos = (uint8_t)INT64_C(0);
     s->here.safe = (uint8_t)INT64_C(0);
-    s->new_command = false;
-    s->begun = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
-    s->ref_command_in = (uint8_t)INT64_C(0);
-    s->status_in = (uint8_t)INT64_C(0);
-    s->idle = true;
     s->cur_state = (uint8_t)INT64_C(0);
     s->cur_state_next = (uint8_t)INT64_C(0);
     s->loc_of_obj = (uint8_t)INT64_C(0);
@@ -1155,185 +1133,160 @@ void task_init(task_t *s)
     s->remember_current_loc = (uint8_t)INT64_C(0);
     s->current_loc = (uint8_t)INT64_C(0);
     s->current_sector = (uint8_t)INT64_C(0);
-    s->old_order.inc_command = (uint16_t)INT64_C(0);
-    s->old_order.input_command = (uint8_t)INT64_C(0);
-    s->old_order.obj_ptr = (uint8_t)INT64_C(0);
-    s->old_order.grasp = (uint8_t)INT64_C(0);
-    s->old_order.locpt_ptr = (uint8_t)INT64_C(0);
-    s->old_order.sector = (uint8_t)INT64_C(0);
-    s->old_order.apoint_pos_flag = false;
-    s->old_order.gripped_obj_ptr = (uint8_t)INT64_C(0);
     s->tbuffer_boxt = (uint8_t)INT64_C(10);
     s->bbuffer_boxb = (uint8_t)INT64_C(10);
     s->fbuffer_flag = (uint8_t)INT64_C(10);
     s->hbuffer_hous = (uint8_t)INT64_C(10);
-    s->status_report = (uint8_t)INT64_C(0);
-    s->failure = (uint8_t)INT64_C(0);
-    s->to_emove.inc_command = (uint16_t)INT64_C(0);
-    s->to_emove.input_command = (uint8_t)INT64_C(0);
-    s->to_emove.obj_ptr = (uint8_t)INT64_C(0);
-    s->to_emove.grasp = (uint8_t)INT64_C(0);
-    s->to_emove.locpt_ptr = (uint8_t)INT64_C(0);
-    s->to_emove.sector = (uint8_t)INT64_C(0);
-    s->to_emove.apoint_pos_flag = false;
-    s->to_emove.gripped_obj_ptr = (uint8_t)INT64_C(0);
-    s->report.inc_command_echo = (uint16_t)INT64_C(0);
-    s->report.ref_command_echo = (uint8_t)INT64_C(0);
-    s->report.status_report = (uint8_t)INT64_C(0);
-    s->report.status_parameter = (uint8_t)INT64_C(0);
-    s->report.failure = (uint8_t)INT64_C(0);
+    s->echoed = false;
 }
 
 /* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t task_check(const task_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && ((*(const uint8_t *)&s->source.known) > 1u)) {
+    if ((at < 0) && (((int64_t)s->to_workstation.ref_command_echo > INT64_C(5)))) {
+        at = 9;
+    }
+    if ((at < 0) && (((int64_t)s->to_workstation.status_report > INT64_C(2)))) {
+        at = 10;
+    }
+    if ((at < 0) && (((int64_t)s->to_workstation.status_parameter > INT64_C(6)))) {
+        at = 11;
+    }
+    if ((at < 0) && (((int64_t)s->to_workstation.failure > INT64_C(15)))) {
         at = 12;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->source.vision) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
         at = 13;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->source.buffer) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
         at = 14;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest.known) > 1u)) {
-        at = 17;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest.vision) > 1u)) {
-        at = 18;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest.buffer) > 1u)) {
-        at = 19;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->end_at.known) > 1u)) {
-        at = 22;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->end_at.vision) > 1u)) {
-        at = 23;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->end_at.buffer) > 1u)) {
-        at = 24;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->here.known) > 1u)) {
-        at = 27;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->here.vision) > 1u)) {
-        at = 28;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->here.buffer) > 1u)) {
-        at = 29;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
-        at = 32;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->begun) > 1u)) {
-        at = 33;
-    }
-    if ((at < 0) && (((int64_t)s->ref_command_in > INT64_C(5)))) {
-        at = 35;
-    }
-    if ((at < 0) && (((int64_t)s->status_in > INT64_C(2)))) {
-        at = 36;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
-        at = 37;
-    }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(8)))) {
-        at = 38;
-    }
-    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(8)))) {
-        at = 39;
-    }
-    if ((at < 0) && (((int64_t)s->loc_of_obj > INT64_C(1)))) {
-        at = 40;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->source_spec) > 1u)) {
-        at = 41;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest_spec) > 1u)) {
-        at = 42;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->names_known) > 1u)) {
-        at = 43;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
-        at = 44;
-    }
-    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(6)))) {
-        at = 45;
-    }
-    if ((at < 0) && (((int64_t)s->grasp_now > INT64_C(9)))) {
-        at = 46;
-    }
-    if ((at < 0) && (((int64_t)s->current_sector > INT64_C(99)))) {
-        at = 49;
-    }
-    if ((at < 0) && (((int64_t)s->old_order.input_command > INT64_C(5)))) {
-        at = 51;
-    }
-    if ((at < 0) && (((int64_t)s->old_order.obj_ptr > INT64_C(6)))) {
-        at = 52;
-    }
-    if ((at < 0) && (((int64_t)s->old_order.grasp > INT64_C(9)))) {
-        at = 53;
-    }
-    if ((at < 0) && (((int64_t)s->old_order.sector > INT64_C(99)))) {
-        at = 55;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->old_order.apoint_pos_flag) > 1u)) {
-        at = 56;
-    }
-    if ((at < 0) && (((int64_t)s->old_order.gripped_obj_ptr > INT64_C(6)))) {
-        at = 57;
-    }
-    if ((at < 0) && (((int64_t)s->tbuffer_boxt > INT64_C(99)))) {
-        at = 58;
-    }
-    if ((at < 0) && (((int64_t)s->bbuffer_boxb > INT64_C(99)))) {
-        at = 59;
-    }
-    if ((at < 0) && (((int64_t)s->fbuffer_flag > INT64_C(99)))) {
-        at = 60;
-    }
-    if ((at < 0) && (((int64_t)s->hbuffer_hous > INT64_C(99)))) {
-        at = 61;
-    }
-    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
-        at = 62;
-    }
-    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
-        at = 63;
+    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+        at = 15;
     }
     if ((at < 0) && (((int64_t)s->to_emove.input_command > INT64_C(5)))) {
-        at = 65;
+        at = 22;
     }
     if ((at < 0) && (((int64_t)s->to_emove.obj_ptr > INT64_C(6)))) {
-        at = 66;
+        at = 23;
     }
     if ((at < 0) && (((int64_t)s->to_emove.grasp > INT64_C(9)))) {
-        at = 67;
+        at = 24;
     }
     if ((at < 0) && (((int64_t)s->to_emove.sector > INT64_C(99)))) {
-        at = 69;
+        at = 26;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->to_emove.apoint_pos_flag) > 1u)) {
-        at = 70;
+        at = 27;
     }
     if ((at < 0) && (((int64_t)s->to_emove.gripped_obj_ptr > INT64_C(6)))) {
+        at = 28;
+    }
+    if ((at < 0) && (((int64_t)s->emove.command > INT64_C(5)))) {
+        at = 29;
+    }
+    if ((at < 0) && (((int64_t)s->emove.status > INT64_C(2)))) {
+        at = 30;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->emove.resting) > 1u)) {
+        at = 31;
+    }
+    if ((at < 0) && (((int64_t)s->emove.failure > INT64_C(15)))) {
+        at = 32;
+    }
+    if ((at < 0) && (((int64_t)s->last_emove.input_command > INT64_C(5)))) {
+        at = 33;
+    }
+    if ((at < 0) && (((int64_t)s->last_emove.obj_ptr > INT64_C(6)))) {
+        at = 34;
+    }
+    if ((at < 0) && (((int64_t)s->last_emove.grasp > INT64_C(9)))) {
+        at = 35;
+    }
+    if ((at < 0) && (((int64_t)s->last_emove.sector > INT64_C(99)))) {
+        at = 37;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->source.known) > 1u)) {
+        at = 38;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->source.vision) > 1u)) {
+        at = 39;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->source.buffer) > 1u)) {
+        at = 40;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->dest.known) > 1u)) {
+        at = 43;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->dest.vision) > 1u)) {
+        at = 44;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->dest.buffer) > 1u)) {
+        at = 45;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->end_at.known) > 1u)) {
+        at = 48;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->end_at.vision) > 1u)) {
+        at = 49;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->end_at.buffer) > 1u)) {
+        at = 50;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->here.known) > 1u)) {
+        at = 53;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->here.vision) > 1u)) {
+        at = 54;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->here.buffer) > 1u)) {
+        at = 55;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(8)))) {
+        at = 58;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(8)))) {
+        at = 59;
+    }
+    if ((at < 0) && (((int64_t)s->loc_of_obj > INT64_C(1)))) {
+        at = 60;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->source_spec) > 1u)) {
+        at = 61;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->dest_spec) > 1u)) {
+        at = 62;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->names_known) > 1u)) {
+        at = 63;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
+        at = 64;
+    }
+    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(6)))) {
+        at = 65;
+    }
+    if ((at < 0) && (((int64_t)s->grasp_now > INT64_C(9)))) {
+        at = 66;
+    }
+    if ((at < 0) && (((int64_t)s->current_sector > INT64_C(99)))) {
+        at = 69;
+    }
+    if ((at < 0) && (((int64_t)s->tbuffer_boxt > INT64_C(99)))) {
+        at = 70;
+    }
+    if ((at < 0) && (((int64_t)s->bbuffer_boxb > INT64_C(99)))) {
         at = 71;
     }
-    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(5)))) {
+    if ((at < 0) && (((int64_t)s->fbuffer_flag > INT64_C(99)))) {
+        at = 72;
+    }
+    if ((at < 0) && (((int64_t)s->hbuffer_hous > INT64_C(99)))) {
         at = 73;
     }
-    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
         at = 74;
-    }
-    if ((at < 0) && (((int64_t)s->report.status_parameter > INT64_C(6)))) {
-        at = 75;
-    }
-    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
-        at = 76;
     }
     return at;
 }
@@ -1377,7 +1330,7 @@ int32_t task_acquire_line(const task_t *s)
             0xfffbu, 0xffe5u
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->ref_command_in] & (uint32_t)t.t2[s->status_in] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] & (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] & (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] & (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x10000u);
     line = several ? (-2) : line;
@@ -1432,7 +1385,7 @@ int32_t task_clear_line(const task_t *s)
             0x1fefu, 0x1ff7u
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->ref_command_in] & (uint32_t)t.t2[s->status_in] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t6[(s->names_known ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] & (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t6[(s->names_known ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x2000u);
     line = several ? (-2) : line;
@@ -1500,7 +1453,7 @@ int32_t task_move_line(const task_t *s)
             0xffef7u, 0xfff4fu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[s->command.obj] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->ref_command_in] & (uint32_t)t.t3[s->status_in] & (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->loc_of_obj] & (uint32_t)t.t7[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t8[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t9[(s->names_known ? 1u : 0u)] & (uint32_t)t.t10[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->workstation.obj] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->emove.command] & (uint32_t)t.t3[s->emove.status] & (uint32_t)t.t4[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->loc_of_obj] & (uint32_t)t.t7[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t8[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t9[(s->names_known ? 1u : 0u)] & (uint32_t)t.t10[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x100000u);
     line = several ? (-2) : line;
@@ -1527,7 +1480,7 @@ int32_t task_pause_task_line(const task_t *s)
             0x2u, 0x1u
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->idle ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->emove.resting ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x4u);
     line = (m == 0x0u) ? (-1) : line;
@@ -1579,7 +1532,7 @@ int32_t task_release_part_line(const task_t *s)
             0x7f7u, 0x7fbu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->ref_command_in] & (uint32_t)t.t2[s->status_in] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->names_known ? 1u : 0u)] & (uint32_t)t.t6[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] & (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->names_known ? 1u : 0u)] & (uint32_t)t.t6[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x800u);
     line = several ? (-2) : line;
@@ -1643,7 +1596,7 @@ int32_t task_transfer_line(const task_t *s)
             0x3fffb7u, 0x3fff4fu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->ref_command_in] & (uint32_t)t.t2[s->status_in] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] & (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t8[(s->names_known ? 1u : 0u)] & (uint32_t)t.t9[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] & (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] & (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t8[(s->names_known ? 1u : 0u)] & (uint32_t)t.t9[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x400000u);
     line = several ? (-2) : line;
@@ -1732,13 +1685,13 @@ int32_t task_task_cycle(task_t *s)
     if (s->fault == 0) {
         task_settle(s);
         if (s->fault == 0) {
-            task_do_receive(s);
+            task_do_take_orders(s);
         }
         if (s->fault == 0) {
             task_do_test_variables(s);
         }
         if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->command.input_command;
+            const int64_t chosen = (int64_t)s->workstation.input_command;
             if (chosen == INT64_C(0)) {
                 task_run_pause_task(s);
             } else if (chosen == INT64_C(1)) {
@@ -1756,10 +1709,10 @@ int32_t task_task_cycle(task_t *s)
             }
         }
         if (s->fault == 0) {
-            task_do_send(s);
+            task_do_tell_gripped(s);
         }
         if (s->fault == 0) {
-            task_do_answer(s);
+            task_do_give_orders(s);
         }
     }
     return s->fault;

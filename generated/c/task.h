@@ -127,12 +127,16 @@ enum {
 
 /* Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed. */
 enum {
-    TASK_ASSUMPTION_IN_STEP = 0, /* in_step: only told in acquire, clear, move, release_part, transfer */
-    TASK_ASSUMPTION_RESTING = 1, /* resting: only told in acquire, clear, move, release_part, transfer */
-    TASK_ASSUMPTION_ACQUIRE_STATES = 2, /* acquire_states: only told in acquire */
-    TASK_ASSUMPTION_CLEAR_STATES = 3, /* clear_states: only told in clear */
-    TASK_ASSUMPTION_MOVE_STATES = 4, /* move_states: only told in move */
-    TASK_ASSUMPTION_RELEASE_STATES = 5 /* release_states: only told in release_part */
+    TASK_ASSUMPTION_ACQUIRE_IN_STEP = 0, /* acquire_in_step: only told in acquire */
+    TASK_ASSUMPTION_ACQUIRE_RESTING = 1, /* acquire_resting: only told in acquire */
+    TASK_ASSUMPTION_CLEAR_IN_STEP = 2, /* clear_in_step: only told in clear */
+    TASK_ASSUMPTION_CLEAR_RESTING = 3, /* clear_resting: only told in clear */
+    TASK_ASSUMPTION_MOVE_IN_STEP = 4, /* move_in_step: only told in move */
+    TASK_ASSUMPTION_MOVE_RESTING = 5, /* move_resting: only told in move */
+    TASK_ASSUMPTION_RELEASE_PART_IN_STEP = 6, /* release_part_in_step: only told in release_part */
+    TASK_ASSUMPTION_RELEASE_PART_RESTING = 7, /* release_part_resting: only told in release_part */
+    TASK_ASSUMPTION_TRANSFER_IN_STEP = 8, /* transfer_in_step: only told in transfer */
+    TASK_ASSUMPTION_TRANSFER_RESTING = 9 /* transfer_resting: only told in transfer */
 };
 
 /* `fault`, and what a cycle returns. */
@@ -149,39 +153,37 @@ enum {
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    vocabulary_task_order_t command; /* 0 to 7: input; From the WORKSTATION. */
-    vocabulary_emove_report_t emove; /* 8 to 11: input; From E-MOVE. */
-    task_common_place_t source; /* 12 to 16: input; From the database: the source of the command. */
-    task_common_place_t dest; /* 17 to 21: input; From the database: its destination. */
-    task_common_place_t end_at; /* 22 to 26: input; From the database: where it ends. */
-    task_common_place_t here; /* 27 to 31: input; From the database: where the robot is. */
-    bool new_command; /* 32: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
-    bool begun; /* 33: state; This level has answered the new command; pausing the level below first is no answer. */
-    uint16_t inc_command_seen; /* 34: state; 0 .. 65535; Number of the command now being worked on; echoed to the WORKSTATION. */
-    vocabulary_emove_command_t ref_command_in; /* 35: state; Command that E-MOVE last echoed. */
-    vocabulary_level_status_t status_in; /* 36: state; Status that E-MOVE reports. */
-    bool idle; /* 37: state; E-MOVE rests, and what it says answers this level's last order. */
-    task_common_task_state_t cur_state; /* 38: state; Where the table is in its sequence. */
-    task_common_task_state_t cur_state_next; /* 39: state; the deferred next value of cur_state */
-    task_common_locating_t loc_of_obj; /* 40: state; Whether vision is needed at the source. */
-    bool source_spec; /* 41: state; Whether the WORKSTATION named a source that the database knows. */
-    bool dest_spec; /* 42: state; Whether it named a destination that the database knows. */
-    bool names_known; /* 43: state; Every location that it named is known. */
-    bool obj_acquired; /* 44: state; An object is in the gripper. */
-    vocabulary_object_t obj_now_in_gripper; /* 45: state; The object in the gripper. */
-    uint8_t grasp_now; /* 46: state; 0 .. 9; How it is gripped. */
-    uint8_t remember_current_loc; /* 47: state; 0 .. 255; Where the object was taken from. */
-    uint8_t current_loc; /* 48: state; 0 .. 255; Where the robot is; 0 while it moves. */
-    uint8_t current_sector; /* 49: state; 0 .. 99 */
-    vocabulary_emove_order_t old_order; /* 50 to 57: state; The order that was last numbered. */
-    uint8_t tbuffer_boxt; /* 58: state; 0 .. 99; Box tops left on the buffer table. */
-    uint8_t bbuffer_boxb; /* 59: state; 0 .. 99; Box bottoms left on the buffer table. */
-    uint8_t fbuffer_flag; /* 60: state; 0 .. 99; Flags left on the buffer table. */
-    uint8_t hbuffer_hous; /* 61: state; 0 .. 99; Houses left on the buffer table. */
-    vocabulary_level_status_t status_report; /* 62: state; What the command does, to be reported. */
-    vocabulary_reason_t failure; /* 63: state; Why the command failed. */
-    vocabulary_emove_order_t to_emove; /* 64 to 71: output; To E-MOVE. */
-    vocabulary_task_report_t report; /* 72 to 76: output; To the WORKSTATION. */
+    vocabulary_task_order_t workstation; /* 0 to 7: input; Orders of workstation. */
+    vocabulary_task_report_t to_workstation; /* 8 to 12: output; Reports to workstation. */
+    bool new_command; /* 13: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool answered; /* 14: state; A line has answered the new command. */
+    bool settling; /* 15: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    uint16_t inc_command_seen; /* 16: state; 0 .. 65535; Number of the order that was taken last. */
+    vocabulary_emove_report_t from_emove; /* 17 to 20: input; Reports of emove, as they come. */
+    vocabulary_emove_order_t to_emove; /* 21 to 28: output; Orders to emove. */
+    task_common_emove_held_t emove; /* 29 to 32: state; What emove says of the last orders, held until they are echoed. */
+    task_common_emove_last_t last_emove; /* 33 to 37: state; The order to emove that was numbered last. */
+    task_common_place_t source; /* 38 to 42: input; From the database: the source of the workstation. */
+    task_common_place_t dest; /* 43 to 47: input; From the database: its destination. */
+    task_common_place_t end_at; /* 48 to 52: input; From the database: where it ends. */
+    task_common_place_t here; /* 53 to 57: input; From the database: where the robot is. */
+    task_common_task_state_t cur_state; /* 58: state; Where the table is in its sequence. */
+    task_common_task_state_t cur_state_next; /* 59: state; the deferred next value of cur_state */
+    task_common_locating_t loc_of_obj; /* 60: state; Whether vision is needed at the source. */
+    bool source_spec; /* 61: state; Whether the WORKSTATION named a source that the database knows. */
+    bool dest_spec; /* 62: state; Whether it named a destination that the database knows. */
+    bool names_known; /* 63: state; Every location that it named is known. */
+    bool obj_acquired; /* 64: state; An object is in the gripper. */
+    vocabulary_object_t obj_now_in_gripper; /* 65: state; The object in the gripper. */
+    uint8_t grasp_now; /* 66: state; 0 .. 9; How it is gripped. */
+    uint8_t remember_current_loc; /* 67: state; 0 .. 255; Where the object was taken from. */
+    uint8_t current_loc; /* 68: state; 0 .. 255; Where the robot is; 0 while it moves. */
+    uint8_t current_sector; /* 69: state; 0 .. 99 */
+    uint8_t tbuffer_boxt; /* 70: state; 0 .. 99; Box tops left on the buffer table. */
+    uint8_t bbuffer_boxb; /* 71: state; 0 .. 99; Box bottoms left on the buffer table. */
+    uint8_t fbuffer_flag; /* 72: state; 0 .. 99; Flags left on the buffer table. */
+    uint8_t hbuffer_hous; /* 73: state; 0 .. 99; Houses left on the buffer table. */
+    bool echoed; /* 74: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */

@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "vocabulary_types.h"
+
 /* enum task_state */
 typedef uint8_t task_common_task_state_t;
 enum {
@@ -33,5 +35,20 @@ typedef struct {
     uint8_t vupos; /* 0 .. 255 */
     uint8_t safe; /* 0 .. 255 */
 } task_common_place_t;
+
+typedef struct {
+    vocabulary_emove_command_t command;
+    vocabulary_level_status_t status;
+    bool resting;
+    vocabulary_reason_t failure;
+} task_common_emove_held_t;
+
+typedef struct {
+    vocabulary_emove_command_t input_command;
+    vocabulary_object_t obj_ptr;
+    uint8_t grasp; /* 0 .. 9 */
+    uint8_t locpt_ptr; /* 0 .. 255 */
+    uint8_t sector; /* 0 .. 99 */
+} task_common_emove_last_t;
 
 #endif

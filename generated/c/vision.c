@@ -70,31 +70,14 @@ static inline uint8_t vision_u8_of_i64(int64_t a)
     return (uint8_t)a;
 }
 
-/* Procedure receive. */
-static void vision_do_receive(vision_t *s)
-{
-    s->new_command = ((int64_t)s->command.inc_command != (int64_t)s->inc_command_seen);
-    if (s->new_command) {
-        s->failure = (uint8_t)INT64_C(0);
-        s->waited = (uint8_t)INT64_C(0);
-    }
-    s->inc_command_seen = (uint16_t)(int64_t)s->command.inc_command;
-}
-
 /* Procedure measure. */
 static void vision_do_measure(vision_t *s)
 {
+    if (s->new_command) {
+        s->waited = (uint8_t)INT64_C(0);
+    }
     s->arrived = ((int64_t)s->camera.number == (int64_t)s->to_camera.number);
-    s->fits = (vision_abs_f64((s->camera.range_mm - s->command.expected_range_mm)) <= 4.0);
-}
-
-/* Procedure answer. */
-static void vision_do_answer(vision_t *s)
-{
-    s->report.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->report.ref_command_echo = (uint8_t)(int64_t)s->command.input_command;
-    s->report.status_report = (uint8_t)(int64_t)s->status_report;
-    s->report.failure = (uint8_t)(int64_t)s->failure;
+    s->fits = (vision_abs_f64((s->camera.range_mm - s->emove.expected_range_mm)) <= 4.0);
 }
 
 /* Fires a flash; the picture that answers has the next number. */
@@ -102,7 +85,7 @@ static void vision_do_shoot(vision_t *s, int64_t v_which)
 {
     s->to_camera.number = vision_u16_of_i64((((int64_t)s->to_camera.number + INT64_C(1)) % INT64_C(65536)));
     s->to_camera.fire = (uint8_t)v_which;
-    s->to_camera.obj_ptr = (uint8_t)(int64_t)s->command.obj_ptr;
+    s->to_camera.obj_ptr = (uint8_t)(int64_t)s->emove.obj_ptr;
 }
 
 /* Procedure rest. */
@@ -114,29 +97,29 @@ static void vision_do_rest(vision_t *s)
 /* Where the part is in camera coordinates, how it is turned, and its range if it lies flat. */
 static void vision_do_found(vision_t *s)
 {
-    s->report.x_mm = s->camera.x_mm + 0.0;
-    s->report.y_mm = s->camera.y_mm + 0.0;
-    s->report.c = s->camera.c + 0.0;
-    s->report.s = s->camera.s + 0.0;
-    s->report.range_mm = s->camera.range_mm + 0.0;
+    s->to_emove.x_mm = s->camera.x_mm + 0.0;
+    s->to_emove.y_mm = s->camera.y_mm + 0.0;
+    s->to_emove.c = s->camera.c + 0.0;
+    s->to_emove.s = s->camera.s + 0.0;
+    s->to_emove.range_mm = s->camera.range_mm + 0.0;
 }
 
 /* The measured range. */
 static void vision_do_measured(vision_t *s)
 {
-    s->report.range_mm = s->camera.range_mm + 0.0;
+    s->to_emove.range_mm = s->camera.range_mm + 0.0;
 }
 
 /* Procedure no_match. */
 static void vision_do_no_match(vision_t *s)
 {
-    s->failure = (uint8_t)INT64_C(13);
+    s->to_emove.failure = (uint8_t)INT64_C(13);
 }
 
 /* Procedure line_flash_failure. */
 static void vision_do_line_flash_failure(vision_t *s)
 {
-    s->failure = (uint8_t)INT64_C(14);
+    s->to_emove.failure = (uint8_t)INT64_C(14);
 }
 
 /* Procedure state. */
@@ -153,22 +136,49 @@ static void vision_do_wait(vision_t *s)
     }
 }
 
-/* Procedure executing. */
-static void vision_do_executing(vision_t *s)
+/* Procedure take_orders. */
+static void vision_do_take_orders(vision_t *s)
 {
-    s->status_report = (uint8_t)INT64_C(1);
+    if (((int64_t)s->emove.inc_command != (int64_t)s->inc_command_seen)) {
+        s->inc_command_seen = (uint16_t)(int64_t)s->emove.inc_command;
+        s->new_command = true;
+        s->answered = false;
+        s->to_emove.status_report = (uint8_t)INT64_C(1);
+        s->to_emove.failure = (uint8_t)INT64_C(0);
+    } else {
+        if ((s->answered && true)) {
+            s->new_command = false;
+        }
+    }
+    s->settling = false;
+}
+
+/* Procedure give_orders. */
+static void vision_do_give_orders(vision_t *s)
+{
+    if ((s->new_command && (!s->settling))) {
+        s->answered = true;
+    }
+    s->to_emove.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
+    s->to_emove.ref_command_echo = (uint8_t)(int64_t)s->emove.input_command;
 }
 
 /* Procedure done. */
 static void vision_do_done(vision_t *s)
 {
-    s->status_report = (uint8_t)INT64_C(0);
+    s->to_emove.status_report = (uint8_t)INT64_C(0);
 }
 
-/* Procedure fail. */
-static void vision_do_fail(vision_t *s)
+/* Procedure executing. */
+static void vision_do_executing(vision_t *s)
 {
-    s->status_report = (uint8_t)INT64_C(2);
+    s->to_emove.status_report = (uint8_t)INT64_C(1);
+}
+
+/* Procedure failed. */
+static void vision_do_failed(vision_t *s)
+{
+    s->to_emove.status_report = (uint8_t)INT64_C(2);
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
@@ -182,30 +192,30 @@ static void vision_admit(vision_t *s)
     if (!vision_exact()) {
         s->fault = 7;
     }
-    if (((int64_t)s->command.input_command > INT64_C(2))) {
+    if (((int64_t)s->emove.input_command > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 1;
         }
     }
-    if (((int64_t)s->command.obj_ptr > INT64_C(6))) {
+    if (((int64_t)s->emove.obj_ptr > INT64_C(6))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 2;
         }
     }
-    if (!((s->command.expected_range_mm >= 0.0) && (s->command.expected_range_mm <= 2000.0))) {
+    if (!((s->emove.expected_range_mm >= 0.0) && (s->emove.expected_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 3;
         }
     } else {
-        s->command.expected_range_mm = s->command.expected_range_mm + 0.0;
+        s->emove.expected_range_mm = s->emove.expected_range_mm + 0.0;
     }
     if (!((s->camera.x_mm >= (-500.0)) && (s->camera.x_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 6;
+            s->fault_at = 19;
         }
     } else {
         s->camera.x_mm = s->camera.x_mm + 0.0;
@@ -213,7 +223,7 @@ static void vision_admit(vision_t *s)
     if (!((s->camera.y_mm >= (-500.0)) && (s->camera.y_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 7;
+            s->fault_at = 20;
         }
     } else {
         s->camera.y_mm = s->camera.y_mm + 0.0;
@@ -221,7 +231,7 @@ static void vision_admit(vision_t *s)
     if (!((s->camera.c >= (-1.0)) && (s->camera.c <= 1.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 8;
+            s->fault_at = 21;
         }
     } else {
         s->camera.c = s->camera.c + 0.0;
@@ -229,7 +239,7 @@ static void vision_admit(vision_t *s)
     if (!((s->camera.s >= (-1.0)) && (s->camera.s <= 1.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 9;
+            s->fault_at = 22;
         }
     } else {
         s->camera.s = s->camera.s + 0.0;
@@ -237,7 +247,7 @@ static void vision_admit(vision_t *s)
     if (!((s->camera.range_mm >= 0.0) && (s->camera.range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 10;
+            s->fault_at = 23;
         }
     } else {
         s->camera.range_mm = s->camera.range_mm + 0.0;
@@ -275,7 +285,7 @@ static void vision_run_flood_flash(vision_t *s)
         vision_do_no_match(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
-        vision_do_fail(s);
+        vision_do_failed(s);
         break;
     case 3: /* vision/vision.rcs line 4 */
         vision_do_found(s);
@@ -287,7 +297,7 @@ static void vision_run_flood_flash(vision_t *s)
         vision_do_no_match(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
-        vision_do_fail(s);
+        vision_do_failed(s);
         break;
     case 5: /* vision/vision.rcs line 6 */
         vision_do_rest(s);
@@ -295,7 +305,7 @@ static void vision_run_flood_flash(vision_t *s)
         break;
     case 6: /* vision/vision.rcs line 7 */
         vision_do_rest(s);
-        vision_do_fail(s);
+        vision_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -325,7 +335,7 @@ static void vision_run_line_flash(vision_t *s)
         vision_do_line_flash_failure(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
-        vision_do_fail(s);
+        vision_do_failed(s);
         break;
     case 3: /* vision/vision.rcs line 4 */
         vision_do_measured(s);
@@ -337,13 +347,13 @@ static void vision_run_line_flash(vision_t *s)
         vision_do_line_flash_failure(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
-        vision_do_fail(s);
+        vision_do_failed(s);
         break;
     case 5: /* vision/vision.rcs line 5b */
         vision_do_line_flash_failure(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
-        vision_do_fail(s);
+        vision_do_failed(s);
         break;
     case 6: /* vision/vision.rcs line 6 */
         vision_do_rest(s);
@@ -351,7 +361,7 @@ static void vision_run_line_flash(vision_t *s)
         break;
     case 7: /* vision/vision.rcs line 7 */
         vision_do_rest(s);
-        vision_do_fail(s);
+        vision_do_failed(s);
         break;
     case (-1):
         s->fault = 2;
@@ -390,10 +400,23 @@ void vision_init(vision_t *s)
     s->fault = 0;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->command.inc_command = (uint16_t)INT64_C(0);
-    s->command.input_command = (uint8_t)INT64_C(0);
-    s->command.obj_ptr = (uint8_t)INT64_C(0);
-    s->command.expected_range_mm = 0.0;
+    s->emove.inc_command = (uint16_t)INT64_C(0);
+    s->emove.input_command = (uint8_t)INT64_C(0);
+    s->emove.obj_ptr = (uint8_t)INT64_C(0);
+    s->emove.expected_range_mm = 0.0;
+    s->to_emove.inc_command_echo = (uint16_t)INT64_C(0);
+    s->to_emove.ref_command_echo = (uint8_t)INT64_C(0);
+    s->to_emove.status_report = (uint8_t)INT64_C(0);
+    s->to_emove.failure = (uint8_t)INT64_C(0);
+    s->to_emove.x_mm = (-500.0);
+    s->to_emove.y_mm = (-500.0);
+    s->to_emove.c = (-1.0);
+    s->to_emove.s = (-1.0);
+    s->to_emove.range_mm = 0.0;
+    s->new_command = false;
+    s->answered = false;
+    s->settling = false;
+    s->inc_command_seen = (uint16_t)INT64_C(0);
     s->camera.number = (uint16_t)INT64_C(0);
     s->camera.matched = false;
     s->camera.x_mm = (-500.0);
@@ -402,87 +425,74 @@ void vision_init(vision_t *s)
     s->camera.s = (-1.0);
     s->camera.range_mm = 0.0;
     s->camera.flat = false;
-    s->new_command = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
     s->cur_state = (uint8_t)INT64_C(0);
     s->arrived = false;
     s->fits = false;
     s->waited = (uint8_t)INT64_C(0);
-    s->status_report = (uint8_t)INT64_C(0);
-    s->failure = (uint8_t)INT64_C(0);
     s->to_camera.number = (uint16_t)INT64_C(0);
     s->to_camera.fire = (uint8_t)INT64_C(0);
     s->to_camera.obj_ptr = (uint8_t)INT64_C(0);
-    s->report.inc_command_echo = (uint16_t)INT64_C(0);
-    s->report.ref_command_echo = (uint8_t)INT64_C(0);
-    s->report.status_report = (uint8_t)INT64_C(0);
-    s->report.failure = (uint8_t)INT64_C(0);
-    s->report.x_mm = (-500.0);
-    s->report.y_mm = (-500.0);
-    s->report.c = (-1.0);
-    s->report.s = (-1.0);
-    s->report.range_mm = 0.0;
 }
 
 /* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t vision_check(const vision_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && ((*(const uint8_t *)&s->camera.matched) > 1u)) {
+    if ((at < 0) && (((int64_t)s->to_emove.ref_command_echo > INT64_C(2)))) {
         at = 5;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->camera.flat) > 1u)) {
+    if ((at < 0) && (((int64_t)s->to_emove.status_report > INT64_C(2)))) {
+        at = 6;
+    }
+    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(15)))) {
+        at = 7;
+    }
+    if ((at < 0) && (!((s->to_emove.x_mm >= (-500.0)) && (s->to_emove.x_mm <= 500.0)))) {
+        at = 8;
+    }
+    if ((at < 0) && (!((s->to_emove.y_mm >= (-500.0)) && (s->to_emove.y_mm <= 500.0)))) {
+        at = 9;
+    }
+    if ((at < 0) && (!((s->to_emove.c >= (-1.0)) && (s->to_emove.c <= 1.0)))) {
+        at = 10;
+    }
+    if ((at < 0) && (!((s->to_emove.s >= (-1.0)) && (s->to_emove.s <= 1.0)))) {
         at = 11;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+    if ((at < 0) && (!((s->to_emove.range_mm >= 0.0) && (s->to_emove.range_mm <= 2000.0)))) {
         at = 12;
     }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(2)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+        at = 13;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
         at = 14;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->arrived) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
         at = 15;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
-        at = 16;
-    }
-    if ((at < 0) && (((int64_t)s->waited > INT64_C(100)))) {
-        at = 17;
-    }
-    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->camera.matched) > 1u)) {
         at = 18;
     }
-    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
-        at = 19;
-    }
-    if ((at < 0) && (((int64_t)s->to_camera.fire > INT64_C(2)))) {
-        at = 21;
-    }
-    if ((at < 0) && (((int64_t)s->to_camera.obj_ptr > INT64_C(6)))) {
-        at = 22;
-    }
-    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(2)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->camera.flat) > 1u)) {
         at = 24;
     }
-    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(2)))) {
         at = 25;
     }
-    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->arrived) > 1u)) {
         at = 26;
     }
-    if ((at < 0) && (!((s->report.x_mm >= (-500.0)) && (s->report.x_mm <= 500.0)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
         at = 27;
     }
-    if ((at < 0) && (!((s->report.y_mm >= (-500.0)) && (s->report.y_mm <= 500.0)))) {
+    if ((at < 0) && (((int64_t)s->waited > INT64_C(100)))) {
         at = 28;
     }
-    if ((at < 0) && (!((s->report.c >= (-1.0)) && (s->report.c <= 1.0)))) {
-        at = 29;
-    }
-    if ((at < 0) && (!((s->report.s >= (-1.0)) && (s->report.s <= 1.0)))) {
+    if ((at < 0) && (((int64_t)s->to_camera.fire > INT64_C(2)))) {
         at = 30;
     }
-    if ((at < 0) && (!((s->report.range_mm >= 0.0) && (s->report.range_mm <= 2000.0)))) {
+    if ((at < 0) && (((int64_t)s->to_camera.obj_ptr > INT64_C(6)))) {
         at = 31;
     }
     return at;
@@ -500,10 +510,10 @@ int32_t vision_flood_flash_line(const vision_t *s)
         uint8_t t4[101];
     } t = {
         {
-            0x77u, 0x6fu
+            0x7eu, 0x1u
         },
         {
-            0x7eu, 0x1u
+            0x77u, 0x6fu
         },
         {
             0x21u, 0x41u, 0x1fu
@@ -523,7 +533,7 @@ int32_t vision_flood_flash_line(const vision_t *s)
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7du
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->camera.matched ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->cur_state] & (uint32_t)t.t3[(s->arrived ? 1u : 0u)] & (uint32_t)t.t4[s->waited];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[(s->camera.matched ? 1u : 0u)] & (uint32_t)t.t2[s->cur_state] & (uint32_t)t.t3[(s->arrived ? 1u : 0u)] & (uint32_t)t.t4[s->waited];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = vision_bit32(m | 0x80u);
     line = (m == 0x0u) ? (-1) : line;
@@ -553,10 +563,10 @@ int32_t vision_line_flash_line(const vision_t *s)
         uint16_t t5[101];
     } t = {
         {
-            0xf7u, 0xdfu
+            0xfeu, 0x1u
         },
         {
-            0xfeu, 0x1u
+            0xf7u, 0xdfu
         },
         {
             0x41u, 0x81u, 0x3fu
@@ -579,7 +589,7 @@ int32_t vision_line_flash_line(const vision_t *s)
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfdu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->camera.flat ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->cur_state] & (uint32_t)t.t3[(s->arrived ? 1u : 0u)] & (uint32_t)t.t4[(s->fits ? 1u : 0u)] & (uint32_t)t.t5[s->waited];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[(s->camera.flat ? 1u : 0u)] & (uint32_t)t.t2[s->cur_state] & (uint32_t)t.t3[(s->arrived ? 1u : 0u)] & (uint32_t)t.t4[(s->fits ? 1u : 0u)] & (uint32_t)t.t5[s->waited];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = vision_bit32(m | 0x100u);
     line = (m == 0x0u) ? (-1) : line;
@@ -657,13 +667,13 @@ int32_t vision_vision_cycle(vision_t *s)
     if (s->fault == 0) {
         vision_settle(s);
         if (s->fault == 0) {
-            vision_do_receive(s);
+            vision_do_take_orders(s);
         }
         if (s->fault == 0) {
             vision_do_measure(s);
         }
         if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->command.input_command;
+            const int64_t chosen = (int64_t)s->emove.input_command;
             if (chosen == INT64_C(0)) {
                 vision_run_pause_vision(s);
             } else if (chosen == INT64_C(1)) {
@@ -675,7 +685,7 @@ int32_t vision_vision_cycle(vision_t *s)
             }
         }
         if (s->fault == 0) {
-            vision_do_answer(s);
+            vision_do_give_orders(s);
         }
     }
     return s->fault;

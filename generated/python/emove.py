@@ -141,37 +141,77 @@ class State:
     `assumptions_failed` the k-th assumption that is checked.
 
     Assumptions that are checked:
-    0 in_step: only told in locate, move_to, move_to_obj, pickup, release_part
-    1 locate_states: only told in locate
-    2 move_to_states: only told in move_to
-    3 move_to_obj_states: only told in move_to_obj
-    4 pickup_states: only told in pickup
-    5 release_part_states: only told in release_part
+    0 locate_in_step: only told in locate
+    1 move_to_in_step: only told in move_to
+    2 move_to_obj_in_step: only told in move_to_obj
+    3 pickup_in_step: only told in pickup
+    4 release_part_in_step: only told in release_part
     """
 
     __slots__ = (
-        "command_inc_command",
-        "command_input_command",
-        "command_obj_ptr",
-        "command_grasp",
-        "command_locpt_ptr",
-        "command_sector",
-        "command_apoint_pos_flag",
-        "command_gripped_obj_ptr",
-        "primitive_inc_command_echo",
-        "primitive_ref_command_echo",
-        "primitive_status_report",
+        "task_inc_command",
+        "task_input_command",
+        "task_obj_ptr",
+        "task_grasp",
+        "task_locpt_ptr",
+        "task_sector",
+        "task_apoint_pos_flag",
+        "task_gripped_obj_ptr",
+        "to_task_inc_command_echo",
+        "to_task_ref_command_echo",
+        "to_task_status_report",
+        "to_task_failure",
+        "new_command",
+        "answered",
+        "settling",
+        "inc_command_seen",
+        "from_primitive_inc_command_echo",
+        "from_primitive_ref_command_echo",
+        "from_primitive_status_report",
+        "from_primitive_failure",
+        "from_primitive_holds",
+        "to_primitive_inc_command",
+        "to_primitive_input_command",
+        "to_primitive_obj_ptr",
+        "to_primitive_grasp",
+        "to_primitive_pose_ptr",
+        "to_primitive_displaced_x",
+        "to_primitive_displaced_y",
+        "to_primitive_displaced_z",
+        "to_primitive_displaced_c",
+        "to_primitive_displaced_s",
+        "primitive_command",
+        "primitive_status",
+        "primitive_resting",
         "primitive_failure",
-        "primitive_holds",
-        "vision_inc_command_echo",
-        "vision_ref_command_echo",
-        "vision_status_report",
+        "last_primitive_input_command",
+        "last_primitive_obj_ptr",
+        "last_primitive_grasp",
+        "last_primitive_pose_ptr",
+        "last_primitive_displaced_x",
+        "last_primitive_displaced_y",
+        "last_primitive_displaced_z",
+        "last_primitive_displaced_c",
+        "last_primitive_displaced_s",
+        "from_vision_inc_command_echo",
+        "from_vision_ref_command_echo",
+        "from_vision_status_report",
+        "from_vision_failure",
+        "from_vision_x_mm",
+        "from_vision_y_mm",
+        "from_vision_c",
+        "from_vision_s",
+        "from_vision_range_mm",
+        "to_vision_inc_command",
+        "to_vision_input_command",
+        "to_vision_obj_ptr",
+        "to_vision_expected_range_mm",
+        "vision_command",
+        "vision_status",
+        "vision_resting",
         "vision_failure",
-        "vision_x_mm",
-        "vision_y_mm",
-        "vision_c",
-        "vision_s",
-        "vision_range_mm",
+        "last_vision_input_command",
+        "last_vision_obj_ptr",
         "origin_known",
         "origin_depart_first",
         "origin_depart_count",
@@ -196,13 +236,6 @@ class State:
         "held_data_expected_range_mm",
         "held_data_grip_range_mm",
         "held_data_lift_mm",
-        "new_command",
-        "begun",
-        "inc_command_seen",
-        "ref_command_in",
-        "status_in",
-        "ref_vision_in",
-        "vision_status_in",
         "idle",
         "cur_state",
         "cur_state_next",
@@ -223,40 +256,7 @@ class State:
         "displaced_here_s",
         "lift_mm",
         "lost",
-        "old_order_inc_command",
-        "old_order_input_command",
-        "old_order_obj_ptr",
-        "old_order_grasp",
-        "old_order_pose_ptr",
-        "old_order_displaced_x",
-        "old_order_displaced_y",
-        "old_order_displaced_z",
-        "old_order_displaced_c",
-        "old_order_displaced_s",
-        "old_vision_inc_command",
-        "old_vision_input_command",
-        "old_vision_obj_ptr",
-        "old_vision_expected_range_mm",
-        "status_report",
-        "failure",
-        "to_primitive_inc_command",
-        "to_primitive_input_command",
-        "to_primitive_obj_ptr",
-        "to_primitive_grasp",
-        "to_primitive_pose_ptr",
-        "to_primitive_displaced_x",
-        "to_primitive_displaced_y",
-        "to_primitive_displaced_z",
-        "to_primitive_displaced_c",
-        "to_primitive_displaced_s",
-        "to_vision_inc_command",
-        "to_vision_input_command",
-        "to_vision_obj_ptr",
-        "to_vision_expected_range_mm",
-        "report_inc_command_echo",
-        "report_ref_command_echo",
-        "report_status_report",
-        "report_failure",
+        "echoed",
         "line",
         "fault",
         "fault_at",
@@ -264,28 +264,69 @@ class State:
     )
 
     def __init__(self):
-        self.command_inc_command = 0  # From TASK.
-        self.command_input_command = 0  # From TASK.
-        self.command_obj_ptr = 0  # From TASK.
-        self.command_grasp = 0  # From TASK.
-        self.command_locpt_ptr = 0  # From TASK.
-        self.command_sector = 0  # From TASK.
-        self.command_apoint_pos_flag = False  # From TASK.
-        self.command_gripped_obj_ptr = 0  # From TASK.
-        self.primitive_inc_command_echo = 0  # From PRIMITIVE.
-        self.primitive_ref_command_echo = 0  # From PRIMITIVE.
-        self.primitive_status_report = 0  # From PRIMITIVE.
-        self.primitive_failure = 0  # From PRIMITIVE.
-        self.primitive_holds = False  # From PRIMITIVE.
-        self.vision_inc_command_echo = 0  # From vision.
-        self.vision_ref_command_echo = 0  # From vision.
-        self.vision_status_report = 0  # From vision.
-        self.vision_failure = 0  # From vision.
-        self.vision_x_mm = -500.0  # From vision.
-        self.vision_y_mm = -500.0  # From vision.
-        self.vision_c = -1.0  # From vision.
-        self.vision_s = -1.0  # From vision.
-        self.vision_range_mm = 0.0  # From vision.
+        self.task_inc_command = 0  # Orders of task.
+        self.task_input_command = 0  # Orders of task.
+        self.task_obj_ptr = 0  # Orders of task.
+        self.task_grasp = 0  # Orders of task.
+        self.task_locpt_ptr = 0  # Orders of task.
+        self.task_sector = 0  # Orders of task.
+        self.task_apoint_pos_flag = False  # Orders of task.
+        self.task_gripped_obj_ptr = 0  # Orders of task.
+        self.to_task_inc_command_echo = 0  # Reports to task.
+        self.to_task_ref_command_echo = 0  # Reports to task.
+        self.to_task_status_report = 0  # Reports to task.
+        self.to_task_failure = 0  # Reports to task.
+        self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
+        self.answered = False  # A line has answered the new command.
+        self.settling = False  # The line of this cycle lets the levels below rest first, and answers nothing.
+        self.inc_command_seen = 0  # Number of the order that was taken last.
+        self.from_primitive_inc_command_echo = 0  # Reports of primitive, as they come.
+        self.from_primitive_ref_command_echo = 0  # Reports of primitive, as they come.
+        self.from_primitive_status_report = 0  # Reports of primitive, as they come.
+        self.from_primitive_failure = 0  # Reports of primitive, as they come.
+        self.from_primitive_holds = False  # Reports of primitive, as they come.
+        self.to_primitive_inc_command = 0  # Orders to primitive.
+        self.to_primitive_input_command = 0  # Orders to primitive.
+        self.to_primitive_obj_ptr = 0  # Orders to primitive.
+        self.to_primitive_grasp = 0  # Orders to primitive.
+        self.to_primitive_pose_ptr = 0  # Orders to primitive.
+        self.to_primitive_displaced_x = -500.0  # Orders to primitive.
+        self.to_primitive_displaced_y = -500.0  # Orders to primitive.
+        self.to_primitive_displaced_z = -500.0  # Orders to primitive.
+        self.to_primitive_displaced_c = -1.0  # Orders to primitive.
+        self.to_primitive_displaced_s = -1.0  # Orders to primitive.
+        self.primitive_command = 0  # What primitive says of the last orders, held until they are echoed.
+        self.primitive_status = 0  # What primitive says of the last orders, held until they are echoed.
+        self.primitive_resting = False  # What primitive says of the last orders, held until they are echoed.
+        self.primitive_failure = 0  # What primitive says of the last orders, held until they are echoed.
+        self.last_primitive_input_command = 0  # The order to primitive that was numbered last.
+        self.last_primitive_obj_ptr = 0  # The order to primitive that was numbered last.
+        self.last_primitive_grasp = 0  # The order to primitive that was numbered last.
+        self.last_primitive_pose_ptr = 0  # The order to primitive that was numbered last.
+        self.last_primitive_displaced_x = -500.0  # The order to primitive that was numbered last.
+        self.last_primitive_displaced_y = -500.0  # The order to primitive that was numbered last.
+        self.last_primitive_displaced_z = -500.0  # The order to primitive that was numbered last.
+        self.last_primitive_displaced_c = -1.0  # The order to primitive that was numbered last.
+        self.last_primitive_displaced_s = -1.0  # The order to primitive that was numbered last.
+        self.from_vision_inc_command_echo = 0  # Reports of vision, as they come.
+        self.from_vision_ref_command_echo = 0  # Reports of vision, as they come.
+        self.from_vision_status_report = 0  # Reports of vision, as they come.
+        self.from_vision_failure = 0  # Reports of vision, as they come.
+        self.from_vision_x_mm = -500.0  # Reports of vision, as they come.
+        self.from_vision_y_mm = -500.0  # Reports of vision, as they come.
+        self.from_vision_c = -1.0  # Reports of vision, as they come.
+        self.from_vision_s = -1.0  # Reports of vision, as they come.
+        self.from_vision_range_mm = 0.0  # Reports of vision, as they come.
+        self.to_vision_inc_command = 0  # Orders to vision.
+        self.to_vision_input_command = 0  # Orders to vision.
+        self.to_vision_obj_ptr = 0  # Orders to vision.
+        self.to_vision_expected_range_mm = 0.0  # Orders to vision.
+        self.vision_command = 0  # What vision says of the last orders, held until they are echoed.
+        self.vision_status = 0  # What vision says of the last orders, held until they are echoed.
+        self.vision_resting = False  # What vision says of the last orders, held until they are echoed.
+        self.vision_failure = 0  # What vision says of the last orders, held until they are echoed.
+        self.last_vision_input_command = 0  # The order to vision that was numbered last.
+        self.last_vision_obj_ptr = 0  # The order to vision that was numbered last.
         self.origin_known = False  # From the database: where the robot is.
         self.origin_depart_first = 0  # From the database: where the robot is.
         self.origin_depart_count = 0  # From the database: where the robot is.
@@ -294,29 +335,22 @@ class State:
         self.origin_hover_point = 0  # From the database: where the robot is.
         self.origin_grasp_point = 0  # From the database: where the robot is.
         self.origin_view_point = 0  # From the database: where the robot is.
-        self.target_known = False  # From the database: the location of the command.
-        self.target_depart_first = 0  # From the database: the location of the command.
-        self.target_depart_count = 0  # From the database: the location of the command.
-        self.target_approach_first = 0  # From the database: the location of the command.
-        self.target_approach_count = 0  # From the database: the location of the command.
-        self.target_hover_point = 0  # From the database: the location of the command.
-        self.target_grasp_point = 0  # From the database: the location of the command.
-        self.target_view_point = 0  # From the database: the location of the command.
-        self.object_data_known = False  # From the database: the part of the command.
-        self.object_data_expected_range_mm = 0.0  # From the database: the part of the command.
-        self.object_data_grip_range_mm = 0.0  # From the database: the part of the command.
-        self.object_data_lift_mm = -500.0  # From the database: the part of the command.
+        self.target_known = False  # From the database: the location of the task.
+        self.target_depart_first = 0  # From the database: the location of the task.
+        self.target_depart_count = 0  # From the database: the location of the task.
+        self.target_approach_first = 0  # From the database: the location of the task.
+        self.target_approach_count = 0  # From the database: the location of the task.
+        self.target_hover_point = 0  # From the database: the location of the task.
+        self.target_grasp_point = 0  # From the database: the location of the task.
+        self.target_view_point = 0  # From the database: the location of the task.
+        self.object_data_known = False  # From the database: the part of the task.
+        self.object_data_expected_range_mm = 0.0  # From the database: the part of the task.
+        self.object_data_grip_range_mm = 0.0  # From the database: the part of the task.
+        self.object_data_lift_mm = -500.0  # From the database: the part of the task.
         self.held_data_known = False  # From the database: the part in the gripper.
         self.held_data_expected_range_mm = 0.0  # From the database: the part in the gripper.
         self.held_data_grip_range_mm = 0.0  # From the database: the part in the gripper.
         self.held_data_lift_mm = -500.0  # From the database: the part in the gripper.
-        self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
-        self.begun = False  # This level has answered the new command; pausing the levels below first is no answer.
-        self.inc_command_seen = 0  # Number of the command now being worked on; echoed to TASK.
-        self.ref_command_in = 0  # Command that PRIMITIVE last echoed.
-        self.status_in = 0  # Status that PRIMITIVE reports.
-        self.ref_vision_in = 0  # Command that vision last echoed.
-        self.vision_status_in = 0  # Status that vision reports.
         self.idle = True  # Both levels below rest, and what they say answers this level's last orders.
         self.cur_state = 0  # Where the table is in its sequence; both echoes must match before it moves on (section 9).
         self.cur_state_next = 0  # Where the table is in its sequence; both echoes must match before it moves on (section 9).
@@ -337,40 +371,7 @@ class State:
         self.displaced_here_s = -1.0  # How far the part that was located here was displaced: the departure is displaced as far.
         self.lift_mm = -500.0  # How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height.
         self.lost = False  # A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed.
-        self.old_order_inc_command = 0  # The orders that were last numbered.
-        self.old_order_input_command = 0  # The orders that were last numbered.
-        self.old_order_obj_ptr = 0  # The orders that were last numbered.
-        self.old_order_grasp = 0  # The orders that were last numbered.
-        self.old_order_pose_ptr = 0  # The orders that were last numbered.
-        self.old_order_displaced_x = -500.0  # The orders that were last numbered.
-        self.old_order_displaced_y = -500.0  # The orders that were last numbered.
-        self.old_order_displaced_z = -500.0  # The orders that were last numbered.
-        self.old_order_displaced_c = -1.0  # The orders that were last numbered.
-        self.old_order_displaced_s = -1.0  # The orders that were last numbered.
-        self.old_vision_inc_command = 0
-        self.old_vision_input_command = 0
-        self.old_vision_obj_ptr = 0
-        self.old_vision_expected_range_mm = 0.0
-        self.status_report = 0  # What the command does, to be reported.
-        self.failure = 0  # Why the command failed.
-        self.to_primitive_inc_command = 0  # To PRIMITIVE.
-        self.to_primitive_input_command = 0  # To PRIMITIVE.
-        self.to_primitive_obj_ptr = 0  # To PRIMITIVE.
-        self.to_primitive_grasp = 0  # To PRIMITIVE.
-        self.to_primitive_pose_ptr = 0  # To PRIMITIVE.
-        self.to_primitive_displaced_x = -500.0  # To PRIMITIVE.
-        self.to_primitive_displaced_y = -500.0  # To PRIMITIVE.
-        self.to_primitive_displaced_z = -500.0  # To PRIMITIVE.
-        self.to_primitive_displaced_c = -1.0  # To PRIMITIVE.
-        self.to_primitive_displaced_s = -1.0  # To PRIMITIVE.
-        self.to_vision_inc_command = 0  # To vision.
-        self.to_vision_input_command = 0  # To vision.
-        self.to_vision_obj_ptr = 0  # To vision.
-        self.to_vision_expected_range_mm = 0.0  # To vision.
-        self.report_inc_command_echo = 0  # To TASK.
-        self.report_ref_command_echo = 0  # To TASK.
-        self.report_status_report = 0  # To TASK.
-        self.report_failure = 0  # To TASK.
+        self.echoed = False  # Every last order is echoed, or too late.
         self.line = -1
         self.fault = 0
         self.fault_at = -1
@@ -444,14 +445,10 @@ def _lines_of(masks, lines, default):
 
 
 _LOCATE_0 = (
-    0xfffb,
-    0xfffd,
-)
-_LOCATE_1 = (
     0xfff8,
     0x7,
 )
-_LOCATE_2 = (
+_LOCATE_1 = (
     0xfc57,
     0xff77,
     0xfc57,
@@ -459,20 +456,24 @@ _LOCATE_2 = (
     0xfc5f,
     0xfc57,
 )
-_LOCATE_3 = (
+_LOCATE_2 = (
     0xb7ff,
     0xf457,
     0x2c07,
 )
-_LOCATE_4 = (
+_LOCATE_3 = (
     0xffaf,
     0xffbf,
     0xffef,
 )
-_LOCATE_5 = (
+_LOCATE_4 = (
     0x6fff,
     0xefaf,
     0x7faf,
+)
+_LOCATE_5 = (
+    0xfffb,
+    0xfffd,
 )
 _LOCATE_6 = (
     0xfff9,
@@ -495,23 +496,19 @@ _LOCATE_7 = (
     0x7,
 )
 _LOCATE_G0 = (
-    *_joined(_LOCATE_7, _LOCATE_2, _LOCATE_3, _LOCATE_0),
+    *_joined(_LOCATE_7, _LOCATE_1, _LOCATE_2, _LOCATE_0),
 )
 _LOCATE_G1 = (
-    *_joined(_LOCATE_4, _LOCATE_5, _LOCATE_1, _LOCATE_6),
+    *_joined(_LOCATE_3, _LOCATE_4, _LOCATE_5, _LOCATE_6),
 )
 _LOCATE_ONE = (
     _one_of(16, True),
 )
 _MOVE_TO_0 = (
-    0x1fe3,
-    0x1ffd,
-)
-_MOVE_TO_1 = (
     0x1fe0,
     0x1f,
 )
-_MOVE_TO_2 = (
+_MOVE_TO_1 = (
     0x1a1f,
     0x1f9f,
     0x1e7f,
@@ -519,10 +516,14 @@ _MOVE_TO_2 = (
     0x1a1f,
     0x1a1f,
 )
-_MOVE_TO_3 = (
+_MOVE_TO_2 = (
     0xbff,
     0x1a1f,
     0xe1f,
+)
+_MOVE_TO_3 = (
+    0x1fe3,
+    0x1ffd,
 )
 _MOVE_TO_4 = (
     0x1fe1,
@@ -622,10 +623,10 @@ _MOVE_TO_9 = (
     0x1fff,
 )
 _MOVE_TO_G0 = (
-    *_joined(_MOVE_TO_6, _MOVE_TO_2),
+    *_joined(_MOVE_TO_6, _MOVE_TO_1),
 )
 _MOVE_TO_G1 = (
-    *_joined(_MOVE_TO_5, _MOVE_TO_3, _MOVE_TO_0, _MOVE_TO_1, _MOVE_TO_4),
+    *_joined(_MOVE_TO_5, _MOVE_TO_2, _MOVE_TO_0, _MOVE_TO_3, _MOVE_TO_4),
 )
 _MOVE_TO_G2 = (
     *_joined(_MOVE_TO_7, _MOVE_TO_8, _MOVE_TO_9),
@@ -634,14 +635,10 @@ _MOVE_TO_ONE = (
     _one_of(13, True),
 )
 _MOVE_TO_OBJ_0 = (
-    0x1ff3,
-    0x1ffd,
-)
-_MOVE_TO_OBJ_1 = (
     0x1ff0,
     0xf,
 )
-_MOVE_TO_OBJ_2 = (
+_MOVE_TO_OBJ_1 = (
     0x1a0f,
     0x1f0f,
     0x1ecf,
@@ -649,10 +646,14 @@ _MOVE_TO_OBJ_2 = (
     0x1a0f,
     0x1a0f,
 )
-_MOVE_TO_OBJ_3 = (
+_MOVE_TO_OBJ_2 = (
     0xbff,
     0x1a0f,
     0xe0f,
+)
+_MOVE_TO_OBJ_3 = (
+    0x1ff3,
+    0x1ffd,
 )
 _MOVE_TO_OBJ_4 = (
     0x1ff1,
@@ -748,10 +749,10 @@ _MOVE_TO_OBJ_8 = (
     0x1fff,
 )
 _MOVE_TO_OBJ_G0 = (
-    *_joined(_MOVE_TO_OBJ_6, _MOVE_TO_OBJ_2),
+    *_joined(_MOVE_TO_OBJ_6, _MOVE_TO_OBJ_1),
 )
 _MOVE_TO_OBJ_G1 = (
-    *_joined(_MOVE_TO_OBJ_5, _MOVE_TO_OBJ_3, _MOVE_TO_OBJ_0, _MOVE_TO_OBJ_1, _MOVE_TO_OBJ_4),
+    *_joined(_MOVE_TO_OBJ_5, _MOVE_TO_OBJ_2, _MOVE_TO_OBJ_0, _MOVE_TO_OBJ_3, _MOVE_TO_OBJ_4),
 )
 _MOVE_TO_OBJ_G2 = (
     *_joined(_MOVE_TO_OBJ_7, _MOVE_TO_OBJ_8),
@@ -852,61 +853,21 @@ _RELEASE_PART_LINE = (
 )
 
 
-def _do_receive(s):
-    """Procedure receive."""
-    if (s.command_inc_command != s.inc_command_seen):
-        s.inc_command_seen = s.command_inc_command
-        s.new_command = True
-        s.begun = False
-        s.failure = 0
-    else:
-        if ((s.begun and (s.primitive_inc_command_echo == s.to_primitive_inc_command)) and (s.vision_inc_command_echo == s.to_vision_inc_command)):
-            s.new_command = False
-    if ((s.primitive_inc_command_echo == s.to_primitive_inc_command) and (s.vision_inc_command_echo == s.to_vision_inc_command)):
-        s.ref_command_in = s.primitive_ref_command_echo
-        s.status_in = s.primitive_status_report
-        s.ref_vision_in = s.vision_ref_command_echo
-        s.vision_status_in = s.vision_status_report
-    s.idle = (((((((s.ref_command_in == 0) and (s.status_in == 0)) and (s.ref_vision_in == 0)) and (s.vision_status_in == 0)) and (s.begun or ((s.primitive_inc_command_echo == s.to_primitive_inc_command) and (s.vision_inc_command_echo == s.to_vision_inc_command)))) and (s.here == s.here_asked)) and (s.here_sector == s.here_sector_asked))
+def _do_look_below(s):
+    """Procedure look_below."""
+    s.idle = (((s.primitive_resting and s.vision_resting) and (s.here == s.here_asked)) and (s.here_sector == s.here_sector_asked))
 
 
 def _do_measure(s):
     """How long the path would be that begins now; whether the part is still there."""
     if s.new_command:
         s.path_length = (s.origin_depart_count + s.target_approach_count)
-    if ((not s.begun) or (s.old_order_input_command in (1, 2,))):
-        s.lost = ((s.command_gripped_obj_ptr in (1, 2, 3, 4,)) and (not s.primitive_holds))
-    if (s.command_input_command == 2):
+    if ((not s.answered) or (s.last_primitive_input_command in (1, 2,))):
+        s.lost = ((s.task_gripped_obj_ptr in (1, 2, 3, 4,)) and (not s.from_primitive_holds))
+    if (s.task_input_command == 2):
         s.lift_mm = s.object_data_lift_mm + 0.0
     else:
         s.lift_mm = s.held_data_lift_mm + 0.0
-
-
-def _do_send(s):
-    """A new order takes the next number."""
-    if (((((((((s.to_primitive_input_command != s.old_order_input_command) or (s.to_primitive_obj_ptr != s.old_order_obj_ptr)) or (s.to_primitive_grasp != s.old_order_grasp)) or (s.to_primitive_pose_ptr != s.old_order_pose_ptr)) or (s.to_primitive_displaced_x != s.old_order_displaced_x)) or (s.to_primitive_displaced_y != s.old_order_displaced_y)) or (s.to_primitive_displaced_z != s.old_order_displaced_z)) or (s.to_primitive_displaced_c != s.old_order_displaced_c)) or (s.to_primitive_displaced_s != s.old_order_displaced_s)):
-        s.to_primitive_inc_command = _mod((s.to_primitive_inc_command + 1), 65536)
-    s.old_order_input_command = s.to_primitive_input_command
-    s.old_order_obj_ptr = s.to_primitive_obj_ptr
-    s.old_order_grasp = s.to_primitive_grasp
-    s.old_order_pose_ptr = s.to_primitive_pose_ptr
-    s.old_order_displaced_x = s.to_primitive_displaced_x + 0.0
-    s.old_order_displaced_y = s.to_primitive_displaced_y + 0.0
-    s.old_order_displaced_z = s.to_primitive_displaced_z + 0.0
-    s.old_order_displaced_c = s.to_primitive_displaced_c + 0.0
-    s.old_order_displaced_s = s.to_primitive_displaced_s + 0.0
-    if ((s.to_vision_input_command != s.old_vision_input_command) or (s.to_vision_obj_ptr != s.old_vision_obj_ptr)):
-        s.to_vision_inc_command = _mod((s.to_vision_inc_command + 1), 65536)
-    s.old_vision_input_command = s.to_vision_input_command
-    s.old_vision_obj_ptr = s.to_vision_obj_ptr
-
-
-def _do_answer(s):
-    """Procedure answer."""
-    s.report_inc_command_echo = s.inc_command_seen
-    s.report_ref_command_echo = s.command_input_command
-    s.report_status_report = s.status_report
-    s.report_failure = s.failure
 
 
 def _do_asked(s):
@@ -915,54 +876,29 @@ def _do_asked(s):
     s.here_sector_asked = s.here_sector
 
 
-def _do_begin(s):
-    """This line answers the new command."""
-    s.begun = True
-
-
-def _do_settle(s):
-    """A new command finds a level below at work: pause both first."""
-    s.begun = False
-
-
 def _do_nextstate(s, v_value):
     """Procedure nextstate."""
     s.cur_state_next = v_value
 
 
-def _do_executing(s):
-    """Procedure executing."""
-    s.status_report = 1
-
-
-def _do_done(s):
-    """Procedure done."""
-    s.status_report = 0
-
-
-def _do_fail(s):
-    """Procedure fail."""
-    s.status_report = 2
-
-
 def _do_no_place(s):
     """Procedure no_place."""
-    s.failure = 7
+    s.to_task_failure = 7
 
 
 def _do_primitive_failure(s):
     """What PRIMITIVE says went wrong."""
-    s.failure = s.primitive_failure
+    s.to_task_failure = s.primitive_failure
 
 
 def _do_part_lost(s):
     """The fingers are not where the part would keep them."""
-    s.failure = 11
+    s.to_task_failure = 11
 
 
 def _do_vision_failure(s):
     """What vision says went wrong."""
-    s.failure = s.vision_failure
+    s.to_task_failure = s.vision_failure
 
 
 def _do_pause(s):
@@ -983,30 +919,30 @@ def _do_gothru(s):
 
 def _do_approach_position_fingers(s):
     """Procedure approach_position_fingers."""
-    s.to_primitive_obj_ptr = s.command_obj_ptr
-    s.to_primitive_grasp = s.command_grasp
+    s.to_primitive_obj_ptr = s.task_obj_ptr
+    s.to_primitive_grasp = s.task_grasp
     s.to_primitive_input_command = 3
     s.to_vision_input_command = 0
 
 
 def _do_departure_position_fingers(s):
     """Procedure departure_position_fingers."""
-    s.to_primitive_obj_ptr = s.command_obj_ptr
-    s.to_primitive_grasp = s.command_grasp
+    s.to_primitive_obj_ptr = s.task_obj_ptr
+    s.to_primitive_grasp = s.task_grasp
     s.to_primitive_input_command = 4
 
 
 def _do_immed_grasp(s):
     """Procedure immed_grasp."""
-    s.to_primitive_obj_ptr = s.command_obj_ptr
-    s.to_primitive_grasp = s.command_grasp
+    s.to_primitive_obj_ptr = s.task_obj_ptr
+    s.to_primitive_grasp = s.task_grasp
     s.to_primitive_input_command = 5
 
 
 def _do_flood_flash(s):
     """Procedure flood_flash."""
     _do_pause(s)
-    s.to_vision_obj_ptr = s.command_obj_ptr
+    s.to_vision_obj_ptr = s.task_obj_ptr
     s.to_vision_expected_range_mm = s.object_data_expected_range_mm + 0.0
     s.to_vision_input_command = 1
 
@@ -1064,9 +1000,9 @@ def _do_aim_last(s):
 
 
 def _do_arrived(s):
-    """The robot is at the location of the command."""
-    s.here_next = s.command_locpt_ptr
-    s.here_sector = s.command_sector
+    """The robot is at the location of the task."""
+    s.here_next = s.task_locpt_ptr
+    s.here_sector = s.task_sector
     s.displaced_here_x = 0.0 + 0.0
     s.displaced_here_y = 0.0 + 0.0
 
@@ -1076,172 +1012,243 @@ def _do_aim_view(s):
     s.to_vision_input_command = 0
     _do_no_displacement(s)
     s.to_primitive_pose_ptr = s.target_view_point
-    s.to_primitive_displaced_x = s.vision_x_mm + 0.0
-    s.to_primitive_displaced_y = s.vision_y_mm + 0.0
+    s.to_primitive_displaced_x = s.from_vision_x_mm + 0.0
+    s.to_primitive_displaced_y = s.from_vision_y_mm + 0.0
     s.here_next = 0
 
 
 def _do_aim_above(s):
     """Above the part, turned with it."""
     s.to_primitive_pose_ptr = s.target_hover_point
-    s.to_primitive_displaced_x = s.vision_x_mm + 0.0
-    s.to_primitive_displaced_y = s.vision_y_mm + 0.0
+    s.to_primitive_displaced_x = s.from_vision_x_mm + 0.0
+    s.to_primitive_displaced_y = s.from_vision_y_mm + 0.0
     s.to_primitive_displaced_z = 0.0 + 0.0
-    s.to_primitive_displaced_c = s.vision_c + 0.0
-    s.to_primitive_displaced_s = s.vision_s + 0.0
+    s.to_primitive_displaced_c = s.from_vision_c + 0.0
+    s.to_primitive_displaced_s = s.from_vision_s + 0.0
     s.here_next = 0
 
 
 def _do_aim_at_part(s):
     """Around the part; the pads go as much lower as its top is farther away than one that they would take without."""
     s.to_primitive_pose_ptr = s.target_grasp_point
-    s.to_primitive_displaced_z = _max((-500.0), _min(500.0, (s.object_data_grip_range_mm - s.vision_range_mm))) + 0.0
+    s.to_primitive_displaced_z = _max((-500.0), _min(500.0, (s.object_data_grip_range_mm - s.from_vision_range_mm))) + 0.0
 
 
 def _do_located(s):
     """Procedure located."""
-    s.here_next = s.command_locpt_ptr
-    s.here_sector = s.command_sector
+    s.here_next = s.task_locpt_ptr
+    s.here_sector = s.task_sector
     s.displaced_here_x = s.to_primitive_displaced_x + 0.0
     s.displaced_here_y = s.to_primitive_displaced_y + 0.0
 
 
+def _do_take_orders(s):
+    """Procedure take_orders."""
+    s.echoed = ((s.from_primitive_inc_command_echo == s.to_primitive_inc_command) and (s.from_vision_inc_command_echo == s.to_vision_inc_command))
+    if (s.task_inc_command != s.inc_command_seen):
+        s.inc_command_seen = s.task_inc_command
+        s.new_command = True
+        s.answered = False
+        s.to_task_status_report = 1
+        s.to_task_failure = 0
+    else:
+        if (s.answered and s.echoed):
+            s.new_command = False
+    s.settling = False
+    if s.echoed:
+        s.primitive_command = s.from_primitive_ref_command_echo
+        s.primitive_status = s.from_primitive_status_report
+        s.primitive_failure = s.from_primitive_failure
+        s.vision_command = s.from_vision_ref_command_echo
+        s.vision_status = s.from_vision_status_report
+        s.vision_failure = s.from_vision_failure
+    s.primitive_resting = (((s.primitive_command == 0) and (s.primitive_status == 0)) and (s.answered or s.echoed))
+    s.vision_resting = (((s.vision_command == 0) and (s.vision_status == 0)) and (s.answered or s.echoed))
+
+
+def _do_give_orders(s):
+    """Procedure give_orders."""
+    if (s.new_command and (not s.settling)):
+        s.answered = True
+    s.to_task_inc_command_echo = s.inc_command_seen
+    s.to_task_ref_command_echo = s.task_input_command
+    if (((((((((s.to_primitive_input_command != s.last_primitive_input_command) or (s.to_primitive_obj_ptr != s.last_primitive_obj_ptr)) or (s.to_primitive_grasp != s.last_primitive_grasp)) or (s.to_primitive_pose_ptr != s.last_primitive_pose_ptr)) or (s.to_primitive_displaced_x != s.last_primitive_displaced_x)) or (s.to_primitive_displaced_y != s.last_primitive_displaced_y)) or (s.to_primitive_displaced_z != s.last_primitive_displaced_z)) or (s.to_primitive_displaced_c != s.last_primitive_displaced_c)) or (s.to_primitive_displaced_s != s.last_primitive_displaced_s)):
+        s.to_primitive_inc_command = _mod((s.to_primitive_inc_command + 1), 65536)
+    s.last_primitive_input_command = s.to_primitive_input_command
+    s.last_primitive_obj_ptr = s.to_primitive_obj_ptr
+    s.last_primitive_grasp = s.to_primitive_grasp
+    s.last_primitive_pose_ptr = s.to_primitive_pose_ptr
+    s.last_primitive_displaced_x = s.to_primitive_displaced_x + 0.0
+    s.last_primitive_displaced_y = s.to_primitive_displaced_y + 0.0
+    s.last_primitive_displaced_z = s.to_primitive_displaced_z + 0.0
+    s.last_primitive_displaced_c = s.to_primitive_displaced_c + 0.0
+    s.last_primitive_displaced_s = s.to_primitive_displaced_s + 0.0
+    if ((s.to_vision_input_command != s.last_vision_input_command) or (s.to_vision_obj_ptr != s.last_vision_obj_ptr)):
+        s.to_vision_inc_command = _mod((s.to_vision_inc_command + 1), 65536)
+    s.last_vision_input_command = s.to_vision_input_command
+    s.last_vision_obj_ptr = s.to_vision_obj_ptr
+
+
+def _do_settle(s):
+    """A new command finds a level below at work: let it rest first."""
+    s.settling = True
+    s.to_primitive_input_command = 0
+    s.to_vision_input_command = 0
+
+
+def _do_done(s):
+    """Procedure done."""
+    s.to_task_status_report = 0
+
+
+def _do_executing(s):
+    """Procedure executing."""
+    s.to_task_status_report = 1
+
+
+def _do_failed(s):
+    """Procedure failed."""
+    s.to_task_status_report = 2
+
+
 def check(s):
     """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
-    if not (isinstance(s.command_apoint_pos_flag, int) and 0 <= s.command_apoint_pos_flag <= 1):
+    if not (isinstance(s.task_apoint_pos_flag, int) and 0 <= s.task_apoint_pos_flag <= 1):
         return 6
-    if not (isinstance(s.primitive_holds, int) and 0 <= s.primitive_holds <= 1):
-        return 12
-    if not (isinstance(s.origin_known, int) and 0 <= s.origin_known <= 1):
-        return 22
-    if not (isinstance(s.target_known, int) and 0 <= s.target_known <= 1):
-        return 30
-    if not (isinstance(s.object_data_known, int) and 0 <= s.object_data_known <= 1):
-        return 38
-    if not (isinstance(s.held_data_known, int) and 0 <= s.held_data_known <= 1):
-        return 42
+    if not (isinstance(s.to_task_inc_command_echo, int) and 0 <= s.to_task_inc_command_echo <= 65535):
+        return 8
+    if not (isinstance(s.to_task_ref_command_echo, int) and 0 <= s.to_task_ref_command_echo <= 5):
+        return 9
+    if not (isinstance(s.to_task_status_report, int) and 0 <= s.to_task_status_report <= 2):
+        return 10
+    if not (isinstance(s.to_task_failure, int) and 0 <= s.to_task_failure <= 15):
+        return 11
     if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
-        return 46
-    if not (isinstance(s.begun, int) and 0 <= s.begun <= 1):
-        return 47
+        return 12
+    if not (isinstance(s.answered, int) and 0 <= s.answered <= 1):
+        return 13
+    if not (isinstance(s.settling, int) and 0 <= s.settling <= 1):
+        return 14
     if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
-        return 48
-    if not (isinstance(s.ref_command_in, int) and 0 <= s.ref_command_in <= 5):
-        return 49
-    if not (isinstance(s.status_in, int) and 0 <= s.status_in <= 2):
-        return 50
-    if not (isinstance(s.ref_vision_in, int) and 0 <= s.ref_vision_in <= 2):
-        return 51
-    if not (isinstance(s.vision_status_in, int) and 0 <= s.vision_status_in <= 2):
-        return 52
-    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
-        return 53
-    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 13):
-        return 54
-    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 13):
-        return 55
-    if not (isinstance(s.path_at, int) and 0 <= s.path_at <= 62):
-        return 56
-    if not (isinstance(s.path_at_next, int) and 0 <= s.path_at_next <= 62):
-        return 57
-    if not (isinstance(s.here, int) and 0 <= s.here <= 255):
-        return 58
-    if not (isinstance(s.here_next, int) and 0 <= s.here_next <= 255):
-        return 59
-    if not (isinstance(s.here_sector, int) and 0 <= s.here_sector <= 99):
-        return 60
-    if not (isinstance(s.here_asked, int) and 0 <= s.here_asked <= 255):
-        return 61
-    if not (isinstance(s.here_sector_asked, int) and 0 <= s.here_sector_asked <= 99):
-        return 62
-    if not (isinstance(s.depart_first, int) and 0 <= s.depart_first <= 9999):
-        return 63
-    if not (isinstance(s.depart_count, int) and 0 <= s.depart_count <= 31):
-        return 64
-    if not (isinstance(s.path_length, int) and 0 <= s.path_length <= 62):
-        return 65
-    if not (isinstance(s.displaced_here_x, (int, float)) and -500.0 <= s.displaced_here_x <= 500.0):
-        return 66
-    if not (isinstance(s.displaced_here_y, (int, float)) and -500.0 <= s.displaced_here_y <= 500.0):
-        return 67
-    if not (isinstance(s.displaced_here_z, (int, float)) and -500.0 <= s.displaced_here_z <= 500.0):
-        return 68
-    if not (isinstance(s.displaced_here_c, (int, float)) and -1.0 <= s.displaced_here_c <= 1.0):
-        return 69
-    if not (isinstance(s.displaced_here_s, (int, float)) and -1.0 <= s.displaced_here_s <= 1.0):
-        return 70
-    if not (isinstance(s.lift_mm, (int, float)) and -500.0 <= s.lift_mm <= 500.0):
-        return 71
-    if not (isinstance(s.lost, int) and 0 <= s.lost <= 1):
-        return 72
-    if not (isinstance(s.old_order_inc_command, int) and 0 <= s.old_order_inc_command <= 65535):
-        return 73
-    if not (isinstance(s.old_order_input_command, int) and 0 <= s.old_order_input_command <= 5):
-        return 74
-    if not (isinstance(s.old_order_obj_ptr, int) and 0 <= s.old_order_obj_ptr <= 6):
-        return 75
-    if not (isinstance(s.old_order_grasp, int) and 0 <= s.old_order_grasp <= 9):
-        return 76
-    if not (isinstance(s.old_order_pose_ptr, int) and 0 <= s.old_order_pose_ptr <= 9999):
-        return 77
-    if not (isinstance(s.old_order_displaced_x, (int, float)) and -500.0 <= s.old_order_displaced_x <= 500.0):
-        return 78
-    if not (isinstance(s.old_order_displaced_y, (int, float)) and -500.0 <= s.old_order_displaced_y <= 500.0):
-        return 79
-    if not (isinstance(s.old_order_displaced_z, (int, float)) and -500.0 <= s.old_order_displaced_z <= 500.0):
-        return 80
-    if not (isinstance(s.old_order_displaced_c, (int, float)) and -1.0 <= s.old_order_displaced_c <= 1.0):
-        return 81
-    if not (isinstance(s.old_order_displaced_s, (int, float)) and -1.0 <= s.old_order_displaced_s <= 1.0):
-        return 82
-    if not (isinstance(s.old_vision_inc_command, int) and 0 <= s.old_vision_inc_command <= 65535):
-        return 83
-    if not (isinstance(s.old_vision_input_command, int) and 0 <= s.old_vision_input_command <= 2):
-        return 84
-    if not (isinstance(s.old_vision_obj_ptr, int) and 0 <= s.old_vision_obj_ptr <= 6):
-        return 85
-    if not (isinstance(s.old_vision_expected_range_mm, (int, float)) and 0.0 <= s.old_vision_expected_range_mm <= 2000.0):
-        return 86
-    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
-        return 87
-    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
-        return 88
+        return 15
+    if not (isinstance(s.from_primitive_holds, int) and 0 <= s.from_primitive_holds <= 1):
+        return 20
     if not (isinstance(s.to_primitive_inc_command, int) and 0 <= s.to_primitive_inc_command <= 65535):
-        return 89
+        return 21
     if not (isinstance(s.to_primitive_input_command, int) and 0 <= s.to_primitive_input_command <= 5):
-        return 90
+        return 22
     if not (isinstance(s.to_primitive_obj_ptr, int) and 0 <= s.to_primitive_obj_ptr <= 6):
-        return 91
+        return 23
     if not (isinstance(s.to_primitive_grasp, int) and 0 <= s.to_primitive_grasp <= 9):
-        return 92
+        return 24
     if not (isinstance(s.to_primitive_pose_ptr, int) and 0 <= s.to_primitive_pose_ptr <= 9999):
-        return 93
+        return 25
     if not (isinstance(s.to_primitive_displaced_x, (int, float)) and -500.0 <= s.to_primitive_displaced_x <= 500.0):
-        return 94
+        return 26
     if not (isinstance(s.to_primitive_displaced_y, (int, float)) and -500.0 <= s.to_primitive_displaced_y <= 500.0):
-        return 95
+        return 27
     if not (isinstance(s.to_primitive_displaced_z, (int, float)) and -500.0 <= s.to_primitive_displaced_z <= 500.0):
-        return 96
+        return 28
     if not (isinstance(s.to_primitive_displaced_c, (int, float)) and -1.0 <= s.to_primitive_displaced_c <= 1.0):
-        return 97
+        return 29
     if not (isinstance(s.to_primitive_displaced_s, (int, float)) and -1.0 <= s.to_primitive_displaced_s <= 1.0):
-        return 98
+        return 30
+    if not (isinstance(s.primitive_command, int) and 0 <= s.primitive_command <= 5):
+        return 31
+    if not (isinstance(s.primitive_status, int) and 0 <= s.primitive_status <= 2):
+        return 32
+    if not (isinstance(s.primitive_resting, int) and 0 <= s.primitive_resting <= 1):
+        return 33
+    if not (isinstance(s.primitive_failure, int) and 0 <= s.primitive_failure <= 15):
+        return 34
+    if not (isinstance(s.last_primitive_input_command, int) and 0 <= s.last_primitive_input_command <= 5):
+        return 35
+    if not (isinstance(s.last_primitive_obj_ptr, int) and 0 <= s.last_primitive_obj_ptr <= 6):
+        return 36
+    if not (isinstance(s.last_primitive_grasp, int) and 0 <= s.last_primitive_grasp <= 9):
+        return 37
+    if not (isinstance(s.last_primitive_pose_ptr, int) and 0 <= s.last_primitive_pose_ptr <= 9999):
+        return 38
+    if not (isinstance(s.last_primitive_displaced_x, (int, float)) and -500.0 <= s.last_primitive_displaced_x <= 500.0):
+        return 39
+    if not (isinstance(s.last_primitive_displaced_y, (int, float)) and -500.0 <= s.last_primitive_displaced_y <= 500.0):
+        return 40
+    if not (isinstance(s.last_primitive_displaced_z, (int, float)) and -500.0 <= s.last_primitive_displaced_z <= 500.0):
+        return 41
+    if not (isinstance(s.last_primitive_displaced_c, (int, float)) and -1.0 <= s.last_primitive_displaced_c <= 1.0):
+        return 42
+    if not (isinstance(s.last_primitive_displaced_s, (int, float)) and -1.0 <= s.last_primitive_displaced_s <= 1.0):
+        return 43
     if not (isinstance(s.to_vision_inc_command, int) and 0 <= s.to_vision_inc_command <= 65535):
-        return 99
+        return 53
     if not (isinstance(s.to_vision_input_command, int) and 0 <= s.to_vision_input_command <= 2):
-        return 100
+        return 54
     if not (isinstance(s.to_vision_obj_ptr, int) and 0 <= s.to_vision_obj_ptr <= 6):
-        return 101
+        return 55
     if not (isinstance(s.to_vision_expected_range_mm, (int, float)) and 0.0 <= s.to_vision_expected_range_mm <= 2000.0):
+        return 56
+    if not (isinstance(s.vision_command, int) and 0 <= s.vision_command <= 2):
+        return 57
+    if not (isinstance(s.vision_status, int) and 0 <= s.vision_status <= 2):
+        return 58
+    if not (isinstance(s.vision_resting, int) and 0 <= s.vision_resting <= 1):
+        return 59
+    if not (isinstance(s.vision_failure, int) and 0 <= s.vision_failure <= 15):
+        return 60
+    if not (isinstance(s.last_vision_input_command, int) and 0 <= s.last_vision_input_command <= 2):
+        return 61
+    if not (isinstance(s.last_vision_obj_ptr, int) and 0 <= s.last_vision_obj_ptr <= 6):
+        return 62
+    if not (isinstance(s.origin_known, int) and 0 <= s.origin_known <= 1):
+        return 63
+    if not (isinstance(s.target_known, int) and 0 <= s.target_known <= 1):
+        return 71
+    if not (isinstance(s.object_data_known, int) and 0 <= s.object_data_known <= 1):
+        return 79
+    if not (isinstance(s.held_data_known, int) and 0 <= s.held_data_known <= 1):
+        return 83
+    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
+        return 87
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 13):
+        return 88
+    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 13):
+        return 89
+    if not (isinstance(s.path_at, int) and 0 <= s.path_at <= 62):
+        return 90
+    if not (isinstance(s.path_at_next, int) and 0 <= s.path_at_next <= 62):
+        return 91
+    if not (isinstance(s.here, int) and 0 <= s.here <= 255):
+        return 92
+    if not (isinstance(s.here_next, int) and 0 <= s.here_next <= 255):
+        return 93
+    if not (isinstance(s.here_sector, int) and 0 <= s.here_sector <= 99):
+        return 94
+    if not (isinstance(s.here_asked, int) and 0 <= s.here_asked <= 255):
+        return 95
+    if not (isinstance(s.here_sector_asked, int) and 0 <= s.here_sector_asked <= 99):
+        return 96
+    if not (isinstance(s.depart_first, int) and 0 <= s.depart_first <= 9999):
+        return 97
+    if not (isinstance(s.depart_count, int) and 0 <= s.depart_count <= 31):
+        return 98
+    if not (isinstance(s.path_length, int) and 0 <= s.path_length <= 62):
+        return 99
+    if not (isinstance(s.displaced_here_x, (int, float)) and -500.0 <= s.displaced_here_x <= 500.0):
+        return 100
+    if not (isinstance(s.displaced_here_y, (int, float)) and -500.0 <= s.displaced_here_y <= 500.0):
+        return 101
+    if not (isinstance(s.displaced_here_z, (int, float)) and -500.0 <= s.displaced_here_z <= 500.0):
         return 102
-    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
+    if not (isinstance(s.displaced_here_c, (int, float)) and -1.0 <= s.displaced_here_c <= 1.0):
         return 103
-    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 5):
+    if not (isinstance(s.displaced_here_s, (int, float)) and -1.0 <= s.displaced_here_s <= 1.0):
         return 104
-    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+    if not (isinstance(s.lift_mm, (int, float)) and -500.0 <= s.lift_mm <= 500.0):
         return 105
-    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
+    if not (isinstance(s.lost, int) and 0 <= s.lost <= 1):
         return 106
+    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+        return 107
     return -1
 
 
@@ -1250,177 +1257,177 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = _whole(s.command_inc_command)
+    i0 = _whole(s.task_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = _whole(s.command_input_command)
+    i1 = _whole(s.task_input_command)
     if not 0 <= i1 <= 5:
         return _refused(s, 1)
-    i2 = _whole(s.command_obj_ptr)
+    i2 = _whole(s.task_obj_ptr)
     if not 0 <= i2 <= 6:
         return _refused(s, 2)
-    i3 = _whole(s.command_grasp)
+    i3 = _whole(s.task_grasp)
     if not 0 <= i3 <= 9:
         return _refused(s, 3)
-    i4 = _whole(s.command_locpt_ptr)
+    i4 = _whole(s.task_locpt_ptr)
     if not 0 <= i4 <= 255:
         return _refused(s, 4)
-    i5 = _whole(s.command_sector)
+    i5 = _whole(s.task_sector)
     if not 0 <= i5 <= 99:
         return _refused(s, 5)
-    i6 = _whole(s.command_apoint_pos_flag)
+    i6 = _whole(s.task_apoint_pos_flag)
     if not 0 <= i6 <= 1:
         return _refused(s, 6)
-    i7 = _whole(s.command_gripped_obj_ptr)
+    i7 = _whole(s.task_gripped_obj_ptr)
     if not 0 <= i7 <= 6:
         return _refused(s, 7)
-    i8 = _whole(s.primitive_inc_command_echo)
+    i8 = _whole(s.from_primitive_inc_command_echo)
     if not 0 <= i8 <= 65535:
-        return _refused(s, 8)
-    i9 = _whole(s.primitive_ref_command_echo)
-    if not 0 <= i9 <= 5:
-        return _refused(s, 9)
-    i10 = _whole(s.primitive_status_report)
-    if not 0 <= i10 <= 2:
-        return _refused(s, 10)
-    i11 = _whole(s.primitive_failure)
-    if not 0 <= i11 <= 15:
-        return _refused(s, 11)
-    i12 = _whole(s.primitive_holds)
-    if not 0 <= i12 <= 1:
-        return _refused(s, 12)
-    i13 = _whole(s.vision_inc_command_echo)
-    if not 0 <= i13 <= 65535:
-        return _refused(s, 13)
-    i14 = _whole(s.vision_ref_command_echo)
-    if not 0 <= i14 <= 2:
-        return _refused(s, 14)
-    i15 = _whole(s.vision_status_report)
-    if not 0 <= i15 <= 2:
-        return _refused(s, 15)
-    i16 = _whole(s.vision_failure)
-    if not 0 <= i16 <= 15:
         return _refused(s, 16)
-    i17 = _real(s.vision_x_mm)
-    if not -500.0 <= i17 <= 500.0:
+    i9 = _whole(s.from_primitive_ref_command_echo)
+    if not 0 <= i9 <= 5:
         return _refused(s, 17)
-    i17 = i17 + 0.0
-    i18 = _real(s.vision_y_mm)
-    if not -500.0 <= i18 <= 500.0:
+    i10 = _whole(s.from_primitive_status_report)
+    if not 0 <= i10 <= 2:
         return _refused(s, 18)
-    i18 = i18 + 0.0
-    i19 = _real(s.vision_c)
-    if not -1.0 <= i19 <= 1.0:
+    i11 = _whole(s.from_primitive_failure)
+    if not 0 <= i11 <= 15:
         return _refused(s, 19)
-    i19 = i19 + 0.0
-    i20 = _real(s.vision_s)
-    if not -1.0 <= i20 <= 1.0:
+    i12 = _whole(s.from_primitive_holds)
+    if not 0 <= i12 <= 1:
         return _refused(s, 20)
+    i13 = _whole(s.from_vision_inc_command_echo)
+    if not 0 <= i13 <= 65535:
+        return _refused(s, 44)
+    i14 = _whole(s.from_vision_ref_command_echo)
+    if not 0 <= i14 <= 2:
+        return _refused(s, 45)
+    i15 = _whole(s.from_vision_status_report)
+    if not 0 <= i15 <= 2:
+        return _refused(s, 46)
+    i16 = _whole(s.from_vision_failure)
+    if not 0 <= i16 <= 15:
+        return _refused(s, 47)
+    i17 = _real(s.from_vision_x_mm)
+    if not -500.0 <= i17 <= 500.0:
+        return _refused(s, 48)
+    i17 = i17 + 0.0
+    i18 = _real(s.from_vision_y_mm)
+    if not -500.0 <= i18 <= 500.0:
+        return _refused(s, 49)
+    i18 = i18 + 0.0
+    i19 = _real(s.from_vision_c)
+    if not -1.0 <= i19 <= 1.0:
+        return _refused(s, 50)
+    i19 = i19 + 0.0
+    i20 = _real(s.from_vision_s)
+    if not -1.0 <= i20 <= 1.0:
+        return _refused(s, 51)
     i20 = i20 + 0.0
-    i21 = _real(s.vision_range_mm)
+    i21 = _real(s.from_vision_range_mm)
     if not 0.0 <= i21 <= 2000.0:
-        return _refused(s, 21)
+        return _refused(s, 52)
     i21 = i21 + 0.0
     i22 = _whole(s.origin_known)
     if not 0 <= i22 <= 1:
-        return _refused(s, 22)
+        return _refused(s, 63)
     i23 = _whole(s.origin_depart_first)
     if not 0 <= i23 <= 9999:
-        return _refused(s, 23)
+        return _refused(s, 64)
     i24 = _whole(s.origin_depart_count)
     if not 0 <= i24 <= 31:
-        return _refused(s, 24)
+        return _refused(s, 65)
     i25 = _whole(s.origin_approach_first)
     if not 0 <= i25 <= 9999:
-        return _refused(s, 25)
+        return _refused(s, 66)
     i26 = _whole(s.origin_approach_count)
     if not 0 <= i26 <= 31:
-        return _refused(s, 26)
+        return _refused(s, 67)
     i27 = _whole(s.origin_hover_point)
     if not 0 <= i27 <= 9999:
-        return _refused(s, 27)
+        return _refused(s, 68)
     i28 = _whole(s.origin_grasp_point)
     if not 0 <= i28 <= 9999:
-        return _refused(s, 28)
+        return _refused(s, 69)
     i29 = _whole(s.origin_view_point)
     if not 0 <= i29 <= 9999:
-        return _refused(s, 29)
+        return _refused(s, 70)
     i30 = _whole(s.target_known)
     if not 0 <= i30 <= 1:
-        return _refused(s, 30)
+        return _refused(s, 71)
     i31 = _whole(s.target_depart_first)
     if not 0 <= i31 <= 9999:
-        return _refused(s, 31)
+        return _refused(s, 72)
     i32 = _whole(s.target_depart_count)
     if not 0 <= i32 <= 31:
-        return _refused(s, 32)
+        return _refused(s, 73)
     i33 = _whole(s.target_approach_first)
     if not 0 <= i33 <= 9999:
-        return _refused(s, 33)
+        return _refused(s, 74)
     i34 = _whole(s.target_approach_count)
     if not 0 <= i34 <= 31:
-        return _refused(s, 34)
+        return _refused(s, 75)
     i35 = _whole(s.target_hover_point)
     if not 0 <= i35 <= 9999:
-        return _refused(s, 35)
+        return _refused(s, 76)
     i36 = _whole(s.target_grasp_point)
     if not 0 <= i36 <= 9999:
-        return _refused(s, 36)
+        return _refused(s, 77)
     i37 = _whole(s.target_view_point)
     if not 0 <= i37 <= 9999:
-        return _refused(s, 37)
+        return _refused(s, 78)
     i38 = _whole(s.object_data_known)
     if not 0 <= i38 <= 1:
-        return _refused(s, 38)
+        return _refused(s, 79)
     i39 = _real(s.object_data_expected_range_mm)
     if not 0.0 <= i39 <= 2000.0:
-        return _refused(s, 39)
+        return _refused(s, 80)
     i39 = i39 + 0.0
     i40 = _real(s.object_data_grip_range_mm)
     if not 0.0 <= i40 <= 2000.0:
-        return _refused(s, 40)
+        return _refused(s, 81)
     i40 = i40 + 0.0
     i41 = _real(s.object_data_lift_mm)
     if not -500.0 <= i41 <= 500.0:
-        return _refused(s, 41)
+        return _refused(s, 82)
     i41 = i41 + 0.0
     i42 = _whole(s.held_data_known)
     if not 0 <= i42 <= 1:
-        return _refused(s, 42)
+        return _refused(s, 83)
     i43 = _real(s.held_data_expected_range_mm)
     if not 0.0 <= i43 <= 2000.0:
-        return _refused(s, 43)
+        return _refused(s, 84)
     i43 = i43 + 0.0
     i44 = _real(s.held_data_grip_range_mm)
     if not 0.0 <= i44 <= 2000.0:
-        return _refused(s, 44)
+        return _refused(s, 85)
     i44 = i44 + 0.0
     i45 = _real(s.held_data_lift_mm)
     if not -500.0 <= i45 <= 500.0:
-        return _refused(s, 45)
+        return _refused(s, 86)
     i45 = i45 + 0.0
-    s.command_inc_command = i0
-    s.command_input_command = i1
-    s.command_obj_ptr = i2
-    s.command_grasp = i3
-    s.command_locpt_ptr = i4
-    s.command_sector = i5
-    s.command_apoint_pos_flag = i6
-    s.command_gripped_obj_ptr = i7
-    s.primitive_inc_command_echo = i8
-    s.primitive_ref_command_echo = i9
-    s.primitive_status_report = i10
-    s.primitive_failure = i11
-    s.primitive_holds = i12
-    s.vision_inc_command_echo = i13
-    s.vision_ref_command_echo = i14
-    s.vision_status_report = i15
-    s.vision_failure = i16
-    s.vision_x_mm = i17
-    s.vision_y_mm = i18
-    s.vision_c = i19
-    s.vision_s = i20
-    s.vision_range_mm = i21
+    s.task_inc_command = i0
+    s.task_input_command = i1
+    s.task_obj_ptr = i2
+    s.task_grasp = i3
+    s.task_locpt_ptr = i4
+    s.task_sector = i5
+    s.task_apoint_pos_flag = i6
+    s.task_gripped_obj_ptr = i7
+    s.from_primitive_inc_command_echo = i8
+    s.from_primitive_ref_command_echo = i9
+    s.from_primitive_status_report = i10
+    s.from_primitive_failure = i11
+    s.from_primitive_holds = i12
+    s.from_vision_inc_command_echo = i13
+    s.from_vision_ref_command_echo = i14
+    s.from_vision_status_report = i15
+    s.from_vision_failure = i16
+    s.from_vision_x_mm = i17
+    s.from_vision_y_mm = i18
+    s.from_vision_c = i19
+    s.from_vision_s = i20
+    s.from_vision_range_mm = i21
     s.origin_known = i22
     s.origin_depart_first = i23
     s.origin_depart_count = i24
@@ -1450,9 +1457,9 @@ def _admit(s):
 
 def _settle(s):
     """Deferred variables take their next values, all at once."""
-    ready0 = ((s.primitive_inc_command_echo == s.to_primitive_inc_command) and (s.vision_inc_command_echo == s.to_vision_inc_command))
-    ready1 = (s.primitive_inc_command_echo == s.to_primitive_inc_command)
-    ready2 = (s.primitive_inc_command_echo == s.to_primitive_inc_command)
+    ready0 = ((s.from_primitive_inc_command_echo == s.to_primitive_inc_command) and (s.from_vision_inc_command_echo == s.to_vision_inc_command))
+    ready1 = (s.from_primitive_inc_command_echo == s.to_primitive_inc_command)
+    ready2 = (s.from_primitive_inc_command_echo == s.to_primitive_inc_command)
     if ready0:
         s.cur_state = s.cur_state_next
     if ready1:
@@ -1464,7 +1471,7 @@ def _settle(s):
 def locate_line(s):
     """The line of table locate that matches admitted inputs: its position; -1 none, -2 several."""
     try:
-        return _LOCATE_ONE[0][_LOCATE_G0[s.cur_state * 36 + s.ref_command_in * 6 + s.status_in * 2 + s.target_known] & _LOCATE_G1[s.ref_vision_in * 12 + s.vision_status_in * 4 + s.new_command * 2 + s.idle]]
+        return _LOCATE_ONE[0][_LOCATE_G0[s.cur_state * 36 + s.primitive_command * 6 + s.primitive_status * 2 + s.new_command] & _LOCATE_G1[s.vision_command * 12 + s.vision_status * 4 + s.target_known * 2 + s.idle]]
     except KeyError:
         return -2
 
@@ -1476,10 +1483,8 @@ def locate_lines(states):
 
 def _run_locate(s):
     """Matches table locate and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
+    if not (not (not s.new_command) or (((((((((s.cur_state == 0) and (s.primitive_command == 0)) and (s.vision_command == 0)) or (s.cur_state == 1)) or ((s.cur_state == 5) and (s.primitive_command == 4))) or (((s.cur_state == 6) and (s.primitive_command == 0)) and (s.vision_command == 1))) or (((s.cur_state in (7, 10, 11,)) and (s.primitive_command == 1)) and (s.vision_command == 0))) or (((s.cur_state == 8) and (s.primitive_command == 0)) and (s.vision_command == 2))) or (((s.cur_state == 9) and (s.primitive_command == 3)) and (s.vision_command == 0)))):  # locate_in_step
         s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 5, 6, 7, 8, 9, 10, 11,))):  # locate_states
-        s.assumptions_failed |= 1 << 1
     line = locate_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1497,15 +1502,13 @@ def _locate_0(s):
 
 def _locate_1(s):
     """emove/locate.rcs line 1"""
-    _do_begin(s)
     _do_no_place(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _locate_2(s):
     """emove/locate.rcs line 2"""
-    _do_begin(s)
     _do_nextstate(s, 5)
     _do_departure_position_fingers(s)
     _do_executing(s)
@@ -1575,7 +1578,7 @@ def _locate_11(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _locate_12(s):
@@ -1583,13 +1586,13 @@ def _locate_12(s):
     _do_vision_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _locate_13(s):
     """emove/locate.rcs line 12"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _locate_14(s):
@@ -1607,7 +1610,7 @@ def _locate_16(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def locate_step(s):
@@ -1625,7 +1628,7 @@ def locate_step(s):
 def move_to_line(s):
     """The line of table move_to that matches admitted inputs: its position; -1 none, -2 several."""
     try:
-        return _MOVE_TO_ONE[0][_MOVE_TO_G0[s.path_length * 6 + s.ref_command_in] & _MOVE_TO_G1[s.cur_state * 24 + s.status_in * 8 + s.target_known * 4 + s.new_command * 2 + s.idle] & _MOVE_TO_G2[s.lost * 4 + (((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]]
+        return _MOVE_TO_ONE[0][_MOVE_TO_G0[s.path_length * 6 + s.primitive_command] & _MOVE_TO_G1[s.cur_state * 24 + s.primitive_status * 8 + s.new_command * 4 + s.target_known * 2 + s.idle] & _MOVE_TO_G2[s.lost * 4 + (((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]]
     except KeyError:
         return -2
 
@@ -1637,10 +1640,8 @@ def move_to_lines(states):
 
 def _run_move_to(s):
     """Matches table move_to and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 2, 3,))):  # move_to_states
-        s.assumptions_failed |= 1 << 2
+    if not (not (not s.new_command) or (((((s.cur_state == 0) and (s.primitive_command == 0)) or (s.cur_state == 1)) or ((s.cur_state == 2) and (s.primitive_command == 2))) or ((s.cur_state == 3) and (s.primitive_command == 1)))):  # move_to_in_step
+        s.assumptions_failed |= 1 << 1
     line = move_to_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1658,23 +1659,20 @@ def _move_to_0(s):
 
 def _move_to_1(s):
     """emove/move_to.rcs line 1"""
-    _do_begin(s)
     _do_no_place(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_to_2(s):
     """emove/move_to.rcs line 2"""
-    _do_begin(s)
     _do_no_place(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_to_3(s):
     """emove/move_to.rcs line 3"""
-    _do_begin(s)
     _do_aim_first(s)
     _do_nextstate(s, 3)
     _do_goto_(s)
@@ -1683,7 +1681,6 @@ def _move_to_3(s):
 
 def _move_to_4(s):
     """emove/move_to.rcs line 4"""
-    _do_begin(s)
     _do_aim_first(s)
     _do_nextstate(s, 2)
     _do_gothru(s)
@@ -1719,7 +1716,7 @@ def _move_to_8(s):
     _do_part_lost(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_to_9(s):
@@ -1733,13 +1730,13 @@ def _move_to_10(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_to_11(s):
     """emove/move_to.rcs line 10"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_to_12(s):
@@ -1752,7 +1749,7 @@ def _move_to_13(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def move_to_step(s):
@@ -1770,7 +1767,7 @@ def move_to_step(s):
 def move_to_obj_line(s):
     """The line of table move_to_obj that matches admitted inputs: its position; -1 none, -2 several."""
     try:
-        return _MOVE_TO_OBJ_ONE[0][_MOVE_TO_OBJ_G0[s.path_length * 6 + s.ref_command_in] & _MOVE_TO_OBJ_G1[s.cur_state * 24 + s.status_in * 8 + s.target_known * 4 + s.new_command * 2 + s.idle] & _MOVE_TO_OBJ_G2[(((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]]
+        return _MOVE_TO_OBJ_ONE[0][_MOVE_TO_OBJ_G0[s.path_length * 6 + s.primitive_command] & _MOVE_TO_OBJ_G1[s.cur_state * 24 + s.primitive_status * 8 + s.new_command * 4 + s.target_known * 2 + s.idle] & _MOVE_TO_OBJ_G2[(((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]]
     except KeyError:
         return -2
 
@@ -1782,10 +1779,8 @@ def move_to_obj_lines(states):
 
 def _run_move_to_obj(s):
     """Matches table move_to_obj and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 2, 3, 4,))):  # move_to_obj_states
-        s.assumptions_failed |= 1 << 3
+    if not (not (not s.new_command) or ((((((s.cur_state == 0) and (s.primitive_command == 0)) or (s.cur_state == 1)) or ((s.cur_state == 2) and (s.primitive_command == 2))) or ((s.cur_state == 3) and (s.primitive_command == 1))) or ((s.cur_state == 4) and (s.primitive_command == 3)))):  # move_to_obj_in_step
+        s.assumptions_failed |= 1 << 2
     line = move_to_obj_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1803,23 +1798,20 @@ def _move_to_obj_0(s):
 
 def _move_to_obj_1(s):
     """emove/move_to_obj.rcs line 1"""
-    _do_begin(s)
     _do_no_place(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_to_obj_2(s):
     """emove/move_to_obj.rcs line 2"""
-    _do_begin(s)
     _do_no_place(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_to_obj_3(s):
     """emove/move_to_obj.rcs line 3"""
-    _do_begin(s)
     _do_nextstate(s, 4)
     _do_approach_position_fingers(s)
     _do_executing(s)
@@ -1876,13 +1868,13 @@ def _move_to_obj_10(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_to_obj_11(s):
     """emove/move_to_obj.rcs line 11"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_to_obj_12(s):
@@ -1895,7 +1887,7 @@ def _move_to_obj_13(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def move_to_obj_step(s):
@@ -1932,7 +1924,6 @@ def _run_pause_emove(s):
 
 def _pause_emove_0(s):
     """emove/pause.rcs line 1"""
-    _do_begin(s)
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_done(s)
@@ -1940,6 +1931,7 @@ def _pause_emove_0(s):
 
 def _pause_emove_1(s):
     """emove/pause.rcs line 2"""
+    _do_settle(s)
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_executing(s)
@@ -1959,7 +1951,7 @@ def pause_emove_step(s):
 
 def pickup_line(s):
     """The line of table pickup that matches admitted inputs: its position; -1 none, -2 several."""
-    return _PICKUP_LINE[s.cur_state * 72 + s.ref_command_in * 12 + s.status_in * 4 + s.new_command * 2 + s.idle]
+    return _PICKUP_LINE[s.cur_state * 72 + s.primitive_command * 12 + s.primitive_status * 4 + s.new_command * 2 + s.idle]
 
 
 def pickup_lines(states):
@@ -1969,10 +1961,8 @@ def pickup_lines(states):
 
 def _run_pickup(s):
     """Matches table pickup and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 12,))):  # pickup_states
-        s.assumptions_failed |= 1 << 4
+    if not (not (not s.new_command) or (((s.cur_state in (0, 1,)) and (s.primitive_command == 0)) or ((s.cur_state == 12) and (s.primitive_command == 5)))):  # pickup_in_step
+        s.assumptions_failed |= 1 << 3
     line = pickup_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1990,7 +1980,6 @@ def _pickup_0(s):
 
 def _pickup_1(s):
     """emove/pickup.rcs line 1"""
-    _do_begin(s)
     _do_nextstate(s, 12)
     _do_immed_grasp(s)
     _do_executing(s)
@@ -2014,13 +2003,13 @@ def _pickup_4(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _pickup_5(s):
     """emove/pickup.rcs line 5"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _pickup_6(s):
@@ -2033,7 +2022,7 @@ def _pickup_7(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def pickup_step(s):
@@ -2050,7 +2039,7 @@ def pickup_step(s):
 
 def release_part_line(s):
     """The line of table release_part that matches admitted inputs: its position; -1 none, -2 several."""
-    return _RELEASE_PART_LINE[s.cur_state * 144 + s.ref_command_in * 24 + s.status_in * 8 + s.new_command * 4 + s.idle * 2 + s.lost]
+    return _RELEASE_PART_LINE[s.cur_state * 144 + s.primitive_command * 24 + s.primitive_status * 8 + s.new_command * 4 + s.idle * 2 + s.lost]
 
 
 def release_part_lines(states):
@@ -2060,10 +2049,8 @@ def release_part_lines(states):
 
 def _run_release_part(s):
     """Matches table release_part and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 13,))):  # release_part_states
-        s.assumptions_failed |= 1 << 5
+    if not (not (not s.new_command) or (((s.cur_state in (0, 1,)) and (s.primitive_command == 0)) or ((s.cur_state == 13) and (s.primitive_command == 4)))):  # release_part_in_step
+        s.assumptions_failed |= 1 << 4
     line = release_part_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -2081,7 +2068,6 @@ def _release_part_0(s):
 
 def _release_part_1(s):
     """emove/release.rcs line 1"""
-    _do_begin(s)
     _do_nextstate(s, 13)
     _do_departure_position_fingers(s)
     _do_executing(s)
@@ -2089,11 +2075,10 @@ def _release_part_1(s):
 
 def _release_part_2(s):
     """emove/release.rcs line 1a"""
-    _do_begin(s)
     _do_part_lost(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _release_part_3(s):
@@ -2114,13 +2099,13 @@ def _release_part_5(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _release_part_6(s):
     """emove/release.rcs line 5"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _release_part_7(s):
@@ -2133,7 +2118,7 @@ def _release_part_8(s):
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def release_part_step(s):
@@ -2154,13 +2139,13 @@ def emove_cycle(s):
     if s.fault == 0:
         try:
             _settle(s)
-            _do_receive(s)
+            _do_take_orders(s)
+            _do_look_below(s)
             _do_measure(s)
-            {0: _run_pause_emove, 1: _run_move_to, 2: _run_move_to_obj, 3: _run_locate, 4: _run_pickup, 5: _run_release_part}[s.command_input_command](s)
+            {0: _run_pause_emove, 1: _run_move_to, 2: _run_move_to_obj, 3: _run_locate, 4: _run_pickup, 5: _run_release_part}[s.task_input_command](s)
             if s.fault == 0:
                 _do_asked(s)
-                _do_send(s)
-                _do_answer(s)
+                _do_give_orders(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
     return s.fault

@@ -131,31 +131,31 @@ class State:
     """
 
     __slots__ = (
-        "command_inc_command",
-        "command_input_command",
-        "command_opening_mm",
-        "command_force_n",
-        "command_speed_mm_s",
+        "primitive_inc_command",
+        "primitive_input_command",
+        "primitive_opening_mm",
+        "primitive_force_n",
+        "primitive_speed_mm_s",
+        "to_primitive_inc_command_echo",
+        "to_primitive_ref_command_echo",
+        "to_primitive_status_report",
+        "to_primitive_failure",
+        "to_primitive_opening_mm",
+        "new_command",
+        "answered",
+        "settling",
+        "inc_command_seen",
         "hand_opening_mm",
         "hand_force_n",
-        "new_command",
-        "inc_command_seen",
         "cur_state",
         "at_opening",
         "forced",
         "closing",
         "waited",
-        "status_report",
-        "failure",
         "to_hand_drive",
         "to_hand_opening_mm",
         "to_hand_force_n",
         "to_hand_speed_mm_s",
-        "report_inc_command_echo",
-        "report_ref_command_echo",
-        "report_status_report",
-        "report_failure",
-        "report_opening_mm",
         "line",
         "fault",
         "fault_at",
@@ -163,31 +163,31 @@ class State:
     )
 
     def __init__(self):
-        self.command_inc_command = 0  # From PRIMITIVE.
-        self.command_input_command = 0  # From PRIMITIVE.
-        self.command_opening_mm = 0.0  # From PRIMITIVE.
-        self.command_force_n = 0.0  # From PRIMITIVE.
-        self.command_speed_mm_s = 0.0  # From PRIMITIVE.
+        self.primitive_inc_command = 0  # Orders of primitive.
+        self.primitive_input_command = 0  # Orders of primitive.
+        self.primitive_opening_mm = 0.0  # Orders of primitive.
+        self.primitive_force_n = 0.0  # Orders of primitive.
+        self.primitive_speed_mm_s = 0.0  # Orders of primitive.
+        self.to_primitive_inc_command_echo = 0  # Reports to primitive.
+        self.to_primitive_ref_command_echo = 0  # Reports to primitive.
+        self.to_primitive_status_report = 0  # Reports to primitive.
+        self.to_primitive_failure = 0  # Reports to primitive.
+        self.to_primitive_opening_mm = 0.0  # Reports to primitive.
+        self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
+        self.answered = False  # A line has answered the new command.
+        self.settling = False  # The line of this cycle lets the levels below rest first, and answers nothing.
+        self.inc_command_seen = 0  # Number of the order that was taken last.
         self.hand_opening_mm = 0.0  # From the hand; a reading beyond the range is pulled to it.
         self.hand_force_n = 0.0  # From the hand; a reading beyond the range is pulled to it.
-        self.new_command = False  # True in the cycle in which a new command comes.
-        self.inc_command_seen = 0
         self.cur_state = 0
         self.at_opening = False  # The fingers are at the commanded opening; the force on them is met; they are to close, so that a force is one against them: fingers that let go of a part still feel it for some cycles.
         self.forced = False
         self.closing = False
         self.waited = 0
-        self.status_report = 0
-        self.failure = 0
         self.to_hand_drive = False  # To the hand.
         self.to_hand_opening_mm = 0.0  # To the hand.
         self.to_hand_force_n = 0.0  # To the hand.
         self.to_hand_speed_mm_s = 0.0  # To the hand.
-        self.report_inc_command_echo = 0  # To PRIMITIVE.
-        self.report_ref_command_echo = 0  # To PRIMITIVE.
-        self.report_status_report = 0  # To PRIMITIVE.
-        self.report_failure = 0  # To PRIMITIVE.
-        self.report_opening_mm = 0.0  # To PRIMITIVE.
         self.line = -1
         self.fault = 0
         self.fault_at = -1
@@ -611,29 +611,18 @@ _PAUSE_GRIPPER_ONE = (
 )
 
 
-def _do_receive(s):
-    """Procedure receive."""
-    s.new_command = (s.command_inc_command != s.inc_command_seen)
-    if s.new_command:
-        s.failure = 0
-        s.waited = 0
-    s.inc_command_seen = s.command_inc_command
-
-
 def _do_measure(s):
     """Within half a millimetre; the force met but for a twentieth: fingers come to rest a little before they push all of it."""
-    s.at_opening = (abs((s.hand_opening_mm - s.command_opening_mm)) <= 0.5)
-    s.forced = (s.hand_force_n >= (0.95 * s.command_force_n))
-    s.closing = (s.command_opening_mm < s.hand_opening_mm)
+    if s.new_command:
+        s.waited = 0
+    s.at_opening = (abs((s.hand_opening_mm - s.primitive_opening_mm)) <= 0.5)
+    s.forced = (s.hand_force_n >= (0.95 * s.primitive_force_n))
+    s.closing = (s.primitive_opening_mm < s.hand_opening_mm)
 
 
-def _do_answer(s):
-    """Procedure answer."""
-    s.report_inc_command_echo = s.inc_command_seen
-    s.report_ref_command_echo = s.command_input_command
-    s.report_status_report = s.status_report
-    s.report_failure = s.failure
-    s.report_opening_mm = s.hand_opening_mm + 0.0
+def _do_show_opening(s):
+    """Procedure show_opening."""
+    s.to_primitive_opening_mm = s.hand_opening_mm + 0.0
 
 
 def _do_hold(s):
@@ -644,9 +633,9 @@ def _do_hold(s):
 def _do_drive(s):
     """Procedure drive."""
     s.to_hand_drive = True
-    s.to_hand_opening_mm = s.command_opening_mm + 0.0
-    s.to_hand_force_n = s.command_force_n + 0.0
-    s.to_hand_speed_mm_s = s.command_speed_mm_s + 0.0
+    s.to_hand_opening_mm = s.primitive_opening_mm + 0.0
+    s.to_hand_force_n = s.primitive_force_n + 0.0
+    s.to_hand_speed_mm_s = s.primitive_speed_mm_s + 0.0
 
 
 def _do_state(s, v_value):
@@ -656,7 +645,7 @@ def _do_state(s, v_value):
 
 def _do_grip_failure(s):
     """Procedure grip_failure."""
-    s.failure = 10
+    s.to_primitive_failure = 10
 
 
 def _do_wait(s):
@@ -665,58 +654,80 @@ def _do_wait(s):
         s.waited = (s.waited + 1)
 
 
-def _do_executing(s):
-    """Procedure executing."""
-    s.status_report = 1
+def _do_take_orders(s):
+    """Procedure take_orders."""
+    if (s.primitive_inc_command != s.inc_command_seen):
+        s.inc_command_seen = s.primitive_inc_command
+        s.new_command = True
+        s.answered = False
+        s.to_primitive_status_report = 1
+        s.to_primitive_failure = 0
+    else:
+        if (s.answered and True):
+            s.new_command = False
+    s.settling = False
+
+
+def _do_give_orders(s):
+    """Procedure give_orders."""
+    if (s.new_command and (not s.settling)):
+        s.answered = True
+    s.to_primitive_inc_command_echo = s.inc_command_seen
+    s.to_primitive_ref_command_echo = s.primitive_input_command
 
 
 def _do_done(s):
     """Procedure done."""
-    s.status_report = 0
+    s.to_primitive_status_report = 0
 
 
-def _do_fail(s):
-    """Procedure fail."""
-    s.status_report = 2
+def _do_executing(s):
+    """Procedure executing."""
+    s.to_primitive_status_report = 1
+
+
+def _do_failed(s):
+    """Procedure failed."""
+    s.to_primitive_status_report = 2
 
 
 def check(s):
     """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
-    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
+    if not (isinstance(s.to_primitive_inc_command_echo, int) and 0 <= s.to_primitive_inc_command_echo <= 65535):
+        return 5
+    if not (isinstance(s.to_primitive_ref_command_echo, int) and 0 <= s.to_primitive_ref_command_echo <= 2):
+        return 6
+    if not (isinstance(s.to_primitive_status_report, int) and 0 <= s.to_primitive_status_report <= 2):
         return 7
-    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+    if not (isinstance(s.to_primitive_failure, int) and 0 <= s.to_primitive_failure <= 15):
         return 8
-    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 2):
+    if not (isinstance(s.to_primitive_opening_mm, (int, float)) and 0.0 <= s.to_primitive_opening_mm <= 200.0):
         return 9
-    if not (isinstance(s.at_opening, int) and 0 <= s.at_opening <= 1):
+    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
         return 10
-    if not (isinstance(s.forced, int) and 0 <= s.forced <= 1):
+    if not (isinstance(s.answered, int) and 0 <= s.answered <= 1):
         return 11
-    if not (isinstance(s.closing, int) and 0 <= s.closing <= 1):
+    if not (isinstance(s.settling, int) and 0 <= s.settling <= 1):
         return 12
-    if not (isinstance(s.waited, int) and 0 <= s.waited <= 150):
+    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
         return 13
-    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
-        return 14
-    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
-        return 15
-    if not (isinstance(s.to_hand_drive, int) and 0 <= s.to_hand_drive <= 1):
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 2):
         return 16
-    if not (isinstance(s.to_hand_opening_mm, (int, float)) and 0.0 <= s.to_hand_opening_mm <= 200.0):
+    if not (isinstance(s.at_opening, int) and 0 <= s.at_opening <= 1):
         return 17
-    if not (isinstance(s.to_hand_force_n, (int, float)) and 0.0 <= s.to_hand_force_n <= 1000.0):
+    if not (isinstance(s.forced, int) and 0 <= s.forced <= 1):
         return 18
-    if not (isinstance(s.to_hand_speed_mm_s, (int, float)) and 0.0 <= s.to_hand_speed_mm_s <= 500.0):
+    if not (isinstance(s.closing, int) and 0 <= s.closing <= 1):
         return 19
-    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
+    if not (isinstance(s.waited, int) and 0 <= s.waited <= 150):
         return 20
-    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 2):
+    if not (isinstance(s.to_hand_drive, int) and 0 <= s.to_hand_drive <= 1):
         return 21
-    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+    if not (isinstance(s.to_hand_opening_mm, (int, float)) and 0.0 <= s.to_hand_opening_mm <= 200.0):
         return 22
-    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
+    if not (isinstance(s.to_hand_force_n, (int, float)) and 0.0 <= s.to_hand_force_n <= 1000.0):
         return 23
-    if not (isinstance(s.report_opening_mm, (int, float)) and 0.0 <= s.report_opening_mm <= 200.0):
+    if not (isinstance(s.to_hand_speed_mm_s, (int, float)) and 0.0 <= s.to_hand_speed_mm_s <= 500.0):
         return 24
     return -1
 
@@ -726,21 +737,21 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = _whole(s.command_inc_command)
+    i0 = _whole(s.primitive_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = _whole(s.command_input_command)
+    i1 = _whole(s.primitive_input_command)
     if not 0 <= i1 <= 2:
         return _refused(s, 1)
-    i2 = _real(s.command_opening_mm)
+    i2 = _real(s.primitive_opening_mm)
     if not 0.0 <= i2 <= 200.0:
         return _refused(s, 2)
     i2 = i2 + 0.0
-    i3 = _real(s.command_force_n)
+    i3 = _real(s.primitive_force_n)
     if not 0.0 <= i3 <= 1000.0:
         return _refused(s, 3)
     i3 = i3 + 0.0
-    i4 = _real(s.command_speed_mm_s)
+    i4 = _real(s.primitive_speed_mm_s)
     if not 0.0 <= i4 <= 500.0:
         return _refused(s, 4)
     i4 = i4 + 0.0
@@ -750,7 +761,7 @@ def _admit(s):
     elif i5 > 200.0:
         i5 = 200.0
     if not 0.0 <= i5 <= 200.0:
-        return _refused(s, 5)
+        return _refused(s, 14)
     i5 = i5 + 0.0
     i6 = _real(s.hand_force_n)
     if i6 < 0.0:
@@ -758,13 +769,13 @@ def _admit(s):
     elif i6 > 1000.0:
         i6 = 1000.0
     if not 0.0 <= i6 <= 1000.0:
-        return _refused(s, 6)
+        return _refused(s, 15)
     i6 = i6 + 0.0
-    s.command_inc_command = i0
-    s.command_input_command = i1
-    s.command_opening_mm = i2
-    s.command_force_n = i3
-    s.command_speed_mm_s = i4
+    s.primitive_inc_command = i0
+    s.primitive_input_command = i1
+    s.primitive_opening_mm = i2
+    s.primitive_force_n = i3
+    s.primitive_speed_mm_s = i4
     s.hand_opening_mm = i5
     s.hand_force_n = i6
     return 0
@@ -814,7 +825,7 @@ def _position_2(s):
     _do_grip_failure(s)
     _do_state(s, 1)
     _do_hold(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _position_3(s):
@@ -829,7 +840,7 @@ def _position_4(s):
     _do_grip_failure(s)
     _do_state(s, 1)
     _do_hold(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _position_5(s):
@@ -841,7 +852,7 @@ def _position_5(s):
 def _position_6(s):
     """gripper/gripper.rcs line 7"""
     _do_hold(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def position_step(s):
@@ -902,7 +913,7 @@ def _grasp_3(s):
     _do_grip_failure(s)
     _do_state(s, 1)
     _do_hold(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _grasp_4(s):
@@ -914,7 +925,7 @@ def _grasp_4(s):
 def _grasp_5(s):
     """gripper/gripper.rcs line 6"""
     _do_hold(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def grasp_step(s):
@@ -977,11 +988,12 @@ def gripper_cycle(s):
     if s.fault == 0:
         try:
             _settle(s)
-            _do_receive(s)
+            _do_take_orders(s)
             _do_measure(s)
-            {0: _run_pause_gripper, 1: _run_position, 2: _run_grasp}[s.command_input_command](s)
+            {0: _run_pause_gripper, 1: _run_position, 2: _run_grasp}[s.primitive_input_command](s)
             if s.fault == 0:
-                _do_answer(s)
+                _do_show_opening(s)
+                _do_give_orders(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
     return s.fault

@@ -138,43 +138,80 @@ class State:
     `assumptions_failed` the k-th assumption that is checked.
 
     Assumptions that are checked:
-    0 in_step: only told in approach_position_fingers, departure_position_fingers, goto, gothru, immed_grasp
-    1 approach_states: only told in approach_position_fingers
-    2 departure_states: only told in departure_position_fingers
-    3 goto_states: only told in goto
-    4 gothru_states: only told in gothru
-    5 grasp_states: only told in immed_grasp
+    0 approach_position_fingers_in_step: only told in approach_position_fingers
+    1 departure_position_fingers_in_step: only told in departure_position_fingers
+    2 goto_in_step: only told in goto
+    3 gothru_in_step: only told in gothru
+    4 immed_grasp_in_step: only told in immed_grasp
     """
 
     __slots__ = (
-        "command_inc_command",
-        "command_input_command",
-        "command_obj_ptr",
-        "command_grasp",
-        "command_pose_ptr",
-        "command_displaced_x",
-        "command_displaced_y",
-        "command_displaced_z",
-        "command_displaced_c",
-        "command_displaced_s",
-        "robot_inc_command_echo",
-        "robot_ref_command_echo",
-        "robot_status_report",
+        "emove_inc_command",
+        "emove_input_command",
+        "emove_obj_ptr",
+        "emove_grasp",
+        "emove_pose_ptr",
+        "emove_displaced_x",
+        "emove_displaced_y",
+        "emove_displaced_z",
+        "emove_displaced_c",
+        "emove_displaced_s",
+        "to_emove_inc_command_echo",
+        "to_emove_ref_command_echo",
+        "to_emove_status_report",
+        "to_emove_failure",
+        "to_emove_holds",
+        "new_command",
+        "answered",
+        "settling",
+        "inc_command_seen",
+        "from_robot_inc_command_echo",
+        "from_robot_ref_command_echo",
+        "from_robot_status_report",
+        "from_robot_failure",
+        "from_robot_plate_0",
+        "from_robot_plate_1",
+        "from_robot_plate_2",
+        "from_robot_plate_3",
+        "from_robot_plate_4",
+        "from_robot_plate_5",
+        "from_robot_plate_6",
+        "from_robot_plate_7",
+        "from_robot_plate_8",
+        "to_robot_inc_command",
+        "to_robot_input_command",
+        "to_robot_plate_0",
+        "to_robot_plate_1",
+        "to_robot_plate_2",
+        "to_robot_plate_3",
+        "to_robot_plate_4",
+        "to_robot_plate_5",
+        "to_robot_plate_6",
+        "to_robot_plate_7",
+        "to_robot_plate_8",
+        "robot_command",
+        "robot_status",
+        "robot_resting",
         "robot_failure",
-        "robot_plate_0",
-        "robot_plate_1",
-        "robot_plate_2",
-        "robot_plate_3",
-        "robot_plate_4",
-        "robot_plate_5",
-        "robot_plate_6",
-        "robot_plate_7",
-        "robot_plate_8",
-        "gripper_inc_command_echo",
-        "gripper_ref_command_echo",
-        "gripper_status_report",
+        "last_robot_input_command",
+        "from_gripper_inc_command_echo",
+        "from_gripper_ref_command_echo",
+        "from_gripper_status_report",
+        "from_gripper_failure",
+        "from_gripper_opening_mm",
+        "to_gripper_inc_command",
+        "to_gripper_input_command",
+        "to_gripper_opening_mm",
+        "to_gripper_force_n",
+        "to_gripper_speed_mm_s",
+        "gripper_command",
+        "gripper_status",
+        "gripper_resting",
         "gripper_failure",
-        "gripper_opening_mm",
+        "last_gripper_input_command",
+        "last_gripper_opening_mm",
+        "last_gripper_force_n",
+        "last_gripper_speed_mm_s",
         "goal_known",
         "goal_plate_0",
         "goal_plate_1",
@@ -195,13 +232,6 @@ class State:
         "fingers_tolerance_mm",
         "fingers_force_n",
         "fingers_speed_mm_s",
-        "new_command",
-        "begun",
-        "inc_command_seen",
-        "ref_robot_in",
-        "robot_status_in",
-        "ref_gripper_in",
-        "gripper_status_in",
         "idle",
         "cur_state",
         "cur_state_next",
@@ -232,36 +262,8 @@ class State:
         "fits",
         "closed",
         "waited",
-        "old_robot",
-        "old_gripper_inc_command",
-        "old_gripper_input_command",
-        "old_gripper_opening_mm",
-        "old_gripper_force_n",
-        "old_gripper_speed_mm_s",
-        "status_report",
-        "failure",
-        "to_robot_inc_command",
-        "to_robot_input_command",
-        "to_robot_plate_0",
-        "to_robot_plate_1",
-        "to_robot_plate_2",
-        "to_robot_plate_3",
-        "to_robot_plate_4",
-        "to_robot_plate_5",
-        "to_robot_plate_6",
-        "to_robot_plate_7",
-        "to_robot_plate_8",
-        "to_gripper_inc_command",
-        "to_gripper_input_command",
-        "to_gripper_opening_mm",
-        "to_gripper_force_n",
-        "to_gripper_speed_mm_s",
-        "report_inc_command_echo",
-        "report_ref_command_echo",
-        "report_status_report",
-        "report_failure",
-        "report_holds",
         "display",
+        "echoed",
         "line",
         "fault",
         "fault_at",
@@ -269,34 +271,72 @@ class State:
     )
 
     def __init__(self):
-        self.command_inc_command = 0  # From E-MOVE.
-        self.command_input_command = 0  # From E-MOVE.
-        self.command_obj_ptr = 0  # From E-MOVE.
-        self.command_grasp = 0  # From E-MOVE.
-        self.command_pose_ptr = 0  # From E-MOVE.
-        self.command_displaced_x = -500.0  # From E-MOVE.
-        self.command_displaced_y = -500.0  # From E-MOVE.
-        self.command_displaced_z = -500.0  # From E-MOVE.
-        self.command_displaced_c = -1.0  # From E-MOVE.
-        self.command_displaced_s = -1.0  # From E-MOVE.
-        self.robot_inc_command_echo = 0  # From the robot controller.
-        self.robot_ref_command_echo = 0  # From the robot controller.
-        self.robot_status_report = 0  # From the robot controller.
-        self.robot_failure = 0  # From the robot controller.
-        self.robot_plate_0 = -4000.0  # From the robot controller.
-        self.robot_plate_1 = -4000.0  # From the robot controller.
-        self.robot_plate_2 = -4000.0  # From the robot controller.
-        self.robot_plate_3 = -4000.0  # From the robot controller.
-        self.robot_plate_4 = -4000.0  # From the robot controller.
-        self.robot_plate_5 = -4000.0  # From the robot controller.
-        self.robot_plate_6 = -4000.0  # From the robot controller.
-        self.robot_plate_7 = -4000.0  # From the robot controller.
-        self.robot_plate_8 = -4000.0  # From the robot controller.
-        self.gripper_inc_command_echo = 0  # From the gripper controller.
-        self.gripper_ref_command_echo = 0  # From the gripper controller.
-        self.gripper_status_report = 0  # From the gripper controller.
-        self.gripper_failure = 0  # From the gripper controller.
-        self.gripper_opening_mm = 0.0  # From the gripper controller.
+        self.emove_inc_command = 0  # Orders of emove.
+        self.emove_input_command = 0  # Orders of emove.
+        self.emove_obj_ptr = 0  # Orders of emove.
+        self.emove_grasp = 0  # Orders of emove.
+        self.emove_pose_ptr = 0  # Orders of emove.
+        self.emove_displaced_x = -500.0  # Orders of emove.
+        self.emove_displaced_y = -500.0  # Orders of emove.
+        self.emove_displaced_z = -500.0  # Orders of emove.
+        self.emove_displaced_c = -1.0  # Orders of emove.
+        self.emove_displaced_s = -1.0  # Orders of emove.
+        self.to_emove_inc_command_echo = 0  # Reports to emove.
+        self.to_emove_ref_command_echo = 0  # Reports to emove.
+        self.to_emove_status_report = 0  # Reports to emove.
+        self.to_emove_failure = 0  # Reports to emove.
+        self.to_emove_holds = False  # Reports to emove.
+        self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
+        self.answered = False  # A line has answered the new command.
+        self.settling = False  # The line of this cycle lets the levels below rest first, and answers nothing.
+        self.inc_command_seen = 0  # Number of the order that was taken last.
+        self.from_robot_inc_command_echo = 0  # Reports of robot, as they come.
+        self.from_robot_ref_command_echo = 0  # Reports of robot, as they come.
+        self.from_robot_status_report = 0  # Reports of robot, as they come.
+        self.from_robot_failure = 0  # Reports of robot, as they come.
+        self.from_robot_plate_0 = -4000.0  # Reports of robot, as they come.
+        self.from_robot_plate_1 = -4000.0  # Reports of robot, as they come.
+        self.from_robot_plate_2 = -4000.0  # Reports of robot, as they come.
+        self.from_robot_plate_3 = -4000.0  # Reports of robot, as they come.
+        self.from_robot_plate_4 = -4000.0  # Reports of robot, as they come.
+        self.from_robot_plate_5 = -4000.0  # Reports of robot, as they come.
+        self.from_robot_plate_6 = -4000.0  # Reports of robot, as they come.
+        self.from_robot_plate_7 = -4000.0  # Reports of robot, as they come.
+        self.from_robot_plate_8 = -4000.0  # Reports of robot, as they come.
+        self.to_robot_inc_command = 0  # Orders to robot.
+        self.to_robot_input_command = 0  # Orders to robot.
+        self.to_robot_plate_0 = -4000.0  # Orders to robot.
+        self.to_robot_plate_1 = -4000.0  # Orders to robot.
+        self.to_robot_plate_2 = -4000.0  # Orders to robot.
+        self.to_robot_plate_3 = -4000.0  # Orders to robot.
+        self.to_robot_plate_4 = -4000.0  # Orders to robot.
+        self.to_robot_plate_5 = -4000.0  # Orders to robot.
+        self.to_robot_plate_6 = -4000.0  # Orders to robot.
+        self.to_robot_plate_7 = -4000.0  # Orders to robot.
+        self.to_robot_plate_8 = -4000.0  # Orders to robot.
+        self.robot_command = 0  # What robot says of the last orders, held until they are echoed.
+        self.robot_status = 0  # What robot says of the last orders, held until they are echoed.
+        self.robot_resting = False  # What robot says of the last orders, held until they are echoed.
+        self.robot_failure = 0  # What robot says of the last orders, held until they are echoed.
+        self.last_robot_input_command = 0  # The order to robot that was numbered last.
+        self.from_gripper_inc_command_echo = 0  # Reports of gripper, as they come.
+        self.from_gripper_ref_command_echo = 0  # Reports of gripper, as they come.
+        self.from_gripper_status_report = 0  # Reports of gripper, as they come.
+        self.from_gripper_failure = 0  # Reports of gripper, as they come.
+        self.from_gripper_opening_mm = 0.0  # Reports of gripper, as they come.
+        self.to_gripper_inc_command = 0  # Orders to gripper.
+        self.to_gripper_input_command = 0  # Orders to gripper.
+        self.to_gripper_opening_mm = 0.0  # Orders to gripper.
+        self.to_gripper_force_n = 0.0  # Orders to gripper.
+        self.to_gripper_speed_mm_s = 0.0  # Orders to gripper.
+        self.gripper_command = 0  # What gripper says of the last orders, held until they are echoed.
+        self.gripper_status = 0  # What gripper says of the last orders, held until they are echoed.
+        self.gripper_resting = False  # What gripper says of the last orders, held until they are echoed.
+        self.gripper_failure = 0  # What gripper says of the last orders, held until they are echoed.
+        self.last_gripper_input_command = 0  # The order to gripper that was numbered last.
+        self.last_gripper_opening_mm = 0.0  # The order to gripper that was numbered last.
+        self.last_gripper_force_n = 0.0  # The order to gripper that was numbered last.
+        self.last_gripper_speed_mm_s = 0.0  # The order to gripper that was numbered last.
         self.goal_known = False  # From the database: the point of the command.
         self.goal_plate_0 = -4000.0  # From the database: the point of the command.
         self.goal_plate_1 = -4000.0  # From the database: the point of the command.
@@ -317,13 +357,6 @@ class State:
         self.fingers_tolerance_mm = 0.0  # From the database: how the part of the command is gripped.
         self.fingers_force_n = 0.0  # From the database: how the part of the command is gripped.
         self.fingers_speed_mm_s = 0.0  # From the database: how the part of the command is gripped.
-        self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
-        self.begun = False  # This level has answered the new command.
-        self.inc_command_seen = 0  # Number of the command now being worked on; echoed to E-MOVE.
-        self.ref_robot_in = 0  # Command that the robot controller last echoed, and its status.
-        self.robot_status_in = 0
-        self.ref_gripper_in = 0  # Command that the gripper controller last echoed, and its status.
-        self.gripper_status_in = 0
         self.idle = True  # Both controllers rest.
         self.cur_state = 0  # Where the table is in its sequence; both echoes must match before it moves on (section 9).
         self.cur_state_next = 0  # Where the table is in its sequence; both echoes must match before it moves on (section 9).
@@ -354,36 +387,8 @@ class State:
         self.fits = False  # The finger spacing is that of the part; the fingers touch each other.
         self.closed = False
         self.waited = 0  # Cycles that the robot has been waited for.
-        self.old_robot = 0  # The orders that were last numbered.
-        self.old_gripper_inc_command = 0
-        self.old_gripper_input_command = 0
-        self.old_gripper_opening_mm = 0.0
-        self.old_gripper_force_n = 0.0
-        self.old_gripper_speed_mm_s = 0.0
-        self.status_report = 0  # What the command does, to be reported.
-        self.failure = 0  # Why the command failed.
-        self.to_robot_inc_command = 0  # To the robot controller.
-        self.to_robot_input_command = 0  # To the robot controller.
-        self.to_robot_plate_0 = -4000.0  # To the robot controller.
-        self.to_robot_plate_1 = -4000.0  # To the robot controller.
-        self.to_robot_plate_2 = -4000.0  # To the robot controller.
-        self.to_robot_plate_3 = -4000.0  # To the robot controller.
-        self.to_robot_plate_4 = -4000.0  # To the robot controller.
-        self.to_robot_plate_5 = -4000.0  # To the robot controller.
-        self.to_robot_plate_6 = -4000.0  # To the robot controller.
-        self.to_robot_plate_7 = -4000.0  # To the robot controller.
-        self.to_robot_plate_8 = -4000.0  # To the robot controller.
-        self.to_gripper_inc_command = 0  # To the gripper controller.
-        self.to_gripper_input_command = 0  # To the gripper controller.
-        self.to_gripper_opening_mm = 0.0  # To the gripper controller.
-        self.to_gripper_force_n = 0.0  # To the gripper controller.
-        self.to_gripper_speed_mm_s = 0.0  # To the gripper controller.
-        self.report_inc_command_echo = 0  # To E-MOVE.
-        self.report_ref_command_echo = 0  # To E-MOVE.
-        self.report_status_report = 0  # To E-MOVE.
-        self.report_failure = 0  # To E-MOVE.
-        self.report_holds = False  # To E-MOVE.
         self.display = 0  # To whoever looks.
+        self.echoed = False  # Every last order is echoed, or too late.
         self.line = -1
         self.fault = 0
         self.fault_at = -1
@@ -457,17 +462,17 @@ def _lines_of(masks, lines, default):
 
 
 _APPROACH_POSITION_FINGERS_0 = (
-    0x7e,
-    0x7d,
-)
-_APPROACH_POSITION_FINGERS_1 = (
     0x7c,
     0x3,
 )
-_APPROACH_POSITION_FINGERS_2 = (
+_APPROACH_POSITION_FINGERS_1 = (
     0x6b,
     0x67,
     0x73,
+)
+_APPROACH_POSITION_FINGERS_2 = (
+    0x7e,
+    0x7d,
 )
 _APPROACH_POSITION_FINGERS_3 = (
     0x23,
@@ -476,20 +481,20 @@ _APPROACH_POSITION_FINGERS_3 = (
     0x1f,
 )
 _APPROACH_POSITION_FINGERS_LINE = (
-    *_lines_of(_joined(_APPROACH_POSITION_FINGERS_3, _APPROACH_POSITION_FINGERS_2, _APPROACH_POSITION_FINGERS_0, _APPROACH_POSITION_FINGERS_1), 7, True),
+    *_lines_of(_joined(_APPROACH_POSITION_FINGERS_3, _APPROACH_POSITION_FINGERS_1, _APPROACH_POSITION_FINGERS_0, _APPROACH_POSITION_FINGERS_2), 7, True),
 )
 _DEPARTURE_POSITION_FINGERS_0 = (
-    0x7e,
-    0x7d,
-)
-_DEPARTURE_POSITION_FINGERS_1 = (
     0x7c,
     0x3,
 )
-_DEPARTURE_POSITION_FINGERS_2 = (
+_DEPARTURE_POSITION_FINGERS_1 = (
     0x6b,
     0x67,
     0x73,
+)
+_DEPARTURE_POSITION_FINGERS_2 = (
+    0x7e,
+    0x7d,
 )
 _DEPARTURE_POSITION_FINGERS_3 = (
     0x23,
@@ -498,20 +503,20 @@ _DEPARTURE_POSITION_FINGERS_3 = (
     0x1f,
 )
 _DEPARTURE_POSITION_FINGERS_LINE = (
-    *_lines_of(_joined(_DEPARTURE_POSITION_FINGERS_3, _DEPARTURE_POSITION_FINGERS_2, _DEPARTURE_POSITION_FINGERS_0, _DEPARTURE_POSITION_FINGERS_1), 7, True),
+    *_lines_of(_joined(_DEPARTURE_POSITION_FINGERS_3, _DEPARTURE_POSITION_FINGERS_1, _DEPARTURE_POSITION_FINGERS_0, _DEPARTURE_POSITION_FINGERS_2), 7, True),
 )
 _GOTO__0 = (
-    0x7fe,
-    0x7fd,
-)
-_GOTO__1 = (
     0x7fc,
     0x3,
 )
-_GOTO__2 = (
+_GOTO__1 = (
     0x6e7,
     0x61f,
     0x703,
+)
+_GOTO__2 = (
+    0x7fe,
+    0x7fd,
 )
 _GOTO__3 = (
     0x203,
@@ -784,23 +789,23 @@ _GOTO__G0 = (
     *_joined(_GOTO__6, _GOTO__0),
 )
 _GOTO__G1 = (
-    *_joined(_GOTO__3, _GOTO__2, _GOTO__1, _GOTO__4, _GOTO__5),
+    *_joined(_GOTO__3, _GOTO__1, _GOTO__2, _GOTO__4, _GOTO__5),
 )
 _GOTO__ONE = (
     _one_of(11, True),
 )
 _GOTHRU_0 = (
-    0x7e,
-    0x7d,
-)
-_GOTHRU_1 = (
     0x7c,
     0x3,
 )
-_GOTHRU_2 = (
+_GOTHRU_1 = (
     0x5f,
     0x5f,
     0x63,
+)
+_GOTHRU_2 = (
+    0x7e,
+    0x7d,
 )
 _GOTHRU_3 = (
     0x33,
@@ -813,20 +818,20 @@ _GOTHRU_4 = (
     0x7b,
 )
 _GOTHRU_LINE = (
-    *_lines_of(_joined(_GOTHRU_3, _GOTHRU_2, _GOTHRU_0, _GOTHRU_1, _GOTHRU_4), 7, True),
+    *_lines_of(_joined(_GOTHRU_3, _GOTHRU_1, _GOTHRU_0, _GOTHRU_2, _GOTHRU_4), 7, True),
 )
 _IMMED_GRASP_0 = (
-    0xfe,
-    0xfd,
-)
-_IMMED_GRASP_1 = (
     0xfc,
     0x3,
 )
-_IMMED_GRASP_2 = (
+_IMMED_GRASP_1 = (
     0xdb,
     0xc7,
     0xe3,
+)
+_IMMED_GRASP_2 = (
+    0xfe,
+    0xfd,
 )
 _IMMED_GRASP_3 = (
     0x43,
@@ -839,7 +844,7 @@ _IMMED_GRASP_4 = (
     0xef,
 )
 _IMMED_GRASP_LINE = (
-    *_lines_of(_joined(_IMMED_GRASP_3, _IMMED_GRASP_2, _IMMED_GRASP_0, _IMMED_GRASP_1, _IMMED_GRASP_4), 8, True),
+    *_lines_of(_joined(_IMMED_GRASP_3, _IMMED_GRASP_1, _IMMED_GRASP_0, _IMMED_GRASP_2, _IMMED_GRASP_4), 8, True),
 )
 _PAUSE_PRIMITIVE_0 = (
     0x2,
@@ -850,63 +855,29 @@ _PAUSE_PRIMITIVE_LINE = (
 )
 
 
-def _do_receive(s):
-    """Procedure receive."""
-    if (s.command_inc_command != s.inc_command_seen):
-        s.inc_command_seen = s.command_inc_command
-        s.new_command = True
-        s.begun = False
-        s.failure = 0
+def _do_start_waiting(s):
+    """Procedure start_waiting."""
+    if (s.new_command and (not s.answered)):
         s.waited = 0
-    else:
-        if ((s.begun and (s.robot_inc_command_echo == s.to_robot_inc_command)) and (s.gripper_inc_command_echo == s.to_gripper_inc_command)):
-            s.new_command = False
-    if ((s.robot_inc_command_echo == s.to_robot_inc_command) and (s.gripper_inc_command_echo == s.to_gripper_inc_command)):
-        s.ref_robot_in = s.robot_ref_command_echo
-        s.robot_status_in = s.robot_status_report
-        s.ref_gripper_in = s.gripper_ref_command_echo
-        s.gripper_status_in = s.gripper_status_report
-    s.idle = ((((((s.ref_robot_in == 0) and (s.robot_status_in == 0)) and (s.ref_gripper_in == 0)) and (s.gripper_status_in == 0)) and (s.robot_inc_command_echo == s.to_robot_inc_command)) and (s.gripper_inc_command_echo == s.to_gripper_inc_command))
+    s.idle = ((s.robot_resting and s.gripper_resting) and s.echoed)
 
 
 def _do_measure(s):
     """Procedure measure."""
     s.near = ((s.length_mm - s.travelled_mm) <= s.goal_breakpoint_mm)
     s.there = (s.travelled_mm >= s.length_mm)
-    if (s.old_robot == 1):
+    if (s.last_robot_input_command == 1):
         s.settled = True
         for v_i in range(0, 9):
-            s.settled = (s.settled and (abs(((s.robot_plate_0, s.robot_plate_1, s.robot_plate_2, s.robot_plate_3, s.robot_plate_4, s.robot_plate_5, s.robot_plate_6, s.robot_plate_7, s.robot_plate_8,)[v_i] - (s.to_0, s.to_1, s.to_2, s.to_3, s.to_4, s.to_5, s.to_6, s.to_7, s.to_8,)[v_i])) <= 1.5))
-    if ((s.robot_inc_command_echo == s.to_robot_inc_command) and (s.gripper_inc_command_echo == s.to_gripper_inc_command)):
-        s.fits = (abs((s.gripper_opening_mm - s.fingers_grip_mm)) <= s.fingers_tolerance_mm)
-        s.closed = (s.gripper_opening_mm < 1.0)
+            s.settled = (s.settled and (abs(((s.from_robot_plate_0, s.from_robot_plate_1, s.from_robot_plate_2, s.from_robot_plate_3, s.from_robot_plate_4, s.from_robot_plate_5, s.from_robot_plate_6, s.from_robot_plate_7, s.from_robot_plate_8,)[v_i] - (s.to_0, s.to_1, s.to_2, s.to_3, s.to_4, s.to_5, s.to_6, s.to_7, s.to_8,)[v_i])) <= 1.5))
+    if s.echoed:
+        s.fits = (abs((s.from_gripper_opening_mm - s.fingers_grip_mm)) <= s.fingers_tolerance_mm)
+        s.closed = (s.from_gripper_opening_mm < 1.0)
 
 
-def _do_send(s):
-    """A new order takes the next number; the robot's poses follow one another under the number of `follow`."""
-    if (s.to_robot_input_command != s.old_robot):
-        s.to_robot_inc_command = _mod((s.to_robot_inc_command + 1), 65536)
-    s.old_robot = s.to_robot_input_command
-    if ((((s.to_gripper_input_command != s.old_gripper_input_command) or (s.to_gripper_opening_mm != s.old_gripper_opening_mm)) or (s.to_gripper_force_n != s.old_gripper_force_n)) or (s.to_gripper_speed_mm_s != s.old_gripper_speed_mm_s)):
-        s.to_gripper_inc_command = _mod((s.to_gripper_inc_command + 1), 65536)
-    s.old_gripper_input_command = s.to_gripper_input_command
-    s.old_gripper_opening_mm = s.to_gripper_opening_mm + 0.0
-    s.old_gripper_force_n = s.to_gripper_force_n + 0.0
-    s.old_gripper_speed_mm_s = s.to_gripper_speed_mm_s + 0.0
-
-
-def _do_answer(s):
-    """Procedure answer."""
-    s.report_inc_command_echo = s.inc_command_seen
-    s.report_ref_command_echo = s.command_input_command
-    s.report_status_report = s.status_report
-    s.report_failure = s.failure
-    s.report_holds = (s.fits and (not s.closed))
-
-
-def _do_begin(s):
-    """This line answers the new command."""
-    s.begun = True
+def _do_hold_part(s):
+    """Procedure hold_part."""
+    s.to_emove_holds = (s.fits and (not s.closed))
 
 
 def _do_nextstate(s, v_value):
@@ -914,42 +885,27 @@ def _do_nextstate(s, v_value):
     s.cur_state_next = v_value
 
 
-def _do_executing(s):
-    """Procedure executing."""
-    s.status_report = 1
-
-
-def _do_done(s):
-    """Procedure done."""
-    s.status_report = 0
-
-
-def _do_fail(s):
-    """Procedure fail."""
-    s.status_report = 2
-
-
 def _do_no_pose(s):
     """Procedure no_pose."""
-    s.failure = 8
+    s.to_emove_failure = 8
 
 
 def _do_robot_failure(s):
     """Procedure robot_failure."""
-    s.failure = 9
+    s.to_emove_failure = 9
 
 
 def _do_grip_failure(s):
     """Procedure grip_failure."""
-    s.failure = 10
+    s.to_emove_failure = 10
 
 
 def _do_misfit_failure(s):
     """The spacing is not that of the part."""
     if s.closed:
-        s.failure = 11
+        s.to_emove_failure = 11
     else:
-        s.failure = 12
+        s.to_emove_failure = 12
 
 
 def _do_wait(s):
@@ -999,23 +955,23 @@ def _do_within(s, v_at, v_value):
 
 def _do_start(s):
     """From where the robot is, or was last told to be, to the point displaced: the centre by `x` along the plate's x axis, by `y` to the left of it, and by `z` upward; the two other points of the plate turned about the vertical through it."""
-    if (s.old_robot != 1):
+    if (s.last_robot_input_command != 1):
         for v_i in range(0, 9):
-            setattr(s, ('to_robot_plate_0', 'to_robot_plate_1', 'to_robot_plate_2', 'to_robot_plate_3', 'to_robot_plate_4', 'to_robot_plate_5', 'to_robot_plate_6', 'to_robot_plate_7', 'to_robot_plate_8',)[v_i], (s.robot_plate_0, s.robot_plate_1, s.robot_plate_2, s.robot_plate_3, s.robot_plate_4, s.robot_plate_5, s.robot_plate_6, s.robot_plate_7, s.robot_plate_8,)[v_i] + 0.0)
+            setattr(s, ('to_robot_plate_0', 'to_robot_plate_1', 'to_robot_plate_2', 'to_robot_plate_3', 'to_robot_plate_4', 'to_robot_plate_5', 'to_robot_plate_6', 'to_robot_plate_7', 'to_robot_plate_8',)[v_i], (s.from_robot_plate_0, s.from_robot_plate_1, s.from_robot_plate_2, s.from_robot_plate_3, s.from_robot_plate_4, s.from_robot_plate_5, s.from_robot_plate_6, s.from_robot_plate_7, s.from_robot_plate_8,)[v_i] + 0.0)
         s.speed_mm_s = 0.0 + 0.0
     for v_i_2 in range(0, 9):
         setattr(s, ('from_0', 'from_1', 'from_2', 'from_3', 'from_4', 'from_5', 'from_6', 'from_7', 'from_8',)[v_i_2], (s.to_robot_plate_0, s.to_robot_plate_1, s.to_robot_plate_2, s.to_robot_plate_3, s.to_robot_plate_4, s.to_robot_plate_5, s.to_robot_plate_6, s.to_robot_plate_7, s.to_robot_plate_8,)[v_i_2] + 0.0)
     v_east = ((s.goal_plate_6 - s.goal_plate_0) / 100.0) + 0.0
     v_north = ((s.goal_plate_7 - s.goal_plate_1) / 100.0) + 0.0
-    _do_within(s, 0, ((s.goal_plate_0 + (s.command_displaced_x * v_east)) - (s.command_displaced_y * v_north)) + 0.0)
-    _do_within(s, 1, ((s.goal_plate_1 + (s.command_displaced_x * v_north)) + (s.command_displaced_y * v_east)) + 0.0)
-    _do_within(s, 2, (s.goal_plate_2 + s.command_displaced_z) + 0.0)
+    _do_within(s, 0, ((s.goal_plate_0 + (s.emove_displaced_x * v_east)) - (s.emove_displaced_y * v_north)) + 0.0)
+    _do_within(s, 1, ((s.goal_plate_1 + (s.emove_displaced_x * v_north)) + (s.emove_displaced_y * v_east)) + 0.0)
+    _do_within(s, 2, (s.goal_plate_2 + s.emove_displaced_z) + 0.0)
     for v_k in range(1, 3):
         v_u = ((s.goal_plate_0, s.goal_plate_1, s.goal_plate_2, s.goal_plate_3, s.goal_plate_4, s.goal_plate_5, s.goal_plate_6, s.goal_plate_7, s.goal_plate_8,)[(3 * v_k)] - s.goal_plate_0) + 0.0
         v_v = ((s.goal_plate_0, s.goal_plate_1, s.goal_plate_2, s.goal_plate_3, s.goal_plate_4, s.goal_plate_5, s.goal_plate_6, s.goal_plate_7, s.goal_plate_8,)[((3 * v_k) + 1)] - s.goal_plate_1) + 0.0
-        _do_within(s, (3 * v_k), ((s.to_0 + (s.command_displaced_c * v_u)) - (s.command_displaced_s * v_v)) + 0.0)
-        _do_within(s, ((3 * v_k) + 1), ((s.to_1 + (s.command_displaced_s * v_u)) + (s.command_displaced_c * v_v)) + 0.0)
-        _do_within(s, ((3 * v_k) + 2), ((s.goal_plate_0, s.goal_plate_1, s.goal_plate_2, s.goal_plate_3, s.goal_plate_4, s.goal_plate_5, s.goal_plate_6, s.goal_plate_7, s.goal_plate_8,)[((3 * v_k) + 2)] + s.command_displaced_z) + 0.0)
+        _do_within(s, (3 * v_k), ((s.to_0 + (s.emove_displaced_c * v_u)) - (s.emove_displaced_s * v_v)) + 0.0)
+        _do_within(s, ((3 * v_k) + 1), ((s.to_1 + (s.emove_displaced_s * v_u)) + (s.emove_displaced_c * v_v)) + 0.0)
+        _do_within(s, ((3 * v_k) + 2), ((s.goal_plate_0, s.goal_plate_1, s.goal_plate_2, s.goal_plate_3, s.goal_plate_4, s.goal_plate_5, s.goal_plate_6, s.goal_plate_7, s.goal_plate_8,)[((3 * v_k) + 2)] + s.emove_displaced_z) + 0.0)
     s.travelled_mm = 0.0 + 0.0
     _do_measure_length(s)
 
@@ -1061,146 +1017,215 @@ def _do_stop(s):
     s.speed_mm_s = 0.0 + 0.0
 
 
+def _do_take_orders(s):
+    """Procedure take_orders."""
+    s.echoed = ((s.from_robot_inc_command_echo == s.to_robot_inc_command) and (s.from_gripper_inc_command_echo == s.to_gripper_inc_command))
+    if (s.emove_inc_command != s.inc_command_seen):
+        s.inc_command_seen = s.emove_inc_command
+        s.new_command = True
+        s.answered = False
+        s.to_emove_status_report = 1
+        s.to_emove_failure = 0
+    else:
+        if (s.answered and s.echoed):
+            s.new_command = False
+    s.settling = False
+    if s.echoed:
+        s.robot_command = s.from_robot_ref_command_echo
+        s.robot_status = s.from_robot_status_report
+        s.robot_failure = s.from_robot_failure
+        s.gripper_command = s.from_gripper_ref_command_echo
+        s.gripper_status = s.from_gripper_status_report
+        s.gripper_failure = s.from_gripper_failure
+    s.robot_resting = (((s.robot_command == 0) and (s.robot_status == 0)) and (s.answered or s.echoed))
+    s.gripper_resting = (((s.gripper_command == 0) and (s.gripper_status == 0)) and (s.answered or s.echoed))
+
+
+def _do_give_orders(s):
+    """Procedure give_orders."""
+    if (s.new_command and (not s.settling)):
+        s.answered = True
+    s.to_emove_inc_command_echo = s.inc_command_seen
+    s.to_emove_ref_command_echo = s.emove_input_command
+    if (s.to_robot_input_command != s.last_robot_input_command):
+        s.to_robot_inc_command = _mod((s.to_robot_inc_command + 1), 65536)
+    s.last_robot_input_command = s.to_robot_input_command
+    if ((((s.to_gripper_input_command != s.last_gripper_input_command) or (s.to_gripper_opening_mm != s.last_gripper_opening_mm)) or (s.to_gripper_force_n != s.last_gripper_force_n)) or (s.to_gripper_speed_mm_s != s.last_gripper_speed_mm_s)):
+        s.to_gripper_inc_command = _mod((s.to_gripper_inc_command + 1), 65536)
+    s.last_gripper_input_command = s.to_gripper_input_command
+    s.last_gripper_opening_mm = s.to_gripper_opening_mm + 0.0
+    s.last_gripper_force_n = s.to_gripper_force_n + 0.0
+    s.last_gripper_speed_mm_s = s.to_gripper_speed_mm_s + 0.0
+
+
+def _do_settle(s):
+    """A new command finds a level below at work: let it rest first."""
+    s.settling = True
+    s.to_robot_input_command = 0
+    s.to_gripper_input_command = 0
+
+
+def _do_done(s):
+    """Procedure done."""
+    s.to_emove_status_report = 0
+
+
+def _do_executing(s):
+    """Procedure executing."""
+    s.to_emove_status_report = 1
+
+
+def _do_failed(s):
+    """Procedure failed."""
+    s.to_emove_status_report = 2
+
+
 def check(s):
     """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
-    if not (isinstance(s.goal_known, int) and 0 <= s.goal_known <= 1):
-        return 28
-    if not (isinstance(s.fingers_known, int) and 0 <= s.fingers_known <= 1):
-        return 41
+    if not (isinstance(s.to_emove_inc_command_echo, int) and 0 <= s.to_emove_inc_command_echo <= 65535):
+        return 10
+    if not (isinstance(s.to_emove_ref_command_echo, int) and 0 <= s.to_emove_ref_command_echo <= 5):
+        return 11
+    if not (isinstance(s.to_emove_status_report, int) and 0 <= s.to_emove_status_report <= 2):
+        return 12
+    if not (isinstance(s.to_emove_failure, int) and 0 <= s.to_emove_failure <= 15):
+        return 13
+    if not (isinstance(s.to_emove_holds, int) and 0 <= s.to_emove_holds <= 1):
+        return 14
     if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
-        return 48
-    if not (isinstance(s.begun, int) and 0 <= s.begun <= 1):
-        return 49
+        return 15
+    if not (isinstance(s.answered, int) and 0 <= s.answered <= 1):
+        return 16
+    if not (isinstance(s.settling, int) and 0 <= s.settling <= 1):
+        return 17
     if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
-        return 50
-    if not (isinstance(s.ref_robot_in, int) and 0 <= s.ref_robot_in <= 1):
-        return 51
-    if not (isinstance(s.robot_status_in, int) and 0 <= s.robot_status_in <= 2):
-        return 52
-    if not (isinstance(s.ref_gripper_in, int) and 0 <= s.ref_gripper_in <= 2):
-        return 53
-    if not (isinstance(s.gripper_status_in, int) and 0 <= s.gripper_status_in <= 2):
-        return 54
-    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
-        return 55
-    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 3):
-        return 56
-    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 3):
-        return 57
-    if not (isinstance(s.from_0, (int, float)) and -4000.0 <= s.from_0 <= 4000.0):
-        return 58
-    if not (isinstance(s.from_1, (int, float)) and -4000.0 <= s.from_1 <= 4000.0):
-        return 59
-    if not (isinstance(s.from_2, (int, float)) and -4000.0 <= s.from_2 <= 4000.0):
-        return 60
-    if not (isinstance(s.from_3, (int, float)) and -4000.0 <= s.from_3 <= 4000.0):
-        return 61
-    if not (isinstance(s.from_4, (int, float)) and -4000.0 <= s.from_4 <= 4000.0):
-        return 62
-    if not (isinstance(s.from_5, (int, float)) and -4000.0 <= s.from_5 <= 4000.0):
-        return 63
-    if not (isinstance(s.from_6, (int, float)) and -4000.0 <= s.from_6 <= 4000.0):
-        return 64
-    if not (isinstance(s.from_7, (int, float)) and -4000.0 <= s.from_7 <= 4000.0):
-        return 65
-    if not (isinstance(s.from_8, (int, float)) and -4000.0 <= s.from_8 <= 4000.0):
-        return 66
-    if not (isinstance(s.to_0, (int, float)) and -4000.0 <= s.to_0 <= 4000.0):
-        return 67
-    if not (isinstance(s.to_1, (int, float)) and -4000.0 <= s.to_1 <= 4000.0):
-        return 68
-    if not (isinstance(s.to_2, (int, float)) and -4000.0 <= s.to_2 <= 4000.0):
-        return 69
-    if not (isinstance(s.to_3, (int, float)) and -4000.0 <= s.to_3 <= 4000.0):
-        return 70
-    if not (isinstance(s.to_4, (int, float)) and -4000.0 <= s.to_4 <= 4000.0):
-        return 71
-    if not (isinstance(s.to_5, (int, float)) and -4000.0 <= s.to_5 <= 4000.0):
-        return 72
-    if not (isinstance(s.to_6, (int, float)) and -4000.0 <= s.to_6 <= 4000.0):
-        return 73
-    if not (isinstance(s.to_7, (int, float)) and -4000.0 <= s.to_7 <= 4000.0):
-        return 74
-    if not (isinstance(s.to_8, (int, float)) and -4000.0 <= s.to_8 <= 4000.0):
-        return 75
-    if not (isinstance(s.length_mm, (int, float)) and 1.0 <= s.length_mm <= 30000.0):
-        return 76
-    if not (isinstance(s.travelled_mm, (int, float)) and 0.0 <= s.travelled_mm <= 30000.0):
-        return 77
-    if not (isinstance(s.speed_mm_s, (int, float)) and 0.0 <= s.speed_mm_s <= 2000.0):
-        return 78
-    if not (isinstance(s.near, int) and 0 <= s.near <= 1):
-        return 79
-    if not (isinstance(s.there, int) and 0 <= s.there <= 1):
-        return 80
-    if not (isinstance(s.settled, int) and 0 <= s.settled <= 1):
-        return 81
-    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
-        return 82
-    if not (isinstance(s.closed, int) and 0 <= s.closed <= 1):
-        return 83
-    if not (isinstance(s.waited, int) and 0 <= s.waited <= 250):
-        return 84
-    if not (isinstance(s.old_robot, int) and 0 <= s.old_robot <= 1):
-        return 85
-    if not (isinstance(s.old_gripper_inc_command, int) and 0 <= s.old_gripper_inc_command <= 65535):
-        return 86
-    if not (isinstance(s.old_gripper_input_command, int) and 0 <= s.old_gripper_input_command <= 2):
-        return 87
-    if not (isinstance(s.old_gripper_opening_mm, (int, float)) and 0.0 <= s.old_gripper_opening_mm <= 200.0):
-        return 88
-    if not (isinstance(s.old_gripper_force_n, (int, float)) and 0.0 <= s.old_gripper_force_n <= 1000.0):
-        return 89
-    if not (isinstance(s.old_gripper_speed_mm_s, (int, float)) and 0.0 <= s.old_gripper_speed_mm_s <= 500.0):
-        return 90
-    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
-        return 91
-    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
-        return 92
+        return 18
     if not (isinstance(s.to_robot_inc_command, int) and 0 <= s.to_robot_inc_command <= 65535):
-        return 93
+        return 32
     if not (isinstance(s.to_robot_input_command, int) and 0 <= s.to_robot_input_command <= 1):
-        return 94
+        return 33
     if not (isinstance(s.to_robot_plate_0, (int, float)) and -4000.0 <= s.to_robot_plate_0 <= 4000.0):
-        return 95
+        return 34
     if not (isinstance(s.to_robot_plate_1, (int, float)) and -4000.0 <= s.to_robot_plate_1 <= 4000.0):
-        return 96
+        return 35
     if not (isinstance(s.to_robot_plate_2, (int, float)) and -4000.0 <= s.to_robot_plate_2 <= 4000.0):
-        return 97
+        return 36
     if not (isinstance(s.to_robot_plate_3, (int, float)) and -4000.0 <= s.to_robot_plate_3 <= 4000.0):
-        return 98
+        return 37
     if not (isinstance(s.to_robot_plate_4, (int, float)) and -4000.0 <= s.to_robot_plate_4 <= 4000.0):
-        return 99
+        return 38
     if not (isinstance(s.to_robot_plate_5, (int, float)) and -4000.0 <= s.to_robot_plate_5 <= 4000.0):
-        return 100
+        return 39
     if not (isinstance(s.to_robot_plate_6, (int, float)) and -4000.0 <= s.to_robot_plate_6 <= 4000.0):
-        return 101
+        return 40
     if not (isinstance(s.to_robot_plate_7, (int, float)) and -4000.0 <= s.to_robot_plate_7 <= 4000.0):
-        return 102
+        return 41
     if not (isinstance(s.to_robot_plate_8, (int, float)) and -4000.0 <= s.to_robot_plate_8 <= 4000.0):
-        return 103
+        return 42
+    if not (isinstance(s.robot_command, int) and 0 <= s.robot_command <= 1):
+        return 43
+    if not (isinstance(s.robot_status, int) and 0 <= s.robot_status <= 2):
+        return 44
+    if not (isinstance(s.robot_resting, int) and 0 <= s.robot_resting <= 1):
+        return 45
+    if not (isinstance(s.robot_failure, int) and 0 <= s.robot_failure <= 15):
+        return 46
+    if not (isinstance(s.last_robot_input_command, int) and 0 <= s.last_robot_input_command <= 1):
+        return 47
     if not (isinstance(s.to_gripper_inc_command, int) and 0 <= s.to_gripper_inc_command <= 65535):
-        return 104
+        return 53
     if not (isinstance(s.to_gripper_input_command, int) and 0 <= s.to_gripper_input_command <= 2):
-        return 105
+        return 54
     if not (isinstance(s.to_gripper_opening_mm, (int, float)) and 0.0 <= s.to_gripper_opening_mm <= 200.0):
-        return 106
+        return 55
     if not (isinstance(s.to_gripper_force_n, (int, float)) and 0.0 <= s.to_gripper_force_n <= 1000.0):
-        return 107
+        return 56
     if not (isinstance(s.to_gripper_speed_mm_s, (int, float)) and 0.0 <= s.to_gripper_speed_mm_s <= 500.0):
+        return 57
+    if not (isinstance(s.gripper_command, int) and 0 <= s.gripper_command <= 2):
+        return 58
+    if not (isinstance(s.gripper_status, int) and 0 <= s.gripper_status <= 2):
+        return 59
+    if not (isinstance(s.gripper_resting, int) and 0 <= s.gripper_resting <= 1):
+        return 60
+    if not (isinstance(s.gripper_failure, int) and 0 <= s.gripper_failure <= 15):
+        return 61
+    if not (isinstance(s.last_gripper_input_command, int) and 0 <= s.last_gripper_input_command <= 2):
+        return 62
+    if not (isinstance(s.last_gripper_opening_mm, (int, float)) and 0.0 <= s.last_gripper_opening_mm <= 200.0):
+        return 63
+    if not (isinstance(s.last_gripper_force_n, (int, float)) and 0.0 <= s.last_gripper_force_n <= 1000.0):
+        return 64
+    if not (isinstance(s.last_gripper_speed_mm_s, (int, float)) and 0.0 <= s.last_gripper_speed_mm_s <= 500.0):
+        return 65
+    if not (isinstance(s.goal_known, int) and 0 <= s.goal_known <= 1):
+        return 66
+    if not (isinstance(s.fingers_known, int) and 0 <= s.fingers_known <= 1):
+        return 79
+    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
+        return 86
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 3):
+        return 87
+    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 3):
+        return 88
+    if not (isinstance(s.from_0, (int, float)) and -4000.0 <= s.from_0 <= 4000.0):
+        return 89
+    if not (isinstance(s.from_1, (int, float)) and -4000.0 <= s.from_1 <= 4000.0):
+        return 90
+    if not (isinstance(s.from_2, (int, float)) and -4000.0 <= s.from_2 <= 4000.0):
+        return 91
+    if not (isinstance(s.from_3, (int, float)) and -4000.0 <= s.from_3 <= 4000.0):
+        return 92
+    if not (isinstance(s.from_4, (int, float)) and -4000.0 <= s.from_4 <= 4000.0):
+        return 93
+    if not (isinstance(s.from_5, (int, float)) and -4000.0 <= s.from_5 <= 4000.0):
+        return 94
+    if not (isinstance(s.from_6, (int, float)) and -4000.0 <= s.from_6 <= 4000.0):
+        return 95
+    if not (isinstance(s.from_7, (int, float)) and -4000.0 <= s.from_7 <= 4000.0):
+        return 96
+    if not (isinstance(s.from_8, (int, float)) and -4000.0 <= s.from_8 <= 4000.0):
+        return 97
+    if not (isinstance(s.to_0, (int, float)) and -4000.0 <= s.to_0 <= 4000.0):
+        return 98
+    if not (isinstance(s.to_1, (int, float)) and -4000.0 <= s.to_1 <= 4000.0):
+        return 99
+    if not (isinstance(s.to_2, (int, float)) and -4000.0 <= s.to_2 <= 4000.0):
+        return 100
+    if not (isinstance(s.to_3, (int, float)) and -4000.0 <= s.to_3 <= 4000.0):
+        return 101
+    if not (isinstance(s.to_4, (int, float)) and -4000.0 <= s.to_4 <= 4000.0):
+        return 102
+    if not (isinstance(s.to_5, (int, float)) and -4000.0 <= s.to_5 <= 4000.0):
+        return 103
+    if not (isinstance(s.to_6, (int, float)) and -4000.0 <= s.to_6 <= 4000.0):
+        return 104
+    if not (isinstance(s.to_7, (int, float)) and -4000.0 <= s.to_7 <= 4000.0):
+        return 105
+    if not (isinstance(s.to_8, (int, float)) and -4000.0 <= s.to_8 <= 4000.0):
+        return 106
+    if not (isinstance(s.length_mm, (int, float)) and 1.0 <= s.length_mm <= 30000.0):
+        return 107
+    if not (isinstance(s.travelled_mm, (int, float)) and 0.0 <= s.travelled_mm <= 30000.0):
         return 108
-    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
+    if not (isinstance(s.speed_mm_s, (int, float)) and 0.0 <= s.speed_mm_s <= 2000.0):
         return 109
-    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 5):
+    if not (isinstance(s.near, int) and 0 <= s.near <= 1):
         return 110
-    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+    if not (isinstance(s.there, int) and 0 <= s.there <= 1):
         return 111
-    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
+    if not (isinstance(s.settled, int) and 0 <= s.settled <= 1):
         return 112
-    if not (isinstance(s.report_holds, int) and 0 <= s.report_holds <= 1):
+    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
         return 113
-    if not (isinstance(s.display, int) and 0 <= s.display <= 1):
+    if not (isinstance(s.closed, int) and 0 <= s.closed <= 1):
         return 114
+    if not (isinstance(s.waited, int) and 0 <= s.waited <= 250):
+        return 115
+    if not (isinstance(s.display, int) and 0 <= s.display <= 1):
+        return 116
+    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+        return 117
     return -1
 
 
@@ -1209,211 +1234,211 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = _whole(s.command_inc_command)
+    i0 = _whole(s.emove_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = _whole(s.command_input_command)
+    i1 = _whole(s.emove_input_command)
     if not 0 <= i1 <= 5:
         return _refused(s, 1)
-    i2 = _whole(s.command_obj_ptr)
+    i2 = _whole(s.emove_obj_ptr)
     if not 0 <= i2 <= 6:
         return _refused(s, 2)
-    i3 = _whole(s.command_grasp)
+    i3 = _whole(s.emove_grasp)
     if not 0 <= i3 <= 9:
         return _refused(s, 3)
-    i4 = _whole(s.command_pose_ptr)
+    i4 = _whole(s.emove_pose_ptr)
     if not 0 <= i4 <= 9999:
         return _refused(s, 4)
-    i5 = _real(s.command_displaced_x)
+    i5 = _real(s.emove_displaced_x)
     if not -500.0 <= i5 <= 500.0:
         return _refused(s, 5)
     i5 = i5 + 0.0
-    i6 = _real(s.command_displaced_y)
+    i6 = _real(s.emove_displaced_y)
     if not -500.0 <= i6 <= 500.0:
         return _refused(s, 6)
     i6 = i6 + 0.0
-    i7 = _real(s.command_displaced_z)
+    i7 = _real(s.emove_displaced_z)
     if not -500.0 <= i7 <= 500.0:
         return _refused(s, 7)
     i7 = i7 + 0.0
-    i8 = _real(s.command_displaced_c)
+    i8 = _real(s.emove_displaced_c)
     if not -1.0 <= i8 <= 1.0:
         return _refused(s, 8)
     i8 = i8 + 0.0
-    i9 = _real(s.command_displaced_s)
+    i9 = _real(s.emove_displaced_s)
     if not -1.0 <= i9 <= 1.0:
         return _refused(s, 9)
     i9 = i9 + 0.0
-    i10 = _whole(s.robot_inc_command_echo)
+    i10 = _whole(s.from_robot_inc_command_echo)
     if not 0 <= i10 <= 65535:
-        return _refused(s, 10)
-    i11 = _whole(s.robot_ref_command_echo)
-    if not 0 <= i11 <= 1:
-        return _refused(s, 11)
-    i12 = _whole(s.robot_status_report)
-    if not 0 <= i12 <= 2:
-        return _refused(s, 12)
-    i13 = _whole(s.robot_failure)
-    if not 0 <= i13 <= 15:
-        return _refused(s, 13)
-    i14 = _real(s.robot_plate_0)
-    if not -4000.0 <= i14 <= 4000.0:
-        return _refused(s, 14)
-    i14 = i14 + 0.0
-    i15 = _real(s.robot_plate_1)
-    if not -4000.0 <= i15 <= 4000.0:
-        return _refused(s, 15)
-    i15 = i15 + 0.0
-    i16 = _real(s.robot_plate_2)
-    if not -4000.0 <= i16 <= 4000.0:
-        return _refused(s, 16)
-    i16 = i16 + 0.0
-    i17 = _real(s.robot_plate_3)
-    if not -4000.0 <= i17 <= 4000.0:
-        return _refused(s, 17)
-    i17 = i17 + 0.0
-    i18 = _real(s.robot_plate_4)
-    if not -4000.0 <= i18 <= 4000.0:
-        return _refused(s, 18)
-    i18 = i18 + 0.0
-    i19 = _real(s.robot_plate_5)
-    if not -4000.0 <= i19 <= 4000.0:
         return _refused(s, 19)
-    i19 = i19 + 0.0
-    i20 = _real(s.robot_plate_6)
-    if not -4000.0 <= i20 <= 4000.0:
+    i11 = _whole(s.from_robot_ref_command_echo)
+    if not 0 <= i11 <= 1:
         return _refused(s, 20)
-    i20 = i20 + 0.0
-    i21 = _real(s.robot_plate_7)
-    if not -4000.0 <= i21 <= 4000.0:
+    i12 = _whole(s.from_robot_status_report)
+    if not 0 <= i12 <= 2:
         return _refused(s, 21)
-    i21 = i21 + 0.0
-    i22 = _real(s.robot_plate_8)
-    if not -4000.0 <= i22 <= 4000.0:
+    i13 = _whole(s.from_robot_failure)
+    if not 0 <= i13 <= 15:
         return _refused(s, 22)
-    i22 = i22 + 0.0
-    i23 = _whole(s.gripper_inc_command_echo)
-    if not 0 <= i23 <= 65535:
+    i14 = _real(s.from_robot_plate_0)
+    if not -4000.0 <= i14 <= 4000.0:
         return _refused(s, 23)
-    i24 = _whole(s.gripper_ref_command_echo)
-    if not 0 <= i24 <= 2:
+    i14 = i14 + 0.0
+    i15 = _real(s.from_robot_plate_1)
+    if not -4000.0 <= i15 <= 4000.0:
         return _refused(s, 24)
-    i25 = _whole(s.gripper_status_report)
-    if not 0 <= i25 <= 2:
+    i15 = i15 + 0.0
+    i16 = _real(s.from_robot_plate_2)
+    if not -4000.0 <= i16 <= 4000.0:
         return _refused(s, 25)
-    i26 = _whole(s.gripper_failure)
-    if not 0 <= i26 <= 15:
+    i16 = i16 + 0.0
+    i17 = _real(s.from_robot_plate_3)
+    if not -4000.0 <= i17 <= 4000.0:
         return _refused(s, 26)
-    i27 = _real(s.gripper_opening_mm)
-    if not 0.0 <= i27 <= 200.0:
+    i17 = i17 + 0.0
+    i18 = _real(s.from_robot_plate_4)
+    if not -4000.0 <= i18 <= 4000.0:
         return _refused(s, 27)
+    i18 = i18 + 0.0
+    i19 = _real(s.from_robot_plate_5)
+    if not -4000.0 <= i19 <= 4000.0:
+        return _refused(s, 28)
+    i19 = i19 + 0.0
+    i20 = _real(s.from_robot_plate_6)
+    if not -4000.0 <= i20 <= 4000.0:
+        return _refused(s, 29)
+    i20 = i20 + 0.0
+    i21 = _real(s.from_robot_plate_7)
+    if not -4000.0 <= i21 <= 4000.0:
+        return _refused(s, 30)
+    i21 = i21 + 0.0
+    i22 = _real(s.from_robot_plate_8)
+    if not -4000.0 <= i22 <= 4000.0:
+        return _refused(s, 31)
+    i22 = i22 + 0.0
+    i23 = _whole(s.from_gripper_inc_command_echo)
+    if not 0 <= i23 <= 65535:
+        return _refused(s, 48)
+    i24 = _whole(s.from_gripper_ref_command_echo)
+    if not 0 <= i24 <= 2:
+        return _refused(s, 49)
+    i25 = _whole(s.from_gripper_status_report)
+    if not 0 <= i25 <= 2:
+        return _refused(s, 50)
+    i26 = _whole(s.from_gripper_failure)
+    if not 0 <= i26 <= 15:
+        return _refused(s, 51)
+    i27 = _real(s.from_gripper_opening_mm)
+    if not 0.0 <= i27 <= 200.0:
+        return _refused(s, 52)
     i27 = i27 + 0.0
     i28 = _whole(s.goal_known)
     if not 0 <= i28 <= 1:
-        return _refused(s, 28)
+        return _refused(s, 66)
     i29 = _real(s.goal_plate_0)
     if not -4000.0 <= i29 <= 4000.0:
-        return _refused(s, 29)
+        return _refused(s, 67)
     i29 = i29 + 0.0
     i30 = _real(s.goal_plate_1)
     if not -4000.0 <= i30 <= 4000.0:
-        return _refused(s, 30)
+        return _refused(s, 68)
     i30 = i30 + 0.0
     i31 = _real(s.goal_plate_2)
     if not -4000.0 <= i31 <= 4000.0:
-        return _refused(s, 31)
+        return _refused(s, 69)
     i31 = i31 + 0.0
     i32 = _real(s.goal_plate_3)
     if not -4000.0 <= i32 <= 4000.0:
-        return _refused(s, 32)
+        return _refused(s, 70)
     i32 = i32 + 0.0
     i33 = _real(s.goal_plate_4)
     if not -4000.0 <= i33 <= 4000.0:
-        return _refused(s, 33)
+        return _refused(s, 71)
     i33 = i33 + 0.0
     i34 = _real(s.goal_plate_5)
     if not -4000.0 <= i34 <= 4000.0:
-        return _refused(s, 34)
+        return _refused(s, 72)
     i34 = i34 + 0.0
     i35 = _real(s.goal_plate_6)
     if not -4000.0 <= i35 <= 4000.0:
-        return _refused(s, 35)
+        return _refused(s, 73)
     i35 = i35 + 0.0
     i36 = _real(s.goal_plate_7)
     if not -4000.0 <= i36 <= 4000.0:
-        return _refused(s, 36)
+        return _refused(s, 74)
     i36 = i36 + 0.0
     i37 = _real(s.goal_plate_8)
     if not -4000.0 <= i37 <= 4000.0:
-        return _refused(s, 37)
+        return _refused(s, 75)
     i37 = i37 + 0.0
     i38 = _real(s.goal_speed_mm_s)
     if not 1.0 <= i38 <= 2000.0:
-        return _refused(s, 38)
+        return _refused(s, 76)
     i38 = i38 + 0.0
     i39 = _real(s.goal_accel_mm_s2)
     if not 10.0 <= i39 <= 10000.0:
-        return _refused(s, 39)
+        return _refused(s, 77)
     i39 = i39 + 0.0
     i40 = _real(s.goal_breakpoint_mm)
     if not 0.0 <= i40 <= 500.0:
-        return _refused(s, 40)
+        return _refused(s, 78)
     i40 = i40 + 0.0
     i41 = _whole(s.fingers_known)
     if not 0 <= i41 <= 1:
-        return _refused(s, 41)
+        return _refused(s, 79)
     i42 = _real(s.fingers_approach_mm)
     if not 0.0 <= i42 <= 200.0:
-        return _refused(s, 42)
+        return _refused(s, 80)
     i42 = i42 + 0.0
     i43 = _real(s.fingers_departure_mm)
     if not 0.0 <= i43 <= 200.0:
-        return _refused(s, 43)
+        return _refused(s, 81)
     i43 = i43 + 0.0
     i44 = _real(s.fingers_grip_mm)
     if not 0.0 <= i44 <= 200.0:
-        return _refused(s, 44)
+        return _refused(s, 82)
     i44 = i44 + 0.0
     i45 = _real(s.fingers_tolerance_mm)
     if not 0.0 <= i45 <= 50.0:
-        return _refused(s, 45)
+        return _refused(s, 83)
     i45 = i45 + 0.0
     i46 = _real(s.fingers_force_n)
     if not 0.0 <= i46 <= 1000.0:
-        return _refused(s, 46)
+        return _refused(s, 84)
     i46 = i46 + 0.0
     i47 = _real(s.fingers_speed_mm_s)
     if not 0.0 <= i47 <= 500.0:
-        return _refused(s, 47)
+        return _refused(s, 85)
     i47 = i47 + 0.0
-    s.command_inc_command = i0
-    s.command_input_command = i1
-    s.command_obj_ptr = i2
-    s.command_grasp = i3
-    s.command_pose_ptr = i4
-    s.command_displaced_x = i5
-    s.command_displaced_y = i6
-    s.command_displaced_z = i7
-    s.command_displaced_c = i8
-    s.command_displaced_s = i9
-    s.robot_inc_command_echo = i10
-    s.robot_ref_command_echo = i11
-    s.robot_status_report = i12
-    s.robot_failure = i13
-    s.robot_plate_0 = i14
-    s.robot_plate_1 = i15
-    s.robot_plate_2 = i16
-    s.robot_plate_3 = i17
-    s.robot_plate_4 = i18
-    s.robot_plate_5 = i19
-    s.robot_plate_6 = i20
-    s.robot_plate_7 = i21
-    s.robot_plate_8 = i22
-    s.gripper_inc_command_echo = i23
-    s.gripper_ref_command_echo = i24
-    s.gripper_status_report = i25
-    s.gripper_failure = i26
-    s.gripper_opening_mm = i27
+    s.emove_inc_command = i0
+    s.emove_input_command = i1
+    s.emove_obj_ptr = i2
+    s.emove_grasp = i3
+    s.emove_pose_ptr = i4
+    s.emove_displaced_x = i5
+    s.emove_displaced_y = i6
+    s.emove_displaced_z = i7
+    s.emove_displaced_c = i8
+    s.emove_displaced_s = i9
+    s.from_robot_inc_command_echo = i10
+    s.from_robot_ref_command_echo = i11
+    s.from_robot_status_report = i12
+    s.from_robot_failure = i13
+    s.from_robot_plate_0 = i14
+    s.from_robot_plate_1 = i15
+    s.from_robot_plate_2 = i16
+    s.from_robot_plate_3 = i17
+    s.from_robot_plate_4 = i18
+    s.from_robot_plate_5 = i19
+    s.from_robot_plate_6 = i20
+    s.from_robot_plate_7 = i21
+    s.from_robot_plate_8 = i22
+    s.from_gripper_inc_command_echo = i23
+    s.from_gripper_ref_command_echo = i24
+    s.from_gripper_status_report = i25
+    s.from_gripper_failure = i26
+    s.from_gripper_opening_mm = i27
     s.goal_known = i28
     s.goal_plate_0 = i29
     s.goal_plate_1 = i30
@@ -1439,14 +1464,14 @@ def _admit(s):
 
 def _settle(s):
     """Deferred variables take their next values, all at once."""
-    ready0 = ((s.robot_inc_command_echo == s.to_robot_inc_command) and (s.gripper_inc_command_echo == s.to_gripper_inc_command))
+    ready0 = ((s.from_robot_inc_command_echo == s.to_robot_inc_command) and (s.from_gripper_inc_command_echo == s.to_gripper_inc_command))
     if ready0:
         s.cur_state = s.cur_state_next
 
 
 def approach_position_fingers_line(s):
     """The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2 several."""
-    return _APPROACH_POSITION_FINGERS_LINE[s.cur_state * 12 + s.gripper_status_in * 4 + s.fingers_known * 2 + s.new_command]
+    return _APPROACH_POSITION_FINGERS_LINE[s.cur_state * 12 + s.gripper_status * 4 + s.new_command * 2 + s.fingers_known]
 
 
 def approach_position_fingers_lines(states):
@@ -1456,10 +1481,8 @@ def approach_position_fingers_lines(states):
 
 def _run_approach_position_fingers(s):
     """Matches table approach_position_fingers and runs the line."""
-    if not (not (not s.new_command) or ((not (s.cur_state == 2) or ((s.ref_robot_in == 1) and (s.ref_gripper_in == 0))) and (not (s.cur_state == 3) or ((s.ref_robot_in == 0) and (s.ref_gripper_in in (1, 2,)))))):  # in_step
+    if not (not (not s.new_command) or (s.cur_state in (0, 1, 3,))):  # approach_position_fingers_in_step
         s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 3,))):  # approach_states
-        s.assumptions_failed |= 1 << 1
     line = approach_position_fingers_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1470,7 +1493,6 @@ def _run_approach_position_fingers(s):
 
 def _approach_position_fingers_0(s):
     """primitive/approach_position_fingers.rcs line 1"""
-    _do_begin(s)
     _do_nextstate(s, 3)
     _do_position(s, s.fingers_approach_mm + 0.0)
     _do_executing(s)
@@ -1478,11 +1500,10 @@ def _approach_position_fingers_0(s):
 
 def _approach_position_fingers_1(s):
     """primitive/approach_position_fingers.rcs line 2"""
-    _do_begin(s)
     _do_grip_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _approach_position_fingers_2(s):
@@ -1501,7 +1522,7 @@ def _approach_position_fingers_4(s):
     _do_grip_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _approach_position_fingers_5(s):
@@ -1512,7 +1533,7 @@ def _approach_position_fingers_5(s):
 def _approach_position_fingers_6(s):
     """primitive/approach_position_fingers.rcs line 7"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _approach_position_fingers_7(s):
@@ -1520,7 +1541,7 @@ def _approach_position_fingers_7(s):
     _do_grip_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def approach_position_fingers_step(s):
@@ -1537,7 +1558,7 @@ def approach_position_fingers_step(s):
 
 def departure_position_fingers_line(s):
     """The line of table departure_position_fingers that matches admitted inputs: its position; -1 none, -2 several."""
-    return _DEPARTURE_POSITION_FINGERS_LINE[s.cur_state * 12 + s.gripper_status_in * 4 + s.fingers_known * 2 + s.new_command]
+    return _DEPARTURE_POSITION_FINGERS_LINE[s.cur_state * 12 + s.gripper_status * 4 + s.new_command * 2 + s.fingers_known]
 
 
 def departure_position_fingers_lines(states):
@@ -1547,10 +1568,8 @@ def departure_position_fingers_lines(states):
 
 def _run_departure_position_fingers(s):
     """Matches table departure_position_fingers and runs the line."""
-    if not (not (not s.new_command) or ((not (s.cur_state == 2) or ((s.ref_robot_in == 1) and (s.ref_gripper_in == 0))) and (not (s.cur_state == 3) or ((s.ref_robot_in == 0) and (s.ref_gripper_in in (1, 2,)))))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 3,))):  # departure_states
-        s.assumptions_failed |= 1 << 2
+    if not (not (not s.new_command) or (s.cur_state in (0, 1, 3,))):  # departure_position_fingers_in_step
+        s.assumptions_failed |= 1 << 1
     line = departure_position_fingers_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1561,7 +1580,6 @@ def _run_departure_position_fingers(s):
 
 def _departure_position_fingers_0(s):
     """primitive/departure_position_fingers.rcs line 1"""
-    _do_begin(s)
     _do_nextstate(s, 3)
     _do_position(s, s.fingers_departure_mm + 0.0)
     _do_executing(s)
@@ -1569,11 +1587,10 @@ def _departure_position_fingers_0(s):
 
 def _departure_position_fingers_1(s):
     """primitive/departure_position_fingers.rcs line 2"""
-    _do_begin(s)
     _do_grip_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _departure_position_fingers_2(s):
@@ -1592,7 +1609,7 @@ def _departure_position_fingers_4(s):
     _do_grip_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _departure_position_fingers_5(s):
@@ -1603,7 +1620,7 @@ def _departure_position_fingers_5(s):
 def _departure_position_fingers_6(s):
     """primitive/departure_position_fingers.rcs line 7"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _departure_position_fingers_7(s):
@@ -1611,7 +1628,7 @@ def _departure_position_fingers_7(s):
     _do_grip_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def departure_position_fingers_step(s):
@@ -1629,7 +1646,7 @@ def departure_position_fingers_step(s):
 def goto__line(s):
     """The line of table goto that matches admitted inputs: its position; -1 none, -2 several."""
     try:
-        return _GOTO__ONE[0][_GOTO__G0[s.waited * 2 + s.goal_known] & _GOTO__G1[s.cur_state * 24 + s.robot_status_in * 8 + s.new_command * 4 + s.there * 2 + s.settled]]
+        return _GOTO__ONE[0][_GOTO__G0[s.waited * 2 + s.new_command] & _GOTO__G1[s.cur_state * 24 + s.robot_status * 8 + s.goal_known * 4 + s.there * 2 + s.settled]]
     except KeyError:
         return -2
 
@@ -1641,10 +1658,8 @@ def goto__lines(states):
 
 def _run_goto_(s):
     """Matches table goto and runs the line."""
-    if not (not (not s.new_command) or ((not (s.cur_state == 2) or ((s.ref_robot_in == 1) and (s.ref_gripper_in == 0))) and (not (s.cur_state == 3) or ((s.ref_robot_in == 0) and (s.ref_gripper_in in (1, 2,)))))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 2,))):  # goto_states
-        s.assumptions_failed |= 1 << 3
+    if not (not (not s.new_command) or (s.cur_state in (0, 1, 2,))):  # goto_in_step
+        s.assumptions_failed |= 1 << 2
     line = goto__line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1655,7 +1670,6 @@ def _run_goto_(s):
 
 def _goto__0(s):
     """primitive/goto.rcs line 1"""
-    _do_begin(s)
     _do_start(s)
     _do_nextstate(s, 2)
     _do_follow(s)
@@ -1664,11 +1678,10 @@ def _goto__0(s):
 
 def _goto__1(s):
     """primitive/goto.rcs line 2"""
-    _do_begin(s)
     _do_no_pose(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _goto__2(s):
@@ -1689,7 +1702,7 @@ def _goto__4(s):
     _do_robot_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _goto__5(s):
@@ -1711,7 +1724,7 @@ def _goto__7(s):
     _do_robot_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _goto__8(s):
@@ -1719,7 +1732,7 @@ def _goto__8(s):
     _do_robot_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _goto__9(s):
@@ -1730,7 +1743,7 @@ def _goto__9(s):
 def _goto__10(s):
     """primitive/goto.rcs line 9"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _goto__11(s):
@@ -1738,7 +1751,7 @@ def _goto__11(s):
     _do_robot_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def goto__step(s):
@@ -1755,7 +1768,7 @@ def goto__step(s):
 
 def gothru_line(s):
     """The line of table gothru that matches admitted inputs: its position; -1 none, -2 several."""
-    return _GOTHRU_LINE[s.cur_state * 24 + s.robot_status_in * 8 + s.goal_known * 4 + s.new_command * 2 + s.near]
+    return _GOTHRU_LINE[s.cur_state * 24 + s.robot_status * 8 + s.new_command * 4 + s.goal_known * 2 + s.near]
 
 
 def gothru_lines(states):
@@ -1765,10 +1778,8 @@ def gothru_lines(states):
 
 def _run_gothru(s):
     """Matches table gothru and runs the line."""
-    if not (not (not s.new_command) or ((not (s.cur_state == 2) or ((s.ref_robot_in == 1) and (s.ref_gripper_in == 0))) and (not (s.cur_state == 3) or ((s.ref_robot_in == 0) and (s.ref_gripper_in in (1, 2,)))))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 2,))):  # gothru_states
-        s.assumptions_failed |= 1 << 4
+    if not (not (not s.new_command) or (s.cur_state in (0, 1, 2,))):  # gothru_in_step
+        s.assumptions_failed |= 1 << 3
     line = gothru_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1779,7 +1790,6 @@ def _run_gothru(s):
 
 def _gothru_0(s):
     """primitive/gothru.rcs line 1"""
-    _do_begin(s)
     _do_start(s)
     _do_nextstate(s, 2)
     _do_follow(s)
@@ -1788,11 +1798,10 @@ def _gothru_0(s):
 
 def _gothru_1(s):
     """primitive/gothru.rcs line 2"""
-    _do_begin(s)
     _do_no_pose(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _gothru_2(s):
@@ -1819,13 +1828,13 @@ def _gothru_5(s):
     _do_robot_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _gothru_6(s):
     """primitive/gothru.rcs line 7"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _gothru_7(s):
@@ -1833,7 +1842,7 @@ def _gothru_7(s):
     _do_robot_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def gothru_step(s):
@@ -1850,7 +1859,7 @@ def gothru_step(s):
 
 def immed_grasp_line(s):
     """The line of table immed_grasp that matches admitted inputs: its position; -1 none, -2 several."""
-    return _IMMED_GRASP_LINE[s.cur_state * 24 + s.gripper_status_in * 8 + s.fingers_known * 4 + s.new_command * 2 + s.fits]
+    return _IMMED_GRASP_LINE[s.cur_state * 24 + s.gripper_status * 8 + s.new_command * 4 + s.fingers_known * 2 + s.fits]
 
 
 def immed_grasp_lines(states):
@@ -1860,10 +1869,8 @@ def immed_grasp_lines(states):
 
 def _run_immed_grasp(s):
     """Matches table immed_grasp and runs the line."""
-    if not (not (not s.new_command) or ((not (s.cur_state == 2) or ((s.ref_robot_in == 1) and (s.ref_gripper_in == 0))) and (not (s.cur_state == 3) or ((s.ref_robot_in == 0) and (s.ref_gripper_in in (1, 2,)))))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 3,))):  # grasp_states
-        s.assumptions_failed |= 1 << 5
+    if not (not (not s.new_command) or (s.cur_state in (0, 1, 3,))):  # immed_grasp_in_step
+        s.assumptions_failed |= 1 << 4
     line = immed_grasp_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1874,7 +1881,6 @@ def _run_immed_grasp(s):
 
 def _immed_grasp_0(s):
     """primitive/immed_grasp.rcs line 1"""
-    _do_begin(s)
     _do_nextstate(s, 3)
     _do_grasp(s)
     _do_executing(s)
@@ -1882,11 +1888,10 @@ def _immed_grasp_0(s):
 
 def _immed_grasp_1(s):
     """primitive/immed_grasp.rcs line 2"""
-    _do_begin(s)
     _do_grip_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _immed_grasp_2(s):
@@ -1905,7 +1910,7 @@ def _immed_grasp_4(s):
     _do_misfit_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _immed_grasp_5(s):
@@ -1913,7 +1918,7 @@ def _immed_grasp_5(s):
     _do_grip_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _immed_grasp_6(s):
@@ -1924,7 +1929,7 @@ def _immed_grasp_6(s):
 def _immed_grasp_7(s):
     """primitive/immed_grasp.rcs line 8"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _immed_grasp_8(s):
@@ -1932,7 +1937,7 @@ def _immed_grasp_8(s):
     _do_grip_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def immed_grasp_step(s):
@@ -1969,7 +1974,6 @@ def _run_pause_primitive(s):
 
 def _pause_primitive_0(s):
     """primitive/pause.rcs line 1"""
-    _do_begin(s)
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_done(s)
@@ -1977,6 +1981,7 @@ def _pause_primitive_0(s):
 
 def _pause_primitive_1(s):
     """primitive/pause.rcs line 2"""
+    _do_settle(s)
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_executing(s)
@@ -2000,12 +2005,13 @@ def primitive_cycle(s):
     if s.fault == 0:
         try:
             _settle(s)
-            _do_receive(s)
+            _do_take_orders(s)
+            _do_start_waiting(s)
             _do_measure(s)
-            {0: _run_pause_primitive, 1: _run_goto_, 2: _run_gothru, 3: _run_approach_position_fingers, 4: _run_departure_position_fingers, 5: _run_immed_grasp}[s.command_input_command](s)
+            {0: _run_pause_primitive, 1: _run_goto_, 2: _run_gothru, 3: _run_approach_position_fingers, 4: _run_departure_position_fingers, 5: _run_immed_grasp}[s.emove_input_command](s)
             if s.fault == 0:
-                _do_send(s)
-                _do_answer(s)
+                _do_hold_part(s)
+                _do_give_orders(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
     return s.fault

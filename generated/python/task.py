@@ -143,27 +143,57 @@ class State:
     `assumptions_failed` the k-th assumption that is checked.
 
     Assumptions that are checked:
-    0 in_step: only told in acquire, clear, move, release_part, transfer
-    1 resting: only told in acquire, clear, move, release_part, transfer
-    2 acquire_states: only told in acquire
-    3 clear_states: only told in clear
-    4 move_states: only told in move
-    5 release_states: only told in release_part
+    0 acquire_in_step: only told in acquire
+    1 acquire_resting: only told in acquire
+    2 clear_in_step: only told in clear
+    3 clear_resting: only told in clear
+    4 move_in_step: only told in move
+    5 move_resting: only told in move
+    6 release_part_in_step: only told in release_part
+    7 release_part_resting: only told in release_part
+    8 transfer_in_step: only told in transfer
+    9 transfer_resting: only told in transfer
     """
 
     __slots__ = (
-        "command_inc_command",
-        "command_input_command",
-        "command_obj",
-        "command_grasp",
-        "command_source_locpt",
-        "command_dest_locpt",
-        "command_end_at_locpt",
-        "command_sector",
-        "emove_inc_command_echo",
-        "emove_ref_command_echo",
-        "emove_status_report",
+        "workstation_inc_command",
+        "workstation_input_command",
+        "workstation_obj",
+        "workstation_grasp",
+        "workstation_source_locpt",
+        "workstation_dest_locpt",
+        "workstation_end_at_locpt",
+        "workstation_sector",
+        "to_workstation_inc_command_echo",
+        "to_workstation_ref_command_echo",
+        "to_workstation_status_report",
+        "to_workstation_status_parameter",
+        "to_workstation_failure",
+        "new_command",
+        "answered",
+        "settling",
+        "inc_command_seen",
+        "from_emove_inc_command_echo",
+        "from_emove_ref_command_echo",
+        "from_emove_status_report",
+        "from_emove_failure",
+        "to_emove_inc_command",
+        "to_emove_input_command",
+        "to_emove_obj_ptr",
+        "to_emove_grasp",
+        "to_emove_locpt_ptr",
+        "to_emove_sector",
+        "to_emove_apoint_pos_flag",
+        "to_emove_gripped_obj_ptr",
+        "emove_command",
+        "emove_status",
+        "emove_resting",
         "emove_failure",
+        "last_emove_input_command",
+        "last_emove_obj_ptr",
+        "last_emove_grasp",
+        "last_emove_locpt_ptr",
+        "last_emove_sector",
         "source_known",
         "source_vision",
         "source_buffer",
@@ -184,12 +214,6 @@ class State:
         "here_buffer",
         "here_vupos",
         "here_safe",
-        "new_command",
-        "begun",
-        "inc_command_seen",
-        "ref_command_in",
-        "status_in",
-        "idle",
         "cur_state",
         "cur_state_next",
         "loc_of_obj",
@@ -202,33 +226,11 @@ class State:
         "remember_current_loc",
         "current_loc",
         "current_sector",
-        "old_order_inc_command",
-        "old_order_input_command",
-        "old_order_obj_ptr",
-        "old_order_grasp",
-        "old_order_locpt_ptr",
-        "old_order_sector",
-        "old_order_apoint_pos_flag",
-        "old_order_gripped_obj_ptr",
         "tbuffer_boxt",
         "bbuffer_boxb",
         "fbuffer_flag",
         "hbuffer_hous",
-        "status_report",
-        "failure",
-        "to_emove_inc_command",
-        "to_emove_input_command",
-        "to_emove_obj_ptr",
-        "to_emove_grasp",
-        "to_emove_locpt_ptr",
-        "to_emove_sector",
-        "to_emove_apoint_pos_flag",
-        "to_emove_gripped_obj_ptr",
-        "report_inc_command_echo",
-        "report_ref_command_echo",
-        "report_status_report",
-        "report_status_parameter",
-        "report_failure",
+        "echoed",
         "line",
         "fault",
         "fault_at",
@@ -236,23 +238,49 @@ class State:
     )
 
     def __init__(self):
-        self.command_inc_command = 0  # From the WORKSTATION.
-        self.command_input_command = 0  # From the WORKSTATION.
-        self.command_obj = 0  # From the WORKSTATION.
-        self.command_grasp = 0  # From the WORKSTATION.
-        self.command_source_locpt = 0  # From the WORKSTATION.
-        self.command_dest_locpt = 0  # From the WORKSTATION.
-        self.command_end_at_locpt = 0  # From the WORKSTATION.
-        self.command_sector = 0  # From the WORKSTATION.
-        self.emove_inc_command_echo = 0  # From E-MOVE.
-        self.emove_ref_command_echo = 0  # From E-MOVE.
-        self.emove_status_report = 0  # From E-MOVE.
-        self.emove_failure = 0  # From E-MOVE.
-        self.source_known = False  # From the database: the source of the command.
-        self.source_vision = False  # From the database: the source of the command.
-        self.source_buffer = False  # From the database: the source of the command.
-        self.source_vupos = 0  # From the database: the source of the command.
-        self.source_safe = 0  # From the database: the source of the command.
+        self.workstation_inc_command = 0  # Orders of workstation.
+        self.workstation_input_command = 0  # Orders of workstation.
+        self.workstation_obj = 0  # Orders of workstation.
+        self.workstation_grasp = 0  # Orders of workstation.
+        self.workstation_source_locpt = 0  # Orders of workstation.
+        self.workstation_dest_locpt = 0  # Orders of workstation.
+        self.workstation_end_at_locpt = 0  # Orders of workstation.
+        self.workstation_sector = 0  # Orders of workstation.
+        self.to_workstation_inc_command_echo = 0  # Reports to workstation.
+        self.to_workstation_ref_command_echo = 0  # Reports to workstation.
+        self.to_workstation_status_report = 0  # Reports to workstation.
+        self.to_workstation_status_parameter = 0  # Reports to workstation.
+        self.to_workstation_failure = 0  # Reports to workstation.
+        self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
+        self.answered = False  # A line has answered the new command.
+        self.settling = False  # The line of this cycle lets the levels below rest first, and answers nothing.
+        self.inc_command_seen = 0  # Number of the order that was taken last.
+        self.from_emove_inc_command_echo = 0  # Reports of emove, as they come.
+        self.from_emove_ref_command_echo = 0  # Reports of emove, as they come.
+        self.from_emove_status_report = 0  # Reports of emove, as they come.
+        self.from_emove_failure = 0  # Reports of emove, as they come.
+        self.to_emove_inc_command = 0  # Orders to emove.
+        self.to_emove_input_command = 0  # Orders to emove.
+        self.to_emove_obj_ptr = 0  # Orders to emove.
+        self.to_emove_grasp = 0  # Orders to emove.
+        self.to_emove_locpt_ptr = 0  # Orders to emove.
+        self.to_emove_sector = 0  # Orders to emove.
+        self.to_emove_apoint_pos_flag = False  # Orders to emove.
+        self.to_emove_gripped_obj_ptr = 0  # Orders to emove.
+        self.emove_command = 0  # What emove says of the last orders, held until they are echoed.
+        self.emove_status = 0  # What emove says of the last orders, held until they are echoed.
+        self.emove_resting = False  # What emove says of the last orders, held until they are echoed.
+        self.emove_failure = 0  # What emove says of the last orders, held until they are echoed.
+        self.last_emove_input_command = 0  # The order to emove that was numbered last.
+        self.last_emove_obj_ptr = 0  # The order to emove that was numbered last.
+        self.last_emove_grasp = 0  # The order to emove that was numbered last.
+        self.last_emove_locpt_ptr = 0  # The order to emove that was numbered last.
+        self.last_emove_sector = 0  # The order to emove that was numbered last.
+        self.source_known = False  # From the database: the source of the workstation.
+        self.source_vision = False  # From the database: the source of the workstation.
+        self.source_buffer = False  # From the database: the source of the workstation.
+        self.source_vupos = 0  # From the database: the source of the workstation.
+        self.source_safe = 0  # From the database: the source of the workstation.
         self.dest_known = False  # From the database: its destination.
         self.dest_vision = False  # From the database: its destination.
         self.dest_buffer = False  # From the database: its destination.
@@ -268,12 +296,6 @@ class State:
         self.here_buffer = False  # From the database: where the robot is.
         self.here_vupos = 0  # From the database: where the robot is.
         self.here_safe = 0  # From the database: where the robot is.
-        self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
-        self.begun = False  # This level has answered the new command; pausing the level below first is no answer.
-        self.inc_command_seen = 0  # Number of the command now being worked on; echoed to the WORKSTATION.
-        self.ref_command_in = 0  # Command that E-MOVE last echoed.
-        self.status_in = 0  # Status that E-MOVE reports.
-        self.idle = True  # E-MOVE rests, and what it says answers this level's last order.
         self.cur_state = 0  # Where the table is in its sequence.
         self.cur_state_next = 0  # Where the table is in its sequence.
         self.loc_of_obj = 0  # Whether vision is needed at the source.
@@ -286,33 +308,11 @@ class State:
         self.remember_current_loc = 0  # Where the object was taken from.
         self.current_loc = 0  # Where the robot is; 0 while it moves.
         self.current_sector = 0
-        self.old_order_inc_command = 0  # The order that was last numbered.
-        self.old_order_input_command = 0  # The order that was last numbered.
-        self.old_order_obj_ptr = 0  # The order that was last numbered.
-        self.old_order_grasp = 0  # The order that was last numbered.
-        self.old_order_locpt_ptr = 0  # The order that was last numbered.
-        self.old_order_sector = 0  # The order that was last numbered.
-        self.old_order_apoint_pos_flag = False  # The order that was last numbered.
-        self.old_order_gripped_obj_ptr = 0  # The order that was last numbered.
         self.tbuffer_boxt = 10  # Box tops left on the buffer table.
         self.bbuffer_boxb = 10  # Box bottoms left on the buffer table.
         self.fbuffer_flag = 10  # Flags left on the buffer table.
         self.hbuffer_hous = 10  # Houses left on the buffer table.
-        self.status_report = 0  # What the command does, to be reported.
-        self.failure = 0  # Why the command failed.
-        self.to_emove_inc_command = 0  # To E-MOVE.
-        self.to_emove_input_command = 0  # To E-MOVE.
-        self.to_emove_obj_ptr = 0  # To E-MOVE.
-        self.to_emove_grasp = 0  # To E-MOVE.
-        self.to_emove_locpt_ptr = 0  # To E-MOVE.
-        self.to_emove_sector = 0  # To E-MOVE.
-        self.to_emove_apoint_pos_flag = False  # To E-MOVE.
-        self.to_emove_gripped_obj_ptr = 0  # To E-MOVE.
-        self.report_inc_command_echo = 0  # To the WORKSTATION.
-        self.report_ref_command_echo = 0  # To the WORKSTATION.
-        self.report_status_report = 0  # To the WORKSTATION.
-        self.report_status_parameter = 0  # To the WORKSTATION.
-        self.report_failure = 0  # To the WORKSTATION.
+        self.echoed = False  # Every last order is echoed, or too late.
         self.line = -1
         self.fault = 0
         self.fault_at = -1
@@ -662,61 +662,20 @@ _TRANSFER_ONE = (
 )
 
 
-def _do_receive(s):
-    """A new number sets the flag; it falls when this level's own answer is echoed. What E-MOVE says of an order that another has replaced is not looked at: until the last one is echoed the level sees what it saw when it gave it."""
-    if (s.command_inc_command != s.inc_command_seen):
-        s.inc_command_seen = s.command_inc_command
-        s.new_command = True
-        s.begun = False
-        s.failure = 0
-    else:
-        if (s.begun and (s.emove_inc_command_echo == s.to_emove_inc_command)):
-            s.new_command = False
-    if (s.emove_inc_command_echo == s.to_emove_inc_command):
-        s.ref_command_in = s.emove_ref_command_echo
-        s.status_in = s.emove_status_report
-    s.idle = (((s.ref_command_in == 0) and (s.status_in == 0)) and (s.begun or (s.emove_inc_command_echo == s.to_emove_inc_command)))
-
-
 def _do_test_variables(s):
     """The table test variables that the command and the database give (section 8.1)."""
     if s.source_vision:
         s.loc_of_obj = 0
     else:
         s.loc_of_obj = 1
-    s.source_spec = ((s.command_source_locpt != 0) and s.source_known)
-    s.dest_spec = ((s.command_dest_locpt != 0) and s.dest_known)
-    s.names_known = ((((s.command_source_locpt == 0) or s.source_known) and ((s.command_dest_locpt == 0) or s.dest_known)) and ((s.command_end_at_locpt == 0) or s.end_at_known))
+    s.source_spec = ((s.workstation_source_locpt != 0) and s.source_known)
+    s.dest_spec = ((s.workstation_dest_locpt != 0) and s.dest_known)
+    s.names_known = ((((s.workstation_source_locpt == 0) or s.source_known) and ((s.workstation_dest_locpt == 0) or s.dest_known)) and ((s.workstation_end_at_locpt == 0) or s.end_at_known))
 
 
-def _do_send(s):
-    """A new order takes the next number."""
-    if (((((s.to_emove_input_command != s.old_order_input_command) or (s.to_emove_obj_ptr != s.old_order_obj_ptr)) or (s.to_emove_locpt_ptr != s.old_order_locpt_ptr)) or (s.to_emove_sector != s.old_order_sector)) or (s.to_emove_grasp != s.old_order_grasp)):
-        s.to_emove_inc_command = _mod((s.to_emove_inc_command + 1), 65536)
-    s.old_order_input_command = s.to_emove_input_command
-    s.old_order_obj_ptr = s.to_emove_obj_ptr
-    s.old_order_locpt_ptr = s.to_emove_locpt_ptr
-    s.old_order_sector = s.to_emove_sector
-    s.old_order_grasp = s.to_emove_grasp
-
-
-def _do_answer(s):
-    """What the WORKSTATION sees."""
-    s.report_inc_command_echo = s.inc_command_seen
-    s.report_ref_command_echo = s.command_input_command
-    s.report_status_report = s.status_report
-    s.report_status_parameter = s.obj_now_in_gripper
-    s.report_failure = s.failure
-
-
-def _do_begin(s):
-    """This line answers the new command."""
-    s.begun = True
-
-
-def _do_settle(s):
-    """A new command finds the level below at work: pause it first."""
-    s.begun = False
+def _do_tell_gripped(s):
+    """The WORKSTATION is told what is in the gripper."""
+    s.to_workstation_status_parameter = s.obj_now_in_gripper
 
 
 def _do_nextstate(s, v_value):
@@ -726,29 +685,29 @@ def _do_nextstate(s, v_value):
 
 def _do_set_source(s):
     """Procedure set_source."""
-    s.to_emove_obj_ptr = s.command_obj
-    s.to_emove_grasp = s.command_grasp
-    s.to_emove_locpt_ptr = s.command_source_locpt
-    s.to_emove_sector = s.command_sector
-    s.remember_current_loc = s.command_source_locpt
+    s.to_emove_obj_ptr = s.workstation_obj
+    s.to_emove_grasp = s.workstation_grasp
+    s.to_emove_locpt_ptr = s.workstation_source_locpt
+    s.to_emove_sector = s.workstation_sector
+    s.remember_current_loc = s.workstation_source_locpt
     s.current_loc = 0
 
 
 def _do_vupos_setup(s):
     """Procedure vupos_setup."""
-    s.to_emove_sector = s.command_sector
+    s.to_emove_sector = s.workstation_sector
     s.to_emove_locpt_ptr = s.source_vupos
-    s.remember_current_loc = s.command_source_locpt
-    s.to_emove_obj_ptr = s.command_obj
-    s.to_emove_grasp = s.command_grasp
+    s.remember_current_loc = s.workstation_source_locpt
+    s.to_emove_obj_ptr = s.workstation_obj
+    s.to_emove_grasp = s.workstation_grasp
     s.to_emove_apoint_pos_flag = False
     s.current_loc = 0
 
 
 def _do_locate(s):
     """Procedure locate."""
-    s.to_emove_obj_ptr = s.command_obj
-    s.to_emove_locpt_ptr = s.command_source_locpt
+    s.to_emove_obj_ptr = s.workstation_obj
+    s.to_emove_locpt_ptr = s.workstation_source_locpt
     s.to_emove_input_command = 3
 
 
@@ -759,33 +718,28 @@ def _do_move_to(s):
 
 def _do_move_to_obj(s):
     """Procedure move_to_obj."""
-    s.to_emove_obj_ptr = s.command_obj
-    s.to_emove_grasp = s.command_grasp
+    s.to_emove_obj_ptr = s.workstation_obj
+    s.to_emove_grasp = s.workstation_grasp
     s.to_emove_input_command = 2
 
 
 def _do_pickup(s):
     """Takes one part off the count of the buffer, or gives up: nothing to pick up."""
-    s.to_emove_obj_ptr = s.command_obj
+    s.to_emove_obj_ptr = s.workstation_obj
     s.to_emove_input_command = 4
     s.obj_acquired = True
-    s.obj_now_in_gripper = s.command_obj
-    s.grasp_now = s.command_grasp
-    s.to_emove_gripped_obj_ptr = s.command_obj
-    s.current_loc = s.command_source_locpt
-    s.current_sector = s.command_sector
+    s.obj_now_in_gripper = s.workstation_obj
+    s.grasp_now = s.workstation_grasp
+    s.to_emove_gripped_obj_ptr = s.workstation_obj
+    s.current_loc = s.workstation_source_locpt
+    s.current_sector = s.workstation_sector
     _do_remove_from_buffer_db(s)
 
 
-def _do_pause(s):
-    """Procedure pause."""
-    s.to_emove_input_command = 0
-
-
 def _do_remove_from_buffer_db(s):
-    """Counts once: the line matches again until PICKUP is echoed, and by then PICKUP is the old command."""
-    if (s.source_buffer and (s.old_order_input_command != 4)):
-        case_1 = s.command_obj
+    """Counts once: the line matches again until PICKUP is echoed, and by then PICKUP is the old workstation."""
+    if (s.source_buffer and (s.last_emove_input_command != 4)):
+        case_1 = s.workstation_obj
         if case_1 in (1,):
             if (s.tbuffer_boxt > 0):
                 s.tbuffer_boxt = (s.tbuffer_boxt - 1)
@@ -810,7 +764,7 @@ def _do_remove_from_buffer_db(s):
 
 def _do_buffer_empty(s):
     """Nothing of that type is on the buffer: fail, and let the robot rest."""
-    s.failure = 6
+    s.to_workstation_failure = 6
     _do_none_acquired(s)
     s.to_emove_input_command = 0
     s.cur_state_next = 1
@@ -825,26 +779,26 @@ def _do_none_acquired(s):
 
 def _do_cmd_failure(s):
     """Procedure cmd_failure."""
-    s.failure = 1
+    s.to_workstation_failure = 1
 
 
 def _do_lost_on_the_way(s):
     """E-MOVE found that the part is not between the fingers any more."""
     if (s.emove_failure == 11):
-        s.failure = 11
+        s.to_workstation_failure = 11
         _do_none_acquired(s)
 
 
 def _do_move_failure(s):
     """Procedure move_failure."""
-    s.failure = 2
+    s.to_workstation_failure = 2
     s.remember_current_loc = 0
     _do_lost_on_the_way(s)
 
 
 def _do_loc_failure(s):
     """Procedure loc_failure."""
-    s.failure = 3
+    s.to_workstation_failure = 3
 
 
 def _do_add_to_buffer_db(s, v_what):
@@ -866,13 +820,13 @@ def _do_add_to_buffer_db(s, v_what):
 
 def _do_back_to_buffer_db(s):
     """What was counted off and could not be picked up lies there still; once: the order that follows is no PICKUP."""
-    if (s.source_buffer and (s.old_order_input_command == 4)):
-        _do_add_to_buffer_db(s, s.command_obj)
+    if (s.source_buffer and (s.last_emove_input_command == 4)):
+        _do_add_to_buffer_db(s, s.workstation_obj)
 
 
 def _do_pic_failure(s):
     """Nothing, or a part of the wrong size, is in the gripper."""
-    s.failure = 4
+    s.to_workstation_failure = 4
     _do_back_to_buffer_db(s)
     _do_none_acquired(s)
     if (s.emove_failure == 12):
@@ -883,35 +837,20 @@ def _do_pic_failure(s):
 
 def _do_state_failure(s):
     """Procedure state_failure."""
-    s.failure = 5
-
-
-def _do_executing(s):
-    """Procedure executing."""
-    s.status_report = 1
-
-
-def _do_done(s):
-    """Procedure done."""
-    s.status_report = 0
-
-
-def _do_fail(s):
-    """Procedure fail."""
-    s.status_report = 2
+    s.to_workstation_failure = 5
 
 
 def _do_set_dest(s):
-    """The destination of the command."""
-    s.to_emove_locpt_ptr = s.command_dest_locpt
-    s.to_emove_sector = s.command_sector
+    """The destination of the workstation."""
+    s.to_emove_locpt_ptr = s.workstation_dest_locpt
+    s.to_emove_sector = s.workstation_sector
     s.current_loc = 0
 
 
 def _do_arrived(s):
     """The robot is at the destination."""
-    s.current_loc = s.command_dest_locpt
-    s.current_sector = s.command_sector
+    s.current_loc = s.workstation_dest_locpt
+    s.current_sector = s.workstation_sector
 
 
 def _do_release(s):
@@ -930,8 +869,8 @@ def _do_released(s):
 
 def _do_set_end(s):
     """Where to end: as the command says, else at the safe position of the place where the robot is."""
-    if (s.command_end_at_locpt != 0):
-        s.to_emove_locpt_ptr = s.command_end_at_locpt
+    if (s.workstation_end_at_locpt != 0):
+        s.to_emove_locpt_ptr = s.workstation_end_at_locpt
     else:
         s.to_emove_locpt_ptr = s.here_safe
     s.to_emove_sector = 0
@@ -945,126 +884,183 @@ def _do_ended(s):
 
 def _do_release_failure(s):
     """Opening the gripper failed: what it holds is not known."""
-    s.failure = s.emove_failure
+    s.to_workstation_failure = s.emove_failure
     _do_lost_on_the_way(s)
+
+
+def _do_take_orders(s):
+    """Procedure take_orders."""
+    s.echoed = (s.from_emove_inc_command_echo == s.to_emove_inc_command)
+    if (s.workstation_inc_command != s.inc_command_seen):
+        s.inc_command_seen = s.workstation_inc_command
+        s.new_command = True
+        s.answered = False
+        s.to_workstation_status_report = 1
+        s.to_workstation_failure = 0
+    else:
+        if (s.answered and s.echoed):
+            s.new_command = False
+    s.settling = False
+    if s.echoed:
+        s.emove_command = s.from_emove_ref_command_echo
+        s.emove_status = s.from_emove_status_report
+        s.emove_failure = s.from_emove_failure
+    s.emove_resting = (((s.emove_command == 0) and (s.emove_status == 0)) and (s.answered or s.echoed))
+
+
+def _do_give_orders(s):
+    """Procedure give_orders."""
+    if (s.new_command and (not s.settling)):
+        s.answered = True
+    s.to_workstation_inc_command_echo = s.inc_command_seen
+    s.to_workstation_ref_command_echo = s.workstation_input_command
+    if (((((s.to_emove_input_command != s.last_emove_input_command) or (s.to_emove_obj_ptr != s.last_emove_obj_ptr)) or (s.to_emove_grasp != s.last_emove_grasp)) or (s.to_emove_locpt_ptr != s.last_emove_locpt_ptr)) or (s.to_emove_sector != s.last_emove_sector)):
+        s.to_emove_inc_command = _mod((s.to_emove_inc_command + 1), 65536)
+    s.last_emove_input_command = s.to_emove_input_command
+    s.last_emove_obj_ptr = s.to_emove_obj_ptr
+    s.last_emove_grasp = s.to_emove_grasp
+    s.last_emove_locpt_ptr = s.to_emove_locpt_ptr
+    s.last_emove_sector = s.to_emove_sector
+
+
+def _do_settle(s):
+    """A new command finds a level below at work: let it rest first."""
+    s.settling = True
+    s.to_emove_input_command = 0
+
+
+def _do_done(s):
+    """Procedure done."""
+    s.to_workstation_status_report = 0
+
+
+def _do_executing(s):
+    """Procedure executing."""
+    s.to_workstation_status_report = 1
+
+
+def _do_failed(s):
+    """Procedure failed."""
+    s.to_workstation_status_report = 2
+
+
+def _do_pause(s):
+    """Procedure pause."""
+    s.to_emove_input_command = 0
 
 
 def check(s):
     """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
-    if not (isinstance(s.source_known, int) and 0 <= s.source_known <= 1):
+    if not (isinstance(s.to_workstation_inc_command_echo, int) and 0 <= s.to_workstation_inc_command_echo <= 65535):
+        return 8
+    if not (isinstance(s.to_workstation_ref_command_echo, int) and 0 <= s.to_workstation_ref_command_echo <= 5):
+        return 9
+    if not (isinstance(s.to_workstation_status_report, int) and 0 <= s.to_workstation_status_report <= 2):
+        return 10
+    if not (isinstance(s.to_workstation_status_parameter, int) and 0 <= s.to_workstation_status_parameter <= 6):
+        return 11
+    if not (isinstance(s.to_workstation_failure, int) and 0 <= s.to_workstation_failure <= 15):
         return 12
-    if not (isinstance(s.source_vision, int) and 0 <= s.source_vision <= 1):
-        return 13
-    if not (isinstance(s.source_buffer, int) and 0 <= s.source_buffer <= 1):
-        return 14
-    if not (isinstance(s.dest_known, int) and 0 <= s.dest_known <= 1):
-        return 17
-    if not (isinstance(s.dest_vision, int) and 0 <= s.dest_vision <= 1):
-        return 18
-    if not (isinstance(s.dest_buffer, int) and 0 <= s.dest_buffer <= 1):
-        return 19
-    if not (isinstance(s.end_at_known, int) and 0 <= s.end_at_known <= 1):
-        return 22
-    if not (isinstance(s.end_at_vision, int) and 0 <= s.end_at_vision <= 1):
-        return 23
-    if not (isinstance(s.end_at_buffer, int) and 0 <= s.end_at_buffer <= 1):
-        return 24
-    if not (isinstance(s.here_known, int) and 0 <= s.here_known <= 1):
-        return 27
-    if not (isinstance(s.here_vision, int) and 0 <= s.here_vision <= 1):
-        return 28
-    if not (isinstance(s.here_buffer, int) and 0 <= s.here_buffer <= 1):
-        return 29
     if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
-        return 32
-    if not (isinstance(s.begun, int) and 0 <= s.begun <= 1):
-        return 33
+        return 13
+    if not (isinstance(s.answered, int) and 0 <= s.answered <= 1):
+        return 14
+    if not (isinstance(s.settling, int) and 0 <= s.settling <= 1):
+        return 15
     if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
-        return 34
-    if not (isinstance(s.ref_command_in, int) and 0 <= s.ref_command_in <= 5):
-        return 35
-    if not (isinstance(s.status_in, int) and 0 <= s.status_in <= 2):
-        return 36
-    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
-        return 37
-    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 8):
-        return 38
-    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 8):
-        return 39
-    if not (isinstance(s.loc_of_obj, int) and 0 <= s.loc_of_obj <= 1):
-        return 40
-    if not (isinstance(s.source_spec, int) and 0 <= s.source_spec <= 1):
-        return 41
-    if not (isinstance(s.dest_spec, int) and 0 <= s.dest_spec <= 1):
-        return 42
-    if not (isinstance(s.names_known, int) and 0 <= s.names_known <= 1):
-        return 43
-    if not (isinstance(s.obj_acquired, int) and 0 <= s.obj_acquired <= 1):
-        return 44
-    if not (isinstance(s.obj_now_in_gripper, int) and 0 <= s.obj_now_in_gripper <= 6):
-        return 45
-    if not (isinstance(s.grasp_now, int) and 0 <= s.grasp_now <= 9):
-        return 46
-    if not (isinstance(s.remember_current_loc, int) and 0 <= s.remember_current_loc <= 255):
-        return 47
-    if not (isinstance(s.current_loc, int) and 0 <= s.current_loc <= 255):
-        return 48
-    if not (isinstance(s.current_sector, int) and 0 <= s.current_sector <= 99):
-        return 49
-    if not (isinstance(s.old_order_inc_command, int) and 0 <= s.old_order_inc_command <= 65535):
-        return 50
-    if not (isinstance(s.old_order_input_command, int) and 0 <= s.old_order_input_command <= 5):
-        return 51
-    if not (isinstance(s.old_order_obj_ptr, int) and 0 <= s.old_order_obj_ptr <= 6):
-        return 52
-    if not (isinstance(s.old_order_grasp, int) and 0 <= s.old_order_grasp <= 9):
-        return 53
-    if not (isinstance(s.old_order_locpt_ptr, int) and 0 <= s.old_order_locpt_ptr <= 255):
-        return 54
-    if not (isinstance(s.old_order_sector, int) and 0 <= s.old_order_sector <= 99):
-        return 55
-    if not (isinstance(s.old_order_apoint_pos_flag, int) and 0 <= s.old_order_apoint_pos_flag <= 1):
-        return 56
-    if not (isinstance(s.old_order_gripped_obj_ptr, int) and 0 <= s.old_order_gripped_obj_ptr <= 6):
-        return 57
-    if not (isinstance(s.tbuffer_boxt, int) and 0 <= s.tbuffer_boxt <= 99):
-        return 58
-    if not (isinstance(s.bbuffer_boxb, int) and 0 <= s.bbuffer_boxb <= 99):
-        return 59
-    if not (isinstance(s.fbuffer_flag, int) and 0 <= s.fbuffer_flag <= 99):
-        return 60
-    if not (isinstance(s.hbuffer_hous, int) and 0 <= s.hbuffer_hous <= 99):
-        return 61
-    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
-        return 62
-    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
-        return 63
+        return 16
     if not (isinstance(s.to_emove_inc_command, int) and 0 <= s.to_emove_inc_command <= 65535):
-        return 64
+        return 21
     if not (isinstance(s.to_emove_input_command, int) and 0 <= s.to_emove_input_command <= 5):
-        return 65
+        return 22
     if not (isinstance(s.to_emove_obj_ptr, int) and 0 <= s.to_emove_obj_ptr <= 6):
-        return 66
+        return 23
     if not (isinstance(s.to_emove_grasp, int) and 0 <= s.to_emove_grasp <= 9):
-        return 67
+        return 24
     if not (isinstance(s.to_emove_locpt_ptr, int) and 0 <= s.to_emove_locpt_ptr <= 255):
-        return 68
+        return 25
     if not (isinstance(s.to_emove_sector, int) and 0 <= s.to_emove_sector <= 99):
-        return 69
+        return 26
     if not (isinstance(s.to_emove_apoint_pos_flag, int) and 0 <= s.to_emove_apoint_pos_flag <= 1):
-        return 70
+        return 27
     if not (isinstance(s.to_emove_gripped_obj_ptr, int) and 0 <= s.to_emove_gripped_obj_ptr <= 6):
+        return 28
+    if not (isinstance(s.emove_command, int) and 0 <= s.emove_command <= 5):
+        return 29
+    if not (isinstance(s.emove_status, int) and 0 <= s.emove_status <= 2):
+        return 30
+    if not (isinstance(s.emove_resting, int) and 0 <= s.emove_resting <= 1):
+        return 31
+    if not (isinstance(s.emove_failure, int) and 0 <= s.emove_failure <= 15):
+        return 32
+    if not (isinstance(s.last_emove_input_command, int) and 0 <= s.last_emove_input_command <= 5):
+        return 33
+    if not (isinstance(s.last_emove_obj_ptr, int) and 0 <= s.last_emove_obj_ptr <= 6):
+        return 34
+    if not (isinstance(s.last_emove_grasp, int) and 0 <= s.last_emove_grasp <= 9):
+        return 35
+    if not (isinstance(s.last_emove_locpt_ptr, int) and 0 <= s.last_emove_locpt_ptr <= 255):
+        return 36
+    if not (isinstance(s.last_emove_sector, int) and 0 <= s.last_emove_sector <= 99):
+        return 37
+    if not (isinstance(s.source_known, int) and 0 <= s.source_known <= 1):
+        return 38
+    if not (isinstance(s.source_vision, int) and 0 <= s.source_vision <= 1):
+        return 39
+    if not (isinstance(s.source_buffer, int) and 0 <= s.source_buffer <= 1):
+        return 40
+    if not (isinstance(s.dest_known, int) and 0 <= s.dest_known <= 1):
+        return 43
+    if not (isinstance(s.dest_vision, int) and 0 <= s.dest_vision <= 1):
+        return 44
+    if not (isinstance(s.dest_buffer, int) and 0 <= s.dest_buffer <= 1):
+        return 45
+    if not (isinstance(s.end_at_known, int) and 0 <= s.end_at_known <= 1):
+        return 48
+    if not (isinstance(s.end_at_vision, int) and 0 <= s.end_at_vision <= 1):
+        return 49
+    if not (isinstance(s.end_at_buffer, int) and 0 <= s.end_at_buffer <= 1):
+        return 50
+    if not (isinstance(s.here_known, int) and 0 <= s.here_known <= 1):
+        return 53
+    if not (isinstance(s.here_vision, int) and 0 <= s.here_vision <= 1):
+        return 54
+    if not (isinstance(s.here_buffer, int) and 0 <= s.here_buffer <= 1):
+        return 55
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 8):
+        return 58
+    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 8):
+        return 59
+    if not (isinstance(s.loc_of_obj, int) and 0 <= s.loc_of_obj <= 1):
+        return 60
+    if not (isinstance(s.source_spec, int) and 0 <= s.source_spec <= 1):
+        return 61
+    if not (isinstance(s.dest_spec, int) and 0 <= s.dest_spec <= 1):
+        return 62
+    if not (isinstance(s.names_known, int) and 0 <= s.names_known <= 1):
+        return 63
+    if not (isinstance(s.obj_acquired, int) and 0 <= s.obj_acquired <= 1):
+        return 64
+    if not (isinstance(s.obj_now_in_gripper, int) and 0 <= s.obj_now_in_gripper <= 6):
+        return 65
+    if not (isinstance(s.grasp_now, int) and 0 <= s.grasp_now <= 9):
+        return 66
+    if not (isinstance(s.remember_current_loc, int) and 0 <= s.remember_current_loc <= 255):
+        return 67
+    if not (isinstance(s.current_loc, int) and 0 <= s.current_loc <= 255):
+        return 68
+    if not (isinstance(s.current_sector, int) and 0 <= s.current_sector <= 99):
+        return 69
+    if not (isinstance(s.tbuffer_boxt, int) and 0 <= s.tbuffer_boxt <= 99):
+        return 70
+    if not (isinstance(s.bbuffer_boxb, int) and 0 <= s.bbuffer_boxb <= 99):
         return 71
-    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
+    if not (isinstance(s.fbuffer_flag, int) and 0 <= s.fbuffer_flag <= 99):
         return 72
-    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 5):
+    if not (isinstance(s.hbuffer_hous, int) and 0 <= s.hbuffer_hous <= 99):
         return 73
-    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
         return 74
-    if not (isinstance(s.report_status_parameter, int) and 0 <= s.report_status_parameter <= 6):
-        return 75
-    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
-        return 76
     return -1
 
 
@@ -1073,114 +1069,114 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = _whole(s.command_inc_command)
+    i0 = _whole(s.workstation_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = _whole(s.command_input_command)
+    i1 = _whole(s.workstation_input_command)
     if not 0 <= i1 <= 5:
         return _refused(s, 1)
-    i2 = _whole(s.command_obj)
+    i2 = _whole(s.workstation_obj)
     if not 0 <= i2 <= 6:
         return _refused(s, 2)
-    i3 = _whole(s.command_grasp)
+    i3 = _whole(s.workstation_grasp)
     if not 0 <= i3 <= 9:
         return _refused(s, 3)
-    i4 = _whole(s.command_source_locpt)
+    i4 = _whole(s.workstation_source_locpt)
     if not 0 <= i4 <= 255:
         return _refused(s, 4)
-    i5 = _whole(s.command_dest_locpt)
+    i5 = _whole(s.workstation_dest_locpt)
     if not 0 <= i5 <= 255:
         return _refused(s, 5)
-    i6 = _whole(s.command_end_at_locpt)
+    i6 = _whole(s.workstation_end_at_locpt)
     if not 0 <= i6 <= 255:
         return _refused(s, 6)
-    i7 = _whole(s.command_sector)
+    i7 = _whole(s.workstation_sector)
     if not 0 <= i7 <= 99:
         return _refused(s, 7)
-    i8 = _whole(s.emove_inc_command_echo)
+    i8 = _whole(s.from_emove_inc_command_echo)
     if not 0 <= i8 <= 65535:
-        return _refused(s, 8)
-    i9 = _whole(s.emove_ref_command_echo)
+        return _refused(s, 17)
+    i9 = _whole(s.from_emove_ref_command_echo)
     if not 0 <= i9 <= 5:
-        return _refused(s, 9)
-    i10 = _whole(s.emove_status_report)
+        return _refused(s, 18)
+    i10 = _whole(s.from_emove_status_report)
     if not 0 <= i10 <= 2:
-        return _refused(s, 10)
-    i11 = _whole(s.emove_failure)
+        return _refused(s, 19)
+    i11 = _whole(s.from_emove_failure)
     if not 0 <= i11 <= 15:
-        return _refused(s, 11)
+        return _refused(s, 20)
     i12 = _whole(s.source_known)
     if not 0 <= i12 <= 1:
-        return _refused(s, 12)
+        return _refused(s, 38)
     i13 = _whole(s.source_vision)
     if not 0 <= i13 <= 1:
-        return _refused(s, 13)
+        return _refused(s, 39)
     i14 = _whole(s.source_buffer)
     if not 0 <= i14 <= 1:
-        return _refused(s, 14)
+        return _refused(s, 40)
     i15 = _whole(s.source_vupos)
     if not 0 <= i15 <= 255:
-        return _refused(s, 15)
+        return _refused(s, 41)
     i16 = _whole(s.source_safe)
     if not 0 <= i16 <= 255:
-        return _refused(s, 16)
+        return _refused(s, 42)
     i17 = _whole(s.dest_known)
     if not 0 <= i17 <= 1:
-        return _refused(s, 17)
+        return _refused(s, 43)
     i18 = _whole(s.dest_vision)
     if not 0 <= i18 <= 1:
-        return _refused(s, 18)
+        return _refused(s, 44)
     i19 = _whole(s.dest_buffer)
     if not 0 <= i19 <= 1:
-        return _refused(s, 19)
+        return _refused(s, 45)
     i20 = _whole(s.dest_vupos)
     if not 0 <= i20 <= 255:
-        return _refused(s, 20)
+        return _refused(s, 46)
     i21 = _whole(s.dest_safe)
     if not 0 <= i21 <= 255:
-        return _refused(s, 21)
+        return _refused(s, 47)
     i22 = _whole(s.end_at_known)
     if not 0 <= i22 <= 1:
-        return _refused(s, 22)
+        return _refused(s, 48)
     i23 = _whole(s.end_at_vision)
     if not 0 <= i23 <= 1:
-        return _refused(s, 23)
+        return _refused(s, 49)
     i24 = _whole(s.end_at_buffer)
     if not 0 <= i24 <= 1:
-        return _refused(s, 24)
+        return _refused(s, 50)
     i25 = _whole(s.end_at_vupos)
     if not 0 <= i25 <= 255:
-        return _refused(s, 25)
+        return _refused(s, 51)
     i26 = _whole(s.end_at_safe)
     if not 0 <= i26 <= 255:
-        return _refused(s, 26)
+        return _refused(s, 52)
     i27 = _whole(s.here_known)
     if not 0 <= i27 <= 1:
-        return _refused(s, 27)
+        return _refused(s, 53)
     i28 = _whole(s.here_vision)
     if not 0 <= i28 <= 1:
-        return _refused(s, 28)
+        return _refused(s, 54)
     i29 = _whole(s.here_buffer)
     if not 0 <= i29 <= 1:
-        return _refused(s, 29)
+        return _refused(s, 55)
     i30 = _whole(s.here_vupos)
     if not 0 <= i30 <= 255:
-        return _refused(s, 30)
+        return _refused(s, 56)
     i31 = _whole(s.here_safe)
     if not 0 <= i31 <= 255:
-        return _refused(s, 31)
-    s.command_inc_command = i0
-    s.command_input_command = i1
-    s.command_obj = i2
-    s.command_grasp = i3
-    s.command_source_locpt = i4
-    s.command_dest_locpt = i5
-    s.command_end_at_locpt = i6
-    s.command_sector = i7
-    s.emove_inc_command_echo = i8
-    s.emove_ref_command_echo = i9
-    s.emove_status_report = i10
-    s.emove_failure = i11
+        return _refused(s, 57)
+    s.workstation_inc_command = i0
+    s.workstation_input_command = i1
+    s.workstation_obj = i2
+    s.workstation_grasp = i3
+    s.workstation_source_locpt = i4
+    s.workstation_dest_locpt = i5
+    s.workstation_end_at_locpt = i6
+    s.workstation_sector = i7
+    s.from_emove_inc_command_echo = i8
+    s.from_emove_ref_command_echo = i9
+    s.from_emove_status_report = i10
+    s.from_emove_failure = i11
     s.source_known = i12
     s.source_vision = i13
     s.source_buffer = i14
@@ -1206,14 +1202,14 @@ def _admit(s):
 
 def _settle(s):
     """Deferred variables take their next values, all at once."""
-    ready0 = (s.emove_inc_command_echo == s.to_emove_inc_command)
+    ready0 = (s.from_emove_inc_command_echo == s.to_emove_inc_command)
     if ready0:
         s.cur_state = s.cur_state_next
 
 
 def acquire_line(s):
     """The line of table acquire that matches admitted inputs: its position; -1 none, -2 several."""
-    return _ACQUIRE_LINE[s.cur_state * 576 + s.ref_command_in * 96 + s.status_in * 32 + s.new_command * 16 + s.idle * 8 + s.loc_of_obj * 4 + s.source_spec * 2 + s.obj_acquired]
+    return _ACQUIRE_LINE[s.cur_state * 576 + s.emove_command * 96 + s.emove_status * 32 + s.new_command * 16 + s.emove_resting * 8 + s.loc_of_obj * 4 + s.source_spec * 2 + s.obj_acquired]
 
 
 def acquire_lines(states):
@@ -1223,12 +1219,10 @@ def acquire_lines(states):
 
 def _run_acquire(s):
     """Matches table acquire and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state == 0) and (s.ref_command_in == 0)) or ((s.cur_state == 1) and (s.ref_command_in == 0))) or ((s.cur_state == 2) and (s.ref_command_in == 1))) or ((s.cur_state == 3) and (s.ref_command_in == 3))) or ((s.cur_state == 4) and (s.ref_command_in == 2))) or ((s.cur_state == 5) and (s.ref_command_in == 4))) or ((s.cur_state == 6) and (s.ref_command_in in (1, 2,)))) or ((s.cur_state == 7) and (s.ref_command_in == 5))) or ((s.cur_state == 8) and (s.ref_command_in == 1)))):  # in_step
+    if not (not (not s.new_command) or ((((((s.cur_state in (0, 1,)) and (s.emove_command == 0)) or ((s.cur_state == 2) and (s.emove_command == 1))) or ((s.cur_state == 3) and (s.emove_command == 3))) or ((s.cur_state == 4) and (s.emove_command == 2))) or ((s.cur_state == 5) and (s.emove_command == 4)))):  # acquire_in_step
         s.assumptions_failed |= 1 << 0
-    if not (not s.idle or ((s.ref_command_in == 0) and (s.status_in == 0))):  # resting
+    if not (not s.emove_resting or ((s.emove_command == 0) and (s.emove_status == 0))):  # acquire_resting
         s.assumptions_failed |= 1 << 1
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 2, 3, 4, 5,))):  # acquire_states
-        s.assumptions_failed |= 1 << 2
     line = acquire_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1246,7 +1240,6 @@ def _acquire_0(s):
 
 def _acquire_1(s):
     """task/acquire.rcs line 1"""
-    _do_begin(s)
     _do_set_source(s)
     _do_nextstate(s, 4)
     _do_move_to_obj(s)
@@ -1255,23 +1248,20 @@ def _acquire_1(s):
 
 def _acquire_2(s):
     """task/acquire.rcs line 2"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _acquire_3(s):
     """task/acquire.rcs line 3"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _acquire_4(s):
     """task/acquire.rcs line 4"""
-    _do_begin(s)
     _do_vupos_setup(s)
     _do_nextstate(s, 2)
     _do_move_to(s)
@@ -1317,7 +1307,7 @@ def _acquire_10(s):
     _do_move_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _acquire_11(s):
@@ -1325,7 +1315,7 @@ def _acquire_11(s):
     _do_move_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _acquire_12(s):
@@ -1333,7 +1323,7 @@ def _acquire_12(s):
     _do_loc_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _acquire_13(s):
@@ -1341,13 +1331,13 @@ def _acquire_13(s):
     _do_pic_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _acquire_14(s):
     """task/acquire.rcs line 14"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _acquire_15(s):
@@ -1360,7 +1350,7 @@ def _acquire_16(s):
     _do_state_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def acquire_step(s):
@@ -1377,7 +1367,7 @@ def acquire_step(s):
 
 def clear_line(s):
     """The line of table clear that matches admitted inputs: its position; -1 none, -2 several."""
-    return _CLEAR_LINE[s.cur_state * 576 + s.ref_command_in * 96 + s.status_in * 32 + s.new_command * 16 + s.idle * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]
+    return _CLEAR_LINE[s.cur_state * 576 + s.emove_command * 96 + s.emove_status * 32 + s.new_command * 16 + s.emove_resting * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]
 
 
 def clear_lines(states):
@@ -1387,11 +1377,9 @@ def clear_lines(states):
 
 def _run_clear(s):
     """Matches table clear and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state == 0) and (s.ref_command_in == 0)) or ((s.cur_state == 1) and (s.ref_command_in == 0))) or ((s.cur_state == 2) and (s.ref_command_in == 1))) or ((s.cur_state == 3) and (s.ref_command_in == 3))) or ((s.cur_state == 4) and (s.ref_command_in == 2))) or ((s.cur_state == 5) and (s.ref_command_in == 4))) or ((s.cur_state == 6) and (s.ref_command_in in (1, 2,)))) or ((s.cur_state == 7) and (s.ref_command_in == 5))) or ((s.cur_state == 8) and (s.ref_command_in == 1)))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not s.idle or ((s.ref_command_in == 0) and (s.status_in == 0))):  # resting
-        s.assumptions_failed |= 1 << 1
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 6, 7, 8,))):  # clear_states
+    if not (not (not s.new_command) or ((((s.cur_state in (0, 1,)) and (s.emove_command == 0)) or ((s.cur_state in (6, 8,)) and (s.emove_command == 1))) or ((s.cur_state == 7) and (s.emove_command == 5)))):  # clear_in_step
+        s.assumptions_failed |= 1 << 2
+    if not (not s.emove_resting or ((s.emove_command == 0) and (s.emove_status == 0))):  # clear_resting
         s.assumptions_failed |= 1 << 3
     line = clear_line(s)
     if line < 0:
@@ -1410,31 +1398,27 @@ def _clear_0(s):
 
 def _clear_1(s):
     """task/clear.rcs line 1"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _clear_2(s):
     """task/clear.rcs line 2"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _clear_3(s):
     """task/clear.rcs line 3"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _clear_4(s):
     """task/clear.rcs line 4"""
-    _do_begin(s)
     _do_set_dest(s)
     _do_nextstate(s, 6)
     _do_move_to(s)
@@ -1477,7 +1461,7 @@ def _clear_9(s):
     _do_move_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _clear_10(s):
@@ -1485,13 +1469,13 @@ def _clear_10(s):
     _do_release_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _clear_11(s):
     """task/clear.rcs line 11"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _clear_12(s):
@@ -1504,7 +1488,7 @@ def _clear_13(s):
     _do_state_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def clear_step(s):
@@ -1522,7 +1506,7 @@ def clear_step(s):
 def move_line(s):
     """The line of table move that matches admitted inputs: its position; -1 none, -2 several."""
     try:
-        return _MOVE_ONE[0][_MOVE_G0[s.cur_state * 42 + s.command_obj * 6 + s.ref_command_in] & _MOVE_G1[s.status_in * 128 + s.new_command * 64 + s.idle * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]]
+        return _MOVE_ONE[0][_MOVE_G0[s.cur_state * 42 + s.workstation_obj * 6 + s.emove_command] & _MOVE_G1[s.emove_status * 128 + s.new_command * 64 + s.emove_resting * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]]
     except KeyError:
         return -2
 
@@ -1534,12 +1518,10 @@ def move_lines(states):
 
 def _run_move(s):
     """Matches table move and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state == 0) and (s.ref_command_in == 0)) or ((s.cur_state == 1) and (s.ref_command_in == 0))) or ((s.cur_state == 2) and (s.ref_command_in == 1))) or ((s.cur_state == 3) and (s.ref_command_in == 3))) or ((s.cur_state == 4) and (s.ref_command_in == 2))) or ((s.cur_state == 5) and (s.ref_command_in == 4))) or ((s.cur_state == 6) and (s.ref_command_in in (1, 2,)))) or ((s.cur_state == 7) and (s.ref_command_in == 5))) or ((s.cur_state == 8) and (s.ref_command_in == 1)))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not s.idle or ((s.ref_command_in == 0) and (s.status_in == 0))):  # resting
-        s.assumptions_failed |= 1 << 1
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 2, 3, 4, 5, 6,))):  # move_states
+    if not (not (not s.new_command) or (((((((s.cur_state in (0, 1,)) and (s.emove_command == 0)) or ((s.cur_state == 2) and (s.emove_command == 1))) or ((s.cur_state == 3) and (s.emove_command == 3))) or ((s.cur_state == 4) and (s.emove_command == 2))) or ((s.cur_state == 5) and (s.emove_command == 4))) or ((s.cur_state == 6) and (s.emove_command in (1, 2,))))):  # move_in_step
         s.assumptions_failed |= 1 << 4
+    if not (not s.emove_resting or ((s.emove_command == 0) and (s.emove_status == 0))):  # move_resting
+        s.assumptions_failed |= 1 << 5
     line = move_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1557,31 +1539,27 @@ def _move_0(s):
 
 def _move_1(s):
     """task/move.rcs line 1"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_2(s):
     """task/move.rcs line 2"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_3(s):
     """task/move.rcs line 3"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_4(s):
     """task/move.rcs line 4"""
-    _do_begin(s)
     _do_set_source(s)
     _do_nextstate(s, 4)
     _do_move_to_obj(s)
@@ -1590,7 +1568,6 @@ def _move_4(s):
 
 def _move_5(s):
     """task/move.rcs line 5"""
-    _do_begin(s)
     _do_vupos_setup(s)
     _do_nextstate(s, 2)
     _do_move_to(s)
@@ -1599,7 +1576,6 @@ def _move_5(s):
 
 def _move_6(s):
     """task/move.rcs line 6"""
-    _do_begin(s)
     _do_set_dest(s)
     _do_nextstate(s, 6)
     _do_move_to(s)
@@ -1608,7 +1584,6 @@ def _move_6(s):
 
 def _move_7(s):
     """task/move.rcs line 7"""
-    _do_begin(s)
     _do_set_dest(s)
     _do_nextstate(s, 6)
     _do_move_to_obj(s)
@@ -1617,10 +1592,9 @@ def _move_7(s):
 
 def _move_8(s):
     """task/move.rcs line 8"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_9(s):
@@ -1671,7 +1645,7 @@ def _move_15(s):
     _do_move_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_16(s):
@@ -1679,7 +1653,7 @@ def _move_16(s):
     _do_loc_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_17(s):
@@ -1687,13 +1661,13 @@ def _move_17(s):
     _do_pic_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_18(s):
     """task/move.rcs line 18"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _move_19(s):
@@ -1706,7 +1680,7 @@ def _move_20(s):
     _do_state_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def move_step(s):
@@ -1723,7 +1697,7 @@ def move_step(s):
 
 def pause_task_line(s):
     """The line of table pause_task that matches admitted inputs: its position; -1 none, -2 several."""
-    return _PAUSE_TASK_LINE[s.idle]
+    return _PAUSE_TASK_LINE[s.emove_resting]
 
 
 def pause_task_lines(states):
@@ -1743,7 +1717,6 @@ def _run_pause_task(s):
 
 def _pause_task_0(s):
     """task/pause.rcs line 1"""
-    _do_begin(s)
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_done(s)
@@ -1751,6 +1724,7 @@ def _pause_task_0(s):
 
 def _pause_task_1(s):
     """task/pause.rcs line 2"""
+    _do_settle(s)
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_executing(s)
@@ -1770,7 +1744,7 @@ def pause_task_step(s):
 
 def release_part_line(s):
     """The line of table release_part that matches admitted inputs: its position; -1 none, -2 several."""
-    return _RELEASE_PART_LINE[s.cur_state * 288 + s.ref_command_in * 48 + s.status_in * 16 + s.new_command * 8 + s.idle * 4 + s.names_known * 2 + s.obj_acquired]
+    return _RELEASE_PART_LINE[s.cur_state * 288 + s.emove_command * 48 + s.emove_status * 16 + s.new_command * 8 + s.emove_resting * 4 + s.names_known * 2 + s.obj_acquired]
 
 
 def release_part_lines(states):
@@ -1780,12 +1754,10 @@ def release_part_lines(states):
 
 def _run_release_part(s):
     """Matches table release_part and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state == 0) and (s.ref_command_in == 0)) or ((s.cur_state == 1) and (s.ref_command_in == 0))) or ((s.cur_state == 2) and (s.ref_command_in == 1))) or ((s.cur_state == 3) and (s.ref_command_in == 3))) or ((s.cur_state == 4) and (s.ref_command_in == 2))) or ((s.cur_state == 5) and (s.ref_command_in == 4))) or ((s.cur_state == 6) and (s.ref_command_in in (1, 2,)))) or ((s.cur_state == 7) and (s.ref_command_in == 5))) or ((s.cur_state == 8) and (s.ref_command_in == 1)))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not s.idle or ((s.ref_command_in == 0) and (s.status_in == 0))):  # resting
-        s.assumptions_failed |= 1 << 1
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 7, 8,))):  # release_states
-        s.assumptions_failed |= 1 << 5
+    if not (not (not s.new_command) or ((((s.cur_state in (0, 1,)) and (s.emove_command == 0)) or ((s.cur_state == 7) and (s.emove_command == 5))) or ((s.cur_state == 8) and (s.emove_command == 1)))):  # release_part_in_step
+        s.assumptions_failed |= 1 << 6
+    if not (not s.emove_resting or ((s.emove_command == 0) and (s.emove_status == 0))):  # release_part_resting
+        s.assumptions_failed |= 1 << 7
     line = release_part_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1803,23 +1775,20 @@ def _release_part_0(s):
 
 def _release_part_1(s):
     """task/release.rcs line 1"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _release_part_2(s):
     """task/release.rcs line 2"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _release_part_3(s):
     """task/release.rcs line 3"""
-    _do_begin(s)
     _do_nextstate(s, 7)
     _do_release(s)
     _do_executing(s)
@@ -1853,7 +1822,7 @@ def _release_part_7(s):
     _do_release_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _release_part_8(s):
@@ -1861,13 +1830,13 @@ def _release_part_8(s):
     _do_move_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _release_part_9(s):
     """task/release.rcs line 9"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _release_part_10(s):
@@ -1880,7 +1849,7 @@ def _release_part_11(s):
     _do_state_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def release_part_step(s):
@@ -1898,7 +1867,7 @@ def release_part_step(s):
 def transfer_line(s):
     """The line of table transfer that matches admitted inputs: its position; -1 none, -2 several."""
     try:
-        return _TRANSFER_ONE[0][_TRANSFER_G0[s.cur_state * 36 + s.ref_command_in * 6 + s.status_in * 2 + s.new_command] & _TRANSFER_G1[s.idle * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]]
+        return _TRANSFER_ONE[0][_TRANSFER_G0[s.cur_state * 36 + s.emove_command * 6 + s.emove_status * 2 + s.new_command] & _TRANSFER_G1[s.emove_resting * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]]
     except KeyError:
         return -2
 
@@ -1910,10 +1879,10 @@ def transfer_lines(states):
 
 def _run_transfer(s):
     """Matches table transfer and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state == 0) and (s.ref_command_in == 0)) or ((s.cur_state == 1) and (s.ref_command_in == 0))) or ((s.cur_state == 2) and (s.ref_command_in == 1))) or ((s.cur_state == 3) and (s.ref_command_in == 3))) or ((s.cur_state == 4) and (s.ref_command_in == 2))) or ((s.cur_state == 5) and (s.ref_command_in == 4))) or ((s.cur_state == 6) and (s.ref_command_in in (1, 2,)))) or ((s.cur_state == 7) and (s.ref_command_in == 5))) or ((s.cur_state == 8) and (s.ref_command_in == 1)))):  # in_step
-        s.assumptions_failed |= 1 << 0
-    if not (not s.idle or ((s.ref_command_in == 0) and (s.status_in == 0))):  # resting
-        s.assumptions_failed |= 1 << 1
+    if not (not (not s.new_command) or (((((((s.cur_state in (0, 1,)) and (s.emove_command == 0)) or ((s.cur_state in (2, 6, 8,)) and (s.emove_command == 1))) or ((s.cur_state == 3) and (s.emove_command == 3))) or ((s.cur_state == 4) and (s.emove_command == 2))) or ((s.cur_state == 5) and (s.emove_command == 4))) or ((s.cur_state == 7) and (s.emove_command == 5)))):  # transfer_in_step
+        s.assumptions_failed |= 1 << 8
+    if not (not s.emove_resting or ((s.emove_command == 0) and (s.emove_status == 0))):  # transfer_resting
+        s.assumptions_failed |= 1 << 9
     line = transfer_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
@@ -1931,31 +1900,27 @@ def _transfer_0(s):
 
 def _transfer_1(s):
     """task/transfer.rcs line 1"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _transfer_2(s):
     """task/transfer.rcs line 2"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _transfer_3(s):
     """task/transfer.rcs line 3"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _transfer_4(s):
     """task/transfer.rcs line 4"""
-    _do_begin(s)
     _do_set_source(s)
     _do_nextstate(s, 4)
     _do_move_to_obj(s)
@@ -1964,7 +1929,6 @@ def _transfer_4(s):
 
 def _transfer_5(s):
     """task/transfer.rcs line 5"""
-    _do_begin(s)
     _do_vupos_setup(s)
     _do_nextstate(s, 2)
     _do_move_to(s)
@@ -1973,7 +1937,6 @@ def _transfer_5(s):
 
 def _transfer_6(s):
     """task/transfer.rcs line 6"""
-    _do_begin(s)
     _do_set_dest(s)
     _do_nextstate(s, 6)
     _do_move_to(s)
@@ -1982,10 +1945,9 @@ def _transfer_6(s):
 
 def _transfer_7(s):
     """task/transfer.rcs line 7"""
-    _do_begin(s)
     _do_cmd_failure(s)
     _do_nextstate(s, 1)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _transfer_8(s):
@@ -2053,7 +2015,7 @@ def _transfer_16(s):
     _do_move_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _transfer_17(s):
@@ -2061,7 +2023,7 @@ def _transfer_17(s):
     _do_loc_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _transfer_18(s):
@@ -2069,7 +2031,7 @@ def _transfer_18(s):
     _do_pic_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _transfer_19(s):
@@ -2077,13 +2039,13 @@ def _transfer_19(s):
     _do_release_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _transfer_20(s):
     """task/transfer.rcs line 20"""
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _transfer_21(s):
@@ -2096,7 +2058,7 @@ def _transfer_22(s):
     _do_state_failure(s)
     _do_nextstate(s, 1)
     _do_pause(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def transfer_step(s):
@@ -2117,12 +2079,12 @@ def task_cycle(s):
     if s.fault == 0:
         try:
             _settle(s)
-            _do_receive(s)
+            _do_take_orders(s)
             _do_test_variables(s)
-            {0: _run_pause_task, 1: _run_acquire, 2: _run_move, 3: _run_release_part, 4: _run_transfer, 5: _run_clear}[s.command_input_command](s)
+            {0: _run_pause_task, 1: _run_acquire, 2: _run_move, 3: _run_release_part, 4: _run_transfer, 5: _run_clear}[s.workstation_input_command](s)
             if s.fault == 0:
-                _do_send(s)
-                _do_answer(s)
+                _do_tell_gripped(s)
+                _do_give_orders(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
     return s.fault

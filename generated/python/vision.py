@@ -139,10 +139,23 @@ class State:
     """
 
     __slots__ = (
-        "command_inc_command",
-        "command_input_command",
-        "command_obj_ptr",
-        "command_expected_range_mm",
+        "emove_inc_command",
+        "emove_input_command",
+        "emove_obj_ptr",
+        "emove_expected_range_mm",
+        "to_emove_inc_command_echo",
+        "to_emove_ref_command_echo",
+        "to_emove_status_report",
+        "to_emove_failure",
+        "to_emove_x_mm",
+        "to_emove_y_mm",
+        "to_emove_c",
+        "to_emove_s",
+        "to_emove_range_mm",
+        "new_command",
+        "answered",
+        "settling",
+        "inc_command_seen",
         "camera_number",
         "camera_matched",
         "camera_x_mm",
@@ -151,26 +164,13 @@ class State:
         "camera_s",
         "camera_range_mm",
         "camera_flat",
-        "new_command",
-        "inc_command_seen",
         "cur_state",
         "arrived",
         "fits",
         "waited",
-        "status_report",
-        "failure",
         "to_camera_number",
         "to_camera_fire",
         "to_camera_obj_ptr",
-        "report_inc_command_echo",
-        "report_ref_command_echo",
-        "report_status_report",
-        "report_failure",
-        "report_x_mm",
-        "report_y_mm",
-        "report_c",
-        "report_s",
-        "report_range_mm",
         "line",
         "fault",
         "fault_at",
@@ -178,10 +178,23 @@ class State:
     )
 
     def __init__(self):
-        self.command_inc_command = 0  # From E-MOVE.
-        self.command_input_command = 0  # From E-MOVE.
-        self.command_obj_ptr = 0  # From E-MOVE.
-        self.command_expected_range_mm = 0.0  # From E-MOVE.
+        self.emove_inc_command = 0  # Orders of emove.
+        self.emove_input_command = 0  # Orders of emove.
+        self.emove_obj_ptr = 0  # Orders of emove.
+        self.emove_expected_range_mm = 0.0  # Orders of emove.
+        self.to_emove_inc_command_echo = 0  # Reports to emove.
+        self.to_emove_ref_command_echo = 0  # Reports to emove.
+        self.to_emove_status_report = 0  # Reports to emove.
+        self.to_emove_failure = 0  # Reports to emove.
+        self.to_emove_x_mm = -500.0  # Reports to emove.
+        self.to_emove_y_mm = -500.0  # Reports to emove.
+        self.to_emove_c = -1.0  # Reports to emove.
+        self.to_emove_s = -1.0  # Reports to emove.
+        self.to_emove_range_mm = 0.0  # Reports to emove.
+        self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
+        self.answered = False  # A line has answered the new command.
+        self.settling = False  # The line of this cycle lets the levels below rest first, and answers nothing.
+        self.inc_command_seen = 0  # Number of the order that was taken last.
         self.camera_number = 0  # From the image processing.
         self.camera_matched = False  # From the image processing.
         self.camera_x_mm = -500.0  # From the image processing.
@@ -190,26 +203,13 @@ class State:
         self.camera_s = -1.0  # From the image processing.
         self.camera_range_mm = 0.0  # From the image processing.
         self.camera_flat = False  # From the image processing.
-        self.new_command = False  # True in the cycle in which a new command comes.
-        self.inc_command_seen = 0
         self.cur_state = 0
         self.arrived = False  # The picture that was asked for is there.
         self.fits = False  # Its range is the expected one.
         self.waited = 0
-        self.status_report = 0
-        self.failure = 0
         self.to_camera_number = 0  # To the camera.
         self.to_camera_fire = 0  # To the camera.
         self.to_camera_obj_ptr = 0  # To the camera.
-        self.report_inc_command_echo = 0  # To E-MOVE.
-        self.report_ref_command_echo = 0  # To E-MOVE.
-        self.report_status_report = 0  # To E-MOVE.
-        self.report_failure = 0  # To E-MOVE.
-        self.report_x_mm = -500.0  # To E-MOVE.
-        self.report_y_mm = -500.0  # To E-MOVE.
-        self.report_c = -1.0  # To E-MOVE.
-        self.report_s = -1.0  # To E-MOVE.
-        self.report_range_mm = 0.0  # To E-MOVE.
         self.line = -1
         self.fault = 0
         self.fault_at = -1
@@ -283,12 +283,12 @@ def _lines_of(masks, lines, default):
 
 
 _FLOOD_FLASH_0 = (
-    0x77,
-    0x6f,
-)
-_FLOOD_FLASH_1 = (
     0x7e,
     0x1,
+)
+_FLOOD_FLASH_1 = (
+    0x77,
+    0x6f,
 )
 _FLOOD_FLASH_2 = (
     0x21,
@@ -406,12 +406,12 @@ _FLOOD_FLASH_LINE = (
     *_lines_of(_joined(_FLOOD_FLASH_4, _FLOOD_FLASH_2, _FLOOD_FLASH_0, _FLOOD_FLASH_1, _FLOOD_FLASH_3), 7, False),
 )
 _LINE_FLASH_0 = (
-    0xf7,
-    0xdf,
-)
-_LINE_FLASH_1 = (
     0xfe,
     0x1,
+)
+_LINE_FLASH_1 = (
+    0xf7,
+    0xdf,
 )
 _LINE_FLASH_2 = (
     0x41,
@@ -537,34 +537,19 @@ _PAUSE_VISION_ONE = (
 )
 
 
-def _do_receive(s):
-    """Procedure receive."""
-    s.new_command = (s.command_inc_command != s.inc_command_seen)
-    if s.new_command:
-        s.failure = 0
-        s.waited = 0
-    s.inc_command_seen = s.command_inc_command
-
-
 def _do_measure(s):
     """Procedure measure."""
+    if s.new_command:
+        s.waited = 0
     s.arrived = (s.camera_number == s.to_camera_number)
-    s.fits = (abs((s.camera_range_mm - s.command_expected_range_mm)) <= 4.0)
-
-
-def _do_answer(s):
-    """Procedure answer."""
-    s.report_inc_command_echo = s.inc_command_seen
-    s.report_ref_command_echo = s.command_input_command
-    s.report_status_report = s.status_report
-    s.report_failure = s.failure
+    s.fits = (abs((s.camera_range_mm - s.emove_expected_range_mm)) <= 4.0)
 
 
 def _do_shoot(s, v_which):
     """Fires a flash; the picture that answers has the next number."""
     s.to_camera_number = _mod((s.to_camera_number + 1), 65536)
     s.to_camera_fire = v_which
-    s.to_camera_obj_ptr = s.command_obj_ptr
+    s.to_camera_obj_ptr = s.emove_obj_ptr
 
 
 def _do_rest(s):
@@ -574,26 +559,26 @@ def _do_rest(s):
 
 def _do_found(s):
     """Where the part is in camera coordinates, how it is turned, and its range if it lies flat."""
-    s.report_x_mm = s.camera_x_mm + 0.0
-    s.report_y_mm = s.camera_y_mm + 0.0
-    s.report_c = s.camera_c + 0.0
-    s.report_s = s.camera_s + 0.0
-    s.report_range_mm = s.camera_range_mm + 0.0
+    s.to_emove_x_mm = s.camera_x_mm + 0.0
+    s.to_emove_y_mm = s.camera_y_mm + 0.0
+    s.to_emove_c = s.camera_c + 0.0
+    s.to_emove_s = s.camera_s + 0.0
+    s.to_emove_range_mm = s.camera_range_mm + 0.0
 
 
 def _do_measured(s):
     """The measured range."""
-    s.report_range_mm = s.camera_range_mm + 0.0
+    s.to_emove_range_mm = s.camera_range_mm + 0.0
 
 
 def _do_no_match(s):
     """Procedure no_match."""
-    s.failure = 13
+    s.to_emove_failure = 13
 
 
 def _do_line_flash_failure(s):
     """Procedure line_flash_failure."""
-    s.failure = 14
+    s.to_emove_failure = 14
 
 
 def _do_state(s, v_value):
@@ -607,66 +592,88 @@ def _do_wait(s):
         s.waited = (s.waited + 1)
 
 
-def _do_executing(s):
-    """Procedure executing."""
-    s.status_report = 1
+def _do_take_orders(s):
+    """Procedure take_orders."""
+    if (s.emove_inc_command != s.inc_command_seen):
+        s.inc_command_seen = s.emove_inc_command
+        s.new_command = True
+        s.answered = False
+        s.to_emove_status_report = 1
+        s.to_emove_failure = 0
+    else:
+        if (s.answered and True):
+            s.new_command = False
+    s.settling = False
+
+
+def _do_give_orders(s):
+    """Procedure give_orders."""
+    if (s.new_command and (not s.settling)):
+        s.answered = True
+    s.to_emove_inc_command_echo = s.inc_command_seen
+    s.to_emove_ref_command_echo = s.emove_input_command
 
 
 def _do_done(s):
     """Procedure done."""
-    s.status_report = 0
+    s.to_emove_status_report = 0
 
 
-def _do_fail(s):
-    """Procedure fail."""
-    s.status_report = 2
+def _do_executing(s):
+    """Procedure executing."""
+    s.to_emove_status_report = 1
+
+
+def _do_failed(s):
+    """Procedure failed."""
+    s.to_emove_status_report = 2
 
 
 def check(s):
     """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
-    if not (isinstance(s.camera_matched, int) and 0 <= s.camera_matched <= 1):
+    if not (isinstance(s.to_emove_inc_command_echo, int) and 0 <= s.to_emove_inc_command_echo <= 65535):
+        return 4
+    if not (isinstance(s.to_emove_ref_command_echo, int) and 0 <= s.to_emove_ref_command_echo <= 2):
         return 5
-    if not (isinstance(s.camera_flat, int) and 0 <= s.camera_flat <= 1):
+    if not (isinstance(s.to_emove_status_report, int) and 0 <= s.to_emove_status_report <= 2):
+        return 6
+    if not (isinstance(s.to_emove_failure, int) and 0 <= s.to_emove_failure <= 15):
+        return 7
+    if not (isinstance(s.to_emove_x_mm, (int, float)) and -500.0 <= s.to_emove_x_mm <= 500.0):
+        return 8
+    if not (isinstance(s.to_emove_y_mm, (int, float)) and -500.0 <= s.to_emove_y_mm <= 500.0):
+        return 9
+    if not (isinstance(s.to_emove_c, (int, float)) and -1.0 <= s.to_emove_c <= 1.0):
+        return 10
+    if not (isinstance(s.to_emove_s, (int, float)) and -1.0 <= s.to_emove_s <= 1.0):
         return 11
-    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
+    if not (isinstance(s.to_emove_range_mm, (int, float)) and 0.0 <= s.to_emove_range_mm <= 2000.0):
         return 12
-    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
         return 13
-    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 2):
+    if not (isinstance(s.answered, int) and 0 <= s.answered <= 1):
         return 14
-    if not (isinstance(s.arrived, int) and 0 <= s.arrived <= 1):
+    if not (isinstance(s.settling, int) and 0 <= s.settling <= 1):
         return 15
-    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
+    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
         return 16
-    if not (isinstance(s.waited, int) and 0 <= s.waited <= 100):
-        return 17
-    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
+    if not (isinstance(s.camera_matched, int) and 0 <= s.camera_matched <= 1):
         return 18
-    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
-        return 19
-    if not (isinstance(s.to_camera_number, int) and 0 <= s.to_camera_number <= 65535):
-        return 20
-    if not (isinstance(s.to_camera_fire, int) and 0 <= s.to_camera_fire <= 2):
-        return 21
-    if not (isinstance(s.to_camera_obj_ptr, int) and 0 <= s.to_camera_obj_ptr <= 6):
-        return 22
-    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
-        return 23
-    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 2):
+    if not (isinstance(s.camera_flat, int) and 0 <= s.camera_flat <= 1):
         return 24
-    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 2):
         return 25
-    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
+    if not (isinstance(s.arrived, int) and 0 <= s.arrived <= 1):
         return 26
-    if not (isinstance(s.report_x_mm, (int, float)) and -500.0 <= s.report_x_mm <= 500.0):
+    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
         return 27
-    if not (isinstance(s.report_y_mm, (int, float)) and -500.0 <= s.report_y_mm <= 500.0):
+    if not (isinstance(s.waited, int) and 0 <= s.waited <= 100):
         return 28
-    if not (isinstance(s.report_c, (int, float)) and -1.0 <= s.report_c <= 1.0):
+    if not (isinstance(s.to_camera_number, int) and 0 <= s.to_camera_number <= 65535):
         return 29
-    if not (isinstance(s.report_s, (int, float)) and -1.0 <= s.report_s <= 1.0):
+    if not (isinstance(s.to_camera_fire, int) and 0 <= s.to_camera_fire <= 2):
         return 30
-    if not (isinstance(s.report_range_mm, (int, float)) and 0.0 <= s.report_range_mm <= 2000.0):
+    if not (isinstance(s.to_camera_obj_ptr, int) and 0 <= s.to_camera_obj_ptr <= 6):
         return 31
     return -1
 
@@ -676,52 +683,52 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = _whole(s.command_inc_command)
+    i0 = _whole(s.emove_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = _whole(s.command_input_command)
+    i1 = _whole(s.emove_input_command)
     if not 0 <= i1 <= 2:
         return _refused(s, 1)
-    i2 = _whole(s.command_obj_ptr)
+    i2 = _whole(s.emove_obj_ptr)
     if not 0 <= i2 <= 6:
         return _refused(s, 2)
-    i3 = _real(s.command_expected_range_mm)
+    i3 = _real(s.emove_expected_range_mm)
     if not 0.0 <= i3 <= 2000.0:
         return _refused(s, 3)
     i3 = i3 + 0.0
     i4 = _whole(s.camera_number)
     if not 0 <= i4 <= 65535:
-        return _refused(s, 4)
+        return _refused(s, 17)
     i5 = _whole(s.camera_matched)
     if not 0 <= i5 <= 1:
-        return _refused(s, 5)
+        return _refused(s, 18)
     i6 = _real(s.camera_x_mm)
     if not -500.0 <= i6 <= 500.0:
-        return _refused(s, 6)
+        return _refused(s, 19)
     i6 = i6 + 0.0
     i7 = _real(s.camera_y_mm)
     if not -500.0 <= i7 <= 500.0:
-        return _refused(s, 7)
+        return _refused(s, 20)
     i7 = i7 + 0.0
     i8 = _real(s.camera_c)
     if not -1.0 <= i8 <= 1.0:
-        return _refused(s, 8)
+        return _refused(s, 21)
     i8 = i8 + 0.0
     i9 = _real(s.camera_s)
     if not -1.0 <= i9 <= 1.0:
-        return _refused(s, 9)
+        return _refused(s, 22)
     i9 = i9 + 0.0
     i10 = _real(s.camera_range_mm)
     if not 0.0 <= i10 <= 2000.0:
-        return _refused(s, 10)
+        return _refused(s, 23)
     i10 = i10 + 0.0
     i11 = _whole(s.camera_flat)
     if not 0 <= i11 <= 1:
-        return _refused(s, 11)
-    s.command_inc_command = i0
-    s.command_input_command = i1
-    s.command_obj_ptr = i2
-    s.command_expected_range_mm = i3
+        return _refused(s, 24)
+    s.emove_inc_command = i0
+    s.emove_input_command = i1
+    s.emove_obj_ptr = i2
+    s.emove_expected_range_mm = i3
     s.camera_number = i4
     s.camera_matched = i5
     s.camera_x_mm = i6
@@ -740,7 +747,7 @@ def _settle(s):
 
 def flood_flash_line(s):
     """The line of table flood_flash that matches admitted inputs: its position; -1 none, -2 several."""
-    return _FLOOD_FLASH_LINE[s.waited * 24 + s.cur_state * 8 + s.camera_matched * 4 + s.new_command * 2 + s.arrived]
+    return _FLOOD_FLASH_LINE[s.waited * 24 + s.cur_state * 8 + s.new_command * 4 + s.camera_matched * 2 + s.arrived]
 
 
 def flood_flash_lines(states):
@@ -776,7 +783,7 @@ def _flood_flash_2(s):
     _do_no_match(s)
     _do_state(s, 1)
     _do_rest(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _flood_flash_3(s):
@@ -792,7 +799,7 @@ def _flood_flash_4(s):
     _do_no_match(s)
     _do_state(s, 1)
     _do_rest(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _flood_flash_5(s):
@@ -804,7 +811,7 @@ def _flood_flash_5(s):
 def _flood_flash_6(s):
     """vision/vision.rcs line 7"""
     _do_rest(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def flood_flash_step(s):
@@ -821,7 +828,7 @@ def flood_flash_step(s):
 
 def line_flash_line(s):
     """The line of table line_flash that matches admitted inputs: its position; -1 none, -2 several."""
-    return _LINE_FLASH_LINE[s.waited * 48 + s.cur_state * 16 + s.camera_flat * 8 + s.new_command * 4 + s.arrived * 2 + s.fits]
+    return _LINE_FLASH_LINE[s.waited * 48 + s.cur_state * 16 + s.new_command * 8 + s.camera_flat * 4 + s.arrived * 2 + s.fits]
 
 
 def line_flash_lines(states):
@@ -857,7 +864,7 @@ def _line_flash_2(s):
     _do_line_flash_failure(s)
     _do_state(s, 1)
     _do_rest(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _line_flash_3(s):
@@ -873,7 +880,7 @@ def _line_flash_4(s):
     _do_line_flash_failure(s)
     _do_state(s, 1)
     _do_rest(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _line_flash_5(s):
@@ -881,7 +888,7 @@ def _line_flash_5(s):
     _do_line_flash_failure(s)
     _do_state(s, 1)
     _do_rest(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def _line_flash_6(s):
@@ -893,7 +900,7 @@ def _line_flash_6(s):
 def _line_flash_7(s):
     """vision/vision.rcs line 7"""
     _do_rest(s)
-    _do_fail(s)
+    _do_failed(s)
 
 
 def line_flash_step(s):
@@ -956,11 +963,11 @@ def vision_cycle(s):
     if s.fault == 0:
         try:
             _settle(s)
-            _do_receive(s)
+            _do_take_orders(s)
             _do_measure(s)
-            {0: _run_pause_vision, 1: _run_flood_flash, 2: _run_line_flash}[s.command_input_command](s)
+            {0: _run_pause_vision, 1: _run_flood_flash, 2: _run_line_flash}[s.emove_input_command](s)
             if s.fault == 0:
-                _do_answer(s)
+                _do_give_orders(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
     return s.fault

@@ -137,7 +137,9 @@ class _Derivation:
             tuple(edges),
             self.steps.state.deferred_until is not None,
             self._spelled(self.steps.state.initial),
-            tuple(self.table.assumptions),
+            tuple(
+                name.text for name in self.written.assuming
+            ),  # those that the protocol offers come by themselves
             tuple(
                 declaration.path
                 for declaration in self.file.declarations

@@ -48,11 +48,11 @@ PLATE = (560.0, 210.0, 725.0, 560.0, 210.0, 625.0, 460.0, 210.0, 725.0)
 OVER = 7
 """A point of the database."""
 FALSE = {
-    "task": "to_emove.obj_ptr /= tbox or to_emove.locpt_ptr /= 1 or command.obj /= tbox",
+    "task": "to_emove.obj_ptr /= tbox or to_emove.locpt_ptr /= 1 or workstation.obj /= tbox",
     "primitive": " or ".join((
         "to_robot.input_command = hold",
         *(f"to_robot.plate[{at}] < {value}" for at, value in enumerate(PLATE)),
-        f"command.pose_ptr /= {OVER}",
+        f"emove.pose_ptr /= {OVER}",
     )),
 }  # fmt: skip
 """Properties of the shipped levels that do not hold: the runs that show it are those that are drawn."""
@@ -253,9 +253,10 @@ def test_a_level_that_orders_no_pose_leaves_the_arm_at_rest(found: Found, databa
     [picture] = ALONE
     assert lines(svg, "arm") == [[pytest.approx(picture.flat(point), abs=0.06) for point in skeleton(rest)]]
     assert marked(svg) == ["BUFFER"]
-    assert "BUFFER ( task.command.source_locpt , task.to_emove.locpt_ptr ) is marked." in page.words(1)
+    assert "BUFFER ( task.workstation.source_locpt , task.to_emove.locpt_ptr ) is marked." in page.words(1)
     assert (
-        "tbox ( task.to_emove.obj_ptr , task.command.obj ) is marked where cell.toml has it." in page.words(1)
+        "tbox ( task.to_emove.obj_ptr , task.workstation.obj ) is marked where cell.toml has it."
+        in page.words(1)
     )
     kinds = [part.object == database.objects["tbox"] for part in database.parts]
     assert (len(lines(svg, "part named")), len(lines(svg, "part"))) == (kinds.count(True), kinds.count(False))
@@ -293,17 +294,17 @@ def test_what_is_no_pose_is_not_drawn(found: Found, database: Database) -> None:
     """Ordered before reported; at rest where neither is a pose; and where the arm cannot be, it is not drawn."""
     log, none = read(found.logs["primitive"]), (0.0,) * 9
     reported = drawn_in(database, with_plates(log, to_robot=none)).drawn(1)
-    assert reported.caption[0] == "The hand is where `primitive.robot.plate` says."
-    at_rest = drawn_in(database, with_plates(log, to_robot=none, robot=none)).drawn(1)
+    assert reported.caption[0] == "The hand is where `primitive.from_robot.plate` says."
+    at_rest = drawn_in(database, with_plates(log, to_robot=none, from_robot=none)).drawn(1)
     assert at_rest.caption[0].endswith("; the arm is drawn at rest.")
-    assert "`primitive.to_robot.plate` and `primitive.robot.plate`" in at_rest.caption[0]
+    assert "`primitive.to_robot.plate` and `primitive.from_robot.plate`" in at_rest.caption[0]
     assert lines(at_rest.svg, "arm") != lines(reported.svg, "arm") != []
     far = tuple(value + 3000.0 * (at % 3 == 0) for at, value in enumerate(PLATE))
     beyond = drawn_in(database, with_plates(log, to_robot=far)).drawn(1)
     assert "the arm cannot be there" in beyond.caption[0]
     assert not lines(beyond.svg, "arm")
-    assert "primitive.robot.plate" in marked(beyond.svg)  # the other pose is told apart
-    assert "`primitive.robot.plate` is marked." in beyond.caption
+    assert "primitive.from_robot.plate" in marked(beyond.svg)  # the other pose is told apart
+    assert "`primitive.from_robot.plate` is marked." in beyond.caption
 
 
 def test_what_the_data_does_not_know_is_said(found: Found, database: Database) -> None:
@@ -313,9 +314,9 @@ def test_what_the_data_does_not_know_is_said(found: Found, database: Database) -
         log = read(found.logs["task"])
         level = log.level("task")
         state = list(level.track.layout.unpack(level.track.packed[-1]))
-        for name in ("command.source_locpt", "to_emove.locpt_ptr", "command.obj", "to_emove.obj_ptr"):
+        for name in ("workstation.source_locpt", "to_emove.locpt_ptr", "workstation.obj", "to_emove.obj_ptr"):
             state[level.sign.index[name]] = 0
-        state[level.sign.index["command.source_locpt"]] = at_first
+        state[level.sign.index["workstation.source_locpt"]] = at_first
         for leaf, value in values.items():
             state[level.sign.index[f"to_emove.{leaf}"]] = value
         track = replace(level.track, packed=[*level.track.packed[:-1], level.track.layout.pack(*state)])
@@ -334,7 +335,7 @@ def test_what_the_data_does_not_know_is_said(found: Found, database: Database) -
     assert named(locpt_ptr=pallet, sector=50)[0] == []
     renamed = {"another" if name == "tbox" else name: number for name, number in database.objects.items()}
     captions = drawn_in(replace(database, objects=renamed), read(found.logs["task"])).drawn(1).caption
-    assert "tbox (`task.to_emove.obj_ptr`, `task.command.obj`): no part of `cell.toml`." in captions
+    assert "tbox (`task.to_emove.obj_ptr`, `task.workstation.obj`): no part of `cell.toml`." in captions
 
 
 def test_a_cell_is_drawn_of_its_own_system_only(

@@ -54,10 +54,10 @@ def test_most_bugs_pass_the_proofs_of_their_tables(tmp_path: Path) -> None:
 # --- every fault reaches the tables ---
 
 BUFFERS = {
-    "lost": "primitive.report",
+    "lost": "primitive.to_emove",
     "doubled": "primitive.to_gripper",
-    "stale": "gripper.report",
-    "delayed": "vision.report",
+    "stale": "gripper.to_primitive",
+    "delayed": "vision.to_emove",
 }
 ASIDE = replace(TBOX[0], y_mm=-70.0)
 """Farther from the middle of the picture than another."""

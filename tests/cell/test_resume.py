@@ -107,8 +107,8 @@ def test_a_vise_that_does_not_close_stops_the_script_where_it_is() -> None:
     assert made.station.results[-1].reason == "the right jaw did not close: it stands at 20.0 mm"
     assert made.station.cell == CellState(robot_at="FIX-SAFE")
     assert made.station.at_rest
-    assert made.system.level("task").shown("command.input_command") == "pause"
-    assert made.system.level("task").shown("report.status_report") == "done"
+    assert made.system.level("task").shown("workstation.input_command") == "pause"
+    assert made.system.level("task").shown("to_workstation.status_report") == "done"
 
 
 @pytest.mark.usefixtures("project")
@@ -199,7 +199,7 @@ class Below:
             "failure": failure,
             "status_parameter": held,
         }
-        self.held["task.report"] = tuple(
+        self.held["task.to_workstation"] = tuple(
             leaf.members.index(one) if isinstance(one, str) else one
             for leaf in self.station.report
             for one in [said.get(leaf.name.rpartition(".")[2], leaf.initial)]

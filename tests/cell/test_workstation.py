@@ -403,11 +403,7 @@ def test_a_part_that_was_not_picked_up_is_counted_on_the_buffer_again() -> None:
 def test_a_level_whose_proof_fails_does_not_run(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
     file = project / "tables/gripper/gripper.rcs"
     text = one_row_a_line(file)
-    line = next(
-        one
-        for one in text.splitlines()
-        if one.startswith("  | 6    | false       | d_state   |            |")
-    )
+    line = next(one for one in text.splitlines() if one.startswith("  | 6    | false       | d_state   |"))
     file.write_text(text.replace(line + "\n", "", 1), encoding="utf-8")
     assert run(["run", "make_boxt"]) == 1
     assert "error[RCS401]" in capfd.readouterr().out

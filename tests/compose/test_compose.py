@@ -305,18 +305,20 @@ def test_without_deferral_the_published_argument_is_found_in_three_cycles() -> N
     """Section 9: the next state is taken while the level below still reports the command before."""
     shipped = transition_systems(SHIPPED)["task"]
     ts = shipped.of(undeferred(shipped.program))
-    obligation = obligation_of(ts, Sort.ASSUMPTION, "acquire", "in_step")
+    obligation = obligation_of(ts, Sort.ASSUMPTION, "acquire", "acquire_in_step")
     trace = shortest(ts, obligation)
     assert trace is not None
     assert len(trace.steps) == 3
-    assert trace.steps[-1].failed == ("in_step",)
-    assert "assumption `in_step` fails" in "\n".join(time_line({"task": ts}, of_trace(ts, obligation, trace)))
+    assert trace.steps[-1].failed == ("acquire_in_step",)
+    assert "assumption `acquire_in_step` fails" in "\n".join(
+        time_line({"task": ts}, of_trace(ts, obligation, trace))
+    )
 
 
 def test_a_path_begins_where_the_robot_is() -> None:
     """`here` settles when PAUSE is echoed; a command that comes in that very cycle finds `origin` answered for the place before."""
     ts = transition_systems(SHIPPED)["emove"]
-    assert shortest(ts, obligation_of(ts, Sort.ASSUMPTION, "move_to", "in_step"), most=5) is None
+    assert shortest(ts, obligation_of(ts, Sort.ASSUMPTION, "move_to", "move_to_in_step"), most=5) is None
 
 
 # --- the command line ----------------------------------------------------------------------

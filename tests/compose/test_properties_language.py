@@ -579,7 +579,8 @@ def test_no_walk_of_the_shipped_levels_breaks_what_they_state() -> None:
             before: dict[str, Value] = dict(initial(ts.program))
             for after in walk.states(60):
                 assert [name for name in names if not property_kept(ts, name, before, after)] == []
-                spoken.add(after["status_report"])
+                assert ts.links.above is not None
+                spoken.add(after[f"{ts.links.above.report}.status_report"])
                 before = after
         assert len(spoken) == 3  # the walks saw it done, executing and failed
 
@@ -599,21 +600,21 @@ def test_a_grasp_that_failed_is_not_done_after_all() -> None:
         return kind.members.index(name)
 
     command = {
-        "command.inc_command": 1, "command.input_command": member("command.input_command", "immed_grasp"),
-        "fingers.known": True, "fingers.grip_mm": 20.0, "fingers.tolerance_mm": 5.0, "gripper.opening_mm": 30.0,
+        "emove.inc_command": 1, "emove.input_command": member("emove.input_command", "immed_grasp"),
+        "fingers.known": True, "fingers.grip_mm": 20.0, "fingers.tolerance_mm": 5.0, "from_gripper.opening_mm": 30.0,
     }  # fmt: skip
     grasped = {
-        "gripper.inc_command_echo": 1, "gripper.ref_command_echo": member("gripper.ref_command_echo", "grasp"),
-        "gripper.status_report": member("gripper.status_report", "done"),
+        "from_gripper.inc_command_echo": 1, "from_gripper.ref_command_echo": member("from_gripper.ref_command_echo", "grasp"),
+        "from_gripper.status_report": member("from_gripper.status_report", "done"),
     }  # fmt: skip
     paused = {
-        "gripper.inc_command_echo": 2, "gripper.ref_command_echo": member("gripper.ref_command_echo", "pause"),
+        "from_gripper.inc_command_echo": 2, "from_gripper.ref_command_echo": member("from_gripper.ref_command_echo", "pause"),
     }  # fmt: skip
     inputs = []
-    for new in (command, grasped, {"gripper.opening_mm": 24.0}, paused, {}):
+    for new in (command, grasped, {"from_gripper.opening_mm": 24.0}, paused, {}):
         taken = {**taken, **new}
         inputs.append(taken)
-    status = "report.status_report"
+    status = "to_emove.status_report"
     said = [step.after[status] for step in ran(ts, start, inputs)]
     assert said == [member(status, one) for one in ("executing", "failed", "failed", "failed", "failed")]
 
@@ -623,7 +624,7 @@ def test_a_grasp_that_failed_is_not_done_after_all() -> None:
 FAULTS: dict[str, tuple[str, str, str, str]] = {
     "what failed is done": (
         "gripper", "failed_stays",
-        "| 6    | false       | f_state   |        |               ||                              | hold        | fail       |",
+        "| 6    | false       | f_state   |        |               ||                              | hold        | failed     |",
         "| 6    | false       | f_state   |        |               ||                              | hold        | done       |",
     ),
     "the force is another": ("gripper", "keeps_its_force", "to_hand.force_n :=", "//"),

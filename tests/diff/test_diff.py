@@ -114,24 +114,24 @@ def test_the_same_text_is_known_by_digest_and_no_solver_is_asked(
 def test_a_narrowed_condition_gives_what_it_lost_to_default(task: Callable[..., Program]) -> None:
     nine = line_of("9")
     found = acquire(
-        task, (nine, edited(nine, ("| pause          |           |", "| pause          | done      |")))
+        task, (nine, edited(nine, ("| pause         |              |", "| pause         | done         |")))
     )
     changed = part(found, "acquire")
     assert regions(changed.changes) == {
         (
             "line `9`",
             "DEFAULT `16`",
-            ("new_command = false", "ref_command_in = pause", "status_in /= done", "cur_state = d_state"),
+            ("new_command = false", "emove.command = pause", "emove.status /= done", "cur_state = d_state"),
         )
     }
     [change] = changed.changes
     assert change.sort is PartSort.EFFECT
     assert change.where.inputs == (32, 5184)
-    assert dict(change.witness)["status_in"] == "executing"
+    assert dict(change.witness)["emove.status"] == "executing"
     assert {(v.leaf, v.headings, v.at) for v in change.values} == {
         ("cur_state.next", ("procedures",), ("d_state", "f_state")),
-        ("status_report", ("status_out",), ("done", "failed")),
-        ("failure", ("procedures",), ("none", "state")),
+        ("to_workstation.status_report", ("status_out",), ("done", "failed")),
+        ("to_workstation.failure", ("procedures",), ("none", "state")),
     }
     assert changed.basis is Basis.SOLVER
     assert [compared.name for compared in found.parts if compared.changed] == ["acquire"]
@@ -139,7 +139,7 @@ def test_a_narrowed_condition_gives_what_it_lost_to_default(task: Callable[..., 
 
 def test_a_widened_condition_meets_another_line_where_both_now_match(task: Callable[..., Program]) -> None:
     five = line_of("5")
-    wide = edited(five, ("| done      | state_4 ", "| /= executing | state_4 "))
+    wide = edited(five, ("| done         | state_4 ", "| /= executing | state_4 "))
     changed = part(acquire(task, (five, wide)), "acquire")
     assert regions(changed.changes) == {
         (
@@ -147,8 +147,8 @@ def test_a_widened_condition_meets_another_line_where_both_now_match(task: Calla
             "several lines",
             (
                 "new_command = false",
-                "ref_command_in = move_to_obj",
-                "status_in = failed",
+                "emove.command = move_to_obj",
+                "emove.status = failed",
                 "cur_state = state_4",
             ),
         )
@@ -171,7 +171,7 @@ def test_a_renamed_line_is_another_line_with_the_same_effect(task: Callable[...,
         (
             "line `7`",
             "line `7a`",
-            ("new_command = false", "ref_command_in = locate", "status_in = done", "cur_state = state_3"),
+            ("new_command = false", "emove.command = locate", "emove.status = done", "cur_state = state_3"),
         )
     }
 
@@ -198,28 +198,30 @@ def test_a_constant_in_a_line_changes_its_effect_and_the_steps_of_the_state_grap
     [change] = part(found, "acquire").changes
     assert [(v.leaf, v.before, v.after) for v in change.values] == [("cur_state.next", "state_3", "state_4")]
     assert change.where.words == (
-        ("new_command = false", "ref_command_in = move_to", "status_in = done", "cur_state = state_2"),
+        ("new_command = false", "emove.command = move_to", "emove.status = done", "cur_state = state_2"),
     )
 
 
 def test_a_constant_in_a_procedure_changes_every_line_that_calls_it(task: Callable[..., Program]) -> None:
-    old = "  failure := loc\n  remember_current_loc := 0\n"
+    old = "  to_workstation.failure := loc\n  remember_current_loc := 0\n"
     common = (REPO / "tables/task/common.rcs").read_text(encoding="utf-8")
-    assert common.count("  failure := loc\n") == 1, old
-    found = acquire(task, ("  failure := loc\n", "  failure := cmd\n"), file="common.rcs")
+    assert common.count("  to_workstation.failure := loc\n") == 1, old
+    found = acquire(
+        task, ("  to_workstation.failure := loc\n", "  to_workstation.failure := cmd\n"), file="common.rcs"
+    )
     assert {(compared.what, compared.name) for compared in found.parts if compared.changed} == {
         ("table", "acquire"), ("procedure", "loc_failure")
     }  # fmt: skip
     [change] = part(found, "acquire").changes
     assert (change.before, change.after) == ("line `12`", "line `12`")
     assert change.where.words == (
-        ("new_command = false", "ref_command_in = locate", "status_in = failed", "cur_state /= f_state"),
+        ("new_command = false", "emove.command = locate", "emove.status = failed", "cur_state /= f_state"),
     )
-    assert [(v.leaf, v.before, v.after) for v in change.values] == [("failure", "loc", "cmd")]
+    assert [(v.leaf, v.before, v.after) for v in change.values] == [("to_workstation.failure", "loc", "cmd")]
 
 
 def test_independent_assignments_in_another_order_mean_the_same(task: Callable[..., Program]) -> None:
-    one, two = "  to_emove.sector := command.sector\n", "  to_emove.locpt_ptr := source.vupos\n"
+    one, two = "  to_emove.sector := workstation.sector\n", "  to_emove.locpt_ptr := source.vupos\n"
     found = acquire(task, (one + two, two + one), file="common.rcs")
     assert not found.changed
     assert part(found, "vupos_setup", "procedure").basis is Basis.SOLVER

@@ -439,7 +439,7 @@ def test_lines_are_bits_and_every_line_of_the_tables_is_known() -> None:
 
 EVERYTHING = Episode(
     parts=(PartSpec("tbox", size_mm=(1.0, 2.0, 3.0)),), rows=("MOVE,,,WS-SAFE,",), faults=(FaultSpec("slips", 3, 4),),
-    transport=(TransportSpec("task.report", "lost", 3, 4),), restarts=(Restart(3, "task"),),
+    transport=(TransportSpec("task.to_workstation", "lost", 3, 4),), restarts=(Restart(3, "task"),),
     interruptions=(Interruption(3, "MOVE,,,WS-SAFE,"),), pushes=(Push(3, 0, 1.0, 1.0),),
 )  # fmt: skip
 
@@ -472,7 +472,7 @@ SWITCHES = [
     FaultSpec(name, at, at + 5)
     for at, name in enumerate(("drops", "dark", "blind", "noisy", "slips", "tilted"))
 ]
-HARMED = [TransportSpec("task.report", "lost", at, at) for at in range(5)]
+HARMED = [TransportSpec("task.to_workstation", "lost", at, at) for at in range(5)]
 
 
 def _some(of: Sequence[Any]) -> st.SearchStrategy[tuple[Any, ...]]:

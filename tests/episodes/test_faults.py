@@ -1,11 +1,13 @@
 """Seeded faults: that they are faults, and that each of the three that are asked catches some which the others do not."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import chain, islice
 from pathlib import Path
 
 import pytest
 
+from rcsc.lang.protocol import written
+from rcsc.lang.protocol.roles import Parties
 from tests.faults import (
     Answer,
     Judged,
@@ -57,7 +59,9 @@ def test_every_kind_is_there_and_there_are_more_than_two_hundred_in_turns() -> N
     firsts = [list(islice(sample(TABLES, level, 1984), 50)) for level in LEVELS]
     assert sum(map(len, firsts)) == 250
     assert len({(fault.file, fault.text) for fault in chain.from_iterable(firsts)}) > 240
-    assert {fault.kind for fault in firsts[-1][: len(KINDS)]} == set(KINDS)  # of TASK, which has all
+    for level, first in zip(LEVELS, firsts, strict=True):
+        kinds = {kind for kind, ones in every[level].items() if ones}
+        assert {fault.kind for fault in first[: len(kinds)]} == kinds
 
 
 def test_a_sample_hangs_on_its_seed_alone() -> None:
@@ -76,8 +80,11 @@ def test_a_table_is_read_with_its_head_and_its_lines() -> None:
 
 
 def test_what_does_not_resolve_is_no_fault() -> None:
-    old = "report.ref_command_echo := command.input_command"
-    assert not resolves(gripper("a field swapped", old, "command.opening_mm"))  # a length is no command
+    old = "to_hand.opening_mm := primitive.opening_mm"
+    assert not resolves(gripper("a field swapped", old, "primitive.input_command"))  # a command is no length
+    assert not resolves(
+        gripper("a status taken for another", "done done", "done failed")
+    )  # a buffer at first says done
     assert resolves(gripper("a line dropped", "| 7    | false       | f_state", ""))
 
 
@@ -89,8 +96,22 @@ def test_a_missing_line_is_caught_by_the_table_s_proof_and_by_the_composed_one(
     assert by_compose(fault, sound) == Answer(True, "gripper: position: some line matches")
 
 
-def test_only_the_composed_proof_knows_that_a_command_is_taken_up_once(sound: Mapping[str, Standing]) -> None:
-    fault = gripper("a new number compared wrongly", "/= inc_command_seen", "= inc_command_seen")
+def test_only_the_composed_proof_knows_that_a_command_is_taken_up_once(
+    sound: Mapping[str, Standing], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The fault is in the text that the protocol makes of `serves`: a new number is compared wrongly."""
+    made = written.taken
+
+    def turned(parties: Parties) -> Iterator[str]:
+        lines = list(made(parties))
+        assert sum("/= inc_command_seen" in line for line in lines) == 1
+        return (line.replace("/= inc_command_seen", "= inc_command_seen") for line in lines)
+
+    monkeypatch.setattr(written, "taken", turned)
+    path = TABLES / "gripper" / "gripper.rcs"
+    fault = Fault(
+        "gripper", "the protocol's own text", "gripper/gripper.rcs", 1, "", "", path.read_text("utf-8")
+    )
     assert by_check(fault) == Answer(False)
     assert by_compose(fault, sound).how.startswith("gripper: a command number is taken up once")
 
@@ -118,7 +139,7 @@ def test_the_composed_proof_and_the_episodes_know_that_a_counter_must_count(
 
 def test_only_the_episodes_know_what_the_fingers_do(sound: Mapping[str, Standing]) -> None:
     """They are told to move, and not where to."""
-    fault = gripper("an assignment dropped", "to_hand.opening_mm := command.opening_mm", "")
+    fault = gripper("an assignment dropped", "to_hand.opening_mm := primitive.opening_mm", "")
     assert by_check(fault) == Answer(False)
     assert by_compose(fault, sound) == Answer(False)
     assert by_campaign(fault).caught

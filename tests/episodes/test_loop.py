@@ -140,7 +140,7 @@ def test_an_episode_that_grew_runs_again_as_it_went() -> None:
     machine = CellMachine()
     machine.command("ACQUIRE,BOXT (2),BUFFER,,", 100)
     machine.breaks(FaultSpec("blind", 0, 50), 10)
-    machine.loses(TransportSpec("emove.report", "stale", 0, 3), 10)
+    machine.loses(TransportSpec("emove.to_task", "stale", 0, 3), 10)
     machine.restarts("vision", 5)
     machine.pushes(1, 2)
     machine.pause(30)
@@ -155,7 +155,7 @@ def test_an_episode_that_grew_runs_again_as_it_went() -> None:
 ODD = replace(
     ACQUIRE,
     faults=(FaultSpec("noisy", 80, 200),),
-    transport=(TransportSpec("primitive.report", "delayed", 20, 60),),
+    transport=(TransportSpec("primitive.to_emove", "delayed", 20, 60),),
     restarts=(Restart(40, "vision"),),
     interruptions=(Interruption(30, "MOVE,,,FIX-SAFE,"), Interruption(80, "ACQUIRE,BOXT (2),BUFFER,,")),
 )
@@ -308,7 +308,7 @@ def test_a_script_is_what_rcsc_run_reads() -> None:
 def test_a_reader_never_sees_an_older_value_after_a_newer_one(
     harmed: list[TransportSpec], count: int
 ) -> None:
-    names = sorted({transport.buffer for transport in harmed} | {"task.report"})
+    names = sorted({transport.buffer for transport in harmed} | {"task.to_workstation"})
     buffers = Harmed(harmed)
     seen: dict[str, tuple[float, ...]] = {}
     for tick in range(count):

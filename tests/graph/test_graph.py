@@ -32,7 +32,7 @@ from rcsc.relation.same import Differs, Same, compare
 from rcsc.relation.steps import Steps
 from rcsc.solvers.options import Options
 from tests.support.programs.stages import program_of
-from tests.support.programs.texts import edited
+from tests.support.programs.texts import edit_file, edited
 
 ROOT = Path(__file__).parents[2]
 OPTIONS = Options()
@@ -69,12 +69,16 @@ def said(entry: FoundTable, text: str, form: str) -> Against:
     return against(entry.loaded, entry.root, entry.program, entry.table, table, OPTIONS)
 
 
+def of_name(file: str, name: str) -> list[FoundTable]:
+    made = tables(f"{file}:{name}" if name else file)
+    assert not isinstance(made, NotFound), made
+    return made
+
+
 def found_in(text: str, tmp_path: Path, name: str = "") -> FoundTable:
     file = tmp_path / "case.rcs"
     file.write_text(text, encoding="utf-8")
-    made = tables(f"{file}:{name}" if name else str(file))
-    assert not isinstance(made, NotFound), made
-    return made[0]
+    return of_name(str(file), name)[0]
 
 
 # --- the shipped tables --------------------------------------------------------------------
@@ -119,7 +123,7 @@ def test_the_graph_of_acquire_is_fig_10(shipped: dict[str, FoundTable]) -> None:
     assert by_procedure == {("5", "f_state"): "pickup", ("7", "f_state"): "pickup"}  # the buffer is empty
     assert made.everywhere == "new_command = false"
     shown = {edge.line: edge.shown for edge in made.graph.edges}
-    assert shown["5"] == "status_in = done"  # the command echoed follows from the state
+    assert shown["5"] == "emove.status = done"  # the command echoed follows from the state
     assert shown["9"] == ""
     assert any("line `10`: `/= f_state`" in one for one in made.lost)
 
@@ -140,11 +144,11 @@ def test_the_published_acquire_leaves_its_state_past_the_deferral() -> None:
 BREAKS = [
     (
         "a guard",
-        "ref_command_in = locate and status_in = done",
-        "ref_command_in = locate and status_in = failed",
+        "emove.command = locate and emove.status = done",
+        "emove.command = locate and emove.status = failed",
     ),
     ("an effect", "command_out(locate)", "command_out(move_to)"),
-    ("a procedure", "procedures(begin, set_source)", "procedures(begin)"),
+    ("a procedure", "procedures(vupos_setup)", "procedures(set_source)"),
     ("a state", "state_5", "state_8"),
 ]
 
@@ -168,20 +172,33 @@ def test_a_broken_graph_is_refuted_by_an_input(
 def test_a_dropped_edge_is_refuted(shipped: dict[str, FoundTable], form: str) -> None:
     entry = shipped["primitive.goto"]
     lines = FORMS[form].write(graph_of(entry).graph).splitlines(keepends=True)
-    at = next(at for at, line in enumerate(lines) if "robot_status_in = done and there = true" in line)
+    at = next(at for at, line in enumerate(lines) if "robot.status = done and there = true" in line)
     [found] = said(entry, "".join(lines[:at] + lines[at + 1 :]), form).diagnostics
     assert found.code is Code.GRAPH_DIFFERS
     assert "line `6`, the graph to line `10`" in found.message  # DEFAULT takes it
 
 
-def test_a_table_that_rests_on_other_assumptions_is_not_the_same(shipped: dict[str, FoundTable]) -> None:
-    entry = shipped["task.acquire"]
-    text = (
-        FORMS["mermaid"]
-        .write(graph_of(entry).graph)
-        .replace("in_step, resting, acquire_states", "in_step, resting")
-    )
-    [found] = said(entry, text, "mermaid").diagnostics
+@pytest.fixture(scope="module")
+def assuming(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The file of ACQUIRE with an assumption of its own, besides those that come with the protocol."""
+    folder = tmp_path_factory.mktemp("assuming")
+    for name in ("rcsc.toml", "vocabulary.rcs"):
+        shutil.copy(ROOT / "tables" / name, folder / name)
+    shutil.copytree(ROOT / "tables/task", folder / "task")
+    path = folder / "task/acquire.rcs"
+    states = "cur_state in {d_state, f_state, state_2, state_3, state_4, state_5}"
+    head = "\n## ACQUIRE (OBJ [at A]), level TASK.\ntable acquire {"
+    own = f"\nassume acquire_states monitored : not new_command implies {states}\n"
+    edit_file(path, (head, own + head.replace(" {", " assuming acquire_states {")))
+    return str(path)
+
+
+def test_a_table_that_rests_on_other_assumptions_is_not_the_same(assuming: str) -> None:
+    [entry] = of_name(assuming, "acquire")
+    assert set(entry.table.assumptions) == {"acquire_states", "acquire_in_step", "acquire_resting"}
+    text = FORMS["mermaid"].write(graph_of(entry).graph)
+    assert said(entry, text, "mermaid").diagnostics == ()
+    [found] = said(entry, edited(text, ("assuming: acquire_states", "assuming:")), "mermaid").diagnostics
     assert (found.code, "acquire_states" in found.notes[0]) == (Code.GRAPH_DIFFERS, True)
 
 
@@ -667,7 +684,7 @@ def test_the_drawing_shows_every_state_and_every_line_once_an_arrow(shipped: dic
     ]
     assert sorted(map(str, numbers)) == sorted(edge.line for edge in made.graph.edges if edge.line != "16")
     assert "line 16 is DEFAULT, never reached; it would lead to f_state" in words
-    assert "status_in = executing" in words
+    assert "emove.status = executing" in words
     assert text == svg(made.graph, made.everywhere)
 
 
@@ -762,19 +779,23 @@ ACQUIRE = str(ROOT / "tables/task/acquire.rcs")
 
 
 @pytest.mark.parametrize("form", EVERY_FORM)
-def test_graph_and_table_are_each_other_s_way_back(form: str, tmp_path: Path) -> None:
-    status, text, notes = run("graph", ACQUIRE, "--form", form)
+def test_graph_and_table_are_each_other_s_way_back(form: str, assuming: str, tmp_path: Path) -> None:
+    status, text, notes = run("graph", assuming, "--form", form)
     assert status == 0
     assert "acquire: the table read back from the graph does the same: proved" in notes
     assert "note[RCS774]: acquire: not in the graph: line `10`" in notes
-    status, made, proved = run("table", "-", "--against", ACQUIRE, stdin=text)
+    status, made, proved = run("table", "-", "--against", assuming, stdin=text)
     assert (status, "does the same as" in proved) == (0, True)
-    assert made.startswith("use task/common\n\ntable acquire assuming in_step, resting, acquire_states {")
+    assert made.startswith("use task/common\n\ntable acquire assuming acquire_states {")
     status, refuted, _ = run(
-        "table", "-", "--against", ACQUIRE, stdin=text.replace("status_in = failed", "status_in /= done")
+        "table",
+        "-",
+        "--against",
+        assuming,
+        stdin=text.replace("emove.status = failed", "emove.status /= done"),
     )
     assert (status, "error[RCS773]" in refuted, "the graph to several lines" in refuted) == (1, True, True)
-    status, whole, _ = run("table", "-", "--in", ACQUIRE, stdin=text)
+    status, whole, _ = run("table", "-", "--in", assuming, stdin=text)
     assert (status, "assume acquire_states monitored" in whole) == (0, True)
     place = tmp_path / "new.rcs"
     place.write_text(whole, encoding="utf-8")

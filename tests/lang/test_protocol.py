@@ -388,6 +388,22 @@ def test_levels_without_a_superior_and_without_subordinates_are_levels() -> None
         ("within 2 cycles", "within 0 cycles", "RCS301", "at least one cycle"),
         ("phase : phase restart out", "phase : phase restart elsewhere", "RCS201", "elsewhere"),
         ("input choice : choice", "input choice : choice restart halt", "RCS301", "is an input"),
+        ("reason why : why restart begun_anew", "reason why : why restart rest", "RCS301", "expected `why`"),
+        ("level cell", "adopt choice := halt\nlevel cell", "RCS301", "adopts nothing"),
+        ("level cell", "adopt to_arm := 1\nlevel cell", "RCS301", "record"),
+        ("level cell", "adopt phase := halt\nlevel cell", "RCS301", "expected `phase`"),
+        (
+            "level cell",
+            "adopt to_arm.width_mm after boss.inc_command\nlevel cell",
+            "RCS301",
+            "of its own type",
+        ),
+        (
+            "level cell",
+            "adopt to_arm.width_mm after last_arm.width_mm\nlevel cell",
+            "RCS301",
+            "of its own type",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_declaration_is_said_where_it_stands(

@@ -107,9 +107,9 @@ def edited(tmp_path: Path) -> Path:
     shutil.copytree(REPO / "generated", folder)
     module = folder / "python" / "gripper.py"
     text = module.read_text(encoding="utf-8")
-    procedure = "    s.report_opening_mm = s.hand_opening_mm + 0.0\n"
+    procedure = "    s.to_primitive_opening_mm = s.hand_opening_mm + 0.0\n"
     assert procedure in text
-    changed = text.replace(procedure, "    s.report_opening_mm = min(s.hand_opening_mm, 20.0)\n")
+    changed = text.replace(procedure, "    s.to_primitive_opening_mm = min(s.hand_opening_mm, 20.0)\n")
     module.write_text(changed, encoding="utf-8")
     return folder
 
@@ -190,7 +190,7 @@ def test_it_steps_forwards_and_backwards_and_goes_anywhere(log: Log) -> None:
 def test_a_planted_difference_is_named(logged: Path) -> None:
     forged = read(logged)
     level = forged.level("task")
-    at = level.sign.index["report.status_report"]
+    at = level.sign.index["to_workstation.status_report"]
     values = list(level.track.layout.unpack(level.track.packed[77]))
     then = values[at]
     values[at] = 2 if then != 2 else 1
@@ -201,7 +201,7 @@ def test_a_planted_difference_is_named(logged: Path) -> None:
     [cycle] = [replayed for replayed in moment.cycles if replayed.differences]
     [difference] = cycle.differences
     members = level.sign.leaves[at].members
-    assert (cycle.level, difference.name) == ("task", "report.status_report")
+    assert (cycle.level, difference.name) == ("task", "to_workstation.status_report")
     assert (difference.then, difference.now) == (members[int(values[at])], members[int(then)])
 
 
@@ -304,7 +304,7 @@ def test_what_other_tables_would_have_done(log: Log, edited: Path, logged: Path)
     assert cycle.level == "gripper"
     assert moment.tick == 43  # published in tick 42 (the 41st from 0), taken in the next
     assert [(difference.name, difference.then, difference.now) for difference in cycle.differences] == [
-        ("report.opening_mm", "20.5", "20.0")
+        ("to_primitive.opening_mm", "20.5", "20.0")
     ]
     result = run("replay", logged, "--executor", "python", "--generated", edited)
     assert result.return_value == 1
@@ -319,7 +319,7 @@ def test_tables_with_other_lines_and_leaves(log: Log, edited: Path) -> None:
     said = json.loads(symbols.read_text(encoding="utf-8"))
     for table in said["tables"]:
         table["lines"] = [f"new_{line}" for line in table["lines"]]
-    report = next(one for one in said["leaves"] if one["name"] == "report.ref_command_echo")
+    report = next(one for one in said["leaves"] if one["name"] == "to_primitive.ref_command_echo")
     report["members"] = ["rest", *report["members"][1:]]
     symbols.write_text(json.dumps(said), encoding="utf-8")
     again = Replay(log, edited, "python")
@@ -330,7 +330,7 @@ def test_tables_with_other_lines_and_leaves(log: Log, edited: Path) -> None:
     assert (cycle.line_then, cycle.line_now) == ("pause_gripper line 1", "pause_gripper line new_1")
     assert {(difference.name, difference.then, difference.now) for difference in cycle.differences} == {
         ("line", "1", "new_1"),
-        ("report.ref_command_echo", "pause", "rest"),
+        ("to_primitive.ref_command_echo", "pause", "rest"),
     }
     report["members"][0] = "pause"
     symbols.write_text(json.dumps(said), encoding="utf-8")
@@ -344,12 +344,14 @@ def test_what_other_tables_lack_is_named_and_not_said_to_be_the_same(tmp_path: P
     shutil.copytree(REPO / "generated", folder)
     symbols = folder / "c" / "gripper.json"
     said = json.loads(symbols.read_text(encoding="utf-8"))
-    next(one for one in said["leaves"] if one["name"] == "report.opening_mm")["name"] = "report.width_mm"
+    next(one for one in said["leaves"] if one["name"] == "to_primitive.opening_mm")["name"] = (
+        "to_primitive.width_mm"
+    )
     symbols.write_text(json.dumps(said), encoding="utf-8")
     result = run("replay", logged, "--executor", "python", "--generated", folder)
     assert "nothing differs" not in result.output
     assert "nothing that these tables have differs" in result.output
-    assert "not compared: gripper.report.opening_mm" in result.output
+    assert "not compared: gripper.to_primitive.opening_mm" in result.output
     assert "not compared" not in run("replay", logged, "--executor", "python").output
 
 
@@ -565,18 +567,18 @@ def test_a_run_of_a_level_alone_that_ends_in_a_fault_replays(
 
 def test_the_first_cycle_where_something_holds(log: Log) -> None:
     asked = {
-        "task.command.inc_command == 2": 27,
-        "task.command.inc_command >= 2 and not task.command.inc_command > 2": 27,
-        "1 < task.command.inc_command < 3": 27,
-        "primitive.robot.plate[1] == 1.1 or task.command.inc_command == 9": 4,
-        "task.command.input_command == move": 2,
-        "task.command.input_command == 'release'": 27,
+        "task.workstation.inc_command == 2": 27,
+        "task.workstation.inc_command >= 2 and not task.workstation.inc_command > 2": 27,
+        "1 < task.workstation.inc_command < 3": 27,
+        "primitive.from_robot.plate[1] == 1.1 or task.workstation.inc_command == 9": 4,
+        "task.workstation.input_command == move": 2,
+        "task.workstation.input_command == 'release'": 27,
         "gripper.fault != none": None,
         "primitive.from[0] < -1e9": None,
     }
     for text, tick in asked.items():
         found = find(log, predicate(text, log))
-        if text.startswith("primitive.robot"):
+        if text.startswith("primitive.from_robot"):
             assert found is not None
         else:
             assert found == tick, text
@@ -593,7 +595,7 @@ def test_the_first_cycle_where_something_holds(log: Log) -> None:
     [
         "", "1 +", "task.nothing == 1", "task.cur_state", "task.cur_state == wrong", "task.cur_state < d_state",
         "task.cur_state == 1", "d_state == d_state", "__import__('os').system('true')", "task.cur_state is d_state",
-        "(lambda: 1)() == 1", "task.command.inc_command + 1 == 2", "task['x'] == 1", "x.y.z", "[1] == [1]",
+        "(lambda: 1)() == 1", "task.workstation.inc_command + 1 == 2", "task['x'] == 1", "x.y.z", "[1] == [1]",
         "(" * 500, "not " * 2_000 + "task.new_command",
     ],
 )  # fmt: skip
@@ -651,8 +653,8 @@ def test_the_command_that_replays_a_log(tmp_path: Path, logged: Path) -> None:
     moment = replayed("--at", 30, "--show", "gripper")
     assert moment.return_value == 0
     assert "gripper: " in moment.output
-    assert "    command.opening_mm = " in moment.output
-    assert replayed("--find", "task.command.inc_command == 2").output.startswith("cycle 27, ")
+    assert "    primitive.opening_mm = " in moment.output
+    assert replayed("--find", "task.workstation.inc_command == 2").output.startswith("cycle 27, ")
     assert replayed("--find", "task.fault == none and false").return_value == 1
     assert replayed("--find", "task.nothing").exit_code != 0
     assert replayed("--at", TICKS + 1).exit_code != 0
@@ -674,14 +676,21 @@ def test_a_planted_difference_by_the_command(
 
 def test_pictures(tmp_path: Path, logged: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "run.svg"
-    names = "task.cur_state,primitive.robot.plate[0],task.line,task.new_command"
+    names = "task.cur_state,primitive.from_robot.plate[0],task.line,task.new_command"
     assert run("log", logged, "--plot", names, "-o", out).return_value == 0
     first = out.read_bytes()
     assert b"<svg" in first
     assert run("log", logged, "--plot", names, "-o", out).return_value == 0
     assert out.read_bytes() == first
     across = tmp_path / "xy.png"
-    xy = ["--plot", "primitive.robot.plate[1]", "--against", "primitive.robot.plate[0]", "-o", across]
+    xy = [
+        "--plot",
+        "primitive.from_robot.plate[1]",
+        "--against",
+        "primitive.from_robot.plate[0]",
+        "-o",
+        across,
+    ]
     assert run("log", logged, *xy).return_value == 0
     assert across.read_bytes()[1:4] == b"PNG"
     assert run("log", logged, "--plot", "task.nothing", "-o", out).exit_code != 0
@@ -698,9 +707,9 @@ def test_parquet(tmp_path: Path, logged: Path, log: Log) -> None:
     assert run("log", logged, "--parquet", out).return_value == 0
     table = parquet.read_table(out)
     assert table.num_rows == TICKS
-    at = log.level("primitive").sign.index["robot.plate[0]"]
+    at = log.level("primitive").sign.index["from_robot.plate[0]"]
     track = log.level("primitive").track
-    assert table["primitive.robot.plate[0]"].to_pylist() == [
+    assert table["primitive.from_robot.plate[0]"].to_pylist() == [
         values[at] for tick, values in track if tick in log.ticks
     ]
     assert table["task.cur_state"].to_pylist()[-1] in {"d_state", "f_state"} | {

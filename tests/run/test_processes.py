@@ -136,9 +136,9 @@ def test_a_buffer_that_does_not_fit_is_refused(repo: Path) -> None:
     signs = {name: sign_of(repo, name) for name in LEVELS}
     layout(good, signs)
     for wire in (
-        Wire("task.report", "emove.command"),
+        Wire("task.to_workstation", "emove.task"),
         Wire("camera.picture", "robot.order"),
-        Wire("task.nothing", "emove.command"),
+        Wire("task.nothing", "emove.task"),
     ):
         bad = Description(good.name, good.generated, good.database, 40, good.levels, (wire,))
         with pytest.raises(BadDescription):
@@ -297,7 +297,7 @@ def started(repo: Path, first: int) -> Values:
     """TASK's initial state, but that its numbers begin elsewhere."""
     sign = sign_of(repo, "task")
     values = list(executors(alone(repo), {"task": sign}, "python")["task"].values())
-    for name in ("to_emove.inc_command", "emove.inc_command_echo"):
+    for name in ("to_emove.inc_command", "from_emove.inc_command_echo"):
         values[sign.index[name]] = first
     return tuple(values)
 
@@ -448,7 +448,7 @@ def test_a_level_with_a_lost_state_starts_safely(repo: Path, tmp_path: Path) -> 
     region = system.buffers.layout.regions["task"]
 
     def report() -> Values:
-        return system.buffers.latest("task.report") or (0,) * 5
+        return system.buffers.latest("task.to_workstation") or (0,) * 5
 
     with system:
         system.buffers.publish("workstation.order", (41, *ROUND[0]))
@@ -459,7 +459,7 @@ def test_a_level_with_a_lost_state_starts_safely(repo: Path, tmp_path: Path) -> 
         system.buffers.block.write(region.at, seeded(3).randbytes(2 * region.slot))
         system.start("task")
         until(lambda: report()[2] != DONE, "nothing is said of the restart")
-        restart = sign.leaves[sign.index["report.failure"]].members.index("restart")
+        restart = sign.leaves[sign.index["to_workstation.failure"]].members.index("restart")
         assert report() == (41, ACQUIRE, 2, 0, restart)
         until(lambda: len(lines(tmp_path / "below")) > len(before), "no PAUSE goes down")
         assert lines(tmp_path / "below") == [*before, ((before[-1][0] + 1) % NUMBERS, PAUSE)]
@@ -543,7 +543,7 @@ def test_a_state_that_no_cycle_may_begin_with_is_refused_by_name(
 
 
 def test_what_no_buffer_can_hold_is_refused_by_name(repo: Path) -> None:
-    with pytest.raises(StateTableError, match=r"buffer `emove\.report` cannot hold what was published"):
+    with pytest.raises(StateTableError, match=r"buffer `emove\.to_task` cannot hold what was published"):
         run_processes(alone(repo), "python", {"wrong": Factory(f"{HERE}:wrong")}, queries=QUERIES, rate=0)
 
 
@@ -573,6 +573,8 @@ def test_whatever_is_in_the_buffers_an_adopted_level_rests(
     sign = sign_of(repo, name)
     system = Description(name, repo / "generated", repo, 40, (LevelSpec(name, name, ()),), ())
     executor = executors(system, {name: sign}, "python")[name]
+    above = sign.leaves[0].name.partition(".")[0]
+    assert f"to_{above}.inc_command_echo" in sign.index
     inputs = [at for at, leaf in enumerate(sign.leaves) if leaf.kind == "input"]
     for at in inputs:
         executor.put(at, (data.draw(value(sign.leaves[at])),))
@@ -582,14 +584,14 @@ def test_whatever_is_in_the_buffers_an_adopted_level_rests(
     for _ in range(3):
         assert executor.cycle() == 0
     now = dict(zip((leaf.name for leaf in sign.leaves), executor.values(), strict=False))
-    assert now["report.inc_command_echo"] == now["command.inc_command"]
-    if now["command.input_command"] != PAUSE:
-        assert shown(sign, now, "report.status_report") == "failed"
-        assert shown(sign, now, "report.failure") == "restart"
+    assert now[f"to_{above}.inc_command_echo"] == now[f"{above}.inc_command"]
+    if now[f"{above}.input_command"] != PAUSE:
+        assert shown(sign, now, f"to_{above}.status_report") == "failed"
+        assert shown(sign, now, f"to_{above}.failure") == "restart"
     for leaf in sign.leaves:
         record, _, part = leaf.name.partition(".")
         if record.startswith("to_") and part == "inc_command":
-            assert now[leaf.name] == (now[f"{record[3:]}.inc_command_echo"] + 1) % NUMBERS
+            assert now[leaf.name] == (now[f"from_{record[3:]}.inc_command_echo"] + 1) % NUMBERS
             assert now[f"{record}.input_command"] == PAUSE
 
 
@@ -600,9 +602,9 @@ def shown(sign: Signature, now: dict[str, Value], name: str) -> str:
 def test_adopting_wraps_and_changes_nothing_else(repo: Path) -> None:
     sign = sign_of(repo, "task")
     values = list(started(repo, 65535))
-    values[sign.index["command.inc_command"]] = 9
-    values[sign.index["command.obj"]] = TBOX
-    values[sign.index["command.source_locpt"]] = STORE
+    values[sign.index["workstation.inc_command"]] = 9
+    values[sign.index["workstation.obj"]] = TBOX
+    values[sign.index["workstation.source_locpt"]] = STORE
     adopted = adopt(sign, tuple(values))
     changed = {
         sign.leaves[at].name: adopted[at] for at in range(len(sign.leaves)) if adopted[at] != values[at]
@@ -611,8 +613,8 @@ def test_adopting_wraps_and_changes_nothing_else(repo: Path) -> None:
         "inc_command_seen": 9,
         "cur_state": 1,
         "cur_state.next": 1,
-        "status_report": 2,
-        "failure": sign.leaves[sign.index["failure"]].members.index("restart"),
+        "to_workstation.status_report": 2,
+        "to_workstation.failure": sign.leaves[sign.index["to_workstation.failure"]].members.index("restart"),
         "to_emove.inc_command": 0,
     }
     assert adopt(sign, adopted) == adopted

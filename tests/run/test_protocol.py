@@ -74,7 +74,7 @@ def test_commands_that_change_in_mid_motion_are_each_answered_or_replaced(
         cell.tell(command, **said)
         for _ in range(cycles):
             cell.system.step()
-            report = cell.system.buffers.latest("task.report")
+            report = cell.system.buffers.latest("task.to_workstation")
             assert report is None or int(report[0]) <= cell.number
     assert cell.until_over(LATE_ENDS) in ("done", "failed")
     cell.tell("pause")

@@ -32,8 +32,8 @@ REPO = Path(__file__).parents[2]
 SYSTEM = REPO / "tables" / "system.toml"
 GRIPPER = "gripper/gripper.rcs"
 RCSC = [sys.executable, "-c", "from rcsc.commands import main; main()", "shell"]
-MOVE = ["command.inc_command = 1", "command.input_command = move", "command.dest_locpt = 3"]
-DONE = "run until task.report.inc_command_echo = 1 and task.report.status_report = done"
+MOVE = ["workstation.inc_command = 1", "workstation.input_command = move", "workstation.dest_locpt = 3"]
+DONE = "run until task.to_workstation.inc_command_echo = 1 and task.to_workstation.status_report = done"
 
 
 def inhabited(kind: Kind = "c") -> Commands:
@@ -75,7 +75,7 @@ def test_a_script_moves_the_robot_and_says_so(tmp_path: Path, kind: str) -> None
     lines = [
         *MOVE,
         "run to task.move.13  # the answer",
-        "expect task.status_report = done and task.current_loc = 3",
+        "expect task.to_workstation.status_report = done and task.current_loc = 3",
         "",
     ]
     done = script("\n".join(lines), "--executor", kind, tmp_path=tmp_path)
@@ -84,14 +84,14 @@ def test_a_script_moves_the_robot_and_says_so(tmp_path: Path, kind: str) -> None
 
 
 def test_a_script_stops_at_the_first_command_that_fails(tmp_path: Path) -> None:
-    text = "step 2\nexpect task.idle = false\nstep 3\n"
+    text = "step 2\nexpect task.emove.resting = false\nstep 3\n"
     done = script(text, "--alone", "--executor", "python", tmp_path=tmp_path)
     assert done.returncode == 1
     assert "cycle 2" in done.stdout
     assert "cycle 5" not in done.stdout
     assert (
         done.stderr
-        == f"{tmp_path}/script.txt:2: error[RCS736]: `task.idle = false` does not hold: task.idle = true\n"
+        == f"{tmp_path}/script.txt:2: error[RCS736]: `task.emove.resting = false` does not hold: task.emove.resting = true\n"
     )
 
 
@@ -152,8 +152,8 @@ def _converse(here: int, ran: subprocess.Popen[bytes]) -> None:
     _until(here, "task.inc_command_seen = 0")
     os.write(here, b"nonsense\r")
     _until(here, "RCS731")
-    os.write(here, b"break status_report = failed\r")
-    _until(here, "breakpoint 1: status_report = failed")
+    os.write(here, b"break to_workstation.status_report = failed\r")
+    _until(here, "breakpoint 1: to_workstation.status_report = failed")
     os.write(here, b"run\r")
     _computes(ran.pid)
     ran.send_signal(signal.SIGINT)
@@ -188,8 +188,10 @@ def test_a_variable_is_shown_and_set(shell: Commands) -> None:
     assert do(shell, "cur_state ?") == ["task.cur_state = d_state", "task.cur_state.next = d_state"]
     assert do(shell, "CUR-STATE=STATE-3") == ["task.cur_state = state_3"]
     assert do(shell, "task.cur_state?")[0] == "task.cur_state = state_3"
-    assert do(shell, "gripper.command.opening_mm = 12.5") == ["gripper.command.opening_mm = 12.5 [mm]"]
-    assert do(shell, "level gripper", "command.opening_mm ?") == ["gripper.command.opening_mm = 12.5 [mm]"]
+    assert do(shell, "gripper.primitive.opening_mm = 12.5") == ["gripper.primitive.opening_mm = 12.5 [mm]"]
+    assert do(shell, "level gripper", "primitive.opening_mm ?") == [
+        "gripper.primitive.opening_mm = 12.5 [mm]"
+    ]
     assert do(shell, "new_command = true") == ["gripper.new_command = true"]
 
 
@@ -201,8 +203,8 @@ def test_a_variable_is_shown_and_set(shell: Commands) -> None:
         ("tbuffer_boxt = 100", "int 0 .. 99"),
         ("tbuffer_boxt = 1.5", "int 0 .. 99"),
         ("tbuffer_boxt =", "int 0 .. 99"),
-        ("gripper.command.opening_mm = nan", "real 0.0 .. 200.0 [mm]"),
-        ("gripper.command.opening_mm = -0.1", "real 0.0 .. 200.0 [mm]"),
+        ("gripper.primitive.opening_mm = nan", "real 0.0 .. 200.0 [mm]"),
+        ("gripper.primitive.opening_mm = -0.1", "real 0.0 .. 200.0 [mm]"),
     ],
 )
 def test_a_value_that_is_none_of_the_variables_is_refused(shell: Commands, line: str, said: str) -> None:
@@ -221,27 +223,27 @@ def test_an_unknown_name_comes_with_those_near_it(shell: Commands) -> None:
     assert "near it: gripper" in refused(shell, "level griper").helps[0]
     assert "near it: remove_from_buffer_db" in refused(shell, "remove-from-buffer").helps[0]
     assert "`cur_state ?`" in refused(shell, "cur_state").helps[0]
-    assert "its parts: command.inc_command" in refused(shell, "command = pause").helps[0]
+    assert "its parts: workstation.inc_command" in refused(shell, "workstation = pause").helps[0]
 
 
 def test_what_is_set_stands_in_the_buffer_that_carries_it(shell: Commands) -> None:
-    do(shell, "gripper.command.input_command = position", "gripper.command.opening_mm = 50")
-    assert "input_command position, opening_mm 50.0" in do(shell, "buffers gripper.command")[0]
+    do(shell, "gripper.primitive.input_command = position", "gripper.primitive.opening_mm = 50")
+    assert "input_command position, opening_mm 50.0" in do(shell, "buffers gripper.primitive")[0]
     do(shell, "step gripper")
     assert do(shell, "gripper.to_hand ?")[1] == "gripper.to_hand.opening_mm = 0.0 [mm]"
-    do(shell, "gripper.command.inc_command = 1", "step gripper")
+    do(shell, "gripper.primitive.inc_command = 1", "step gripper")
     assert do(shell, "gripper.to_hand ?")[:2] == [
         "gripper.to_hand.drive = true", "gripper.to_hand.opening_mm = 50.0 [mm]"
     ]  # fmt: skip
     do(shell, "step 2")  # PRIMITIVE gives its own order again
-    assert do(shell, "gripper.command.input_command ?") == ["gripper.command.input_command = pause"]
+    assert do(shell, "gripper.primitive.input_command ?") == ["gripper.primitive.input_command = pause"]
 
 
 def test_what_is_set_in_a_record_of_the_databases_is_its_answer(shell: Commands) -> None:
     do(shell, *MOVE, "dest.known = true")
     do(shell, "step 2", "expect task.dest_spec = true", "undo 2", "step 2", "expect dest_spec = true")
-    do(shell, "command.dest_locpt = 4", "step", "expect dest_spec = false")
-    do(shell, "command.dest_locpt = 3", "step", "expect dest_spec = true")
+    do(shell, "workstation.dest_locpt = 4", "step", "expect dest_spec = false")
+    do(shell, "workstation.dest_locpt = 3", "step", "expect dest_spec = true")
 
 
 # --- by name ---------------------------------------------------------------------------
@@ -262,16 +264,26 @@ def test_the_three_parts_of_a_level_are_one_cycle_of_it(kind: Kind) -> None:
             assert level.values == by_parts
             do(commands, "undo")
         do(commands, "step")
-    do(commands, "expect task.status_report = done and emove.table = pause_emove")
+    do(commands, "expect task.to_workstation.status_report = done and emove.table = pause_emove")
 
 
 def test_a_procedure_a_module_an_owner_and_a_table_run_by_name(shell: Commands) -> None:
-    assert do(shell, "FAIL")[0] == "task: procedure `fail`"
-    assert do(shell, "status_report ?") == ["task.status_report = failed"]
+    assert do(shell, "CMD-FAILURE")[0] == "task: procedure `cmd_failure`"
+    assert do(shell, "to_workstation.failure ?") == ["task.to_workstation.failure = cmd"]
     do(shell, "nextstate(state_2)", "expect cur_state.next = state_2")
     do(shell, "task.nextstate state-4", "expect cur_state.next = state_4")
-    do(shell, "command.inc_command = 9", "receive", "expect inc_command_seen = 9 and new_command")
-    do(shell, "command.inc_command = 10", "PREPROCESS-TASK", "expect inc_command_seen = 10")
+    do(shell, "workstation.inc_command = 9", "take_orders", "expect inc_command_seen = 9 and new_command")
+    do(shell, "workstation.inc_command = 10", "task.TAKE-ORDERS", "expect inc_command_seen = 10")
+    said = do(
+        shell,
+        "level emove",
+        "idle = false",
+        "primitive.resting = true",
+        "vision.resting = true",
+        "PREPROCESS-EMOVE",
+    )
+    assert said[0] == "emove: owner `preprocess_emove`: look_below, measure"
+    do(shell, "expect emove.idle", "vision.resting = false", "PREPROCESS-EMOVE", "expect not emove.idle")
     said = do(shell, "level gripper", "new_command = true", "GRASP")
     assert said[0] == "gripper: table `grasp`, line 1: state(moving); drive; executing"
     do(shell, "expect gripper.cur_state = moving and gripper.to_hand.drive")
@@ -290,7 +302,7 @@ def test_parts_run_only_from_the_sources_that_the_executors_were_made_of(project
     before = state(commands)
     assert refused(commands, "nextstate").code is Code.SHELL_COMMAND
     assert refused(commands, "nextstate(state_99)").code is Code.SHELL_VALUE
-    assert refused(commands, "fail 1").code is Code.SHELL_COMMAND
+    assert refused(commands, "cmd_failure 1").code is Code.SHELL_COMMAND
     assert state(commands) == before
 
 
@@ -298,7 +310,7 @@ def test_a_table_by_name_in_a_state_that_it_does_not_expect(shell: Commands) -> 
     """A line that matches runs; what it relied on is told."""
     said = do(shell, "cur_state = state_2", "ACQUIRE")
     assert said[0].startswith("task: table `acquire`, line 16: state_failure")
-    assert said[0].endswith("; assumptions that do not hold: in_step")
+    assert said[0].endswith("; assumptions that do not hold: acquire_in_step")
 
 
 ALONE = """
@@ -335,11 +347,11 @@ def test_a_part_that_meets_what_the_proof_excludes_is_refused_and_changes_nothin
 
 def test_one_level_steps_alone(shell: Commands) -> None:
     others = [level.values for level in shell.session.levels[:-1]]
-    do(shell, "gripper.command.inc_command = 4", "step gripper 3")
+    do(shell, "gripper.primitive.inc_command = 4", "step gripper 3")
     assert [level.values for level in shell.session.levels[:-1]] == others
     assert shell.session.system.tick == 0
-    assert shell.session.memory.latest("gripper.report") is not None
-    do(shell, "expect gripper.report.inc_command_echo = 4")
+    assert shell.session.memory.latest("gripper.to_primitive") is not None
+    do(shell, "expect gripper.to_primitive.inc_command_echo = 4")
 
 
 @pytest.mark.parametrize("kind", ["c", "python"])
@@ -367,9 +379,9 @@ def test_run_stops_at_lines_conditions_and_cycles() -> None:
     assert do(commands, "run to cycle 2") == ["cycle 2"]
     assert refused(commands, "run to cycle 1").code is Code.SHELL_COMMAND
     assert do(commands, "break task.move.13", "breaks") == ["1: task.move.13"]
-    do(commands, "break primitive.report.ref_command_echo = goto")
+    do(commands, "break primitive.to_emove.ref_command_echo = goto")
     assert do(commands, "run 1000")[0].endswith(
-        "breakpoint 2, `primitive.report.ref_command_echo = goto` holds"
+        "breakpoint 2, `primitive.to_emove.ref_command_echo = goto` holds"
     )
     do(commands, "delete 2")
     assert do(commands, "run")[0].endswith("breakpoint 1, line task.move.13")
@@ -387,7 +399,7 @@ def test_a_refused_input_is_a_state_table_error_that_can_be_undone(shell: Comman
     shell.session.memory.publish("workstation.order", (0, 77, 0, 0, 0, 0, 0, 0))
     error = refused(shell, "step")
     assert error.code is Code.STATE_TABLE_ERROR
-    assert "input refused: `command.input_command` = 77?" in str(error)
+    assert "input refused: `workstation.input_command` = 77?" in str(error)
     assert refused(shell, "task-level").code is Code.STATE_TABLE_ERROR
     do(shell, "undo 2")
     assert state(shell)[2:] == before[2:]
@@ -395,15 +407,15 @@ def test_a_refused_input_is_a_state_table_error_that_can_be_undone(shell: Comman
 
 def test_show_lines_levels_and_help(shell: Commands) -> None:
     assert do(shell, "lines")[0].split() == ["task", "task.pause_task.-"]
-    do(shell, "command.inc_command = 5", "step")
+    do(shell, "workstation.inc_command = 5", "step")
     assert do(shell, "lines")[0].split() == ["task", "task.pause_task.1"]
     assert "task.inc_command_seen: 0 -> 5" in do(shell, "show")
     assert len(do(shell, "show gripper")) == 25
-    do(shell, "command.input_command = acquire")
+    do(shell, "workstation.input_command = acquire")
     assert do(shell, "lines")[0].split() == ["task", "task.acquire.-"]
     assert [line[0] for line in do(shell, "levels")] == ["*", " ", " ", " ", " "]
     assert do(shell, "help") == HELP.splitlines()
-    assert {"task.acquire.5", "cur_state", "receive", "undo", "task-level"} <= set(shell.completions())
+    assert {"task.acquire.5", "cur_state", "take_orders", "undo", "task-level"} <= set(shell.completions())
 
 
 # --- conditions ------------------------------------------------------------------------
@@ -413,13 +425,14 @@ def test_show_lines_levels_and_help(shell: Commands) -> None:
     "condition",
     [
         "task.cur_state = d_state",
-        "cur-state == D-STATE and not (new_command or task.begun)",
+        "cur-state == D-STATE and not (new_command or task.answered)",
         "d_state = cur_state",
         "tbuffer_boxt >= 10 and tbuffer_boxt /= -1.5e3",
-        "task.idle or task.cur_state = state_2",
-        "not not idle = true",
+        "emove.idle or task.cur_state = state_2",
+        "not not emove.idle = true",
+        "not task.emove.resting and emove.resting = false",
         "task.table = pause_task",
-        "gripper.command.opening_mm < .5",
+        "gripper.primitive.opening_mm < .5",
         "task.cur_state = task.cur_state.next",
     ],
 )
@@ -436,7 +449,7 @@ def test_conditions_that_hold(shell: Commands, condition: str) -> None:
         ("cur_state < state_2", Code.SHELL_COMMAND),
         ("cur_state = state_22", Code.SHELL_VALUE),
         ("cur_state = 1", Code.SHELL_VALUE),
-        ("cur_state = status_report", Code.SHELL_COMMAND),
+        ("cur_state = to_workstation.status_report", Code.SHELL_COMMAND),
         ("new_command = 1", Code.SHELL_COMMAND),
         ("(new_command", Code.SHELL_COMMAND),
         ("new_command)", Code.SHELL_COMMAND),
@@ -445,7 +458,7 @@ def test_conditions_that_hold(shell: Commands, condition: str) -> None:
         ("1 < tbuffer_boxt < 3", Code.SHELL_COMMAND),
         ("nobody = 3", Code.SHELL_NAME),
         ("nobody", Code.SHELL_NAME),
-        ("not " * 1000 + "idle", Code.SHELL_COMMAND),
+        ("not " * 1000 + "emove.idle", Code.SHELL_COMMAND),
         ("(" * 1000, Code.SHELL_COMMAND),
     ],
 )
@@ -459,13 +472,13 @@ def test_conditions_that_are_none(shell: Commands, condition: str, code: Code) -
 @pytest.mark.parametrize("kind", ["c", "python"])
 def test_reload_takes_proved_tables_in_the_present_state(project: Path, kind: Kind) -> None:
     commands = alone(project, kind)
-    do(commands, "gripper.command.inc_command = 3", "gripper.command.input_command = grasp")
-    do(commands, "gripper.command.force_n = 10", "step gripper")
+    do(commands, "gripper.primitive.inc_command = 3", "gripper.primitive.input_command = grasp")
+    do(commands, "gripper.primitive.force_n = 10", "step gripper")
     do(commands, "break gripper.waited = 140", "break gripper.grasp.4")
     edit_file(project.parent / GRIPPER, ("const most_waited = 150", "const most_waited = 200"))
     edit_file(
         project.parent / GRIPPER,
-        ("state failure : reason", "state failure : reason\nstate tries : int 3 .. 9 = 3"),
+        ("state forced : bool", "state forced : bool\nstate tries : int 3 .. 9 = 3"),
     )
     said = do(commands, "reload gripper")
     assert (
@@ -491,7 +504,7 @@ def test_reload_takes_proved_tables_in_the_present_state(project: Path, kind: Ki
             "RCS40",
         ),
         ("state waited : int 0 .. most_waited", "state waited : bool", "RCS3"),
-        ("inc_command_seen : number", "inc_command_seen : int 0 .. 65535 [mm]", "RCS3"),
+        ("state waited : int 0 .. most_waited", "state waited : int 0 .. most_waited [mm]", "RCS3"),
         ("state at_opening : bool", "state at_opening : bool = true\nstate other : bool", ""),
         ("enum gripper_state { d_state, ", "enum gripper_state { ", "RCS2"),
         ("state at_opening : bool", "state at_opening : intt", "RCS2"),
@@ -535,7 +548,7 @@ def test_reload_refuses_a_state_that_a_range_or_an_assumption_excludes(project: 
         ("table position {", "assume calm monitored : waited /= 7\ntable position assuming calm {"),
     )
     do(commands, "reload gripper", "undo")  # it is PAUSE's table that runs next
-    do(commands, "gripper.command.input_command = position")
+    do(commands, "gripper.primitive.input_command = position")
     error = refused(commands, "reload gripper")
     assert error.code is Code.SHELL_RELOAD
     assert "assumption `calm` of table `position` does not hold of the present state: waited = 7" in str(

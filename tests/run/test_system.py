@@ -158,7 +158,7 @@ def test_an_empty_buffer_fails_and_stays_failed() -> None:
     for _ in range(20):
         cell.system.step()
         assert cell.answer == "failed"
-    assert cell.system.level("emove").shown("command.input_command") == "pause"
+    assert cell.system.level("emove").shown("task.input_command") == "pause"
     assert task.value("tbuffer_boxt") == 0
 
 

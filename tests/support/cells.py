@@ -50,7 +50,7 @@ class Cell:
         self.world = plant(self.database, "kinematic", parts)
         self.teller = Teller(
             names=tuple(
-                signs["task"].leaves[at].name.rpartition(".")[2] for at in signs["task"].record("command")
+                signs["task"].leaves[at].name.rpartition(".")[2] for at in signs["task"].record("workstation")
             )
         )
         self.system: System = assemble(said, kind, self.database.queries, [self.teller, self.world])
@@ -70,7 +70,7 @@ class Cell:
         task = self.system.level("task")
         leaf = {
             one.name.rpartition(".")[2]: one
-            for at in task.sign.record("command")
+            for at in task.sign.record("workstation")
             for one in [task.sign.leaves[at]]
         }
         self.number = (self.number + 1) % 65536
@@ -87,10 +87,10 @@ class Cell:
     @property
     def answer(self) -> str:
         """What TASK reports of the command: done, executing or failed; nothing before it is echoed."""
-        report = self.system.buffers.latest("task.report")
+        report = self.system.buffers.latest("task.to_workstation")
         if report is None or report[0] != self.number:
             return ""
-        return self.system.level("task").shown("report.status_report")
+        return self.system.level("task").shown("to_workstation.status_report")
 
     def until_over(self, most: int) -> str:
         """Steps until TASK reports done or failed; what it said, empty when it did not in `most` ticks."""
@@ -121,7 +121,7 @@ class Cell:
 
     def reason(self) -> str:
         """Why TASK says that it failed."""
-        return self.system.level("task").shown("report.failure")
+        return self.system.level("task").shown("to_workstation.failure")
 
 
 SCRIPT: tuple[tuple[str, dict[str, str | int]], ...] = (

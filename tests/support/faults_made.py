@@ -198,17 +198,45 @@ def swapped_field(lines: Sequence[str]) -> Edit:
 # --- declarations ---------------------------------------------------------------------------------
 
 
-def dropped_assumption(lines: Sequence[str]) -> Edit:
+PROMISES = ("done_stays", "failed_stays", "done_without_reason")
+
+
+def other_promise(lines: Sequence[str]) -> Edit:
+    """A property that comes with the protocol is switched off, or is not where it was."""
     for at, line in enumerate(lines):
-        if line.startswith("table ") and " assuming " in line:
-            head, _, names = line.rstrip(" {").partition(" assuming ")
-            every = [name.strip() for name in names.split(",")]
-            for place in range(len(every)):
-                left = ", ".join([*every[:place], *every[place + 1 :]])
-                yield at, f"{head} assuming {left} {{" if left else f"{head} {{"
+        if line.startswith("serves "):
+            head, _, names = line.partition(" without ")
+            every = [name.strip() for name in names.split(",") if name.strip()]
+            for name in PROMISES:
+                left = [one for one in every if one != name] if name in every else [*every, name]
+                yield at, f"{head} without {', '.join(left)}" if left else head
 
 
-ECHO = r"(\w+)\.inc_command_echo = to_\1\.inc_command"
+# --- links ----------------------------------------------------------------------------------------
+
+
+def swapped_statuses(lines: Sequence[str]) -> Edit:
+    """One status is taken for another."""
+    for at, line in enumerate(lines):
+        if found := re.match(r"(\s+status : \w+) done (\w+) failed (\w+) executing (\w+)$", line):
+            _, done, failed, executing = found.group(1, 2, 3, 4)
+            for one, two, three in (
+                (failed, done, executing),
+                (executing, failed, done),
+                (done, executing, failed),
+            ):
+                yield at, f"{found[1]} done {one} failed {two} executing {three}"
+
+
+def unnumbered_field(lines: Sequence[str]) -> Edit:
+    """A field of an order that may change without a new number."""
+    inside = False
+    for at, line in enumerate(lines):
+        inside = line.strip() == "order {" or (inside and line.strip() != "}")
+        if inside and re.match(r"\s+(?!stream )\w+ : ", line):
+            yield at, re.sub(r"\w", "stream \\g<0>", line, count=1)
+
+
 KINDS: dict[str, Callable[[Sequence[str]], Edit]] = {
     "a line dropped": dropped_line,
     "a line widened": widened_line,
@@ -218,26 +246,17 @@ KINDS: dict[str, Callable[[Sequence[str]], Edit]] = {
     "a wrong status": _other_action("status_out"),
     "a call forgotten": forgotten_call,
     "an assignment dropped": dropped_assignment,
-    "an echo compared wrongly": _replaced(
-        ECHO,
-        r"\1.inc_command_echo /= to_\1.inc_command",
-        r"to_\1.inc_command = to_\1.inc_command",
-        r"\1.inc_command_echo >= to_\1.inc_command",
-        only=r"^(?!state)",
-    ),
-    "a new number compared wrongly": _replaced(
-        r"command\.inc_command /= inc_command_seen",
-        "command.inc_command = inc_command_seen",
-        "command.inc_command > inc_command_seen",
-    ),
-    "a deferral forgotten": _replaced(ECHO, r"to_\1.inc_command = to_\1.inc_command", only=r"^state .*deferred until"),
+    "an echo not waited for": _replaced(r"\bechoed\b", "true", "not echoed", only=r"^\s+(if|\w+ :=) "),
+    "a deferral forgotten": _replaced(r" deferred( until .+)?$", " deferred until true", only="^state "),
+    "a restart forgotten": _replaced(r" restart \w+", "", only="^state "),
+    "another promise": other_promise,
+    "a status taken for another": swapped_statuses,
+    "a field not numbered": unnumbered_field,
     "a counter not incremented": _replaced(r" \+ 1\b", " + 0", only=":="),
     "a field swapped": swapped_field,
     "a condition turned": _replaced(
         r" and | or | = | /= | < ", *(f" {word} " for word in ("and", "or", "=", "/=", "<=")), only=r"^\s+(\} else )?if "
     ),
-    "an assumption dropped": dropped_assumption,
-    "an assumption too weak": _replaced(r" and | implies (?=\()|not ", " or ", "", only="^assume "),
 }  # fmt: skip
 
 
@@ -249,13 +268,33 @@ def faults(tables_folder: Path, level: str) -> dict[str, list[Fault]]:
     found: dict[str, list[Fault]] = {kind: [] for kind in KINDS}
     for path in sorted((tables_folder / level).glob("*.rcs")):
         lines = one_row_a_line(path).split("\n")
-        for kind, edits in KINDS.items():
-            for at, new in dict.fromkeys(edits(lines)):
-                text = "\n".join([*lines[:at], *([new] if new else []), *lines[at + 1 :]])
-                if _tight(new) != _tight(lines[at]):
-                    file = f"{level}/{path.name}"
-                    found[kind].append(Fault(level, kind, file, at + 1, lines[at], new, text))
+        _add(found, level, f"{level}/{path.name}", lines, lines)
+    lines = one_row_a_line(tables_folder / VOCABULARY).split("\n")
+    _add(found, level, VOCABULARY, lines, _link_served(tables_folder, level, lines))
     return found
+
+
+VOCABULARY = "vocabulary.rcs"
+
+
+def _add(
+    found: dict[str, list[Fault]], level: str, file: str, lines: list[str], looked_at: list[str]
+) -> None:
+    """The faults of a file of which some lines are looked at, and the others empty."""
+    for kind, edits in KINDS.items():
+        for at, new in dict.fromkeys(edits(looked_at)):
+            text = "\n".join([*lines[:at], *([new] if new else []), *lines[at + 1 :]])
+            if _tight(new) != _tight(lines[at]):
+                found[kind].append(Fault(level, kind, file, at + 1, lines[at], new, text))
+
+
+def _link_served(tables_folder: Path, level: str, lines: list[str]) -> list[str]:
+    """Of the words that all share, the link by which the level is ordered; the other lines are empty."""
+    texts = [path.read_text(encoding="utf-8") for path in (tables_folder / level).glob("*.rcs")]
+    [link] = re.findall(r"^serves \w+ : (\w+)", "\n".join(texts), re.MULTILINE)
+    first = lines.index(f"link {link} {{")
+    last = lines.index("}", first)
+    return [line if first <= at <= last else "" for at, line in enumerate(lines)]
 
 
 def sample(tables_folder: Path, level: str, seed: int) -> Iterator[Fault]:

@@ -53,7 +53,7 @@ class Sender:
 
     def step(self, _tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
         number = (self._first + self._at) % NUMBERS
-        report = latest("task.report")
+        report = latest("task.to_workstation")
         if report is not None:
             self._log.say(report[0], report[2], report[4])
             if report[0] == number and report[2] != EXECUTING:
@@ -77,7 +77,7 @@ class Below:
         if order is not None and int(order[0]) != self._number:
             self._number, self._command, self._left = int(order[0]), int(order[1]), self._busy
             self._log.say(self._number, self._command)
-        return {"emove.report": (self._number, self._command, EXECUTING if self._left else DONE, 0)}
+        return {"emove.to_task": (self._number, self._command, EXECUTING if self._left else DONE, 0)}
 
 
 def sender(*arguments: object) -> tuple[Sender, ...]:
@@ -92,7 +92,7 @@ class Wrong:
     """Publishes what the buffer cannot hold."""
 
     def step(self, _tick: int, _latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
-        return {"emove.report": (-1, 0.5, 300, 0)}
+        return {"emove.to_task": (-1, 0.5, 300, 0)}
 
 
 def wrong() -> tuple[Wrong, ...]:

@@ -35,7 +35,7 @@ Examples:
   rcsc log run.mcap                                ticks, levels, and how often each line ran
   rcsc log run.mcap --csv run.csv --json run.json  every cycle, in the tables' words
   rcsc log run.mcap --plot task.cur_state,primitive.travelled_mm -o run.svg
-  rcsc log run.mcap --plot primitive.robot.plate[1] --against primitive.robot.plate[0] -o path.svg
+  rcsc log run.mcap --plot primitive.from_robot.plate[1] --against primitive.from_robot.plate[0] -o path.svg
   rcsc log found/task_waits_to_emove.mcap --report waits.html   what `rcsc prove --log found` found, cycle by cycle""",
 )
 @FILE

@@ -23,6 +23,8 @@ from rcsc.table import boxes
 
 FLAG = "new_command"
 """True until the level's own answer to a new command is echoed (sections 8.3 and 9)."""
+ANSWER, SETTLES = "answered", "settling"
+"""Where roles are declared: a line has answered the new command; the line of this cycle puts the answer off."""
 
 
 class Sort(StrEnum):

@@ -25,7 +25,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.compose.contract.environment import ECHO, ECHOED, NUMBER, STATUS, Below, Neighbour
-from rcsc.compose.contract.obligations import FLAG, command_stays
+from rcsc.compose.contract.obligations import ANSWER, FLAG, SETTLES, command_stays
 from rcsc.compose.contract.transition import Cycle, Leaves, TableAt, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
@@ -216,11 +216,13 @@ class Flow:
             for v in variables
             if v.deferred_until is not None and isinstance(v.type, Bool | Enum)
         ]
-        written = of_lines(self.ts)
+        telling = of_lines(self.ts) | {FLAG}
+        if self.ts.program.roles is not None:
+            telling = (telling | {ANSWER}) - {SETTLES}
         flags = [
             str(v.name)
             for v in variables
-            if v.kind is Kind.STATE and isinstance(v.type, Bool) and (v.name == FLAG or v.name in written)
+            if v.kind is Kind.STATE and isinstance(v.type, Bool) and v.name in telling
         ]
         return (*pending_states, *flags)
 

@@ -108,6 +108,7 @@ class _Resolver:
             more, tables = offered(scope, parties, deferred, tables, procedures)
             assumptions += more
         levels = self._levels(all_, tables, owners, procedures)
+        restart = restart_of(scope, parties, all_)
         if scope.diagnostics:
             return tuple(sorted(set(scope.diagnostics), key=sort_key))
         own = tuple(TableName(d.name.text) for d in root.declarations if isinstance(d, tree.TableDecl))
@@ -128,7 +129,7 @@ class _Resolver:
             levels,
             properties,
             roles_of(scope, parties),
-            restart_of(scope, parties),
+            restart,
         )
 
     def _assumptions(self, all_: list[tree.Declaration]) -> tuple[Assumption, ...]:

@@ -3,23 +3,29 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from rcsc.diagnostics.codes import Code
 from rcsc.lang.expressions.scope import Body, Scope
-from rcsc.lang.expressions.typed import boolean
+from rcsc.lang.expressions.typed import boolean, typed
 from rcsc.lang.model import (
     Assumption,
     AssumptionName,
     Enum,
+    Int,
+    Kind,
     Procedure,
+    Read,
     Role,
     Roles,
     Standing,
     Table,
+    Variable,
     VariableName,
     pending,
 )
 from rcsc.lang.protocol import Flags, Parties, Party, Watched, condition, in_step
 from rcsc.lang.resolve.variables import value_given
 from rcsc.lang.restart import Adopted, After, Fixed, SameAs, by_names
+from rcsc.lang.syntax import tree
 
 
 def roles_of(scope: Scope, parties: Parties) -> Roles | None:
@@ -50,17 +56,56 @@ def _part_of(leaf: str, record: str) -> bool:
     return leaf == record or leaf.startswith((f"{record}.", f"{record}["))
 
 
-def restart_of(scope: Scope, parties: Parties) -> tuple[tuple[VariableName, Adopted], ...] | None:
-    """Return what leaves adopt; None where neither the protocol nor a variable's `restart` says, and all goes by names.
+def restart_of(
+    scope: Scope, parties: Parties, declarations: Sequence[tree.Declaration]
+) -> tuple[tuple[VariableName, Adopted], ...] | None:
+    """Return what leaves adopt; None where neither the protocol nor a variable's `restart` nor `adopt` says, and all goes by names.
 
-    Where only variables say, the others still go by their names: a level that numbers its orders by hand does so after a restart, too.
+    Where no roles are declared the other leaves still go by their names: a level that numbers its orders by hand does so after a
+    restart, too.
     """
-    declared = {name: Fixed(leaf.restart) for name, leaf in scope.leaves.items() if leaf.restart is not None}
+    declared: dict[str, Adopted] = {
+        name: Fixed(leaf.restart) for name, leaf in scope.leaves.items() if leaf.restart is not None
+    }
+    for written in declarations:
+        if isinstance(written, tree.AdoptDecl):
+            declared |= _declared(scope, written)
     if not parties and not declared:
         return None
     parts = {name: leaf.part for name, leaf in scope.leaves.items()}
     adopted = dict(_protocol(scope, parties)) if parties else by_names(parts)
     return tuple((VariableName(leaf), value) for leaf, value in (adopted | declared).items())
+
+
+def _declared(scope: Scope, written: tree.AdoptDecl) -> dict[str, Adopted]:
+    """Return what `adopt` says of one leaf; nothing after an error."""
+    place = _leaf(scope, written.place)
+    if place is None:
+        return {}
+    if place.kind is Kind.INPUT:
+        scope.report(Code.KIND, f"`{place.name}` is an input, and adopts nothing", written.place.span)
+        return {}
+    if not written.after:
+        value = value_given(scope, written.value, place.type, "restart")
+        return {} if value is None else {str(place.name): Fixed(value)}
+    echo = _leaf(scope, written.value)
+    if echo is None:
+        return {}
+    if not isinstance(place.type, Int) or echo.type != place.type or echo.kind is not Kind.INPUT:
+        scope.report(Code.KIND, "a number is counted on from an input of its own type", written.value.span)
+        return {}
+    return {str(place.name): After(str(echo.name))}
+
+
+def _leaf(scope: Scope, place: tree.Expr) -> Variable | None:
+    """Find the leaf that a place names; what is none is reported."""
+    written = typed(scope, Body(), place)
+    if written is None:
+        return None
+    if not isinstance(written.expr, Read):
+        scope.report(Code.KIND, "what a level adopts is of one scalar", place.span)
+        return None
+    return scope.leaves[written.expr.name]
 
 
 def _protocol(scope: Scope, parties: Parties) -> Iterator[tuple[str, Adopted]]:

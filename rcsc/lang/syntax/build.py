@@ -221,6 +221,13 @@ class Build:
         reason = self._name(late[0]) if late else None
         return tree.CommandsDecl(self._name(peer), self._name(link), self.expr(cycles), reason, **head)
 
+    def _adopt_value(self, node: ParseNode) -> tree.AdoptDecl:
+        place, value = map(self.expr, node.children)
+        return tree.AdoptDecl(place, value, **self._head(node))
+
+    def _adopt_after(self, node: ParseNode) -> tree.AdoptDecl:
+        return replace(self._adopt_value(node), after=True)
+
     def _level_decl(self, node: ParseNode) -> tree.LevelDecl:
         head = self._head(node)
         parts = node.children[1:]

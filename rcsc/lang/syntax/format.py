@@ -11,7 +11,7 @@ from rcsc.lang.syntax.layout import WIDTH, table_rows
 from rcsc.lang.syntax.spell import spell_expr, spell_statement, spell_type
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
-         tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl)  # fmt: skip
+         tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl, tree.AdoptDecl)  # fmt: skip
 
 
 def format_file(file: tree.File, width: int = WIDTH) -> str:
@@ -67,7 +67,7 @@ def _declaration(declaration: tree.Declaration, width: int) -> Iterator[str]:
             yield from _table(declaration, width)
         case tree.LinkDecl():
             yield from _link(declaration)
-        case tree.ServesDecl() | tree.CommandsDecl():
+        case tree.ServesDecl() | tree.CommandsDecl() | tree.AdoptDecl():
             yield _role(declaration)
         case tree.LevelDecl():
             yield from _level(declaration)
@@ -122,7 +122,9 @@ def _link(one: tree.LinkDecl) -> Iterator[str]:
     yield "}"
 
 
-def _role(one: tree.ServesDecl | tree.CommandsDecl) -> str:
+def _role(one: tree.ServesDecl | tree.CommandsDecl | tree.AdoptDecl) -> str:
+    if isinstance(one, tree.AdoptDecl):
+        return f"adopt {spell_expr(one.place)} {'after' if one.after else ':='} {spell_expr(one.value)}"
     if isinstance(one, tree.ServesDecl):
         without = ", ".join(name.text for name in one.without)
         return f"serves {one.peer.text} : {one.link.text}" + (f" without {without}" if without else "")

@@ -580,6 +580,18 @@ class CommandsDecl(Documented):
 
 
 @dataclass(frozen=True, slots=True)
+class AdoptDecl(Documented):
+    """`adopt place := expr` or `adopt place after place`: what a scalar has when the level starts anew.
+
+    `after` counts on from a number: the one that stands in the scalar's own buffer, else the other place's.
+    """
+
+    place: Expr
+    value: Expr
+    after: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Dispatch:
     """`member : table` in a level's `table by variable { ... }`."""
 
@@ -622,6 +634,7 @@ Declaration: TypeAlias = (
     | LinkDecl
     | ServesDecl
     | CommandsDecl
+    | AdoptDecl
     | LevelDecl
 )
 

@@ -291,7 +291,7 @@ class Loop:
         if cycle.command is not None and not self._taken:
             self._take(cycle.command)
         if not self._answered and cycle.number_answered:
-            status = cycle.shown("task", "report.status_report")
+            status = cycle.shown("task", "to_workstation.status_report")
             if status != "executing":
                 self._answered, cycle.ended = True, status
 

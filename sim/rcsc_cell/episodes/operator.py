@@ -13,7 +13,7 @@ from rcsc_cell.workstation.interlocks import CellState, after
 from rcsc_cell.workstation.script import RowEnd, ScriptRow
 from rcsc_cell.workstation.station import Workstation
 
-ORDER, REPORT = "workstation.order", "task.report"
+ORDER, REPORT = "workstation.order", "task.to_workstation"
 
 
 @dataclass(slots=True)

@@ -23,7 +23,7 @@ from rcsc_cell.pictures.things import outline
 from rcsc_cell.workstation.station import RowResult, Workstation
 
 SERIES = {
-    "hand height (mm)": "primitive.robot.plate[2]",
+    "hand height (mm)": "primitive.from_robot.plate[2]",
     "hand speed (mm/s)": "primitive.speed_mm_s",
     "finger opening (mm)": "gripper.hand.opening_mm",
     "finger force (N)": "gripper.hand.force_n",

@@ -122,7 +122,8 @@ class CycleState:
     def number_answered(self) -> bool:
         """Whether TASK's answer is about the command under way."""
         return (
-            self.command is not None and self.value("task", "report.inc_command_echo") == self.command.number
+            self.command is not None
+            and self.value("task", "to_workstation.inc_command_echo") == self.command.number
         )
 
     @property

@@ -80,7 +80,7 @@ class RightReason:
         wrong = illegal(cycle.database, command)
         if cycle.ended == "done":
             return f"`{command.name}` is not legal ({wrong}), and was done" if wrong else None
-        reason = cycle.shown("task", "report.failure")
+        reason = cycle.shown("task", "to_workstation.failure")
         if wrong and reason != "cmd" and not self._explained(cycle, command, reason):
             return f"`{command.name}` is not legal ({wrong}), and failed with `{reason}`"
         return (

@@ -86,7 +86,7 @@ class ForceWithin:
     def watch(self, cycle: CycleState) -> str | None:
         """How hard they pressed."""
         primitive = cycle.levels["primitive"]
-        key = int(primitive.value("command.obj_ptr")), int(primitive.value("command.grasp"))
+        key = int(primitive.value("emove.obj_ptr")), int(primitive.value("emove.grasp"))
         if key != self._key:
             self._key = key
             known, *_, force_n, _ = cycle.database.fingers(*key)

@@ -111,7 +111,7 @@ class AnsweredOnce:
             return None
         if cycle.command.name == "pause" and self._stirred >= cycle.tick - STIRRED_TICKS:
             return None
-        now = cycle.shown("task", "report.status_report")
+        now = cycle.shown("task", "to_workstation.status_report")
         if now != self._ended[1]:
             return f"`{cycle.command.name}` was {self._ended[1]}, and is {now}"
         return None

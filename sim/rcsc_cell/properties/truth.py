@@ -211,7 +211,7 @@ def _at_rest(cycle: CycleState, before: tuple[float, ...]) -> str | None:
 
 def _picking(cycle: CycleState) -> bool:
     """Whether PICKUP is under way."""
-    executing = cycle.shown("task", "report.status_report") == "executing"
+    executing = cycle.shown("task", "to_workstation.status_report") == "executing"
     return executing and cycle.shown("task", "to_emove.input_command") == "pickup"
 
 

@@ -48,10 +48,10 @@ def parts_of(signs: Mapping[str, Signature]) -> tuple[str, ...]:
         BadDescription: No level has any.
     """
     leaves = signs["task"].leaves if "task" in signs else ()
-    parts = next((leaf.members for leaf in leaves if leaf.name == "command.obj"), ())
+    parts = next((leaf.members for leaf in leaves if leaf.name == "workstation.obj"), ())
     if not parts:
         raise BadDescription(
-            "the data names parts, and no level `task` has an enumeration `command.obj` of them"
+            "the data names parts, and no level `task` has an enumeration `workstation.obj` of them"
         )
     return parts
 
@@ -126,14 +126,14 @@ def _need_words(page: Document, signs: Mapping[str, Signature]) -> None:
 
 _PLATE = tuple(f"plate[{at}]" for at in range(9))
 BUFFERS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
-    "workstation.order": ("task", "command", (
+    "workstation.order": ("task", "workstation", (
         "inc_command", "input_command", "obj", "grasp", "source_locpt", "dest_locpt", "end_at_locpt", "sector",
     )),
-    "task.report": ("task", "report", (
+    "task.to_workstation": ("task", "to_workstation", (
         "inc_command_echo", "ref_command_echo", "status_report", "status_parameter", "failure",
     )),
     "primitive.to_robot": ("primitive", "to_robot", ("inc_command", "input_command", *_PLATE)),
-    "robot.report": ("primitive", "robot", (
+    "robot.report": ("primitive", "from_robot", (
         "inc_command_echo", "ref_command_echo", "status_report", "failure", *_PLATE,
     )),
     "gripper.to_hand": ("gripper", "to_hand", ("drive", "opening_mm", "force_n", "speed_mm_s")),
@@ -145,9 +145,9 @@ BUFFERS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
 }  # fmt: skip
 """What workstation, robot, hand and camera write and read: of each buffer the level, its variable, and the fields in order."""
 WORDS: Mapping[tuple[str, str], tuple[str, ...]] = {
-    ("task", "command.input_command"): ROBOT,
-    ("task", "command.obj"): ("null_obj",),
-    ("task", "report.status_report"): ("done", "executing", "failed"),
+    ("task", "workstation.input_command"): ROBOT,
+    ("task", "workstation.obj"): ("null_obj",),
+    ("task", "to_workstation.status_report"): ("done", "executing", "failed"),
 }
 
 

@@ -95,7 +95,7 @@ class Workstation:
         """Finds the numbers in TASK's buffers."""
         self._task = Orders(
             "workstation.order",
-            "task.report",
+            "task.to_workstation",
             _place(self.report, "inc_command_echo"),
             _place(self.order, NUMBER),
         )
@@ -305,8 +305,8 @@ def workstation(
     Raises:
         BadScript: A row names an unknown place or part.
     """
-    order = tuple(task.leaves[at] for at in task.record("command"))
-    report = tuple(task.leaves[at] for at in task.record("report"))
+    order = tuple(task.leaves[at] for at in task.record("workstation"))
+    report = tuple(task.leaves[at] for at in task.record("to_workstation"))
     parts = next(leaf.members for leaf in order if _last(leaf) == "obj")
     wrong = [
         f"row {row.number}: no location is called `{name}`"

@@ -312,6 +312,8 @@ def _roles() -> SearchStrategy[tree.Declaration]:
         st.builds(tree.LinkDecl, NAMES, *(NAMES for _ in range(6)), fields, fields, **_HEAD),
         st.builds(tree.ServesDecl, NAMES, NAMES, names, **_HEAD),
         st.builds(tree.CommandsDecl, NAMES, NAMES, **_HEAD),
+        st.builds(tree.AdoptDecl, places(), expressions(), **_HEAD),
+        st.builds(tree.AdoptDecl, places(), places(), st.just(True), **_HEAD),
         st.builds(tree.CommandsDecl, NAMES, NAMES, expressions(), st.none() | NAMES, **_HEAD),
     )
 
