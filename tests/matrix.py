@@ -18,8 +18,9 @@ from rcsc.emit.generated import write
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
+from rcsc.run.episodes.outcome import EpisodeFinding
 from rcsc.solvers.options import Options
-from rcsc_cell.episodes.episode import Episode, EpisodeFinding, FaultSpec, Interruption, PartSpec, Restart
+from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, PartSpec, Restart
 from rcsc_cell.episodes.loop import Loop
 from rcsc_cell.properties import PROPERTIES
 from tests.support.programs.stages import emitted

@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 
 from rcsc import commands as cli
 from rcsc.commands.group import commands
+from rcsc.run.episodes.outcome import EpisodeFinding
 from rcsc_cell.campaign import worker_pool as crew_module
 from rcsc_cell.campaign.counterexamples import (
     BadEpisode,
@@ -43,7 +44,6 @@ from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,
     Episode,
-    EpisodeFinding,
     FaultSpec,
     Interruption,
     PartSpec,

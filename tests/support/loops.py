@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import ClassVar
 
-from rcsc_cell.episodes.episode import SYSTEM, Episode, EpisodeOutcome, PartSpec, script
+from rcsc.run.episodes.outcome import EpisodeOutcome
+from rcsc_cell.episodes.episode import SYSTEM, Episode, PartSpec, script
 from rcsc_cell.episodes.loop import Loop, run
 from rcsc_cell.properties.cycle import CycleState
 

@@ -13,11 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 
+from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, RowEnd
 from rcsc_cell.campaign.rig import known_lines
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import SYSTEM, Episode, EpisodeFinding, EpisodeOutcome, FaultSpec, PartSpec
+from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, PartSpec
 from rcsc_cell.episodes.loop import run as run_in_cell
-from rcsc_cell.workstation.script import RowEnd
 
 KILLS, HANGS, STUCK, RAISES, BREAKS = "slips", "dark", "jammed", "blind", "drops"
 HELD, FAST = "what is held stays", "nothing is fast"

@@ -17,6 +17,7 @@ from rcsc.host.files import write_atomically
 from rcsc.host.files.names import shown
 from rcsc.host.files.read import json_of, text
 from rcsc.run.description import description
+from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.system import Kind
 from rcsc_cell.campaign.journal import EpisodeRecord
 from rcsc_cell.campaign.rig import Rig, digest
@@ -24,7 +25,7 @@ from rcsc_cell.campaign.runner import death
 from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
 from rcsc_cell.campaign.work import SURVIVES, TRIES, Shrunk, attempt, logged, shrunk
 from rcsc_cell.campaign.worker_pool import Crashed, WorkerPool
-from rcsc_cell.episodes.episode import Episode, EpisodeOutcome, script
+from rcsc_cell.episodes.episode import Episode, script
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future

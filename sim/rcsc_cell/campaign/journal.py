@@ -18,8 +18,8 @@ from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files.plain import read
 from rcsc.host.files.read import json_of
+from rcsc.run.episodes.outcome import EpisodeFinding
 from rcsc_cell.campaign.rig import Rig, digest
-from rcsc_cell.episodes.episode import EpisodeFinding
 
 FORM = 1
 """Of the file; another is not read."""

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TypeAlias
 
 from rcsc.run.description import description
+from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.log.schema import fingerprints
 from rcsc.run.system import Kind, signatures
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import SYSTEM, Episode, EpisodeOutcome
+from rcsc_cell.episodes.episode import SYSTEM, Episode
 from rcsc_cell.episodes.loop import run
 from rcsc_cell.episodes.sampling import draw
 

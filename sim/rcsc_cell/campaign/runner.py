@@ -12,11 +12,11 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
 from rcsc_cell.campaign.journal import EpisodeRecord, Journal
 from rcsc_cell.campaign.rig import Rig, digest
 from rcsc_cell.campaign.work import CRASH, ENDS, HANG, SURVIVES, no_end, odd, play
 from rcsc_cell.campaign.worker_pool import WorkerPool, WorkersGone
-from rcsc_cell.episodes.episode import EpisodeFinding, EpisodeOutcome
 from rcsc_cell.episodes.part_faults import fault_classes
 
 Chunk: TypeAlias = tuple[int, ...]

@@ -20,12 +20,13 @@ from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.children import scratch
 from rcsc.run.description import BadDescription
+from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
 from rcsc.run.executors import NotBuilt
 from rcsc_cell.campaign.journal import EpisodeRecord
 from rcsc_cell.campaign.rig import Rig, digest, mask
 from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
 from rcsc_cell.database.build import BadData
-from rcsc_cell.episodes.episode import Episode, EpisodeFinding, EpisodeOutcome
+from rcsc_cell.episodes.episode import Episode
 from rcsc_cell.episodes.part_faults import fault_classes
 
 CRASH, HANG, ERROR = "crash", "hang", "error"

@@ -17,7 +17,6 @@ from rcsc.host.files.read import json_of
 from rcsc.run.system import Kind
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.workstation.script import RowEnd
 
 SYSTEM = Path(__file__).parents[3] / "tables" / "system.toml"
 HARM = Literal["lost", "doubled", "stale", "delayed"]
@@ -190,33 +189,6 @@ class Episode:
 
 LISTS = ("interruptions", "pushes", "rows", "faults", "transport", "restarts", "parts")
 """Fields of an episode that hold any number of things, those first that a smaller episode can best do without."""
-
-
-@dataclass(frozen=True, slots=True)
-class EpisodeFinding:
-    """A property that did not hold, first in this tick."""
-
-    property: str
-    tick: int
-    message: str
-
-
-@dataclass(frozen=True, slots=True)
-class EpisodeOutcome:
-    """What became of an episode.
-
-    Attributes:
-        end: `done`; `failed:REASON`; `refused` by an interlock, or because the script cannot be read; `state-table error`; `hang`.
-        lines: Level, table and line that ran.
-        digest: Of every level's values in every cycle, as canonical bytes.
-    """
-
-    rows: tuple[RowEnd, ...]
-    findings: tuple[EpisodeFinding, ...]
-    end: str
-    ticks: int
-    lines: frozenset[tuple[str, str, str]]
-    digest: str
 
 
 def script(rows: Sequence[str]) -> str:

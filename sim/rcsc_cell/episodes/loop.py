@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
+from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
 from rcsc.run.levels import RunningLevel, running_level
 from rcsc.run.log.recorder import Recorder
 from rcsc.run.orders.script import BadScript
@@ -20,8 +21,6 @@ from rcsc_cell.cell.ready import plant
 from rcsc_cell.episodes.episode import (
     SYSTEM,
     Episode,
-    EpisodeFinding,
-    EpisodeOutcome,
     FaultSpec,
     Interruption,
     Push,

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
+from rcsc.run.episodes.outcome import RowEnd
 from rcsc.run.executors import Executor
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Value, Values
@@ -16,7 +17,6 @@ from rcsc_cell.cell.mujoco_model import Body
 from rcsc_cell.cell.plant import Plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import Pose
-from rcsc_cell.workstation.script import RowEnd
 
 COUNTED: Mapping[str, str] = {
     "tbox": "tbuffer_boxt",

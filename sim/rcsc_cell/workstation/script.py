@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 from rcsc.host.files.read import MIB, Malformed, rows_of, text
 from rcsc.run.orders.script import BadScript
@@ -107,13 +106,3 @@ def _place(text: str) -> tuple[str, int]:
     if match is None:
         raise ValueError(f"`{text}` is no location")
     return match[1], int(match[2] or 0)
-
-
-class RowEnd(NamedTuple):
-    """What became of a row: `state` is done, failed, refused, or changed where another command came first."""
-
-    number: int
-    text: str
-    state: str
-    reason: str
-    ticks: int
