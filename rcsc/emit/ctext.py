@@ -89,11 +89,19 @@ def type_bounds(name: str) -> tuple[int, int]:
 
 
 def _c_bounds(expr: Expr) -> tuple[Value, Value]:
-    """What the C type of an expression can hold: a constant only itself, a double anything."""
+    """What the C type of an expression can hold: a constant only itself, a double anything.
+
+    Of a division or a remainder by a constant compilers know more: they compute it in the type of what is divided.
+    """
     if isinstance(expr, model.Literal):
         return expr.value, expr.value
     if isinstance(expr.type, Real):
         return -math.inf, math.inf
+    match expr:
+        case model.Apply(op=Op.DIV | Op.MOD, args=(whole, model.Literal(value=divisor))):
+            low, high = _c_bounds(whole)  # the result lies no farther from 0
+            far = max(abs(low), abs(high))
+            return (min(low, 0), max(high, 0)) if divisor > 0 else (-far, far)
     return type_bounds(
         c_type(expr.type) if isinstance(expr, model.Read | model.Select) else wide_type(expr.type)
     )

@@ -371,6 +371,9 @@ def compared() -> str:
     kinds = [f"x{at} : int {one}" for at, one in enumerate(RANGES)] + ["b : bool", "e : only"]
     body = [f"o := x{at} {op} {constant}" for at, one in enumerate(RANGES) for constant in CONSTANTS
             for op in ("<", "<=", "=", ">", ">=", "/=") if one_type_holds(one, constant)]  # fmt: skip
+    body += [f"o := x{at} {divided} {op} {constant}" for at, one in enumerate(RANGES) for constant in (-129, -8, 0, 200, 70000)
+             for divided in ("/ 2", "/ 300", "mod 7", "/ -3") for op in ("<", "<=", "=", ">", ">=", "/=")
+             if one_type_holds(one, min(constant, -3 if "-" in divided else 0))]  # fmt: skip
     body += [f"o := {x} {op} {x}" for x in ("x1", "x8", "b", "e") for op in ("=", "/=")]
     body += [f"o := x{at} in {{3, 300, 70000}} o := x{at} in 2 .. 300" for at, _ in enumerate(RANGES)]
     body += ["b2 := b2", "e2 := e2", "if x8 + 1 >= 0 { o := true }"]

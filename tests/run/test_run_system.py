@@ -192,6 +192,7 @@ def test_a_row_that_fails_stops_the_script_and_says_why(
         (["dock", "--script", "zzz.csv"], 2, "there is no script `zzz.csv`; those of `dock/system.toml` are dock, in"),
         (["dock", "--plant", "none.py"], 1, "error[RCS729]: there is no file `none.py`"),
         (["dock", "--cycles", "5", "--processes"], 2, "--cycles are of one process"),
+        (["dock", "--log", "x.mcap", "--processes"], 2, "--log and --cycles are of one process"),
     ],
 )  # fmt: skip
 def test_what_is_meant_is_told_where_it_is_not_there(

@@ -120,9 +120,9 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     after the other, and what became of each is printed. A row that fails stops the script with its reason; the level is told
     to rest.
     """
-    if processes and (resumes or live or report or cycles):
+    if processes and (resumes or live or report or cycles or log):
         raise click.UsageError(
-            "--resume, --live, --report and --cycles are of one process; with --processes, use --from-row"
+            "--resume, --live, --report, --log and --cycles are of one process; with --processes, use --from-row"
         )
     if live:
         need("live")
