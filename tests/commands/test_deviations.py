@@ -88,9 +88,7 @@ def test_the_fields_of_figure_11(page: str, buffer: str, size: str, names: str) 
     """In order, with their bytes, both in the paper and in the program."""
     section, fields = of_buffer(page, buffer)
     there = [(row[0].strip("*"), int(row[1])) for row in fields if row[0]]
-    assert there == [
-        (name, 10 if name in STRINGS else 2) for name in names.split()
-    ]
+    assert there == [(name, 10 if name in STRINGS else 2) for name in names.split()]
     level, _, record = buffer.partition(".")
     sign = signatures(description(TABLES / "system.toml"))[level]
     leaves = [sign.leaves[at] for at in sign.record(record)]
