@@ -37,6 +37,14 @@ static inline uint8_t task_u8_of_i64(int64_t a)
     return (uint8_t)a;
 }
 
+/* A command that has not failed has no cause of failure. */
+static void task_do_forget_cause(task_t *s)
+{
+    if (((int64_t)s->to_workstation.failure == INT64_C(0))) {
+        s->to_workstation.cause = (uint8_t)INT64_C(0);
+    }
+}
+
 /* The table test variables that the command and the database give (section 8.1). */
 static void task_do_test_variables(task_t *s)
 {
@@ -181,6 +189,12 @@ static void task_do_cmd_failure(task_t *s)
     s->to_workstation.failure = (uint8_t)INT64_C(1);
 }
 
+/* What E-MOVE says went wrong. */
+static void task_do_cause_below(task_t *s)
+{
+    s->to_workstation.cause = (uint8_t)(int64_t)s->emove.failure;
+}
+
 /* E-MOVE found that the part is not between the fingers any more. */
 static void task_do_lost_on_the_way(task_t *s)
 {
@@ -194,6 +208,7 @@ static void task_do_lost_on_the_way(task_t *s)
 static void task_do_move_failure(task_t *s)
 {
     s->to_workstation.failure = (uint8_t)INT64_C(2);
+    task_do_cause_below(s);
     s->remember_current_loc = (uint8_t)INT64_C(0);
     task_do_lost_on_the_way(s);
 }
@@ -202,6 +217,7 @@ static void task_do_move_failure(task_t *s)
 static void task_do_loc_failure(task_t *s)
 {
     s->to_workstation.failure = (uint8_t)INT64_C(3);
+    task_do_cause_below(s);
 }
 
 /* One part more on the buffer table. */
@@ -243,6 +259,7 @@ static void task_do_back_to_buffer_db(task_t *s)
 static void task_do_pic_failure(task_t *s)
 {
     s->to_workstation.failure = (uint8_t)INT64_C(4);
+    task_do_cause_below(s);
     task_do_back_to_buffer_db(s);
     task_do_none_acquired(s);
     if (((int64_t)s->emove.failure == INT64_C(12))) {
@@ -312,6 +329,7 @@ static void task_do_ended(task_t *s)
 static void task_do_release_failure(task_t *s)
 {
     s->to_workstation.failure = (uint8_t)(int64_t)s->emove.failure;
+    task_do_cause_below(s);
     task_do_lost_on_the_way(s);
 }
 
@@ -423,19 +441,19 @@ static void task_admit(task_t *s)
     if (((int64_t)s->from_emove.ref_command_echo > INT64_C(5))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 18;
+            s->fault_at = 19;
         }
     }
     if (((int64_t)s->from_emove.status_report > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 19;
+            s->fault_at = 20;
         }
     }
     if (((int64_t)s->from_emove.failure > INT64_C(15))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 20;
+            s->fault_at = 21;
         }
     }
     if (s->fault != 0) {
@@ -1076,6 +1094,7 @@ void task_init(task_t *s)
     s->to_workstation.status_report = (uint8_t)INT64_C(0);
     s->to_workstation.status_parameter = (uint8_t)INT64_C(0);
     s->to_workstation.failure = (uint8_t)INT64_C(0);
+    s->to_workstation.cause = (uint8_t)INT64_C(0);
     s->new_command = false;
     s->answered = false;
     s->settling = false;
@@ -1156,137 +1175,140 @@ int32_t task_check(const task_t *s)
     if ((at < 0) && (((int64_t)s->to_workstation.failure > INT64_C(15)))) {
         at = 12;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+    if ((at < 0) && (((int64_t)s->to_workstation.cause > INT64_C(15)))) {
         at = 13;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
         at = 14;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
         at = 15;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.input_command > INT64_C(5)))) {
-        at = 22;
+    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+        at = 16;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->to_emove.input_command > INT64_C(5)))) {
         at = 23;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.grasp > INT64_C(9)))) {
+    if ((at < 0) && (((int64_t)s->to_emove.obj_ptr > INT64_C(6)))) {
         at = 24;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.sector > INT64_C(99)))) {
-        at = 26;
+    if ((at < 0) && (((int64_t)s->to_emove.grasp > INT64_C(9)))) {
+        at = 25;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->to_emove.apoint_pos_flag) > 1u)) {
+    if ((at < 0) && (((int64_t)s->to_emove.sector > INT64_C(99)))) {
         at = 27;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.gripped_obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->to_emove.apoint_pos_flag) > 1u)) {
         at = 28;
     }
-    if ((at < 0) && (((int64_t)s->emove.command > INT64_C(5)))) {
+    if ((at < 0) && (((int64_t)s->to_emove.gripped_obj_ptr > INT64_C(6)))) {
         at = 29;
     }
-    if ((at < 0) && (((int64_t)s->emove.status > INT64_C(2)))) {
+    if ((at < 0) && (((int64_t)s->emove.command > INT64_C(5)))) {
         at = 30;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->emove.resting) > 1u)) {
+    if ((at < 0) && (((int64_t)s->emove.status > INT64_C(2)))) {
         at = 31;
     }
-    if ((at < 0) && (((int64_t)s->emove.failure > INT64_C(15)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->emove.resting) > 1u)) {
         at = 32;
     }
-    if ((at < 0) && (((int64_t)s->last_emove.input_command > INT64_C(5)))) {
+    if ((at < 0) && (((int64_t)s->emove.failure > INT64_C(15)))) {
         at = 33;
     }
-    if ((at < 0) && (((int64_t)s->last_emove.obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->last_emove.input_command > INT64_C(5)))) {
         at = 34;
     }
-    if ((at < 0) && (((int64_t)s->last_emove.grasp > INT64_C(9)))) {
+    if ((at < 0) && (((int64_t)s->last_emove.obj_ptr > INT64_C(6)))) {
         at = 35;
     }
-    if ((at < 0) && (((int64_t)s->last_emove.sector > INT64_C(99)))) {
-        at = 37;
+    if ((at < 0) && (((int64_t)s->last_emove.grasp > INT64_C(9)))) {
+        at = 36;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->source.known) > 1u)) {
+    if ((at < 0) && (((int64_t)s->last_emove.sector > INT64_C(99)))) {
         at = 38;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->source.vision) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->source.known) > 1u)) {
         at = 39;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->source.buffer) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->source.vision) > 1u)) {
         at = 40;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest.known) > 1u)) {
-        at = 43;
+    if ((at < 0) && ((*(const uint8_t *)&s->source.buffer) > 1u)) {
+        at = 41;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest.vision) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->dest.known) > 1u)) {
         at = 44;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest.buffer) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->dest.vision) > 1u)) {
         at = 45;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->end_at.known) > 1u)) {
-        at = 48;
+    if ((at < 0) && ((*(const uint8_t *)&s->dest.buffer) > 1u)) {
+        at = 46;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->end_at.vision) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->end_at.known) > 1u)) {
         at = 49;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->end_at.buffer) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->end_at.vision) > 1u)) {
         at = 50;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->here.known) > 1u)) {
-        at = 53;
+    if ((at < 0) && ((*(const uint8_t *)&s->end_at.buffer) > 1u)) {
+        at = 51;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->here.vision) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->here.known) > 1u)) {
         at = 54;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->here.buffer) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->here.vision) > 1u)) {
         at = 55;
     }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(8)))) {
-        at = 58;
+    if ((at < 0) && ((*(const uint8_t *)&s->here.buffer) > 1u)) {
+        at = 56;
     }
-    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(8)))) {
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(8)))) {
         at = 59;
     }
-    if ((at < 0) && (((int64_t)s->loc_of_obj > INT64_C(1)))) {
+    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(8)))) {
         at = 60;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->source_spec) > 1u)) {
+    if ((at < 0) && (((int64_t)s->loc_of_obj > INT64_C(1)))) {
         at = 61;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest_spec) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->source_spec) > 1u)) {
         at = 62;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->names_known) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->dest_spec) > 1u)) {
         at = 63;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->names_known) > 1u)) {
         at = 64;
     }
-    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(6)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
         at = 65;
     }
-    if ((at < 0) && (((int64_t)s->grasp_now > INT64_C(9)))) {
+    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(6)))) {
         at = 66;
     }
-    if ((at < 0) && (((int64_t)s->current_sector > INT64_C(99)))) {
-        at = 69;
+    if ((at < 0) && (((int64_t)s->grasp_now > INT64_C(9)))) {
+        at = 67;
     }
-    if ((at < 0) && (((int64_t)s->tbuffer_boxt > INT64_C(99)))) {
+    if ((at < 0) && (((int64_t)s->current_sector > INT64_C(99)))) {
         at = 70;
     }
-    if ((at < 0) && (((int64_t)s->bbuffer_boxb > INT64_C(99)))) {
+    if ((at < 0) && (((int64_t)s->tbuffer_boxt > INT64_C(99)))) {
         at = 71;
     }
-    if ((at < 0) && (((int64_t)s->fbuffer_flag > INT64_C(99)))) {
+    if ((at < 0) && (((int64_t)s->bbuffer_boxb > INT64_C(99)))) {
         at = 72;
     }
-    if ((at < 0) && (((int64_t)s->hbuffer_hous > INT64_C(99)))) {
+    if ((at < 0) && (((int64_t)s->fbuffer_flag > INT64_C(99)))) {
         at = 73;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+    if ((at < 0) && (((int64_t)s->hbuffer_hous > INT64_C(99)))) {
         at = 74;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+        at = 75;
     }
     return at;
 }
@@ -1686,6 +1708,9 @@ int32_t task_task_cycle(task_t *s)
         task_settle(s);
         if (s->fault == 0) {
             task_do_take_orders(s);
+        }
+        if (s->fault == 0) {
+            task_do_forget_cause(s);
         }
         if (s->fault == 0) {
             task_do_test_variables(s);

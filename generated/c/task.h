@@ -154,36 +154,36 @@ enum {
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
     vocabulary_task_order_t workstation; /* 0 to 7: input; Orders of workstation. */
-    vocabulary_task_report_t to_workstation; /* 8 to 12: output; Reports to workstation. */
-    bool new_command; /* 13: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
-    bool answered; /* 14: state; A line has answered the new command. */
-    bool settling; /* 15: state; The line of this cycle lets the levels below rest first, and answers nothing. */
-    uint16_t inc_command_seen; /* 16: state; 0 .. 65535; Number of the order that was taken last. */
-    vocabulary_emove_report_t from_emove; /* 17 to 20: input; Reports of emove, as they come. */
-    vocabulary_emove_order_t to_emove; /* 21 to 28: output; Orders to emove. */
-    task_common_emove_held_t emove; /* 29 to 32: state; What emove says of the last orders, held until they are echoed. */
-    task_common_emove_last_t last_emove; /* 33 to 37: state; The order to emove that was numbered last. */
-    task_common_place_t source; /* 38 to 42: input; From the database: the source of the workstation. */
-    task_common_place_t dest; /* 43 to 47: input; From the database: its destination. */
-    task_common_place_t end_at; /* 48 to 52: input; From the database: where it ends. */
-    task_common_place_t here; /* 53 to 57: input; From the database: where the robot is. */
-    task_common_task_state_t cur_state; /* 58: state; Where the table is in its sequence. */
-    task_common_task_state_t cur_state_next; /* 59: state; the deferred next value of cur_state */
-    task_common_locating_t loc_of_obj; /* 60: state; Whether vision is needed at the source. */
-    bool source_spec; /* 61: state; Whether the WORKSTATION named a source that the database knows. */
-    bool dest_spec; /* 62: state; Whether it named a destination that the database knows. */
-    bool names_known; /* 63: state; Every location that it named is known. */
-    bool obj_acquired; /* 64: state; An object is in the gripper. */
-    vocabulary_object_t obj_now_in_gripper; /* 65: state; The object in the gripper. */
-    uint8_t grasp_now; /* 66: state; 0 .. 9; How it is gripped. */
-    uint8_t remember_current_loc; /* 67: state; 0 .. 255; Where the object was taken from. */
-    uint8_t current_loc; /* 68: state; 0 .. 255; Where the robot is; 0 while it moves. */
-    uint8_t current_sector; /* 69: state; 0 .. 99 */
-    uint8_t tbuffer_boxt; /* 70: state; 0 .. 99; Box tops left on the buffer table. */
-    uint8_t bbuffer_boxb; /* 71: state; 0 .. 99; Box bottoms left on the buffer table. */
-    uint8_t fbuffer_flag; /* 72: state; 0 .. 99; Flags left on the buffer table. */
-    uint8_t hbuffer_hous; /* 73: state; 0 .. 99; Houses left on the buffer table. */
-    bool echoed; /* 74: state; Every last order is echoed, or too late. */
+    vocabulary_task_report_t to_workstation; /* 8 to 13: output; Reports to workstation. */
+    bool new_command; /* 14: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool answered; /* 15: state; A line has answered the new command. */
+    bool settling; /* 16: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    uint16_t inc_command_seen; /* 17: state; 0 .. 65535; Number of the order that was taken last. */
+    vocabulary_emove_report_t from_emove; /* 18 to 21: input; Reports of emove, as they come. */
+    vocabulary_emove_order_t to_emove; /* 22 to 29: output; Orders to emove. */
+    task_common_emove_held_t emove; /* 30 to 33: state; What emove says of the last orders, held until they are echoed. */
+    task_common_emove_last_t last_emove; /* 34 to 38: state; The order to emove that was numbered last. */
+    task_common_place_t source; /* 39 to 43: input; From the database: the source of the workstation. */
+    task_common_place_t dest; /* 44 to 48: input; From the database: its destination. */
+    task_common_place_t end_at; /* 49 to 53: input; From the database: where it ends. */
+    task_common_place_t here; /* 54 to 58: input; From the database: where the robot is. */
+    task_common_task_state_t cur_state; /* 59: state; Where the table is in its sequence. */
+    task_common_task_state_t cur_state_next; /* 60: state; the deferred next value of cur_state */
+    task_common_locating_t loc_of_obj; /* 61: state; Whether vision is needed at the source. */
+    bool source_spec; /* 62: state; Whether the WORKSTATION named a source that the database knows. */
+    bool dest_spec; /* 63: state; Whether it named a destination that the database knows. */
+    bool names_known; /* 64: state; Every location that it named is known. */
+    bool obj_acquired; /* 65: state; An object is in the gripper. */
+    vocabulary_object_t obj_now_in_gripper; /* 66: state; The object in the gripper. */
+    uint8_t grasp_now; /* 67: state; 0 .. 9; How it is gripped. */
+    uint8_t remember_current_loc; /* 68: state; 0 .. 255; Where the object was taken from. */
+    uint8_t current_loc; /* 69: state; 0 .. 255; Where the robot is; 0 while it moves. */
+    uint8_t current_sector; /* 70: state; 0 .. 99 */
+    uint8_t tbuffer_boxt; /* 71: state; 0 .. 99; Box tops left on the buffer table. */
+    uint8_t bbuffer_boxb; /* 72: state; 0 .. 99; Box bottoms left on the buffer table. */
+    uint8_t fbuffer_flag; /* 73: state; 0 .. 99; Flags left on the buffer table. */
+    uint8_t hbuffer_hous; /* 74: state; 0 .. 99; Houses left on the buffer table. */
+    bool echoed; /* 75: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */

@@ -119,6 +119,7 @@ typedef struct {
     vocabulary_level_status_t status_report;
     vocabulary_object_t status_parameter;
     vocabulary_reason_t failure;
+    vocabulary_reason_t cause;
 } vocabulary_task_report_t;
 
 typedef struct {

@@ -169,6 +169,7 @@ class State:
         "to_workstation_status_report",
         "to_workstation_status_parameter",
         "to_workstation_failure",
+        "to_workstation_cause",
         "new_command",
         "answered",
         "settling",
@@ -251,6 +252,7 @@ class State:
         self.to_workstation_status_report = 0  # Reports to workstation.
         self.to_workstation_status_parameter = 0  # Reports to workstation.
         self.to_workstation_failure = 0  # Reports to workstation.
+        self.to_workstation_cause = 0  # Reports to workstation.
         self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
         self.answered = False  # A line has answered the new command.
         self.settling = False  # The line of this cycle lets the levels below rest first, and answers nothing.
@@ -662,6 +664,12 @@ _TRANSFER_ONE = (
 )
 
 
+def _do_forget_cause(s):
+    """A command that has not failed has no cause of failure."""
+    if (s.to_workstation_failure == 0):
+        s.to_workstation_cause = 0
+
+
 def _do_test_variables(s):
     """The table test variables that the command and the database give (section 8.1)."""
     if s.source_vision:
@@ -782,6 +790,11 @@ def _do_cmd_failure(s):
     s.to_workstation_failure = 1
 
 
+def _do_cause_below(s):
+    """What E-MOVE says went wrong."""
+    s.to_workstation_cause = s.emove_failure
+
+
 def _do_lost_on_the_way(s):
     """E-MOVE found that the part is not between the fingers any more."""
     if (s.emove_failure == 11):
@@ -792,6 +805,7 @@ def _do_lost_on_the_way(s):
 def _do_move_failure(s):
     """Procedure move_failure."""
     s.to_workstation_failure = 2
+    _do_cause_below(s)
     s.remember_current_loc = 0
     _do_lost_on_the_way(s)
 
@@ -799,6 +813,7 @@ def _do_move_failure(s):
 def _do_loc_failure(s):
     """Procedure loc_failure."""
     s.to_workstation_failure = 3
+    _do_cause_below(s)
 
 
 def _do_add_to_buffer_db(s, v_what):
@@ -827,6 +842,7 @@ def _do_back_to_buffer_db(s):
 def _do_pic_failure(s):
     """Nothing, or a part of the wrong size, is in the gripper."""
     s.to_workstation_failure = 4
+    _do_cause_below(s)
     _do_back_to_buffer_db(s)
     _do_none_acquired(s)
     if (s.emove_failure == 12):
@@ -885,6 +901,7 @@ def _do_ended(s):
 def _do_release_failure(s):
     """Opening the gripper failed: what it holds is not known."""
     s.to_workstation_failure = s.emove_failure
+    _do_cause_below(s)
     _do_lost_on_the_way(s)
 
 
@@ -961,106 +978,108 @@ def check(s):
         return 11
     if not (isinstance(s.to_workstation_failure, int) and 0 <= s.to_workstation_failure <= 15):
         return 12
-    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
+    if not (isinstance(s.to_workstation_cause, int) and 0 <= s.to_workstation_cause <= 15):
         return 13
-    if not (isinstance(s.answered, int) and 0 <= s.answered <= 1):
+    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
         return 14
-    if not (isinstance(s.settling, int) and 0 <= s.settling <= 1):
+    if not (isinstance(s.answered, int) and 0 <= s.answered <= 1):
         return 15
-    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+    if not (isinstance(s.settling, int) and 0 <= s.settling <= 1):
         return 16
+    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+        return 17
     if not (isinstance(s.to_emove_inc_command, int) and 0 <= s.to_emove_inc_command <= 65535):
-        return 21
-    if not (isinstance(s.to_emove_input_command, int) and 0 <= s.to_emove_input_command <= 5):
         return 22
-    if not (isinstance(s.to_emove_obj_ptr, int) and 0 <= s.to_emove_obj_ptr <= 6):
+    if not (isinstance(s.to_emove_input_command, int) and 0 <= s.to_emove_input_command <= 5):
         return 23
-    if not (isinstance(s.to_emove_grasp, int) and 0 <= s.to_emove_grasp <= 9):
+    if not (isinstance(s.to_emove_obj_ptr, int) and 0 <= s.to_emove_obj_ptr <= 6):
         return 24
-    if not (isinstance(s.to_emove_locpt_ptr, int) and 0 <= s.to_emove_locpt_ptr <= 255):
+    if not (isinstance(s.to_emove_grasp, int) and 0 <= s.to_emove_grasp <= 9):
         return 25
-    if not (isinstance(s.to_emove_sector, int) and 0 <= s.to_emove_sector <= 99):
+    if not (isinstance(s.to_emove_locpt_ptr, int) and 0 <= s.to_emove_locpt_ptr <= 255):
         return 26
-    if not (isinstance(s.to_emove_apoint_pos_flag, int) and 0 <= s.to_emove_apoint_pos_flag <= 1):
+    if not (isinstance(s.to_emove_sector, int) and 0 <= s.to_emove_sector <= 99):
         return 27
-    if not (isinstance(s.to_emove_gripped_obj_ptr, int) and 0 <= s.to_emove_gripped_obj_ptr <= 6):
+    if not (isinstance(s.to_emove_apoint_pos_flag, int) and 0 <= s.to_emove_apoint_pos_flag <= 1):
         return 28
-    if not (isinstance(s.emove_command, int) and 0 <= s.emove_command <= 5):
+    if not (isinstance(s.to_emove_gripped_obj_ptr, int) and 0 <= s.to_emove_gripped_obj_ptr <= 6):
         return 29
-    if not (isinstance(s.emove_status, int) and 0 <= s.emove_status <= 2):
+    if not (isinstance(s.emove_command, int) and 0 <= s.emove_command <= 5):
         return 30
-    if not (isinstance(s.emove_resting, int) and 0 <= s.emove_resting <= 1):
+    if not (isinstance(s.emove_status, int) and 0 <= s.emove_status <= 2):
         return 31
-    if not (isinstance(s.emove_failure, int) and 0 <= s.emove_failure <= 15):
+    if not (isinstance(s.emove_resting, int) and 0 <= s.emove_resting <= 1):
         return 32
-    if not (isinstance(s.last_emove_input_command, int) and 0 <= s.last_emove_input_command <= 5):
+    if not (isinstance(s.emove_failure, int) and 0 <= s.emove_failure <= 15):
         return 33
-    if not (isinstance(s.last_emove_obj_ptr, int) and 0 <= s.last_emove_obj_ptr <= 6):
+    if not (isinstance(s.last_emove_input_command, int) and 0 <= s.last_emove_input_command <= 5):
         return 34
-    if not (isinstance(s.last_emove_grasp, int) and 0 <= s.last_emove_grasp <= 9):
+    if not (isinstance(s.last_emove_obj_ptr, int) and 0 <= s.last_emove_obj_ptr <= 6):
         return 35
-    if not (isinstance(s.last_emove_locpt_ptr, int) and 0 <= s.last_emove_locpt_ptr <= 255):
+    if not (isinstance(s.last_emove_grasp, int) and 0 <= s.last_emove_grasp <= 9):
         return 36
-    if not (isinstance(s.last_emove_sector, int) and 0 <= s.last_emove_sector <= 99):
+    if not (isinstance(s.last_emove_locpt_ptr, int) and 0 <= s.last_emove_locpt_ptr <= 255):
         return 37
-    if not (isinstance(s.source_known, int) and 0 <= s.source_known <= 1):
+    if not (isinstance(s.last_emove_sector, int) and 0 <= s.last_emove_sector <= 99):
         return 38
-    if not (isinstance(s.source_vision, int) and 0 <= s.source_vision <= 1):
+    if not (isinstance(s.source_known, int) and 0 <= s.source_known <= 1):
         return 39
-    if not (isinstance(s.source_buffer, int) and 0 <= s.source_buffer <= 1):
+    if not (isinstance(s.source_vision, int) and 0 <= s.source_vision <= 1):
         return 40
+    if not (isinstance(s.source_buffer, int) and 0 <= s.source_buffer <= 1):
+        return 41
     if not (isinstance(s.dest_known, int) and 0 <= s.dest_known <= 1):
-        return 43
-    if not (isinstance(s.dest_vision, int) and 0 <= s.dest_vision <= 1):
         return 44
-    if not (isinstance(s.dest_buffer, int) and 0 <= s.dest_buffer <= 1):
+    if not (isinstance(s.dest_vision, int) and 0 <= s.dest_vision <= 1):
         return 45
+    if not (isinstance(s.dest_buffer, int) and 0 <= s.dest_buffer <= 1):
+        return 46
     if not (isinstance(s.end_at_known, int) and 0 <= s.end_at_known <= 1):
-        return 48
-    if not (isinstance(s.end_at_vision, int) and 0 <= s.end_at_vision <= 1):
         return 49
-    if not (isinstance(s.end_at_buffer, int) and 0 <= s.end_at_buffer <= 1):
+    if not (isinstance(s.end_at_vision, int) and 0 <= s.end_at_vision <= 1):
         return 50
+    if not (isinstance(s.end_at_buffer, int) and 0 <= s.end_at_buffer <= 1):
+        return 51
     if not (isinstance(s.here_known, int) and 0 <= s.here_known <= 1):
-        return 53
-    if not (isinstance(s.here_vision, int) and 0 <= s.here_vision <= 1):
         return 54
-    if not (isinstance(s.here_buffer, int) and 0 <= s.here_buffer <= 1):
+    if not (isinstance(s.here_vision, int) and 0 <= s.here_vision <= 1):
         return 55
+    if not (isinstance(s.here_buffer, int) and 0 <= s.here_buffer <= 1):
+        return 56
     if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 8):
-        return 58
-    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 8):
         return 59
-    if not (isinstance(s.loc_of_obj, int) and 0 <= s.loc_of_obj <= 1):
+    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 8):
         return 60
-    if not (isinstance(s.source_spec, int) and 0 <= s.source_spec <= 1):
+    if not (isinstance(s.loc_of_obj, int) and 0 <= s.loc_of_obj <= 1):
         return 61
-    if not (isinstance(s.dest_spec, int) and 0 <= s.dest_spec <= 1):
+    if not (isinstance(s.source_spec, int) and 0 <= s.source_spec <= 1):
         return 62
-    if not (isinstance(s.names_known, int) and 0 <= s.names_known <= 1):
+    if not (isinstance(s.dest_spec, int) and 0 <= s.dest_spec <= 1):
         return 63
-    if not (isinstance(s.obj_acquired, int) and 0 <= s.obj_acquired <= 1):
+    if not (isinstance(s.names_known, int) and 0 <= s.names_known <= 1):
         return 64
-    if not (isinstance(s.obj_now_in_gripper, int) and 0 <= s.obj_now_in_gripper <= 6):
+    if not (isinstance(s.obj_acquired, int) and 0 <= s.obj_acquired <= 1):
         return 65
-    if not (isinstance(s.grasp_now, int) and 0 <= s.grasp_now <= 9):
+    if not (isinstance(s.obj_now_in_gripper, int) and 0 <= s.obj_now_in_gripper <= 6):
         return 66
-    if not (isinstance(s.remember_current_loc, int) and 0 <= s.remember_current_loc <= 255):
+    if not (isinstance(s.grasp_now, int) and 0 <= s.grasp_now <= 9):
         return 67
-    if not (isinstance(s.current_loc, int) and 0 <= s.current_loc <= 255):
+    if not (isinstance(s.remember_current_loc, int) and 0 <= s.remember_current_loc <= 255):
         return 68
-    if not (isinstance(s.current_sector, int) and 0 <= s.current_sector <= 99):
+    if not (isinstance(s.current_loc, int) and 0 <= s.current_loc <= 255):
         return 69
-    if not (isinstance(s.tbuffer_boxt, int) and 0 <= s.tbuffer_boxt <= 99):
+    if not (isinstance(s.current_sector, int) and 0 <= s.current_sector <= 99):
         return 70
-    if not (isinstance(s.bbuffer_boxb, int) and 0 <= s.bbuffer_boxb <= 99):
+    if not (isinstance(s.tbuffer_boxt, int) and 0 <= s.tbuffer_boxt <= 99):
         return 71
-    if not (isinstance(s.fbuffer_flag, int) and 0 <= s.fbuffer_flag <= 99):
+    if not (isinstance(s.bbuffer_boxb, int) and 0 <= s.bbuffer_boxb <= 99):
         return 72
-    if not (isinstance(s.hbuffer_hous, int) and 0 <= s.hbuffer_hous <= 99):
+    if not (isinstance(s.fbuffer_flag, int) and 0 <= s.fbuffer_flag <= 99):
         return 73
-    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+    if not (isinstance(s.hbuffer_hous, int) and 0 <= s.hbuffer_hous <= 99):
         return 74
+    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+        return 75
     return -1
 
 
@@ -1095,76 +1114,76 @@ def _admit(s):
         return _refused(s, 7)
     i8 = _whole(s.from_emove_inc_command_echo)
     if not 0 <= i8 <= 65535:
-        return _refused(s, 17)
+        return _refused(s, 18)
     i9 = _whole(s.from_emove_ref_command_echo)
     if not 0 <= i9 <= 5:
-        return _refused(s, 18)
+        return _refused(s, 19)
     i10 = _whole(s.from_emove_status_report)
     if not 0 <= i10 <= 2:
-        return _refused(s, 19)
+        return _refused(s, 20)
     i11 = _whole(s.from_emove_failure)
     if not 0 <= i11 <= 15:
-        return _refused(s, 20)
+        return _refused(s, 21)
     i12 = _whole(s.source_known)
     if not 0 <= i12 <= 1:
-        return _refused(s, 38)
+        return _refused(s, 39)
     i13 = _whole(s.source_vision)
     if not 0 <= i13 <= 1:
-        return _refused(s, 39)
+        return _refused(s, 40)
     i14 = _whole(s.source_buffer)
     if not 0 <= i14 <= 1:
-        return _refused(s, 40)
+        return _refused(s, 41)
     i15 = _whole(s.source_vupos)
     if not 0 <= i15 <= 255:
-        return _refused(s, 41)
+        return _refused(s, 42)
     i16 = _whole(s.source_safe)
     if not 0 <= i16 <= 255:
-        return _refused(s, 42)
+        return _refused(s, 43)
     i17 = _whole(s.dest_known)
     if not 0 <= i17 <= 1:
-        return _refused(s, 43)
+        return _refused(s, 44)
     i18 = _whole(s.dest_vision)
     if not 0 <= i18 <= 1:
-        return _refused(s, 44)
+        return _refused(s, 45)
     i19 = _whole(s.dest_buffer)
     if not 0 <= i19 <= 1:
-        return _refused(s, 45)
+        return _refused(s, 46)
     i20 = _whole(s.dest_vupos)
     if not 0 <= i20 <= 255:
-        return _refused(s, 46)
+        return _refused(s, 47)
     i21 = _whole(s.dest_safe)
     if not 0 <= i21 <= 255:
-        return _refused(s, 47)
+        return _refused(s, 48)
     i22 = _whole(s.end_at_known)
     if not 0 <= i22 <= 1:
-        return _refused(s, 48)
+        return _refused(s, 49)
     i23 = _whole(s.end_at_vision)
     if not 0 <= i23 <= 1:
-        return _refused(s, 49)
+        return _refused(s, 50)
     i24 = _whole(s.end_at_buffer)
     if not 0 <= i24 <= 1:
-        return _refused(s, 50)
+        return _refused(s, 51)
     i25 = _whole(s.end_at_vupos)
     if not 0 <= i25 <= 255:
-        return _refused(s, 51)
+        return _refused(s, 52)
     i26 = _whole(s.end_at_safe)
     if not 0 <= i26 <= 255:
-        return _refused(s, 52)
+        return _refused(s, 53)
     i27 = _whole(s.here_known)
     if not 0 <= i27 <= 1:
-        return _refused(s, 53)
+        return _refused(s, 54)
     i28 = _whole(s.here_vision)
     if not 0 <= i28 <= 1:
-        return _refused(s, 54)
+        return _refused(s, 55)
     i29 = _whole(s.here_buffer)
     if not 0 <= i29 <= 1:
-        return _refused(s, 55)
+        return _refused(s, 56)
     i30 = _whole(s.here_vupos)
     if not 0 <= i30 <= 255:
-        return _refused(s, 56)
+        return _refused(s, 57)
     i31 = _whole(s.here_safe)
     if not 0 <= i31 <= 255:
-        return _refused(s, 57)
+        return _refused(s, 58)
     s.workstation_inc_command = i0
     s.workstation_input_command = i1
     s.workstation_obj = i2
@@ -2080,6 +2099,7 @@ def task_cycle(s):
         try:
             _settle(s)
             _do_take_orders(s)
+            _do_forget_cause(s)
             _do_test_variables(s)
             {0: _run_pause_task, 1: _run_acquire, 2: _run_move, 3: _run_release_part, 4: _run_transfer, 5: _run_clear}[s.workstation_input_command](s)
             if s.fault == 0:

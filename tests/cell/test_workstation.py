@@ -335,7 +335,7 @@ def test_a_failed_row_stops_the_script_and_can_be_tried_again() -> None:
     assert isinstance(outside, Plant)
     outside.faults.blind = True
     *_, last = made.steps()
-    assert (last.row.number, last.state, last.reason) == (2, "failed", "loc")
+    assert (last.row.number, last.state, last.reason) == (2, "failed", "loc: no_match")
     for _ in range(40):
         made.system.step()
     assert made.system.level("primitive").shown("to_robot.input_command") == "hold"
@@ -358,7 +358,7 @@ def test_a_part_of_the_wrong_size_is_let_go_of_and_the_next_is_acquired() -> Non
     made = prepare(SYSTEM, rows, "c", house_in_the_fixture)
     made.station.cell = CellState(fixture="tbox")  # as a script before this one left it
     [failed] = made.steps()
-    assert (failed.state, failed.reason) == ("failed", "pic")
+    assert (failed.state, failed.reason) == ("failed", "pic: wrong_size")
     assert made.station.cell.held == "unknown_object"
     made.station.resume()
     made.station.begin_at(1)
@@ -391,7 +391,7 @@ def test_a_part_that_was_not_picked_up_is_counted_on_the_buffer_again() -> None:
 
     made.system.watch.append(watch)
     [failed] = made.steps()
-    assert (failed.state, failed.reason) == ("failed", "pic")
+    assert (failed.state, failed.reason) == ("failed", "pic: nothing_gripped")
     for _ in range(20):
         made.system.step()
     assert counts == [10, 9, 10]

@@ -106,18 +106,19 @@ def test_every_command_is_answered_by_its_own_number_across_the_wrap() -> None:
 
 
 FAULTS = {
-    "no source": ("acquire", {"obj": "tbox", "grasp": 2}, "cmd"),
-    "no destination": ("move", {}, "cmd"),
-    "nothing to release": ("release", {}, "cmd"),
-    "nothing to clear": ("clear", {"dest": "STATION"}, "cmd"),
-    "nothing to transfer": ("transfer", {"dest": "V-BLK1"}, "cmd"),
-    "no such place": ("move", {"dest": 200}, "cmd"),
-    "no such sector": ("move", {"dest": "STATION", "sector": 50}, "move"),
-    "not on the buffer": ("acquire", {"obj": "hous", "grasp": 2, "source": "BUFFER"}, "loc"),
-    "thicker than expected": ("acquire", {"obj": "bbox", "grasp": 2, "source": "BUFFER"}, "loc"),
-    "no such grasp": ("acquire", {"obj": "tbox", "grasp": 9, "source": "FIX-MAC5"}, "move"),
-    "nothing there": ("acquire", {"obj": "tbox", "grasp": 2, "source": "FIX-MAC5"}, "pic"),
+    "no source": ("acquire", {"obj": "tbox", "grasp": 2}, "cmd none"),
+    "no destination": ("move", {}, "cmd none"),
+    "nothing to release": ("release", {}, "cmd none"),
+    "nothing to clear": ("clear", {"dest": "STATION"}, "cmd none"),
+    "nothing to transfer": ("transfer", {"dest": "V-BLK1"}, "cmd none"),
+    "no such place": ("move", {"dest": 200}, "cmd none"),
+    "no such sector": ("move", {"dest": "STATION", "sector": 50}, "move no_place"),
+    "not on the buffer": ("acquire", {"obj": "hous", "grasp": 2, "source": "BUFFER"}, "loc no_match"),
+    "thicker than expected": ("acquire", {"obj": "bbox", "grasp": 2, "source": "BUFFER"}, "loc wrong_range"),
+    "no such grasp": ("acquire", {"obj": "tbox", "grasp": 9, "source": "FIX-MAC5"}, "move grip"),
+    "nothing there": ("acquire", {"obj": "tbox", "grasp": 2, "source": "FIX-MAC5"}, "pic nothing_gripped"),
 }
+"""Commands with TASK's word for what fails, and E-MOVE's."""
 
 
 @pytest.mark.parametrize("name", list(FAULTS))
@@ -125,9 +126,18 @@ def test_what_cannot_be_done_is_reported_with_its_reason(name: str) -> None:
     command, said, reason = FAULTS[name]
     cell = Cell()
     assert cell.do(command, **said) == "failed"  # type: ignore[arg-type]  # of the table above
-    assert cell.reason() == reason
+    assert f"{cell.reason()} {cell.cause()}" == reason
     assert cell.do("move", dest="WS-SAFE") == "done"
+    assert (cell.reason(), cell.cause()) == ("none", "none")
     assert cell.failed == []
+
+
+def test_a_command_that_is_refused_has_no_cause_left_of_the_one_before() -> None:
+    cell = Cell()
+    assert cell.do("acquire", obj="hous", grasp=2, source="BUFFER") == "failed"
+    assert cell.cause() == "no_match"
+    assert cell.do("release") == "failed"
+    assert (cell.reason(), cell.cause()) == ("cmd", "none")
 
 
 def test_a_second_command_while_a_part_is_held_is_refused() -> None:
@@ -165,18 +175,18 @@ def test_an_empty_buffer_fails_and_stays_failed() -> None:
 @pytest.mark.parametrize(
     ("fault", "command", "said", "reason"),
     [
-        ("robot_stuck", "move", {"dest": "FIX-SAFE"}, "move"),
-        ("hand_stuck", "acquire", {"obj": "tbox", "grasp": 2, "source": "FIX-MAC5"}, "move"),
-        ("blind", "acquire", {"obj": "tbox", "grasp": 2, "source": "BUFFER"}, "loc"),
+        ("robot_stuck", "move", {"dest": "FIX-SAFE"}, ("move", "robot")),
+        ("hand_stuck", "acquire", {"obj": "tbox", "grasp": 2, "source": "FIX-MAC5"}, ("move", "grip")),
+        ("blind", "acquire", {"obj": "tbox", "grasp": 2, "source": "BUFFER"}, ("loc", "no_match")),
     ],
 )
 def test_a_fault_below_is_reported_upward(
-    fault: str, command: str, said: dict[str, str], reason: str
+    fault: str, command: str, said: dict[str, str], reason: tuple[str, str]
 ) -> None:
     cell = Cell()
     setattr(cell.world.faults, fault, True)
     assert cell.do(command, **said) == "failed"
-    assert cell.reason() == reason
+    assert (cell.reason(), cell.cause()) == reason
     setattr(cell.world.faults, fault, False)
     assert cell.do("move", dest="WS-SAFE") == "done"
     assert cell.failed == []

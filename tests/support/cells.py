@@ -123,6 +123,10 @@ class Cell:
         """Why TASK says that it failed."""
         return self.system.level("task").shown("to_workstation.failure")
 
+    def cause(self) -> str:
+        """What E-MOVE said of it, as TASK passes it on."""
+        return self.system.level("task").shown("to_workstation.cause")
+
 
 SCRIPT: tuple[tuple[str, dict[str, str | int]], ...] = (
     ("move", {"obj": "tbox", "grasp": 2, "source": "BUFFER", "dest": "FIX-MAC1"}),

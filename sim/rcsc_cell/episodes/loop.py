@@ -187,7 +187,8 @@ class Loop:
         if last.state == "refused":
             return "refused"
         command = last.text.partition(" ")[0].partition("-")[0].lower()
-        return f"failed:{last.reason if ' ' not in last.reason else command}"
+        word = last.reason.partition(":")[0]
+        return f"failed:{word if ' ' not in word else command}"
 
     # --- what goes wrong ---
 

@@ -130,7 +130,7 @@ BUFFERS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
         "inc_command", "input_command", "obj", "grasp", "source_locpt", "dest_locpt", "end_at_locpt", "sector",
     )),
     "task.to_workstation": ("task", "to_workstation", (
-        "inc_command_echo", "ref_command_echo", "status_report", "status_parameter", "failure",
+        "inc_command_echo", "ref_command_echo", "status_report", "status_parameter", "failure", "cause",
     )),
     "primitive.to_robot": ("primitive", "to_robot", ("inc_command", "input_command", *_PLATE)),
     "robot.report": ("primitive", "from_robot", (

@@ -246,7 +246,7 @@ class Workstation:
                 held = self._word(report, IN_GRIPPER)
                 self.progress.failed(row, held, failure)
                 self.cell = stands(row, self.progress, held, self.cell)
-                return "failed", failure
+                return "failed", _reason(failure, self._word(report, "cause"))
             case _:
                 return RUNNING
 
@@ -336,6 +336,11 @@ def _answered(who: str, report: Values | None, ticks: int, most: int) -> Now:
     if report is None:
         return RUNNING if ticks < ANSWER_TICKS else ("failed", f"the {who} does not answer")
     return RUNNING if ticks < most else ("failed", f"the {who} did not end in {most} cycles")
+
+
+def _reason(failure: str, cause: str) -> str:
+    """TASK's word for what failed, and after a colon what E-MOVE said of it, where that is another."""
+    return failure if cause in ("none", failure) else f"{failure}: {cause}"
 
 
 def _place(leaves: Sequence[Leaf], name: str) -> int:
