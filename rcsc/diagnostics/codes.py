@@ -1229,11 +1229,12 @@ class Code(StrEnum):
     """
     SCRIPT_STOPPED = """RCS724: the script was stopped
 
-    A row failed, with what the level reported, or did not end within the cycles that it may take. The level was told to rest: mend the
-    cause and begin anew at the row with `--from-row`. In the paper's cell an interlock may refuse a row before it begins, for it would
-    machine a loose part, put a second part into the fixture, or let go of a part; there all is kept as it stands, and `rcsc run
-    SCRIPT --resume` goes on from the row. What has been done of it is not done again. `--from-row N` besides goes on after it, as if
-    it were done.
+    A row failed, with what the level reported, or did not end within the cycles that it may take. The level was told to rest, and all is
+    kept as it stands: mend the cause, and the same command with `--resume` tries the row again. `--from-row N` besides goes on at
+    another row, as if those between were done; without `--resume` it begins anew. A plant that holds what no file does, a generator of
+    random numbers for instance, is kept if its class has `state` and `restore`. In the paper's cell an interlock may refuse a row before
+    it begins, for it would machine a loose part, put a second part into the fixture, or let go of a part; and what has been done of
+    a row is not done again.
     """
     STATE_TABLE_ERROR = """RCS725: STATE-TABLE error
 
@@ -1244,7 +1245,7 @@ class Code(StrEnum):
     """
     NOT_RESUMED = """RCS726: there is nothing to go on from
 
-    `rcsc run SCRIPT --resume` goes on where a script was stopped. No run of this system was stopped, or what was kept of it is damaged
+    `rcsc run SYSTEM --resume` goes on where a script was stopped. No run of this system was stopped, or what was kept of it is damaged
     or of another version of rcsc, or the script is another one than was stopped, or has changed since. Nothing has moved. `--from-row
     N` without `--resume` begins anew at a row, as if those before it were done.
     """

@@ -18,6 +18,8 @@ import pytest
 from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
 from rcsc.run.description import description
+from rcsc.run.orders.operator import ScriptedRun
+from rcsc.run.orders.stopped import NotResumed, StoppedRuns, stopped_path
 from rcsc.run.plant.staging import StageOrder
 from rcsc.run.plant.staging import outside as outside_of_processes
 from rcsc.run.signature import Value, Values
@@ -30,6 +32,7 @@ from rcsc_cell.workstation.interlocks import CellState
 from rcsc_cell.workstation.orders import (
     DONE,
     EXECUTING,
+    KINDS,
     MACHINE_ORDER,
     MACHINE_REPORT,
     VISE_ORDER,
@@ -38,7 +41,6 @@ from rcsc_cell.workstation.orders import (
 from rcsc_cell.workstation.prepared import ScriptDraft, prepare
 from rcsc_cell.workstation.script import ScriptRow
 from rcsc_cell.workstation.station import ANSWER_TICKS, PAUSE_TICKS, Workstation, workstation
-from rcsc_cell.workstation.stopped import NotResumed, go_on, keep, stopped_path
 from tests.support.cells import REPO, SYSTEM
 
 HEAD = "command,part,source,dest,end_at\n"
@@ -90,6 +92,20 @@ def stopped_by_robot() -> ScriptDraft:
         plant_of(made).faults.robot_refuses = result.row.number == 2
     assert made.station.results[-1].row.number == 3
     return made
+
+
+def keep(made: ScriptDraft, script: str) -> Path:
+    """As `rcsc run` keeps a run of the cell."""
+    return _stopped(made).keep(ScriptedRun(made.system, made.station), script)
+
+
+def go_on(made: ScriptDraft) -> None:
+    """As `rcsc run --resume` goes on."""
+    _stopped(made).go_on(ScriptedRun(made.system, made.station))
+
+
+def _stopped(made: ScriptDraft) -> StoppedRuns:
+    return StoppedRuns(made.system.description, made.database.locations, KINDS)
 
 
 def rcsc(*args: str) -> "subprocess.CompletedProcess[str]":
@@ -484,7 +500,7 @@ def _fewer_locations(project: Path) -> None:
 def _damaged(project: Path) -> None:
     path = stopped_path(description(project / "tables/system.toml"))
     said = json.loads(path.read_text(encoding="utf-8"))
-    said["stopped"]["station"]["at"] = 3
+    said["stopped"]["operator"]["at"] = 3
     path.write_text(json.dumps(said), encoding="utf-8")
 
 
@@ -553,7 +569,7 @@ def _places(value: object, path: tuple[str | int, ...] = ()) -> Iterable[tuple[s
 
 def _odd(said: dict[str, Any], rnd: Random) -> None:
     """Puts something odd somewhere, beside something, or nowhere in its place."""
-    part = rnd.choice(["tick", "station", "levels", "buffers", "outside", "outside"])
+    part = rnd.choice(["tick", "operator", "levels", "buffers", "outside", "outside"])
     *path, last = rnd.choice([place for place in _places(said) if place[0] == part])
     held: Any = said
     for key in path:
@@ -602,7 +618,7 @@ def other_parts(database: Database) -> list[Timed]:
     [
         (lambda _: (), "nothing outside is a `Timed`"),
         (other_parts, "the state is of a cell with other parts"),
-        (lambda database: [Timed(plant(database))], "the stopped run is of another cell"),
+        (lambda database: [Timed(plant(database))], "the stopped run is of another plant"),
     ],
     ids=["nothing", "parts", "physics"],
 )
@@ -642,7 +658,7 @@ def test_a_stop_that_cannot_be_kept_says_how_to_begin_anew(
 
     Path("bad.csv").write_text(HEAD + "MOVE,,,FIX-SAFE,\nENGRAVE PART,,,,\n", encoding="utf-8")
     kept = keep(stopped_at_vise(), "go.csv")
-    monkeypatch.setattr("rcsc_cell.workstation.stopped.write_atomically", full)
+    monkeypatch.setattr("rcsc.run.orders.stopped.write_atomically", full)
     assert run(["run", "bad.csv", *QUICK]) == 1
     said = capfd.readouterr().err
     assert "No space left on device" in said

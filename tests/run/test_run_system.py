@@ -148,7 +148,9 @@ PICTURE = """
 """
 
 
-def test_a_report_is_written_and_resuming_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_report_is_written_and_nothing_is_left_to_resume(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     base = (here / "base.py").read_text(encoding="utf-8")
     (here / "base.py").write_text(base + PICTURE, encoding="utf-8")
     assert run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--report", "dock.html"]) == 0
@@ -161,7 +163,7 @@ def test_a_report_is_written_and_resuming_is_refused(here: Path, capsys: pytest.
     ):
         assert said in page
     assert run(["run", "dock", "--no-compile", "-q", "--resume"]) == 1
-    assert "error[RCS726]: this plant cannot be put back" in stopped(capsys)
+    assert "error[RCS726]: there is nothing to resume" in stopped(capsys)
 
 
 def test_a_row_that_fails_stops_the_script_and_says_why(
@@ -174,7 +176,7 @@ def test_a_row_that_fails_stops_the_script_and_says_why(
     assert run(["run", "dock", "--no-compile", "-q", "--executor", "python"]) == 1
     error = stopped(capsys)
     assert "error[RCS724]: row 1, dock: failed: reason no_beacon" in error
-    assert "rcsc run dock --executor python --from-row 1" in error
+    assert "rcsc run dock --executor python --resume" in error
     assert run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--from-row", "3"]) == 0
     assert run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--from-row", "4"]) == 1
     assert "error[RCS723]: the script has 3 rows, and none is 4" in stopped(capsys)

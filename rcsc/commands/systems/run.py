@@ -20,7 +20,7 @@ from rcsc.host.files.read import content, json_of
 from rcsc.run.description import BadDescription, Description, description
 from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
 from rcsc.run.orders.script import BadScript
-from rcsc.run.plant.load import Resumable, Staged
+from rcsc.run.orders.stopped import NotKept, StoppedRuns
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.processes.serve import Factory
 from rcsc.run.processes.supervisor import Supervisor, run_processes
@@ -30,6 +30,7 @@ from rcsc_cell.pages.report import report
 from rcsc_cell.pages.witness import RunWitness, names
 
 if TYPE_CHECKING:
+    from rcsc.run.plant.load import Staged
     from rcsc_cell.live import Live
 
 UNORDERED_TICKS = 1000
@@ -189,7 +190,7 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
     return _closing(witness, stage.resume, asked, seconds, log)
 
 
-def _place(run: ScriptedRun, resume: Resumable | None, from_row: int | None, resumes: bool) -> None:
+def _place(run: ScriptedRun, resume: StoppedRuns | None, from_row: int | None, resumes: bool) -> None:
     """Puts the run where it is to begin.
 
     Raises:
@@ -198,11 +199,12 @@ def _place(run: ScriptedRun, resume: Resumable | None, from_row: int | None, res
     """
     _check_row(run, from_row)
     if resumes and resume is None:
-        raise Stopped(
-            Code.NOT_RESUMED,
-            "this plant cannot be put back as it stood",
-            "`--from-row N` begins anew at row N",
+        why = (
+            "this plant cannot be put back as it stood"
+            if run.operator
+            else "no script is named to go on with"
         )
+        raise Stopped(Code.NOT_RESUMED, why, "`--from-row N` begins anew at row N")
     if resume is not None and resumes:
         resume.go_on(run)
     elif resume is not None:
@@ -371,7 +373,7 @@ def _write_report(path: Path, witness: RunWitness, asked: RunOptions, seconds: f
 
 
 def _closing(
-    witness: RunWitness, resume: Resumable | None, asked: RunOptions, seconds: float, log: Path
+    witness: RunWitness, resume: StoppedRuns | None, asked: RunOptions, seconds: float, log: Path
 ) -> int:
     run = witness.run
     again = _kept(run, resume, asked)
@@ -390,7 +392,10 @@ def _closing(
             Code.SCRIPT_STOPPED, f"row {end.row.number}, {end.row.text}: {word}: {end.reason}", again
         )
     if not operator.over:
-        raise Stopped(Code.SCRIPT_STOPPED, f"row {operator.at + 1} did not end in {run.system.tick} cycles")
+        raise Stopped(
+            Code.SCRIPT_STOPPED,
+            f"row {operator.at + 1} did not end in {run.system.tick - run.first_tick} cycles",
+        )
     return 0
 
 
@@ -410,15 +415,16 @@ def _unfilled(run: ScriptedRun) -> Iterator[str]:
 def _figures(run: ScriptedRun, seconds: float) -> str:
     """How long it took."""
     system = run.system
-    control_s = system.tick * system.description.tick_ms / 1000
+    ticks = system.tick - run.first_tick
+    control_s = ticks * system.description.tick_ms / 1000
     failed = sum(1 for level in system.levels if level.values[-1])
     return (
-        f"{system.tick} cycles, {control_s:.1f} s of control time in {seconds:.2f} s: {control_s / max(seconds, 1e-9):.0f} times "
+        f"{ticks} cycles, {control_s:.1f} s of control time in {seconds:.2f} s: {control_s / max(seconds, 1e-9):.0f} times "
         f"as fast as the clock; {failed} assumptions failed"
     )
 
 
-def _kept(run: ScriptedRun, resume: Resumable | None, asked: RunOptions) -> str:
+def _kept(run: ScriptedRun, resume: StoppedRuns | None, asked: RunOptions) -> str:
     """Keeps a run that stopped, forgets one that came to its end; what to do about it."""
     operator = run.operator
     if operator is None:
@@ -432,6 +438,7 @@ def _kept(run: ScriptedRun, resume: Resumable | None, asked: RunOptions) -> str:
         return f"mend the cause, then begin anew: {row}"
     try:
         resume.keep(run, asked.title)
-    except OSError as error:
-        return f"where it stopped could not be kept: {error.strerror}; mend the cause, then begin anew: {row}"
-    return f"the robot is paused; mend the cause, then: {asked.again} --resume"
+    except (OSError, NotKept) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        return f"where it stopped could not be kept: {why}; mend the cause, then begin anew: {row}"
+    return f"its level rests; mend the cause, then: {asked.again} --resume"

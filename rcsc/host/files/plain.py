@@ -2,7 +2,7 @@
 
 In: dataclasses whose fields are plain values, words of a `StrEnum`, literals, tuples, lists, dictionaries by text, and dataclasses of
 these. Out: the same after `plain` and `read`; what no such value was written as is refused. `Kept` has `state` and `restore` of
-`rcsc_cell.workstation.stopped.Restorable`.
+`rcsc.run.orders.stopped.Restorable`.
 """
 
 import types

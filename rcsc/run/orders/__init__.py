@@ -13,5 +13,6 @@ Nothing here is trusted for a proof: a level is proved for any order at any mome
 Source: Haynes et al. 1984, section 9.
 
 Modules, in the order the data flows: `roles` (which buffer carries orders, and which of its fields says what), `numbered`
-(an order and its answer), `script` (rows), `operator` (who gives them), `together` (operator and plants as one).
+(an order and its answer), `script` (rows), `operator` (who gives them), `stopped` (a run kept, and gone on with by another
+process), `together` (operator and plants as one).
 """

@@ -6,7 +6,7 @@ first command says, which rests.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from rcsc.run.orders.numbered import Latest, Orders
 from rcsc.run.orders.roles import DONE, FAILED, PROTOCOL, Served, field_of
@@ -162,6 +162,24 @@ class ScriptOperator:
         """
         self.at, self._since = row, -1
 
+    def state(self) -> dict[str, Any]:
+        """What a stopped one goes on from; its orders stand in their buffers."""
+        return {"at": self.at}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Puts back a state, and tries its row again; numbers go on from those in the buffers.
+
+        Raises:
+            ValueError: It is none.
+        """
+        at = state.get("at")
+        if type(at) is not int or not 0 <= at < len(self.rows) or len(state) != 1:
+            raise ValueError(f"the script has {len(self.rows)} rows")
+        self.at, self._since, self._resting = at, -1, -1
+        self.results.clear()
+        for line in self._lines.values():
+            line.sent = ()
+
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
         """One tick: begin a row, wait for its end, or rest."""
         for line in self._lines.values():
@@ -242,10 +260,15 @@ def _said(level: Served, report: Values) -> str:
 
 @dataclass(slots=True)
 class ScriptedRun:
-    """A system with somebody who orders it, or nobody, to be stepped to the end."""
+    """A system with somebody who orders it, or nobody, to be stepped to the end.
+
+    Attributes:
+        first_tick: With which it began; not 0 where it goes on from a run that stopped.
+    """
 
     system: System
     operator: Operator | None
+    first_tick: int = field(init=False, default=0)
 
     @property
     def ended(self) -> bool:
@@ -266,7 +289,8 @@ class ScriptedRun:
         """
         results = () if self.operator is None else self.operator.results
         known = len(results)
-        while not self.ended and self.system.tick < most:
+        self.first_tick = self.system.tick
+        while not self.ended and self.system.tick < self.first_tick + most:
             self.system.step()
             while known < len(results):
                 yield results[known]

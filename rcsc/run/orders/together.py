@@ -9,11 +9,22 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from rcsc.host.files.names import shown
+from rcsc.host.files.plain import read
 from rcsc.run.orders.numbered import Latest
 from rcsc.run.orders.operator import Operator, ScriptOperator
+from rcsc.run.orders.stopped import Restorable
 from rcsc.run.signature import Value, Values
 from rcsc.run.system import Outside
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    between: Mapping[str, list[bool | int | float]]
+    set: Mapping[str, list[bool | int | float]]
+    plants: list[Mapping[str, Any]]
 
 
 @dataclass(slots=True)
@@ -55,6 +66,39 @@ class Together:
         self._write()
         shared = {name: values for name, values in published.items() if name in self.shared}
         return self._with_row(shared)
+
+    def state(self) -> dict[str, Any]:
+        """What stands outside but the operator, in plain values.
+
+        Raises:
+            NotKept: A plant has something that no file holds.
+        """
+        return {
+            "between": {name: list(values) for name, values in self._between.items()},
+            "set": {name: list(values) for name, values in self._set.items()},
+            "plants": [plant.state() for plant in self._plants()],
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Puts back a state.
+
+        Raises:
+            ValueError: It is none of these plants.
+        """
+        held: _State = read(_State, state)
+        plants = self._plants()
+        if len(held.plants) != len(plants):
+            raise ValueError(f"{len(held.plants)} plants were stopped, and {len(plants)} are here")
+        for name, values in held.set.items():
+            if len(values) != len(self.first.get(name, ())):
+                raise ValueError(f"no script sets {shown(name)} so")
+        for plant, its in zip(plants, held.plants, strict=True):
+            plant.restore(its)
+        self._between = {name: tuple(values) for name, values in held.between.items()}
+        self._set = {name: tuple(values) for name, values in held.set.items()}
+
+    def _plants(self) -> list[Restorable]:
+        return [plant for plant in self.others if isinstance(plant, Restorable)]
 
     def _with_row(self, published: dict[str, Values]) -> dict[str, Values]:
         """What is published, with the values that the row under way sets."""

@@ -29,7 +29,8 @@ plant misbehave: whoever tests the system switches it.
 
 Trusted: the file of a plant that a description names, which is imported and run; nothing of it is trusted for a proof.
 
-Modules, in the order the data flows: `fields` (what a class declares), `units`, `values` (a field against leaves), `bind`
+Modules, in the order the data flows: `fields` (what a class declares), `units`, `values` (a field against leaves), `held` (what
+a plant holds, for a run that goes on in another process), `bind`
 (a class against the buffers), `load` (a plant by its name), `staging` (with its script). A model for MuJoCo is bound by
 data in `rcsc_cell.bound`.
 """

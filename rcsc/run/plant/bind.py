@@ -19,6 +19,7 @@ from rcsc.run.description import Description, Wire
 from rcsc.run.levels import StateTableError
 from rcsc.run.orders.roles import served
 from rcsc.run.plant import fields
+from rcsc.run.plant.held import held_of, put_back
 from rcsc.run.plant.values import BadValue, Link, Misfit, link, shape
 from rcsc.run.signature import Leaf, Signature, Values
 
@@ -93,6 +94,24 @@ class BoundPlant:
     def switch(self, fault: str, *, on: bool) -> None:
         """Switches a fault on or off."""
         setattr(self.plant, fault, on)
+
+    def state(self) -> dict[str, Any]:
+        """The plant's state, in plain values: what its own `state()` gives, else its attributes but for its faults.
+
+        Raises:
+            NotKept: It has something that no file holds.
+        """
+        return {"plant": held_of(self.plant, self.faults)}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Puts back a state.
+
+        Raises:
+            ValueError: It is none of this class.
+        """
+        if set(state) != {"plant"}:
+            raise ValueError("not the state of a plant")
+        put_back(self.plant, state["plant"], self.faults)
 
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
         """One tick: fields from the levels, the plant's `step`, fields to the levels.

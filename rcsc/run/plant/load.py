@@ -22,6 +22,7 @@ from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description
 from rcsc.run.levels import Query
 from rcsc.run.orders.operator import Operator, ScriptedRun
+from rcsc.run.orders.stopped import StoppedRuns
 from rcsc.run.plant.bind import BadPlant, BoundPlant, bind, plant_page, raised
 from rcsc.run.signature import Signature
 from rcsc.run.system import Outside
@@ -50,30 +51,6 @@ class Setup:
     script: str = ""
     database: Path | None = None
     answers_only: bool = False
-
-
-class Resumable(Protocol):
-    """What keeps a run that was stopped, and goes on from there."""
-
-    def keep(self, run: ScriptedRun, script: str) -> object:
-        """Writes where the run stands.
-
-        Raises:
-            OSError: It could not be written.
-        """
-        ...
-
-    def go_on(self, run: ScriptedRun) -> None:
-        """Puts a run that has not begun where the stopped one stood.
-
-        Raises:
-            CodedError: There is nothing to go on from.
-        """
-        ...
-
-    def forget(self) -> None:
-        """Removes what was kept."""
-        ...
 
 
 @runtime_checkable
@@ -108,7 +85,7 @@ class Staged:
     operator: Operator | None = None
     pictures: Mapping[str, Callable[[], str]] = field(default_factory=dict)
     witness: Callable[[ScriptedRun], Any] | None = None
-    resume: Resumable | None = None
+    resume: StoppedRuns | None = None
 
     @property
     def over(self) -> bool:

@@ -13,6 +13,7 @@ from rcsc.run.description import Description, description
 from rcsc.run.levels import Query
 from rcsc.run.orders.operator import Operator, ScriptOperator
 from rcsc.run.orders.script import outside_buffers, read_script, script_path
+from rcsc.run.orders.stopped import Restorable, StoppedRuns
 from rcsc.run.orders.together import Together
 from rcsc.run.plant.load import Staged, load
 from rcsc.run.signature import Signature
@@ -53,7 +54,8 @@ def staged(
         return stage
     rows = read_script(script_path(order.script, Path(order.system).parent), system, signs)
     operator: Operator = ScriptOperator(rows)
-    return replace(stage, operator=operator)
+    keeps = all(isinstance(part, Restorable) for part in stage.outside)
+    return replace(stage, operator=operator, resume=StoppedRuns(system) if keeps else None)
 
 
 def together(

@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from rcsc.host.described import Document
+from rcsc.host.files.plain import finite
 from rcsc.run.plant.bind import BadPlant, PlantFailed, buffers_of, parties_of, plant_page
 from rcsc.run.plant.load import Setup, Staged
 from rcsc.run.plant.values import BadValue
@@ -20,6 +22,8 @@ from rcsc.run.signature import Leaf, Value, Values
 from rcsc_cell.bound.bindings import ActuatorBinding, Binder, FaultBinding, SensorBinding, ends
 from rcsc_cell.pictures.solid import View, solid
 
+KEPT = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""What of a model's state its next step is made of, and nothing that it only computes."""
 UNSTABLE = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
     mujoco.mjtWarning.mjWARN_BADQVEL,
@@ -84,6 +88,26 @@ class BoundModel:
         return {
             name: tuple(self._read(tick, sensor, still) for sensor in sensors) for name, sensors in self.gives
         }
+
+    def state(self) -> dict[str, Any]:
+        """All that the model's next step is made of, in plain values; which faults are on is none of it."""
+        held = np.zeros(mujoco.mj_stateSize(self.model, KEPT))
+        mujoco.mj_getState(self.model, self.data, held, KEPT)
+        return {"state": held.tolist()}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Puts back a state.
+
+        Raises:
+            ValueError: It is none of this model.
+        """
+        held = state.get("state")
+        size = mujoco.mj_stateSize(self.model, KEPT)
+        numbers = isinstance(held, list) and all(type(value) in (int, float) for value in held)
+        if len(state) != 1 or not numbers or len(held or ()) != size or not finite(held):
+            raise ValueError(f"the model's state has {size} numbers")
+        mujoco.mj_setState(self.model, self.data, np.array(held, dtype=np.float64), KEPT)
+        mujoco.mj_forward(self.model, self.data)
 
     def _read(self, tick: int, sensor: SensorBinding, still: Mapping[str, Value]) -> Value:
         if sensor.end in still:

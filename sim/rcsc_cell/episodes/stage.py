@@ -4,19 +4,15 @@ In: a system and, for a run, a script. Out: workstation, robot, hand, camera, vi
 watches the run, and what keeps one that was stopped.
 """
 
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.host.cache import open_cache
-from rcsc.run.description import Description
-from rcsc.run.orders.operator import ScriptedRun
+from rcsc.run.orders.stopped import StoppedRuns
 from rcsc.run.plant.load import Setup, Staged
-from rcsc_cell.database.ask import Database
-from rcsc_cell.workstation import stopped
-from rcsc_cell.workstation.prepared import ScriptDraft, database_of, needs_cell, safe_places, script_path
+from rcsc_cell.workstation.orders import KINDS
+from rcsc_cell.workstation.prepared import database_of, needs_cell, safe_places, script_path
 from rcsc_cell.workstation.script import read_script
-from rcsc_cell.workstation.station import Workstation, workstation
+from rcsc_cell.workstation.station import workstation
 
 if TYPE_CHECKING:
     from rcsc_cell.cell.ready import Backend
@@ -59,29 +55,5 @@ def _staged(setup: Setup, backend: "Backend") -> Staged:
         database.queries,
         station,
         witness=lambda run: Witness(run, timed=timed, database=database),
-        resume=StoppedCell(setup.system, station, database),
+        resume=StoppedRuns(setup.system, database.locations, KINDS),
     )
-
-
-@dataclass(frozen=True, slots=True)
-class StoppedCell:
-    """Keeps a stopped run of the cell beside its data."""
-
-    system: Description
-    station: Workstation
-    database: Database
-
-    def keep(self, run: ScriptedRun, script: str) -> Path:
-        """Writes where the run stands."""
-        return stopped.keep(self._draft(run), script)
-
-    def go_on(self, run: ScriptedRun) -> None:
-        """Puts a run that has not begun where the stopped one stood."""
-        stopped.go_on(self._draft(run))
-
-    def forget(self) -> None:
-        """Removes what was kept."""
-        stopped.forget(self.system)
-
-    def _draft(self, run: ScriptedRun) -> ScriptDraft:
-        return ScriptDraft(run.system, self.station, self.database)
