@@ -111,8 +111,8 @@ BUGS = (
         "PICKUP is counted until it is echoed",
         "buffer counts",
         "tables/task/common.rcs",
-        "if source.buffer and last_emove.input_command /= pickup {",
-        "if source.buffer {",
+        "if source_buffer and last_emove.input_command /= pickup {",
+        "if source_buffer {",
         ACQUIRE,
     ),
     Bug(

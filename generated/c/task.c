@@ -45,15 +45,41 @@ static void task_do_forget_cause(task_t *s)
     }
 }
 
-/* The table test variables that the command and the database give (section 8.1). */
-static void task_do_test_variables(task_t *s)
+/* Procedure look. */
+static void task_do_look(task_t *s, bool v_vision)
 {
-    if (s->source.vision) {
+    if (v_vision) {
         s->loc_of_obj = (uint8_t)INT64_C(0);
     } else {
         s->loc_of_obj = (uint8_t)INT64_C(1);
     }
-    s->source_spec = (((int64_t)s->workstation.source_locpt != INT64_C(0)) && s->source.known);
+}
+
+/* Where the part is to be taken: found once for each command, for `current_loc` is forgotten as soon as the robot moves. */
+static void task_do_find_source(task_t *s)
+{
+    if ((!s->answered)) {
+        if ((((int64_t)s->workstation.input_command == INT64_C(1)) && ((int64_t)s->workstation.source_locpt == INT64_C(0)))) {
+            s->source_spec = (((int64_t)s->current_loc != INT64_C(0)) && s->here.known);
+            s->source_loc = (uint8_t)(int64_t)s->current_loc;
+            s->source_sector = (uint8_t)(int64_t)s->current_sector;
+            s->source_vupos = (uint8_t)(int64_t)s->here.vupos;
+            s->source_buffer = s->here.buffer;
+            task_do_look(s, s->here.vision);
+        } else {
+            s->source_spec = (((int64_t)s->workstation.source_locpt != INT64_C(0)) && s->source.known);
+            s->source_loc = (uint8_t)(int64_t)s->workstation.source_locpt;
+            s->source_sector = (uint8_t)(int64_t)s->workstation.sector;
+            s->source_vupos = (uint8_t)(int64_t)s->source.vupos;
+            s->source_buffer = s->source.buffer;
+            task_do_look(s, s->source.vision);
+        }
+    }
+}
+
+/* The other table test variables that the command and the database give (section 8.1). */
+static void task_do_test_variables(task_t *s)
+{
     s->dest_spec = (((int64_t)s->workstation.dest_locpt != INT64_C(0)) && s->dest.known);
     s->names_known = (((((int64_t)s->workstation.source_locpt == INT64_C(0)) || s->source.known) && (((int64_t)s->workstation.dest_locpt == INT64_C(0)) || s->dest.known)) && (((int64_t)s->workstation.end_at_locpt == INT64_C(0)) || s->end_at.known));
 }
@@ -75,18 +101,18 @@ static void task_do_set_source(task_t *s)
 {
     s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
     s->to_emove.grasp = (uint8_t)(int64_t)s->workstation.grasp;
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->workstation.source_locpt;
-    s->to_emove.sector = (uint8_t)(int64_t)s->workstation.sector;
-    s->remember_current_loc = (uint8_t)(int64_t)s->workstation.source_locpt;
+    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->source_loc;
+    s->to_emove.sector = (uint8_t)(int64_t)s->source_sector;
+    s->remember_current_loc = (uint8_t)(int64_t)s->source_loc;
     s->current_loc = (uint8_t)INT64_C(0);
 }
 
 /* Procedure vupos_setup. */
 static void task_do_vupos_setup(task_t *s)
 {
-    s->to_emove.sector = (uint8_t)(int64_t)s->workstation.sector;
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->source.vupos;
-    s->remember_current_loc = (uint8_t)(int64_t)s->workstation.source_locpt;
+    s->to_emove.sector = (uint8_t)(int64_t)s->source_sector;
+    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->source_vupos;
+    s->remember_current_loc = (uint8_t)(int64_t)s->source_loc;
     s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
     s->to_emove.grasp = (uint8_t)(int64_t)s->workstation.grasp;
     s->to_emove.apoint_pos_flag = false;
@@ -97,7 +123,7 @@ static void task_do_vupos_setup(task_t *s)
 static void task_do_locate(task_t *s)
 {
     s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->workstation.source_locpt;
+    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->source_loc;
     s->to_emove.input_command = (uint8_t)INT64_C(3);
 }
 
@@ -135,7 +161,7 @@ static void task_do_buffer_empty(task_t *s)
 /* Counts once: the line matches again until PICKUP is echoed, and by then PICKUP is the old workstation. */
 static void task_do_remove_from_buffer_db(task_t *s)
 {
-    if ((s->source.buffer && ((int64_t)s->last_emove.input_command != INT64_C(4)))) {
+    if ((s->source_buffer && ((int64_t)s->last_emove.input_command != INT64_C(4)))) {
         {
             const int64_t subject = (int64_t)s->workstation.obj;
             if ((subject == INT64_C(1))) {
@@ -178,8 +204,8 @@ static void task_do_pickup(task_t *s)
     s->obj_now_in_gripper = (uint8_t)(int64_t)s->workstation.obj;
     s->grasp_now = (uint8_t)(int64_t)s->workstation.grasp;
     s->to_emove.gripped_obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
-    s->current_loc = (uint8_t)(int64_t)s->workstation.source_locpt;
-    s->current_sector = (uint8_t)(int64_t)s->workstation.sector;
+    s->current_loc = (uint8_t)(int64_t)s->source_loc;
+    s->current_sector = (uint8_t)(int64_t)s->source_sector;
     task_do_remove_from_buffer_db(s);
 }
 
@@ -250,7 +276,7 @@ static void task_do_add_to_buffer_db(task_t *s, int64_t v_what)
 /* What was counted off and could not be picked up lies there still; once: the order that follows is no PICKUP. */
 static void task_do_back_to_buffer_db(task_t *s)
 {
-    if ((s->source.buffer && ((int64_t)s->last_emove.input_command == INT64_C(4)))) {
+    if ((s->source_buffer && ((int64_t)s->last_emove.input_command == INT64_C(4)))) {
         task_do_add_to_buffer_db(s, (int64_t)s->workstation.obj);
     }
 }
@@ -1144,6 +1170,10 @@ void task_init(task_t *s)
     s->cur_state_next = (uint8_t)INT64_C(0);
     s->loc_of_obj = (uint8_t)INT64_C(0);
     s->source_spec = false;
+    s->source_loc = (uint8_t)INT64_C(0);
+    s->source_sector = (uint8_t)INT64_C(0);
+    s->source_vupos = (uint8_t)INT64_C(0);
+    s->source_buffer = false;
     s->dest_spec = false;
     s->names_known = false;
     s->obj_acquired = false;
@@ -1277,38 +1307,44 @@ int32_t task_check(const task_t *s)
     if ((at < 0) && ((*(const uint8_t *)&s->source_spec) > 1u)) {
         at = 62;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest_spec) > 1u)) {
-        at = 63;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->names_known) > 1u)) {
+    if ((at < 0) && (((int64_t)s->source_sector > INT64_C(99)))) {
         at = 64;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
-        at = 65;
-    }
-    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(6)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->source_buffer) > 1u)) {
         at = 66;
     }
-    if ((at < 0) && (((int64_t)s->grasp_now > INT64_C(9)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->dest_spec) > 1u)) {
         at = 67;
     }
-    if ((at < 0) && (((int64_t)s->current_sector > INT64_C(99)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->names_known) > 1u)) {
+        at = 68;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
+        at = 69;
+    }
+    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(6)))) {
         at = 70;
     }
-    if ((at < 0) && (((int64_t)s->tbuffer_boxt > INT64_C(99)))) {
+    if ((at < 0) && (((int64_t)s->grasp_now > INT64_C(9)))) {
         at = 71;
     }
-    if ((at < 0) && (((int64_t)s->bbuffer_boxb > INT64_C(99)))) {
-        at = 72;
-    }
-    if ((at < 0) && (((int64_t)s->fbuffer_flag > INT64_C(99)))) {
-        at = 73;
-    }
-    if ((at < 0) && (((int64_t)s->hbuffer_hous > INT64_C(99)))) {
+    if ((at < 0) && (((int64_t)s->current_sector > INT64_C(99)))) {
         at = 74;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+    if ((at < 0) && (((int64_t)s->tbuffer_boxt > INT64_C(99)))) {
         at = 75;
+    }
+    if ((at < 0) && (((int64_t)s->bbuffer_boxb > INT64_C(99)))) {
+        at = 76;
+    }
+    if ((at < 0) && (((int64_t)s->fbuffer_flag > INT64_C(99)))) {
+        at = 77;
+    }
+    if ((at < 0) && (((int64_t)s->hbuffer_hous > INT64_C(99)))) {
+        at = 78;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+        at = 79;
     }
     return at;
 }
@@ -1711,6 +1747,9 @@ int32_t task_task_cycle(task_t *s)
         }
         if (s->fault == 0) {
             task_do_forget_cause(s);
+        }
+        if (s->fault == 0) {
+            task_do_find_source(s);
         }
         if (s->fault == 0) {
             task_do_test_variables(s);

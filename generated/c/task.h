@@ -170,20 +170,24 @@ typedef struct {
     task_common_task_state_t cur_state; /* 59: state; Where the table is in its sequence. */
     task_common_task_state_t cur_state_next; /* 60: state; the deferred next value of cur_state */
     task_common_locating_t loc_of_obj; /* 61: state; Whether vision is needed at the source. */
-    bool source_spec; /* 62: state; Whether the WORKSTATION named a source that the database knows. */
-    bool dest_spec; /* 63: state; Whether it named a destination that the database knows. */
-    bool names_known; /* 64: state; Every location that it named is known. */
-    bool obj_acquired; /* 65: state; An object is in the gripper. */
-    vocabulary_object_t obj_now_in_gripper; /* 66: state; The object in the gripper. */
-    uint8_t grasp_now; /* 67: state; 0 .. 9; How it is gripped. */
-    uint8_t remember_current_loc; /* 68: state; 0 .. 255; Where the object was taken from. */
-    uint8_t current_loc; /* 69: state; 0 .. 255; Where the robot is; 0 while it moves. */
-    uint8_t current_sector; /* 70: state; 0 .. 99 */
-    uint8_t tbuffer_boxt; /* 71: state; 0 .. 99; Box tops left on the buffer table. */
-    uint8_t bbuffer_boxb; /* 72: state; 0 .. 99; Box bottoms left on the buffer table. */
-    uint8_t fbuffer_flag; /* 73: state; 0 .. 99; Flags left on the buffer table. */
-    uint8_t hbuffer_hous; /* 74: state; 0 .. 99; Houses left on the buffer table. */
-    bool echoed; /* 75: state; Every last order is echoed, or too late. */
+    bool source_spec; /* 62: state; Whether there is a place to take the part from: the source that the WORKSTATION named, if the database knows it, or where the robot is. */
+    uint8_t source_loc; /* 63: state; 0 .. 255; Where the part is taken: at the source; an ACQUIRE without one takes it from where the robot is (section 3.1). */
+    uint8_t source_sector; /* 64: state; 0 .. 99 */
+    uint8_t source_vupos; /* 65: state; 0 .. 255; From where vision looks for it there; whether parts are counted there. */
+    bool source_buffer; /* 66: state */
+    bool dest_spec; /* 67: state; Whether it named a destination that the database knows. */
+    bool names_known; /* 68: state; Every location that it named is known. */
+    bool obj_acquired; /* 69: state; An object is in the gripper. */
+    vocabulary_object_t obj_now_in_gripper; /* 70: state; The object in the gripper. */
+    uint8_t grasp_now; /* 71: state; 0 .. 9; How it is gripped. */
+    uint8_t remember_current_loc; /* 72: state; 0 .. 255; Where the object was taken from. */
+    uint8_t current_loc; /* 73: state; 0 .. 255; Where the robot is; 0 while it moves. */
+    uint8_t current_sector; /* 74: state; 0 .. 99 */
+    uint8_t tbuffer_boxt; /* 75: state; 0 .. 99; Box tops left on the buffer table. */
+    uint8_t bbuffer_boxb; /* 76: state; 0 .. 99; Box bottoms left on the buffer table. */
+    uint8_t fbuffer_flag; /* 77: state; 0 .. 99; Flags left on the buffer table. */
+    uint8_t hbuffer_hous; /* 78: state; 0 .. 99; Houses left on the buffer table. */
+    bool echoed; /* 79: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */

@@ -197,8 +197,8 @@ class State:
         "last_emove_sector",
         "source_known",
         "source_vision",
-        "source_buffer",
-        "source_vupos",
+        "source_buffer_2",
+        "source_vupos_2",
         "source_safe",
         "dest_known",
         "dest_vision",
@@ -219,6 +219,10 @@ class State:
         "cur_state_next",
         "loc_of_obj",
         "source_spec",
+        "source_loc",
+        "source_sector",
+        "source_vupos",
+        "source_buffer",
         "dest_spec",
         "names_known",
         "obj_acquired",
@@ -280,8 +284,8 @@ class State:
         self.last_emove_sector = 0  # The order to emove that was numbered last.
         self.source_known = False  # From the database: the source of the workstation.
         self.source_vision = False  # From the database: the source of the workstation.
-        self.source_buffer = False  # From the database: the source of the workstation.
-        self.source_vupos = 0  # From the database: the source of the workstation.
+        self.source_buffer_2 = False  # From the database: the source of the workstation.
+        self.source_vupos_2 = 0  # From the database: the source of the workstation.
         self.source_safe = 0  # From the database: the source of the workstation.
         self.dest_known = False  # From the database: its destination.
         self.dest_vision = False  # From the database: its destination.
@@ -301,7 +305,11 @@ class State:
         self.cur_state = 0  # Where the table is in its sequence.
         self.cur_state_next = 0  # Where the table is in its sequence.
         self.loc_of_obj = 0  # Whether vision is needed at the source.
-        self.source_spec = False  # Whether the WORKSTATION named a source that the database knows.
+        self.source_spec = False  # Whether there is a place to take the part from: the source that the WORKSTATION named, if the database knows it, or where the robot is.
+        self.source_loc = 0  # Where the part is taken: at the source; an ACQUIRE without one takes it from where the robot is (section 3.1).
+        self.source_sector = 0
+        self.source_vupos = 0  # From where vision looks for it there; whether parts are counted there.
+        self.source_buffer = False
         self.dest_spec = False  # Whether it named a destination that the database knows.
         self.names_known = False  # Every location that it named is known.
         self.obj_acquired = False  # An object is in the gripper.
@@ -670,13 +678,35 @@ def _do_forget_cause(s):
         s.to_workstation_cause = 0
 
 
-def _do_test_variables(s):
-    """The table test variables that the command and the database give (section 8.1)."""
-    if s.source_vision:
+def _do_look(s, v_vision):
+    """Procedure look."""
+    if v_vision:
         s.loc_of_obj = 0
     else:
         s.loc_of_obj = 1
-    s.source_spec = ((s.workstation_source_locpt != 0) and s.source_known)
+
+
+def _do_find_source(s):
+    """Where the part is to be taken: found once for each command, for `current_loc` is forgotten as soon as the robot moves."""
+    if (not s.answered):
+        if ((s.workstation_input_command == 1) and (s.workstation_source_locpt == 0)):
+            s.source_spec = ((s.current_loc != 0) and s.here_known)
+            s.source_loc = s.current_loc
+            s.source_sector = s.current_sector
+            s.source_vupos = s.here_vupos
+            s.source_buffer = s.here_buffer
+            _do_look(s, s.here_vision)
+        else:
+            s.source_spec = ((s.workstation_source_locpt != 0) and s.source_known)
+            s.source_loc = s.workstation_source_locpt
+            s.source_sector = s.workstation_sector
+            s.source_vupos = s.source_vupos_2
+            s.source_buffer = s.source_buffer_2
+            _do_look(s, s.source_vision)
+
+
+def _do_test_variables(s):
+    """The other table test variables that the command and the database give (section 8.1)."""
     s.dest_spec = ((s.workstation_dest_locpt != 0) and s.dest_known)
     s.names_known = ((((s.workstation_source_locpt == 0) or s.source_known) and ((s.workstation_dest_locpt == 0) or s.dest_known)) and ((s.workstation_end_at_locpt == 0) or s.end_at_known))
 
@@ -695,17 +725,17 @@ def _do_set_source(s):
     """Procedure set_source."""
     s.to_emove_obj_ptr = s.workstation_obj
     s.to_emove_grasp = s.workstation_grasp
-    s.to_emove_locpt_ptr = s.workstation_source_locpt
-    s.to_emove_sector = s.workstation_sector
-    s.remember_current_loc = s.workstation_source_locpt
+    s.to_emove_locpt_ptr = s.source_loc
+    s.to_emove_sector = s.source_sector
+    s.remember_current_loc = s.source_loc
     s.current_loc = 0
 
 
 def _do_vupos_setup(s):
     """Procedure vupos_setup."""
-    s.to_emove_sector = s.workstation_sector
+    s.to_emove_sector = s.source_sector
     s.to_emove_locpt_ptr = s.source_vupos
-    s.remember_current_loc = s.workstation_source_locpt
+    s.remember_current_loc = s.source_loc
     s.to_emove_obj_ptr = s.workstation_obj
     s.to_emove_grasp = s.workstation_grasp
     s.to_emove_apoint_pos_flag = False
@@ -715,7 +745,7 @@ def _do_vupos_setup(s):
 def _do_locate(s):
     """Procedure locate."""
     s.to_emove_obj_ptr = s.workstation_obj
-    s.to_emove_locpt_ptr = s.workstation_source_locpt
+    s.to_emove_locpt_ptr = s.source_loc
     s.to_emove_input_command = 3
 
 
@@ -739,8 +769,8 @@ def _do_pickup(s):
     s.obj_now_in_gripper = s.workstation_obj
     s.grasp_now = s.workstation_grasp
     s.to_emove_gripped_obj_ptr = s.workstation_obj
-    s.current_loc = s.workstation_source_locpt
-    s.current_sector = s.workstation_sector
+    s.current_loc = s.source_loc
+    s.current_sector = s.source_sector
     _do_remove_from_buffer_db(s)
 
 
@@ -1026,7 +1056,7 @@ def check(s):
         return 39
     if not (isinstance(s.source_vision, int) and 0 <= s.source_vision <= 1):
         return 40
-    if not (isinstance(s.source_buffer, int) and 0 <= s.source_buffer <= 1):
+    if not (isinstance(s.source_buffer_2, int) and 0 <= s.source_buffer_2 <= 1):
         return 41
     if not (isinstance(s.dest_known, int) and 0 <= s.dest_known <= 1):
         return 44
@@ -1054,32 +1084,40 @@ def check(s):
         return 61
     if not (isinstance(s.source_spec, int) and 0 <= s.source_spec <= 1):
         return 62
-    if not (isinstance(s.dest_spec, int) and 0 <= s.dest_spec <= 1):
+    if not (isinstance(s.source_loc, int) and 0 <= s.source_loc <= 255):
         return 63
-    if not (isinstance(s.names_known, int) and 0 <= s.names_known <= 1):
+    if not (isinstance(s.source_sector, int) and 0 <= s.source_sector <= 99):
         return 64
-    if not (isinstance(s.obj_acquired, int) and 0 <= s.obj_acquired <= 1):
+    if not (isinstance(s.source_vupos, int) and 0 <= s.source_vupos <= 255):
         return 65
-    if not (isinstance(s.obj_now_in_gripper, int) and 0 <= s.obj_now_in_gripper <= 6):
+    if not (isinstance(s.source_buffer, int) and 0 <= s.source_buffer <= 1):
         return 66
-    if not (isinstance(s.grasp_now, int) and 0 <= s.grasp_now <= 9):
+    if not (isinstance(s.dest_spec, int) and 0 <= s.dest_spec <= 1):
         return 67
-    if not (isinstance(s.remember_current_loc, int) and 0 <= s.remember_current_loc <= 255):
+    if not (isinstance(s.names_known, int) and 0 <= s.names_known <= 1):
         return 68
-    if not (isinstance(s.current_loc, int) and 0 <= s.current_loc <= 255):
+    if not (isinstance(s.obj_acquired, int) and 0 <= s.obj_acquired <= 1):
         return 69
-    if not (isinstance(s.current_sector, int) and 0 <= s.current_sector <= 99):
+    if not (isinstance(s.obj_now_in_gripper, int) and 0 <= s.obj_now_in_gripper <= 6):
         return 70
-    if not (isinstance(s.tbuffer_boxt, int) and 0 <= s.tbuffer_boxt <= 99):
+    if not (isinstance(s.grasp_now, int) and 0 <= s.grasp_now <= 9):
         return 71
-    if not (isinstance(s.bbuffer_boxb, int) and 0 <= s.bbuffer_boxb <= 99):
+    if not (isinstance(s.remember_current_loc, int) and 0 <= s.remember_current_loc <= 255):
         return 72
-    if not (isinstance(s.fbuffer_flag, int) and 0 <= s.fbuffer_flag <= 99):
+    if not (isinstance(s.current_loc, int) and 0 <= s.current_loc <= 255):
         return 73
-    if not (isinstance(s.hbuffer_hous, int) and 0 <= s.hbuffer_hous <= 99):
+    if not (isinstance(s.current_sector, int) and 0 <= s.current_sector <= 99):
         return 74
-    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+    if not (isinstance(s.tbuffer_boxt, int) and 0 <= s.tbuffer_boxt <= 99):
         return 75
+    if not (isinstance(s.bbuffer_boxb, int) and 0 <= s.bbuffer_boxb <= 99):
+        return 76
+    if not (isinstance(s.fbuffer_flag, int) and 0 <= s.fbuffer_flag <= 99):
+        return 77
+    if not (isinstance(s.hbuffer_hous, int) and 0 <= s.hbuffer_hous <= 99):
+        return 78
+    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+        return 79
     return -1
 
 
@@ -1130,10 +1168,10 @@ def _admit(s):
     i13 = _whole(s.source_vision)
     if not 0 <= i13 <= 1:
         return _refused(s, 40)
-    i14 = _whole(s.source_buffer)
+    i14 = _whole(s.source_buffer_2)
     if not 0 <= i14 <= 1:
         return _refused(s, 41)
-    i15 = _whole(s.source_vupos)
+    i15 = _whole(s.source_vupos_2)
     if not 0 <= i15 <= 255:
         return _refused(s, 42)
     i16 = _whole(s.source_safe)
@@ -1198,8 +1236,8 @@ def _admit(s):
     s.from_emove_failure = i11
     s.source_known = i12
     s.source_vision = i13
-    s.source_buffer = i14
-    s.source_vupos = i15
+    s.source_buffer_2 = i14
+    s.source_vupos_2 = i15
     s.source_safe = i16
     s.dest_known = i17
     s.dest_vision = i18
@@ -2100,6 +2138,7 @@ def task_cycle(s):
             _settle(s)
             _do_take_orders(s)
             _do_forget_cause(s)
+            _do_find_source(s)
             _do_test_variables(s)
             {0: _run_pause_task, 1: _run_acquire, 2: _run_move, 3: _run_release_part, 4: _run_transfer, 5: _run_clear}[s.workstation_input_command](s)
             if s.fault == 0:

@@ -16,6 +16,7 @@ from rcsc_cell.cell.plant import Plant
 from rcsc_cell.cell.ready import Lying, lying, plant
 from rcsc_cell.database.ask import Database, open_database
 from rcsc_cell.database.build import BadData, build
+from rcsc_cell.episodes.witness import placements
 from rcsc_cell.workstation.interlocks import CellState, after, refusal
 from rcsc_cell.workstation.prepared import prepare
 from rcsc_cell.workstation.script import ScriptRow, read_script
@@ -312,6 +313,12 @@ REFUSED = {
     ),
     "nothing held": (CellState(), ScriptRow(1, "", "release")),
     "nothing to take": (CellState(), ScriptRow(1, "", "acquire", part="tbox", source="FIX-MAC5")),
+    "nobody knows where": (CellState(), ScriptRow(1, "", "acquire", part="tbox")),
+    "nothing here": (CellState(robot_at="FIX-MAC5"), ScriptRow(1, "", "acquire", part="tbox")),
+    "held here": (
+        CellState(held="tbox", fixture="tbox", robot_at="FIX-MAC1"),
+        ScriptRow(1, "", "acquire", part="tbox"),
+    ),
     "held already": (CellState(held="tbox"), ScriptRow(1, "", "acquire", part="tbox", source="BUFFER")),
 }
 
@@ -327,6 +334,32 @@ def test_interlocks_let_the_corrected_script_pass() -> None:
         assert not refusal(cell, row), row
         cell = after(cell, row)
     assert (cell.held, cell.fixture, cell.robot_at) == ("", "", "STATION") or cell.robot_at == "WS-SAFE"
+
+
+ACQUIRES_HERE = f"""{HEAD}"VISE-OPEN RIGHT, CLOSE LEFT",,,,
+MOVE,BOXT (2),BUFFER,FIX-MAC1,
+VISE-CLOSE RIGHT,,,,
+RELEASE,,,,FIX-MAC2
+MOVE,,,FIX-MAC5,
+ACQUIRE,BOXT (2),,,
+VISE-OPEN RIGHT,,,,
+TRANSFER,,,STATION(3),WS-SAFE
+"""
+
+
+def test_a_part_is_acquired_where_the_robot_is(tmp_path: Path) -> None:
+    """Section 3.1, by contact forces: the robot went to the part with an empty hand."""
+    script = tmp_path / "here.csv"
+    script.write_text(ACQUIRES_HERE, encoding="utf-8")
+    made = prepare(SYSTEM, str(script), "c", lambda database: [plant(database, "mujoco")])
+    results = list(made.steps())
+    assert [result.state for result in results] == ["done"] * 8
+    physical = made.system.outside[1]
+    assert isinstance(physical, Plant)
+    [placed] = placements(results, made.database, physical)
+    assert (placed.part, placed.place) == ("tbox", "STATION(3)")
+    assert placed.error_mm < 2.0
+    assert (made.station.cell.fixture, made.station.cell.held) == ("", "")
 
 
 def test_a_failed_row_stops_the_script_and_can_be_tried_again() -> None:

@@ -106,7 +106,7 @@ def test_every_command_is_answered_by_its_own_number_across_the_wrap() -> None:
 
 
 FAULTS = {
-    "no source": ("acquire", {"obj": "tbox", "grasp": 2}, "cmd none"),
+    "no source, and the robot is nowhere": ("acquire", {"obj": "tbox", "grasp": 2}, "cmd none"),
     "no destination": ("move", {}, "cmd none"),
     "nothing to release": ("release", {}, "cmd none"),
     "nothing to clear": ("clear", {"dest": "STATION"}, "cmd none"),
@@ -138,6 +138,35 @@ def test_a_command_that_is_refused_has_no_cause_left_of_the_one_before() -> None
     assert cell.cause() == "no_match"
     assert cell.do("release") == "failed"
     assert (cell.reason(), cell.cause()) == ("cmd", "none")
+
+
+def test_without_a_source_the_part_is_taken_where_the_robot_is() -> None:
+    """Section 3.1: at a place that is known, and at the buffer by vision, where it is counted."""
+    cell = Cell()
+    assert cell.do("move", dest="BUFFER") == "done"
+    assert cell.do("acquire", obj="tbox", grasp=2) == "done"
+    assert cell.system.level("task").value("tbuffer_boxt") == 9
+    assert cell.do("acquire", obj="tbox", grasp=2) == "failed"
+    assert (cell.reason(), cell.cause()) == ("cmd", "none")  # it holds one already
+    assert cell.do("transfer", dest="STATION", sector=2, end_at="WS-SAFE") == "done"
+    assert cell.do("acquire", obj="tbox", grasp=2) == "failed"
+    assert (cell.reason(), cell.cause()) == ("pic", "nothing_gripped")  # in the air
+    assert cell.do("move", dest="STATION", sector=2) == "done"
+    assert cell.do("acquire", obj="tbox", grasp=2) == "done"
+    assert cell.system.level("task").value("current_sector") == 2
+    assert [at for at, part in enumerate(cell.world.objects) if part == 1] == [0]
+    assert cell.world.mechanism.touching() >= {("pad_left", "part0"), ("pad_right", "part0")}
+    assert cell.failed == []
+
+
+def test_without_a_source_a_robot_on_its_way_takes_nothing() -> None:
+    cell = Cell()
+    assert cell.do("move", dest="FIX-SAFE") == "done"
+    cell.tell("move", dest="WS-SAFE")
+    assert cell.until_over(10) == ""
+    assert cell.do("acquire", obj="tbox", grasp=2) == "failed"
+    assert cell.reason() == "cmd"
+    assert cell.do("move", dest="WS-SAFE") == "done"
 
 
 def test_a_second_command_while_a_part_is_held_is_refused() -> None:

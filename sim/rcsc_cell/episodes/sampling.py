@@ -84,7 +84,8 @@ NOT_LEGAL = (
     "TRANSFER,BOXT (2),BUFFER,,WS-SAFE",
     "MOVE,,,,",
 )
-"""Nothing held, no source, no destination: TASK has to refuse them (section 8.1, lines 2 and 3)."""
+"""Nothing held, no destination: TASK has to refuse them (section 8.1, lines 2 and 3). ACQUIRE takes what is where the robot is, which
+is mostly nothing."""
 ONLY_WITHOUT_PHYSICS = (
     "MOVE,,,FIX-MAC1,",
     "MOVE,BOXT (2),BUFFER,V-BLK3,",

@@ -165,7 +165,7 @@ def placements(results: Sequence[RowResult], database: Database, plant: Plant) -
         row = result.row
         if result.state != "done" or not row.robot:
             continue
-        held = row.part if row.source else held
+        held = row.part if row.source or row.robot == "acquire" else held
         put = {place: what for place, what in put.items() if place != row.source}
         if row.robot in PUTS and row.dest and held:
             put[row.dest] = (held, row.sector)

@@ -148,6 +148,7 @@ def illegal(database: Database, command: Command) -> str:
     dest = bool(database.place(command.dest)[0]) and bool(command.dest)
     match command.name:
         case "acquire":
+            takes = takes or (not command.source and bool(database.place(command.here)[0]))
             return "it holds an object" if holds else "" if takes else "no source"
         case "move" | "transfer" if not dest:
             return "no destination"

@@ -128,7 +128,8 @@ class DoneTrue:
         if known and abs(cycle.opening_mm - grip_mm) > tolerance_mm:
             return f"the fingers are {cycle.opening_mm:.1f} mm apart, not {grip_mm:.1f}"
         kind = self._objects[cycle.held[0]]
-        seen = bool(cycle.database.place(command.source)[1]) and command.name in MOVES
+        source = command.source or (command.here if command.name == "acquire" else 0)
+        seen = bool(cycle.database.place(source)[1]) and command.name in MOVES
         return f"the hand holds a `{kind}`, not a `{believed}`" if seen and kind != believed else None
 
     def _put(self, cycle: CycleState, command: Command) -> str | None:
@@ -219,7 +220,7 @@ def _ends_at(cycle: CycleState, command: Command) -> int:
     """The location at which the robot ends; 0 where the command leaves it where it is."""
     match command.name:
         case "acquire":
-            return command.source
+            return command.source or command.here
         case "move":
             return command.dest
         case "release" | "transfer" | "clear":

@@ -52,7 +52,13 @@ def _vise(cell: CellState, row: ScriptRow) -> str:
     return ""
 
 
+def taken_from(cell: CellState, row: ScriptRow) -> str:
+    """Where the row takes a part from; an ACQUIRE without a source takes it where the robot is (section 3.1)."""
+    return row.source or (cell.robot_at if row.robot == "acquire" else "")
+
+
 def _robot(cell: CellState, row: ScriptRow) -> str:
+    source = taken_from(cell, row)
     brings = row.dest in FIXTURE and bool(cell.held or row.source)
     if brings and cell.fixture:
         return "the fixture is full"
@@ -62,11 +68,11 @@ def _robot(cell: CellState, row: ScriptRow) -> str:
         return "nothing is in the gripper"
     if row.robot == "transfer" and not cell.held and not row.source:
         return "nothing is in the gripper and no source is given"
-    if row.robot == "acquire" and not row.source:
-        return "no source is given"
-    if row.source and cell.held:
+    if row.robot == "acquire" and not source:
+        return "no source is given, and nobody knows where the robot is"
+    if source and cell.held:
         return f"the gripper holds a part already: {cell.held}"
-    if row.source in FIXTURE and not cell.fixture:
+    if source in FIXTURE and not cell.fixture:
         return "there is no part in the fixture"
     return ""
 
@@ -81,12 +87,13 @@ def after(cell: CellState, row: ScriptRow) -> CellState:
         )
     if not row.robot or row.robot == "pause":
         return cell
-    held = row.part if row.source else cell.held
-    takes_away = (row.source in FIXTURE and row.robot != "acquire") or (
+    source = taken_from(cell, row)
+    held = row.part if source else cell.held
+    takes_away = (source in FIXTURE and row.robot != "acquire") or (
         bool(cell.held) and cell.robot_at in FIXTURE and bool(row.dest)
     )
     fixture = "" if takes_away else cell.fixture
-    ends = row.source if row.robot == "acquire" else row.dest or row.end_at or cell.robot_at
+    ends = source if row.robot == "acquire" else row.dest or row.end_at or cell.robot_at
     if row.robot in ("release", "transfer", "clear"):
         put = row.dest or cell.robot_at
         fixture = held if put in FIXTURE else fixture
