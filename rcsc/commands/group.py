@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from rcsc import __version__
-from rcsc.commands.shared.extras import lacking, need
+from rcsc.commands.shared.extras import lacking
 from rcsc.commands.shared.stopped import stopped
 from rcsc.diagnostics.coded import CodedError
 
@@ -25,7 +25,7 @@ Examples:
 Exit status: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc."""
 
 COMMANDS = {
-    "systems.campaign": "Run many episodes of the cell, with faults; shrink what breaks a property.",
+    "systems.campaign": "Run many episodes of a system, with faults; shrink what breaks a property.",
     "tables.certify": "Re-check a proof without the prover.",
     "tables.check": "Prove that exactly one line of each table matches.",
     "tables.compile": "Write the executors of proved tables, in Python and C.",
@@ -46,9 +46,6 @@ COMMANDS = {
 }
 """The module of each command, whose last name is the command's, and what `rcsc --help` says of it."""
 
-NEEDS = {"campaign": "cell"}
-"""Commands that do nothing without an extra. What others lack, an import or an option of theirs says."""
-
 
 class Group(click.Group):
     """Commands by name and summary, each imported when the command line has named it."""
@@ -58,8 +55,6 @@ class Group(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command that the first argument names, and the arguments that are left for it."""
         name, summary, rest = super().resolve_command(ctx, args)
-        if name in NEEDS:
-            need(NEEDS[name])
         return name, None if summary is None else imported(str(summary.name)), rest
 
     def invoke(self, ctx: click.Context) -> Any:

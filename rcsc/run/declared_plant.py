@@ -26,7 +26,12 @@ from rcsc.host.described import (
 from rcsc.host.files.names import BadName, is_identifier, is_member, within
 from rcsc.lang.project import project_root
 
-PYTHON: Mapping[str, Kind] = {"python": Text(), "parties": Listing(Word()), "by_hand": Flag()}
+PYTHON: Mapping[str, Kind] = {
+    "python": Text(),
+    "parties": Listing(Word()),
+    "by_hand": Flag(),
+    "campaign": Text(),
+}
 SENSOR = Record(
     {},
     {
@@ -67,7 +72,8 @@ class PlantSpec:
         keyframe: From which the model starts; empty for its first state.
         sensors: What fills a buffer's field, by the far end; `actuators` what a field drives.
         faults: By name, what a model does wrong while somebody switches it on.
-        by_hand: Whether `rcsc shell` takes it when nobody says which.
+        by_hand: Whether `rcsc shell` and `rcsc campaign` take it when nobody says which.
+        campaign: `MODULE:NAME` of the kind of its episodes, where they are not those of any system.
         path: Where it stands in the document.
     """
 
@@ -81,6 +87,7 @@ class PlantSpec:
     actuators: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     faults: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     by_hand: bool = False
+    campaign: str = ""
     path: KeyPath = ("plant",)
 
 
@@ -161,6 +168,7 @@ def _spec(path: Path, document: Document, name: str, table: Mapping[str, Any], p
         _entries(table, "actuators"),
         _entries(table, "faults"),
         table.get("by_hand") is True,
+        str(table.get("campaign", "")),
         place,
     )
 

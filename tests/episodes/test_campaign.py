@@ -20,10 +20,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsc import commands as cli
-from rcsc.commands.group import commands
-from rcsc.run.episodes.outcome import EpisodeFinding
-from rcsc_cell.campaign import worker_pool as crew_module
-from rcsc_cell.campaign.counterexamples import (
+from rcsc.campaign import worker_pool as crew_module
+from rcsc.campaign.counterexamples import (
     BadEpisode,
     Choice,
     again,
@@ -33,13 +31,15 @@ from rcsc_cell.campaign.counterexamples import (
     save,
     saved_episode,
 )
-from rcsc_cell.campaign.journal import BadJournal, EpisodeRecord, Journal, header, journal_path
-from rcsc_cell.campaign.rig import Rig, digest, episode_seed, known_lines, mask
-from rcsc_cell.campaign.runner import campaign
-from rcsc_cell.campaign.shrink import shrink
-from rcsc_cell.campaign.summary import as_json, as_text, summary
-from rcsc_cell.campaign.work import OtherTables, play
-from rcsc_cell.campaign.worker_pool import WorkerPool, WorkersGone, pool_of, processes
+from rcsc.campaign.journal import BadJournal, EpisodeRecord, Journal, header, journal_path
+from rcsc.campaign.rig import Rig, digest, episode_seed, known_lines, mask
+from rcsc.campaign.runner import campaign
+from rcsc.campaign.shrink import shrink
+from rcsc.campaign.summary import as_json, as_text, summary
+from rcsc.campaign.work import OtherTables, play
+from rcsc.campaign.worker_pool import WorkerPool, WorkersGone, pool_of, processes
+from rcsc.commands.group import commands
+from rcsc.run.episodes.outcome import EpisodeFinding
 from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,
@@ -51,10 +51,19 @@ from rcsc_cell.episodes.episode import (
     Restart,
     TransportSpec,
 )
+from rcsc_cell.episodes.kind import CELL
 from rcsc_cell.workstation.script import read_script
 from tests.support import played as fake
 
-CALM = Rig(draw=fake.calm, run=fake.play)
+PLAIN = Rig(CELL, SYSTEM, "kinematic")
+
+
+def playing(rig: Rig[Episode], **functions: Any) -> Rig[Episode]:
+    """The rig with other functions of its kind."""
+    return replace(rig, kind=replace(rig.kind, **functions))
+
+
+CALM = playing(PLAIN, draw=fake.calm, run=fake.play)
 
 
 @contextmanager
@@ -63,16 +72,18 @@ def threads(count: int) -> Iterator[WorkerPool]:
         yield WorkerPool(pool, count)
 
 
-def played(rig: Rig, count: int, pool: WorkerPool, path: Path, seed: int = 5) -> dict[int, EpisodeRecord]:
+def played(
+    rig: Rig[Episode], count: int, pool: WorkerPool, path: Path, seed: int = 5
+) -> dict[int, EpisodeRecord]:
     with Journal(path, header(rig, seed)) as journal:
         for _ in campaign(rig, seed, count, pool, journal):
             pass
         return dict(journal.records)
 
 
-def alone(rig: Rig, count: int, seed: int = 5) -> dict[int, EpisodeRecord]:
+def alone(rig: Rig[Episode], count: int, seed: int = 5) -> dict[int, EpisodeRecord]:
     """The records without any worker pool."""
-    return {record.index: record for record in play(rig, digest(rig.system), seed, range(count))}
+    return {record.index: record for record in play(rig, digest(rig), seed, range(count))}
 
 
 # --- the same with any worker pool ---
@@ -92,7 +103,7 @@ def test_processes_play_as_threads_do(tmp_path: Path) -> None:
 def test_a_cluster_plays_as_threads_do(tmp_path: Path) -> None:
     from distributed import Client, LocalCluster
 
-    rig = replace(CALM, draw=fake.endless, limit_s=0.2)
+    rig = replace(playing(CALM, draw=fake.endless), limit_s=0.2)
     with (
         LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
         Client(cluster) as client,
@@ -115,7 +126,7 @@ def test_episodes_of_neighbouring_seeds_have_nothing_in_common() -> None:
 
 
 def test_a_worker_that_dies_costs_its_own_episode_and_no_other(tmp_path: Path) -> None:
-    rig = replace(CALM, draw=fake.wild)
+    rig = playing(CALM, draw=fake.wild)
     kills = {at for at in range(40) if fake.KILLS in _faults(rig, at)}
     assert 1 < len(kills) < 9
     with processes(2) as pool:
@@ -124,21 +135,21 @@ def test_a_worker_that_dies_costs_its_own_episode_and_no_other(tmp_path: Path) -
     assert all(
         [finding.property for finding in found[at].findings] == ["the process survives"] for at in kills
     )
-    expected = play(rig, digest(rig.system), 5, [at for at in range(40) if at not in kills])
+    expected = play(rig, digest(rig), 5, [at for at in range(40) if at not in kills])
     assert [found[at] for at in sorted(found) if at not in kills] == list(expected)
     raised = [record for record in found.values() if record.end == "error:ArithmeticError"]
     assert raised
     assert raised[0].findings == (EpisodeFinding("nothing is raised", 0, "ArithmeticError: seen nothing"),)
 
 
-def _faults(rig: Rig, index: int, seed: int = 5) -> list[str]:
+def _faults(rig: Rig[Episode], index: int, seed: int = 5) -> list[str]:
     return [fault.name for fault in rig.episode(seed, index).faults]
 
 
 def test_what_hangs_is_stopped_and_so_is_what_cannot_be_stopped(tmp_path: Path) -> None:
     """The second keeps the interpreter's lock: only its process's end stops it."""
     for draw in (fake.endless, fake.stuck):
-        rig = replace(CALM, draw=draw, limit_s=0.25)
+        rig = replace(playing(CALM, draw=draw), limit_s=0.25)
         hang = {at for at in range(16) if {fake.HANGS, fake.STUCK} & set(_faults(rig, at))}
         assert hang
         with processes(1) as pool:
@@ -219,7 +230,7 @@ def test_the_deaths_that_one_executor_reports_cost_no_other(tmp_path: Path) -> N
 
 
 def test_what_was_under_way_beside_a_killer_is_not_blamed(tmp_path: Path) -> None:
-    rig = replace(CALM, draw=fake.wild, run=fake.dawdle)
+    rig = playing(CALM, draw=fake.wild, run=fake.dawdle)
     killer = next(at for at in range(200) if fake.KILLS in _faults(rig, at))
     beside = [killer - 2, killer - 1, killer + 1, killer + 2]
     assert not any(fake.KILLS in _faults(rig, at) for at in beside)
@@ -288,7 +299,7 @@ def test_a_journal_cut_off_at_any_byte_keeps_its_whole_lines(tmp_path: Path) -> 
     [
         ({"seed": 6}, "is of another seed: 5, not 6"),
         ({"digest": "f"}, "is of other tables, data or programs"),
-        ({"backend": "mujoco"}, "is of another plant: kinematic, not mujoco"),
+        ({"plant": "mujoco"}, "is of another plant: kinematic, not mujoco"),
         ({"executor": "python"}, "is of other executors"),
         ({"rcsc": "0"}, "was written by another version of rcsc"),
         ({"form": 99}, "is of another form"),
@@ -377,11 +388,11 @@ with processes(2) as crew:
     with Journal(path, header(slow(), 5)) as journal:
         kept = dict(journal.records)
     assert 30 <= len(kept) < 2000
-    assert kept == {record.index: record for record in play(CALM, digest(SYSTEM), 5, sorted(kept))}
+    assert kept == {record.index: record for record in play(CALM, digest(PLAIN), 5, sorted(kept))}
 
 
-def slow() -> Rig:
-    return replace(CALM, run=fake.dawdle)
+def slow() -> Rig[Episode]:
+    return playing(CALM, run=fake.dawdle)
 
 
 def _until(holds: Any, most_s: float = 900) -> None:
@@ -412,8 +423,8 @@ def test_the_digest_changes_with_the_data_the_scripts_and_the_tables(tmp_path: P
         return place / "tables" / "system.toml"
 
     same = copied("same")
-    assert digest(same) == digest(SYSTEM)
-    seen = {digest(same)}
+    assert digest(replace(PLAIN, system=same)) == digest(PLAIN)
+    seen = {digest(PLAIN)}
     for name in (
         "tables/cell.toml",
         "tables/scripts/make_boxt.csv",
@@ -422,7 +433,7 @@ def test_the_digest_changes_with_the_data_the_scripts_and_the_tables(tmp_path: P
     ):
         system = copied(name.replace("/", "_"))
         (system.parents[1] / name).write_bytes((system.parents[1] / name).read_bytes() + b"\n")
-        seen.add(digest(system))
+        seen.add(digest(replace(PLAIN, system=system)))
     assert len(seen) == 5
     assert journal_path(replace(CALM, system=same), 1, tmp_path) == journal_path(CALM, 1, tmp_path)
 
@@ -585,8 +596,8 @@ def test_one_counterexample_for_each_property_and_set_of_faults() -> None:
 
 
 def test_a_counterexample_of_the_cell_is_small_replays_and_fails_again(tmp_path: Path) -> None:
-    rig = Rig(run=fake.dislike)
-    records = next(found for at in range(40) if (found := play(rig, digest(SYSTEM), 2, [at]))[0].findings)
+    rig = playing(PLAIN, run=fake.dislike)
+    records = next(found for at in range(40) if (found := play(rig, digest(PLAIN), 2, [at]))[0].findings)
     with threads(1) as pool:
         [(choice, made)] = counterexamples(rig, 2, choices(records)[:1], pool)
     place = save(tmp_path, rig, 2, choice, made)
@@ -596,21 +607,23 @@ def test_a_counterexample_of_the_cell_is_small_replays_and_fails_again(tmp_path:
         "log.mcap",
         "script.csv",
     ]
-    whole, least = rig.episode(2, choice.index), saved_episode(place)
+    whole, least = rig.episode(2, choice.index), saved_episode(place, PLAIN)
     assert len(least.rows) == 1 <= len(whole.rows)
     assert [finding.property for finding in again(place, rig).findings] == ["no row fails"]
     assert again(place, rig, "python").digest == again(place, rig, "c").digest
-    assert again(place / "episode.json").digest == again(place, rig).digest  # properties look on
+    assert again(place / "episode.json", PLAIN).digest == again(place, rig).digest  # properties look on
     assert is_saved(tmp_path, rig, 2, choice)
     assert not is_saved(tmp_path, replace(rig, executor="python"), 2, choice)
     replayed = _rcsc("replay", str(place / "log.mcap"), "--generated", str(SYSTEM.parents[1] / "generated"))
     assert (replayed.exit_code, replayed.return_value) == (0, 0)
     assert "nothing differs" in replayed.output
-    assert [row.text for row in read_script(place / "script.csv")] == [one.text for one in again(place).rows]
+    assert [row.text for row in read_script(place / "script.csv")] == [
+        one.text for one in again(place, PLAIN).rows
+    ]
 
 
 def test_what_kills_its_process_is_shrunk_all_the_same() -> None:
-    rig = replace(CALM, draw=fake.wild)
+    rig = playing(CALM, draw=fake.wild)
     fatal = [at for at in range(200) if len(_faults(rig, at)) == 2 and fake.KILLS in _faults(rig, at)]
     index = min(fatal, key=lambda at: len(rig.episode(5, at).to_json()))  # each try is a process
     with processes(1) as pool:
@@ -626,9 +639,9 @@ def test_a_file_without_an_episode_is_refused(tmp_path: Path) -> None:
     for content in ("", "3", "{", '{"rows": 3}', '{"faults": [{"name": "nobody"}]}', '{"backend": "paper"}'):
         (tmp_path / "episode.json").write_text(content)
         with pytest.raises(BadEpisode, match=r"episode\.json"):
-            again(tmp_path)
+            again(tmp_path, PLAIN)
     with pytest.raises(BadEpisode, match="cannot be read"):
-        again(tmp_path / "none.json")
+        again(tmp_path / "none.json", PLAIN)
 
 
 def _changed(value: Any) -> Iterator[Any]:
@@ -651,10 +664,10 @@ def test_an_episode_is_read_by_what_its_fields_are(tmp_path: Path) -> None:
     for changed in _changed(json.loads(EVERYTHING.to_json())):
         (tmp_path / "episode.json").write_text(json.dumps(changed))
         with pytest.raises(BadEpisode, match=r"episode\.json"):
-            saved_episode(tmp_path)
+            saved_episode(tmp_path, PLAIN)
     (tmp_path / "episode.json").write_text(replace(EVERYTHING, restarts=(Restart(3, "nobody"),)).to_json())
     with pytest.raises(BadEpisode, match="there is no level `nobody`"):
-        again(tmp_path)
+        again(tmp_path, PLAIN)
 
 
 # --- the summary ---
@@ -718,10 +731,7 @@ def test_a_short_campaign_of_the_cell_has_no_findings_and_goes_on(tmp_path: Path
 def test_findings_are_saved_and_told_and_the_status_is_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(
-        "rcsc_cell.campaign.rig.Rig.__init__.__defaults__",
-        ("kinematic", "c", SYSTEM, 120.0, fake.calm, fake.play),
-    )
+    monkeypatch.setattr("rcsc_cell.episodes.kind.CELL", CALM.kind)
     args = ["campaign", "--system", str(SYSTEM), "--no-compile", "--workers", "1", "--episodes", "30"]
     args += ["--journal", str(tmp_path / "j"), "--save", str(tmp_path / "c"), "--seed", "5"]
     assert cli.run(args) == 1
@@ -729,8 +739,8 @@ def test_findings_are_saved_and_told_and_the_status_is_1(
     assert f"`{fake.HELD}` does not hold: it fell" in err
     places = sorted((tmp_path / "c").iterdir())
     assert len(places) == err.count("error[RCS743]") > 0
-    assert all(f"rcsc campaign --again {place}\n" in err for place in places)
-    assert [fault.name for fault in saved_episode(places[0]).faults] == [fake.BREAKS]
+    assert all(f"rcsc campaign --system {SYSTEM} --again {place}\n" in err for place in places)
+    assert [fault.name for fault in saved_episode(places[0], PLAIN).faults] == [fake.BREAKS]
     assert cli.run(args) == 1
     assert "RCS743" not in capsys.readouterr().err  # saved before
     assert cli.run(["campaign", "--system", str(SYSTEM), "--no-compile", "--again", str(places[0])]) == 1
@@ -755,7 +765,7 @@ def test_what_a_campaign_cannot_use_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     common = ["campaign", "--system", str(SYSTEM), "--no-compile", "--episodes", "1", "--journal"]
-    Journal(tmp_path / "j", header(Rig(), 5)).close()
+    Journal(tmp_path / "j", header(PLAIN, 5)).close()
     assert cli.run([*common, str(tmp_path / "j"), "--seed", "6"]) == 1
     assert "error[RCS741]" in capsys.readouterr().err
     monkeypatch.setattr(crew_module, "_CONNECT_S", 0.1)
@@ -767,9 +777,15 @@ def test_what_a_campaign_cannot_use_is_said(
     for wrong in (
         ["--episodes", "0"],
         ["--workers", "2", "--scheduler", "x"],
-        ["--backend", "paper"],
         ["--again", "no"],
+        ["--script", "make_boxt"],  # the cell's episodes draw their own
+        ["--script", "nobody"],
+        ["elsewhere"],
+        [str(SYSTEM)],  # two systems
     ):
         assert cli.run([*common, str(tmp_path / "m"), *wrong]) == 2
+    capsys.readouterr()
+    assert cli.run([*common, str(tmp_path / "m"), "--backend", "paper"]) == 1
+    assert "the description has no plant `paper`" in capsys.readouterr().err
     assert cli.run([*common, "/proc/none/j"]) == 1
     assert "error[RCS502]" in capsys.readouterr().err

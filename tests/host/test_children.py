@@ -381,11 +381,11 @@ ALLOWED = {
     ("rcsc/run/processes/supervisor.py", "multiprocessing"),  # a type
     ("rcsc/run/processes/serve.py", "multiprocessing"),  # likewise
     (
-        "sim/rcsc_cell/campaign/worker_pool.py",
+        "rcsc/campaign/worker_pool.py",
         "concurrent.futures",
     ),  # the classes of executors and what they raise
-    ("sim/rcsc_cell/campaign/runner.py", "concurrent.futures"),
-    ("sim/rcsc_cell/campaign/counterexamples.py", "concurrent.futures"),
+    ("rcsc/campaign/runner.py", "concurrent.futures"),
+    ("rcsc/campaign/counterexamples.py", "concurrent.futures"),
     ("sim/rcsc_cell/live/server.py", "concurrent.futures"),
 }
 

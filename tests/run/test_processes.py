@@ -354,7 +354,7 @@ COMPILER = {
     [
         ("rcsc.run.processes.serve, rcsc.run.plant.staging", COMPILER | {"numpy", "mujoco"}),  # a level
         ("rcsc_cell.episodes.stage", COMPILER | {"numpy", "mujoco"}),  # what answers its feeds in the cell
-        ("rcsc_cell.campaign.work", COMPILER | {"mujoco"}),  # episodes by kinematics
+        ("rcsc.campaign.work, rcsc_cell.episodes.kind", COMPILER | {"mujoco"}),  # episodes by kinematics
     ],
 )
 def test_a_process_loads_only_what_it_needs(loads: str, never: set[str]) -> None:

@@ -13,9 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 
+from rcsc.campaign.rig import known_lines
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, RowEnd
-from rcsc_cell.campaign.rig import known_lines
-from rcsc_cell.cell.ready import Backend
 from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, PartSpec
 from rcsc_cell.episodes.loop import run as run_in_cell
 
@@ -26,12 +25,12 @@ RUNS = "RCSC_TEST_RUNS"
 """Names a file, in the environment: each run adds its process's number."""
 
 
-def calm(seed: int, backend: Backend) -> Episode:
+def calm(seed: int, system: Path, plant: str, script: str = "") -> Episode:  # noqa: ARG001  # as any kind's is called
     """Nothing worse than a broken property, in about one of four."""
     by = Random(seed)  # noqa: S311  # by seed
     names = [by.choice((BREAKS, "noisy", "tilted", "hand_weak")) for _ in range(by.randrange(3))]
     return Episode(
-        backend=backend,
+        backend="mujoco" if plant == "mujoco" else "kinematic",
         seed=seed,
         parts=tuple(PartSpec("tbox", x_mm=by.randrange(-40, 41)) for _ in range(by.randrange(3))),
         rows=tuple(by.choice(ROWS) for _ in range(by.randrange(1, 6))),
@@ -39,22 +38,22 @@ def calm(seed: int, backend: Backend) -> Episode:
     )
 
 
-def wild(seed: int, backend: Backend) -> Episode:
+def wild(seed: int, system: Path, plant: str, script: str = "") -> Episode:
     """As `calm`, but one in ten kills its process and one in twenty raises."""
-    episode = calm(seed, backend)
+    episode = calm(seed, system, plant, script)
     worse = {0: KILLS, 1: KILLS, 2: RAISES}.get(seed % 20)
     return replace(episode, faults=(*episode.faults, FaultSpec(worse, 3, 9))) if worse else episode
 
 
-def endless(seed: int, backend: Backend) -> Episode:
+def endless(seed: int, system: Path, plant: str, script: str = "") -> Episode:
     """As `calm`, but one in eight never ends."""
-    episode = calm(seed, backend)
+    episode = calm(seed, system, plant, script)
     return replace(episode, faults=(FaultSpec(HANGS, 0, 9),)) if seed % 8 == 0 else episode
 
 
-def stuck(seed: int, backend: Backend) -> Episode:
+def stuck(seed: int, system: Path, plant: str, script: str = "") -> Episode:
     """As `calm`, but one in eight cannot be stopped."""
-    episode = calm(seed, backend)
+    episode = calm(seed, system, plant, script)
     return replace(episode, faults=(FaultSpec(STUCK, 0, 9),)) if seed % 8 == 0 else episode
 
 

@@ -1,18 +1,18 @@
-"""`rcsc campaign`: many episodes of the cell, with whatever can go wrong in them."""
+"""`rcsc campaign`: many episodes of a system, with whatever can go wrong in them."""
 
 import json
+import shlex
 import sys
 import time
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
-from rcsc.commands.shared.options import cores
-from rcsc.commands.shared.show import Progress, put, writing
-from rcsc.commands.shared.systems import SYSTEM, compiled, system_path
-from rcsc.diagnostics.codes import Code
-from rcsc_cell.campaign.counterexamples import (
+from rcsc.campaign.choose import kind_of, plant_name, plant_of
+from rcsc.campaign.counterexamples import (
     MOST,
     again,
     choices,
@@ -20,12 +20,17 @@ from rcsc_cell.campaign.counterexamples import (
     is_saved,
     save,
 )
-from rcsc_cell.campaign.journal import EpisodeRecord, Journal, header, journal_path
-from rcsc_cell.campaign.rig import Rig, known_lines
-from rcsc_cell.campaign.runner import campaign as play
-from rcsc_cell.campaign.summary import as_json, as_text, summary
-from rcsc_cell.campaign.worker_pool import WorkerPool, cluster, processes
-from rcsc_cell.episodes.episode import FAULTS
+from rcsc.campaign.journal import EpisodeRecord, Journal, header, journal_path
+from rcsc.campaign.rig import Rig, known_lines
+from rcsc.campaign.runner import campaign as play
+from rcsc.campaign.summary import as_json, as_text, summary
+from rcsc.campaign.worker_pool import WorkerPool, cluster, processes
+from rcsc.commands.shared.extras import need
+from rcsc.commands.shared.options import cores
+from rcsc.commands.shared.show import Progress, put, writing
+from rcsc.commands.shared.systems import SYSTEM, compiled, meant, system_path
+from rcsc.diagnostics.codes import Code
+from rcsc.run.description import description
 
 _TO = click.Path(dir_okay=False, path_type=Path)
 _TERMINAL_S, _PLAIN_S = 1.0, 10.0
@@ -36,24 +41,29 @@ _TERMINAL_S, _PLAIN_S = 1.0, 10.0
     "campaign",
     epilog="""\b
 Examples:
-  rcsc campaign --episodes 1000 --seed 7         a thousand episodes without physics; again: goes on, or adds
-  rcsc campaign --backend mujoco --episodes 100  with physics
-  rcsc campaign --again campaign/7-12-held       a saved counterexample: does it still fail?
+  rcsc campaign my_robot                         200 episodes of the system in a folder; again: goes on, or adds
+  rcsc campaign my_robot --plant mujoco          with another plant
+  rcsc campaign my_robot --again campaign/0-12-docked-at-rest  a saved counterexample: does it still fail?
+  rcsc campaign --episodes 1000 --seed 7         of the system that is here
   rcsc campaign --scheduler tcp://head:8786      on a dask.distributed cluster (extra `cluster`)
 
 \b
 Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
 )
+@click.argument("target", metavar="[SYSTEM]", required=False, type=click.Path(exists=True, path_type=Path))
+@SYSTEM
+@click.option("--plant", "--backend", "plant", default=None, metavar="PLANT",
+              help="What stands outside: a file FILE.py or FILE.py:CLASS, or a plant's name in the description; "
+                   "else the one that is `by_hand`, or the first.")  # fmt: skip
+@click.option("--script", default=None, metavar="SCRIPT",
+              help="The orders: a CSV or TOML file, or the name of one beside the system or in its scripts/.")  # fmt: skip
 @click.option("--episodes", type=click.IntRange(min=1), default=200, show_default=True, metavar="N",
               help="How many, those of the journal included.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(min=1), default=None, metavar="K",
               help="Processes here; one a processor when nobody says. The outcomes are the same with any number.")  # fmt: skip
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Which episodes.")
-@click.option("--backend", type=click.Choice(["kinematic", "mujoco"]), default="kinematic", show_default=True,
-              help="The plant: kinematics alone, or physics.")  # fmt: skip
 @click.option("--executor", type=click.Choice(["c", "python"]), default=None,
               help="Which of the generated executors run; c when nobody says, and with --again the episode's own.")  # fmt: skip
-@SYSTEM
 @click.option("--journal", type=_TO, default=None, metavar="FILE",
               help="Where each episode's outcome is kept; else in .rcsc-cache beside the system, by seed and tables.")  # fmt: skip
 @click.option("--save", type=click.Path(file_okay=False, path_type=Path), default=Path("campaign"), show_default=True,
@@ -70,35 +80,73 @@ Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
 @click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
               help="Prove and compile what changed before anything moves.")  # fmt: skip
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
-    episodes: int, workers: int | None, seed: int, backend: str, executor: str | None, system: Path | None,
-    journal: Path | None, save: Path, json_: Path | None, limit_s: float, scheduler: str | None, again: Path | None,
-    compiles: bool,
+    target: Path | None, system: Path | None, plant: str | None, script: str | None, episodes: int, workers: int | None,
+    seed: int, executor: str | None, journal: Path | None, save: Path, json_: Path | None, limit_s: float,
+    scheduler: str | None, again: Path | None, compiles: bool,
 ) -> int:  # fmt: skip
-    """Run episodes of the cell: parts, scripts, faults, lost buffers and restarts by seed, with every property watching.
+    """Run episodes of SYSTEM: orders, lost buffers, restarts and faults of its plant by seed, with every property watching.
 
-    Each outcome goes into a journal at once, so that a campaign killed at any moment goes on where it was. Where a property does
-    not hold, the episode is made as small as it gets and saved with its script and its log. An episode that takes its
-    process with it, or does not end, is a finding like any other.
+    SYSTEM is a description (system.toml) or a folder that has one; without it, the system that is here. Each outcome goes into a
+    journal at once, so that a campaign killed at any moment goes on where it was. Where a property does not hold, the episode
+    is made as small as it gets and saved with its script and its log. An episode that takes its process with it, or does not end,
+    is a finding like any other.
     """
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers are processes here; with --scheduler the cluster's are taken")
-    rig = _rig(system_path(system), backend, executor, limit_s)
-    if compiles and not compiled(rig.system, quiet=True):
+    if target is not None and system is not None:
+        raise click.UsageError(f"`{target}` is a system, and `--system` names another")
+    path, named = meant(None, system_path(target or system), script)
+    asked = CampaignOptions(
+        _rig(path, plant, executor, named, limit_s), _again_words(target, system), save, json_
+    )
+    if compiles and not compiled(path, quiet=True):
         return 1
     if again is not None:
-        return _again(again, rig, executor)
+        return _again(again, asked.rig, executor)
     pool = _pool(scheduler, workers or cores())
-    return _campaign(rig, seed, episodes, pool, _journal(rig, seed, journal), save, json_)
+    return _campaign(asked, seed, episodes, pool, _journal(asked.rig, seed, journal))
 
 
-def _rig(path: Path, backend: str, executor: str | None, limit_s: float) -> Rig:
+@dataclass(frozen=True, slots=True)
+class CampaignOptions:
+    """What the user asked for.
 
+    Attributes:
+        again: What to type to see an episode again; its file is to be added.
+        folder: Where counterexamples go.
+        json: Where the summary goes, too.
+    """
+
+    rig: Rig[Any]
+    again: str
+    folder: Path
+    json: Path | None
+
+
+def _rig(path: Path, plant: str | None, executor: str | None, script: str, limit_s: float) -> Rig[Any]:
+    """What is played on.
+
+    Raises:
+        BadDescription, BadPlant: The system is not in order, or has no such plant.
+        Stopped: Its episodes need an extra that is not installed.
+        click.UsageError: Its episodes take no script.
+    """
+    system = description(path)
+    spec = plant_of(system, plant)
+    kind = kind_of(system, spec)
+    need(kind.extra)
+    if script and not kind.takes_script:
+        raise click.UsageError("the episodes of this plant have scripts of their own, and take none")
     return Rig(
-        "mujoco" if backend == "mujoco" else "kinematic",
-        "python" if executor == "python" else "c",
-        path.resolve(),
-        limit_s,
+        kind, path.resolve(), plant_name(spec), "python" if executor == "python" else "c", script, limit_s
     )
+
+
+def _again_words(target: Path | None, system: Path | None) -> str:
+    """What to type to see a saved episode again; its file is to be added."""
+    words = ["rcsc", "campaign", *([str(target)] if target else [])]
+    words += ["--system", str(system)] if system else []
+    return f"{shlex.join(words)} --again"
 
 
 def _pool(scheduler: str | None, workers: int) -> AbstractContextManager[WorkerPool]:
@@ -106,7 +154,7 @@ def _pool(scheduler: str | None, workers: int) -> AbstractContextManager[WorkerP
     return processes(workers) if scheduler is None else cluster(scheduler)
 
 
-def _journal(rig: Rig, seed: int, path: Path | None) -> Journal:
+def _journal(rig: Rig[Any], seed: int, path: Path | None) -> Journal:
 
     place = path or journal_path(rig, seed, rig.system.parent / ".rcsc-cache")
     with writing(place):
@@ -114,16 +162,19 @@ def _journal(rig: Rig, seed: int, path: Path | None) -> Journal:
 
 
 def _campaign(  # as many as there are options
-    rig: Rig, seed: int, episodes: int, hired: AbstractContextManager[WorkerPool], journal: Journal, save: Path,
-    json_: Path | None,
-) -> int:  # fmt: skip
+    asked: CampaignOptions,
+    seed: int,
+    episodes: int,
+    hired: AbstractContextManager[WorkerPool],
+    journal: Journal,
+) -> int:
     """Play, sum up, and save counterexamples."""
     with journal, hired as pool:
         progress = _EpisodeProgress(
             episodes, [episode_record for at, episode_record in journal.records.items() if at < episodes]
         )
         try:
-            for new in play(rig, seed, episodes, pool, journal):
+            for new in play(asked.rig, seed, episodes, pool, journal):
                 progress(new)
         except KeyboardInterrupt:
             progress.end()
@@ -134,9 +185,9 @@ def _campaign(  # as many as there are options
             raise
         progress.end()
         records = [record for index, record in sorted(journal.records.items()) if index < episodes]
-        _sum_up(rig, records, progress, json_)
+        _sum_up(asked, records, progress)
         click.echo(f"journal: {journal.path}")
-        _save(rig, seed, records, pool, save)
+        _save(asked, seed, records, pool)
     return 1 if any(record.findings for record in records) else 0
 
 
@@ -190,28 +241,29 @@ def _clock(seconds: float) -> str:
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
-def _sum_up(rig: Rig, records: list[EpisodeRecord], progress: _EpisodeProgress, json_: Path | None) -> None:
-
-    figures = summary(records, known_lines(rig.system), tuple(FAULTS))
+def _sum_up(asked: CampaignOptions, records: list[EpisodeRecord], progress: _EpisodeProgress) -> None:
+    rig = asked.rig
+    figures = summary(records, known_lines(rig.system), rig.kind.faults(rig.system, rig.plant))
     seconds = max(progress.seconds, 1e-9)
     click.echo(as_text(figures))
     click.echo(
         f"{figures.episodes} episodes, {figures.cycles} cycles, {figures.with_findings} with findings; "
         f"{progress.here} played now in {_clock(seconds)}: {progress.here / seconds:.1f} a second, {progress.cycles / seconds:.0f} cycles"
     )
-    if json_ is None:
+    if asked.json is None:
         return
     clock = {
         "played_now": progress.here,
         "seconds": round(seconds, 3),
         "episodes_a_second": progress.here / seconds,
     }
-    put(json.dumps(as_json(figures) | clock, indent=1) + "\n", json_)
-    click.echo(f"wrote {json_}")
+    put(json.dumps(as_json(figures) | clock, indent=1) + "\n", asked.json)
+    click.echo(f"wrote {asked.json}")
 
 
-def _save(rig: Rig, seed: int, records: list[EpisodeRecord], pool: WorkerPool, folder: Path) -> None:
+def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool: WorkerPool) -> None:
     """Shrink and save what is not saved already, and say what to type."""
+    rig, folder = asked.rig, asked.folder
     chosen = choices(records)
     wanted = [choice for choice in chosen[:MOST] if not is_saved(folder, rig, seed, choice)]
     for choice in chosen[:MOST]:
@@ -226,9 +278,9 @@ def _save(rig: Rig, seed: int, records: list[EpisodeRecord], pool: WorkerPool, f
             counterexample.finding.tick,
             counterexample.finding.message,
         )
-        click.echo(f"  = help: rcsc campaign --again {place}", err=True)
         if counterexample.log:
             click.echo(f"  = help: rcsc replay {place / 'log.mcap'}", err=True)
+        click.echo(f"  = help: {asked.again} {shlex.quote(str(place))}", err=True)
     if len(chosen) > MOST:
         click.echo(f"and {len(chosen) - MOST} more kinds of findings, in the journal")
 
@@ -240,9 +292,10 @@ def _tell(where: str, name: str, tick: int, reason: str) -> None:
     )
 
 
-def _again(path: Path, rig: Rig, executor: str | None) -> int:
-
-    outcome = again(path, rig, None if executor is None else rig.executor)
+def _again(path: Path, rig: Rig[Any], executor: str | None) -> int:
+    """Run a saved episode, in a process of its own: it may take that with it."""
+    with processes(1) as pool:
+        outcome = again(path, rig, None if executor is None else rig.executor, pool)
     for number, text, state, reason, ticks in outcome.rows:
         click.echo(f"{number:3}  {text:44} {state:8} {ticks:4} cycles{f'  {reason}' if reason else ''}")
     click.echo(f"{outcome.end} after {outcome.ticks} cycles")

@@ -161,7 +161,7 @@ def load(
     if spec is None:
         return Staged()
     given = spec not in system.plants
-    factory = _factory(system, spec, given=given) if spec.model is None else _named(system, spec, MODELS)
+    factory = _factory(system, spec, given=given) if spec.model is None else named(system, spec, MODELS)
     if not inspect.isclass(factory):
         stage: StageFunction = factory
         return stage(Setup(system, signs, spec, seed, script, database, answers_only))
@@ -189,7 +189,7 @@ def _factory(system: Description, spec: PlantSpec, *, given: bool) -> Any:
     """
     file, _, name = spec.python.partition(":")
     if not file.endswith(".py"):
-        return _named(system, spec, spec.python)
+        return named(system, spec, spec.python)
     page, place = plant_page(system), (*spec.path, "python")
     path = Path(file)
     if not given:
@@ -250,7 +250,7 @@ def _imported(system: Description, path: Path, place: KeyPath) -> ModuleType:
     return module
 
 
-def _named(system: Description, spec: PlantSpec, name: str) -> Any:
+def named(system: Description, spec: PlantSpec, name: str, key: str = "python") -> Any:
     """What `MODULE:NAME` names, of an installed package.
 
     Raises:
@@ -267,7 +267,7 @@ def _named(system: Description, spec: PlantSpec, name: str) -> Any:
         wrong = error
     page = plant_page(system)
     page.wrong(
-        (*spec.path, "python"),
+        (*spec.path, key),
         f"`{name}` cannot be imported: {wrong}",
         "write `FILE.py:CLASS`, or `MODULE:NAME`",
     )

@@ -15,6 +15,7 @@ Nothing here is trusted for a proof. What it costs: without physics a twentieth 
 
 Modules, in the order the data flows: an `episode` is a value; `sampling` draws one by seed, `part_faults` names what
 is odd in it. `setting` makes what a run needs, `operator` interrupts its script, `transport` harms its buffers,
-`loop` runs it and watches its properties. `witness` watches a run for page and report, `stage` is the cell as
+`loop` runs it and watches its properties; `kind` has all that as campaigns take it.
+`witness` watches a run for page and report, `stage` is the cell as
 the plant of its system.
 """

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import chain
 from pathlib import Path
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 from rcsc.host.files.names import shown
 from rcsc.host.files.plain import plain, read
@@ -125,6 +125,11 @@ class Episode:
         step_s: Of physics.
     """
 
+    LISTS: ClassVar[tuple[str, ...]] = (
+        "interruptions", "pushes", "rows", "faults", "transport", "restarts", "parts",
+    )  # fmt: skip
+    PLAINER: ClassVar[tuple[str, ...]] = ("backend",)
+
     backend: Backend = "kinematic"
     executor: Kind = "c"
     seed: int = 0
@@ -164,10 +169,14 @@ class Episode:
     def _numbers(self) -> Iterator[tuple[str, float]]:
         """Yield every number in it, by the name of its field."""
         yield from (("seed", self.seed), ("step_s", self.step_s))
-        for element in chain.from_iterable(getattr(self, name) for name in LISTS):
+        for element in chain.from_iterable(getattr(self, name) for name in self.LISTS):
             for name in REACH:
                 value = getattr(element, name, ())
                 yield from ((name, number) for number in (value if isinstance(value, tuple) else (value,)))
+
+    def script(self) -> str:
+        """Return its rows as a script."""
+        return script(self.rows)
 
     def to_json(self) -> str:
         """Return text that `from_json` reads; the same for the same episode."""
@@ -185,10 +194,6 @@ class Episode:
             raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
         episode: Episode = read(cls, {**plain(Episode()), **values})
         return episode
-
-
-LISTS = ("interruptions", "pushes", "rows", "faults", "transport", "restarts", "parts")
-"""Fields of an episode that hold any number of things, those first that a smaller episode can best do without."""
 
 
 def script(rows: Sequence[str]) -> str:

@@ -10,38 +10,34 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
+from rcsc.campaign.journal import EpisodeRecord, Journal
+from rcsc.campaign.rig import Rig, digest
+from rcsc.campaign.work import CRASH, ENDS, HANG, SURVIVES, no_end, odd, play
+from rcsc.campaign.worker_pool import WorkerPool, WorkersGone
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
-from rcsc_cell.campaign.journal import EpisodeRecord, Journal
-from rcsc_cell.campaign.rig import Rig, digest
-from rcsc_cell.campaign.work import CRASH, ENDS, HANG, SURVIVES, no_end, odd, play
-from rcsc_cell.campaign.worker_pool import WorkerPool, WorkersGone
-from rcsc_cell.episodes.part_faults import fault_classes
 
 Chunk: TypeAlias = tuple[int, ...]
 Records: TypeAlias = tuple[EpisodeRecord, ...]
-
-CHUNKS = {"kinematic": 10, "mujoco": 4}
-"""Episodes a task at most: about a second of work, which handing over does not slow, and which is all that a kill loses."""
 
 _AHEAD = 2
 """Chunks that wait for each worker, so that none waits for a chunk."""
 
 
 def campaign(
-    rig: Rig, seed: int, episodes: int, pool: WorkerPool, journal: Journal, poll_s: float = 0.5
+    rig: Rig[Any], seed: int, episodes: int, pool: WorkerPool, journal: Journal, poll_s: float = 0.5
 ) -> Iterator[Records]:
     """Play the episodes below `episodes` that the journal lacks; yield, at least every `poll_s`, what came in.
 
     Raises:
         WorkersGone: Nobody is left to play.
         OtherTables: A worker is of another checkout.
-        BadDescription, BadData, NotBuilt: The system is not in order.
+        CodedError: The system is not in order.
         OSError: The journal cannot be written.
     """
     todo = [index for index in range(episodes) if index not in journal.records]
-    size = min(CHUNKS[rig.backend], max(1, len(todo) // (4 * pool.workers)))
+    size = min(rig.kind.chunk(rig.system, rig.plant), max(1, len(todo) // (4 * pool.workers)))
     chunks = deque(tuple(todo[at : at + size]) for at in range(0, len(todo), size))
     round_ = _Round(rig, seed, pool, chunks)
     try:
@@ -67,9 +63,9 @@ class _Flight:
 class _Round:
     """Chunks that wait, that are suspected, and that fly."""
 
-    def __init__(self, rig: Rig, seed: int, pool: WorkerPool, waiting: deque[Chunk]) -> None:
+    def __init__(self, rig: Rig[Any], seed: int, pool: WorkerPool, waiting: deque[Chunk]) -> None:
         self._rig, self._seed, self._pool = rig, seed, pool
-        self._digest = digest(rig.system)
+        self._digest = digest(rig)
         self._waiting = waiting
         self._suspects: deque[Chunk] = deque()
         self._alone = False
@@ -119,11 +115,11 @@ class _Round:
     def _guilty(self, index: int) -> EpisodeRecord:
         """The record of an episode that a worker died of."""
         outcome = death(self._rig, time.monotonic() - self._since_s)
-        faults = fault_classes(self._rig.episode(self._seed, index))
+        faults = self._rig.kind.fault_classes(self._rig.episode(self._seed, index))
         return EpisodeRecord(index, faults, outcome.end, 0, outcome.findings, 0, "")
 
 
-def death(rig: Rig, took_s: float) -> EpisodeOutcome:
+def death(rig: Rig[Any], took_s: float) -> EpisodeOutcome:
     """Return the end of an episode that killed its worker after so long: a hang if past the limit."""
     if took_s > rig.limit_s:
         return odd(HANG, EpisodeFinding(ENDS, 0, no_end(rig)))

@@ -9,10 +9,10 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from rcsc.campaign.work import own_process
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host import children
-from rcsc_cell.campaign.work import own_process
 
 if TYPE_CHECKING:
     from distributed import Client

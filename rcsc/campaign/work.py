@@ -15,19 +15,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import FrameType
+from typing import Any, Generic
 
+from rcsc.campaign.journal import EpisodeRecord
+from rcsc.campaign.rig import E, Rig, digest, mask
+from rcsc.campaign.shrink import MOST_TRIES, shrink
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.children import scratch
-from rcsc.run.description import BadDescription
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
-from rcsc.run.executors import NotBuilt
-from rcsc_cell.campaign.journal import EpisodeRecord
-from rcsc_cell.campaign.rig import Rig, digest, mask
-from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
-from rcsc_cell.database.build import BadData
-from rcsc_cell.episodes.episode import Episode
-from rcsc_cell.episodes.part_faults import fault_classes
 
 CRASH, HANG, ERROR = "crash", "hang", "error"
 SURVIVES, ENDS, RAISES = "the process survives", "the run ends in time", "nothing is raised"
@@ -49,19 +45,19 @@ class _OutOfTime(BaseException):
 
 
 @dataclass(frozen=True, slots=True)
-class Shrunk:
+class Shrunk(Generic[E]):
     """A counterexample.
 
     Attributes:
         log: Its log, whole; empty where none could be kept.
     """
 
-    episode: Episode
+    episode: E
     finding: EpisodeFinding
     log: bytes
 
 
-def play(rig: Rig, wanted: str, seed: int, indices: Sequence[int]) -> tuple[EpisodeRecord, ...]:
+def play(rig: Rig[Any], wanted: str, seed: int, indices: Sequence[int]) -> tuple[EpisodeRecord, ...]:
     """Plays episodes of a campaign, one after the other.
 
     Args:
@@ -72,44 +68,43 @@ def play(rig: Rig, wanted: str, seed: int, indices: Sequence[int]) -> tuple[Epis
 
     Raises:
         OtherTables: They have not.
-        BadDescription, BadData, NotBuilt: The system is not in order here.
+        CodedError: The system is not in order here.
     """
     _same(rig, wanted)
     return tuple(_record(rig, index, rig.episode(seed, index)) for index in indices)
 
 
-def _same(rig: Rig, wanted: str) -> None:
-    if digest(rig.system) != wanted:
+def _same(rig: Rig[Any], wanted: str) -> None:
+    if digest(rig) != wanted:
         raise OtherTables("a worker has other tables, data or programs than this campaign")
 
 
-def _record(rig: Rig, index: int, episode: Episode) -> EpisodeRecord:
+def _record(rig: Rig[E], index: int, episode: E) -> EpisodeRecord:
     outcome = attempt(rig, episode)
     lines = mask(outcome.lines, rig.system)
-    return EpisodeRecord(
-        index, fault_classes(episode), outcome.end, outcome.ticks, outcome.findings, lines, outcome.digest
-    )
+    faults = rig.kind.fault_classes(episode)
+    return EpisodeRecord(index, faults, outcome.end, outcome.ticks, outcome.findings, lines, outcome.digest)
 
 
-def attempt(rig: Rig, episode: Episode, log: Path | None = None) -> EpisodeOutcome:
+def attempt(rig: Rig[E], episode: E, log: Path | None = None) -> EpisodeOutcome:
     """Runs an episode; what it raises, and that it does not end, are findings.
 
     Raises:
-        BadDescription, BadData, NotBuilt: The system is not in order; that is no episode's doing.
+        CodedError: The system is not in order; that is no episode's doing.
     """
     try:
         with within(rig.limit_s):
-            return rig.run(episode, rig.system, log)
+            return rig.kind.run(episode, rig.system, log)
     except _OutOfTime:
         return odd(HANG, EpisodeFinding(ENDS, 0, no_end(rig)))
-    except (BadDescription, BadData, NotBuilt):
+    except rig.kind.not_in_order:
         raise
     except Exception as error:  # noqa: BLE001  # whatever it is, it is this episode's finding
         kind = type(error).__name__
         return odd(f"{ERROR}:{kind}", EpisodeFinding(RAISES, 0, f"{kind}: {error}"[:300]))
 
 
-def no_end(rig: Rig) -> str:
+def no_end(rig: Rig[Any]) -> str:
     """Return the finding of a hang: the same however it was ended."""
     return f"no end within {rig.limit_s:g} s"
 
@@ -119,7 +114,7 @@ def odd(end: str, finding: EpisodeFinding) -> EpisodeOutcome:
     return EpisodeOutcome((), (finding,), end, 0, frozenset(), "")
 
 
-def shrunk(rig: Rig, wanted: str, seed: int, index: int, name: str) -> Shrunk:
+def shrunk(rig: Rig[E], wanted: str, seed: int, index: int, name: str) -> Shrunk[E]:
     """Shrink an episode of a campaign to a counterexample of a property, with its log.
 
     Raises:
@@ -130,12 +125,12 @@ def shrunk(rig: Rig, wanted: str, seed: int, index: int, name: str) -> Shrunk:
     return logged(rig, shrink(rig.episode(seed, index), fails, TRIES.get(name, MOST_TRIES)), name)
 
 
-def fails_in(rig: Rig, name: str, episode: Episode) -> bool:
+def fails_in(rig: Rig[E], name: str, episode: E) -> bool:
     """Whether a property does not hold in an episode."""
     return any(finding.property == name for finding in attempt(rig, episode).findings)
 
 
-def logged(rig: Rig, episode: Episode, name: str) -> Shrunk:
+def logged(rig: Rig[E], episode: E, name: str) -> Shrunk[E]:
     """Return the counterexample with its log, which holds the run up to where it ended."""
     with scratch("campaign") as folder:
         path = folder / "log.mcap"

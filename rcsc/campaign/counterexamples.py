@@ -11,21 +11,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rcsc.campaign.journal import EpisodeRecord
+from rcsc.campaign.rig import E, Rig, digest
+from rcsc.campaign.runner import death
+from rcsc.campaign.shrink import MOST_TRIES, shrink
+from rcsc.campaign.work import SURVIVES, TRIES, Shrunk, attempt, logged, shrunk
+from rcsc.campaign.worker_pool import Crashed, WorkerPool
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files import write_atomically
-from rcsc.host.files.names import shown
 from rcsc.host.files.read import json_of, text
-from rcsc.run.description import description
 from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.system import Kind
-from rcsc_cell.campaign.journal import EpisodeRecord
-from rcsc_cell.campaign.rig import Rig, digest
-from rcsc_cell.campaign.runner import death
-from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
-from rcsc_cell.campaign.work import SURVIVES, TRIES, Shrunk, attempt, logged, shrunk
-from rcsc_cell.campaign.worker_pool import Crashed, WorkerPool
-from rcsc_cell.episodes.episode import Episode, script
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -76,8 +73,8 @@ def choices(records: Iterable[EpisodeRecord]) -> tuple[Choice, ...]:
 
 
 def counterexamples(
-    rig: Rig, seed: int, wanted: Sequence[Choice], pool: WorkerPool
-) -> Iterator[tuple[Choice, Shrunk]]:
+    rig: Rig[E], seed: int, wanted: Sequence[Choice], pool: WorkerPool
+) -> Iterator[tuple[Choice, Shrunk[E]]]:
     """Shrink all at once, each in a worker; what kills its worker, one try a task.
 
     Raises:
@@ -85,10 +82,10 @@ def counterexamples(
         OtherTables: A worker is of another checkout.
     """
     careful = [choice for choice in wanted if choice.property == SURVIVES]
-    flying: dict[Choice, tuple[Future[Shrunk], Executor]] = {}
+    flying: dict[Choice, tuple[Future[Shrunk[E]], Executor]] = {}
     for choice in wanted:
         if choice.property != SURVIVES:
-            future = pool.submit(shrunk, rig, digest(rig.system), seed, choice.index, choice.property)
+            future = pool.submit(shrunk, rig, digest(rig), seed, choice.index, choice.property)
             flying[choice] = future, pool.executor
     for choice, (future, executor) in flying.items():
         try:
@@ -100,10 +97,10 @@ def counterexamples(
         yield choice, _carefully(rig, seed, choice, pool)
 
 
-def _carefully(rig: Rig, seed: int, choice: Choice, pool: WorkerPool) -> Shrunk:
+def _carefully(rig: Rig[E], seed: int, choice: Choice, pool: WorkerPool) -> Shrunk[E]:
     """Shrink from this process: a worker may die of each try."""
 
-    def fails(episode: Episode) -> bool:
+    def fails(episode: E) -> bool:
         return any(finding.property == choice.property for finding in _survived(rig, episode, pool).findings)
 
     tries = TRIES.get(choice.property, MOST_TRIES)
@@ -117,7 +114,7 @@ def _carefully(rig: Rig, seed: int, choice: Choice, pool: WorkerPool) -> Shrunk:
         return Shrunk(least, finding, b"")
 
 
-def _survived(rig: Rig, episode: Episode, pool: WorkerPool) -> EpisodeOutcome:
+def _survived(rig: Rig[E], episode: E, pool: WorkerPool) -> EpisodeOutcome:
     begun_s = time.monotonic()
     try:
         return pool.call(attempt, rig, episode)
@@ -128,7 +125,7 @@ def _survived(rig: Rig, episode: Episode, pool: WorkerPool) -> EpisodeOutcome:
 # --- as files ---
 
 
-def save(folder: Path, rig: Rig, seed: int, choice: Choice, shrunk: Shrunk) -> Path:
+def save(folder: Path, rig: Rig[E], seed: int, choice: Choice, shrunk: Shrunk[E]) -> Path:
     """Write a counterexample and return its folder.
 
     Raises:
@@ -142,7 +139,7 @@ def save(folder: Path, rig: Rig, seed: int, choice: Choice, shrunk: Shrunk) -> P
         "faults": list(choice.faults),
     }
     write_atomically(place / "episode.json", shrunk.episode.to_json().encode())
-    write_atomically(place / "script.csv", script(shrunk.episode.rows).encode())
+    write_atomically(place / "script.csv", shrunk.episode.script().encode())
     if shrunk.log:
         write_atomically(place / "log.mcap", shrunk.log)
     else:
@@ -151,7 +148,7 @@ def save(folder: Path, rig: Rig, seed: int, choice: Choice, shrunk: Shrunk) -> P
     return place
 
 
-def is_saved(folder: Path, rig: Rig, seed: int, choice: Choice) -> bool:
+def is_saved(folder: Path, rig: Rig[Any], seed: int, choice: Choice) -> bool:
     """Return whether the folder has this counterexample of these tables; `finding.json` is written last."""
     try:
         facts = json_of(text(folder / choice.name(seed) / "finding.json"))
@@ -160,48 +157,50 @@ def is_saved(folder: Path, rig: Rig, seed: int, choice: Choice) -> bool:
         return False
 
 
-def _origin(rig: Rig, seed: int, choice: Choice) -> dict[str, Any]:
+def _origin(rig: Rig[Any], seed: int, choice: Choice) -> dict[str, Any]:
     return {
         "property": choice.property,
         "seed": seed,
         "index": choice.index,
-        "backend": rig.backend,
+        "plant": rig.plant,
         "executor": rig.executor,
-        "digest": digest(rig.system),
+        "digest": digest(rig),
     }
 
 
-def saved_episode(path: Path) -> Episode:
-    """The episode in a file, or in a counterexample's folder.
+def saved_episode(path: Path, rig: Rig[E]) -> E:
+    """The episode in a file, or in a counterexample's folder, if it is one of this system.
 
     Raises:
         BadEpisode: There is none.
     """
     file = path / "episode.json" if path.is_dir() else path
     try:
-        return Episode.from_json(text(file))
+        episode = rig.kind.read(text(file))
+        rig.kind.check(episode, rig.system)
     except OSError as error:
         raise BadEpisode(f"{file} cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise BadEpisode(f"{file}: {error}") from error
+    return episode
 
 
-def again(path: Path, rig: Rig | None = None, executor: Kind | None = None) -> EpisodeOutcome:
+def again(
+    path: Path, rig: Rig[E], executor: Kind | None = None, pool: WorkerPool | None = None
+) -> EpisodeOutcome:
     """Run a saved episode; what it raises is a finding, too. A regression case has none.
 
     Args:
         path: Its file or folder.
         rig: System, limit and what runs; the plant is the episode's own.
         executor: Instead of the episode's.
+        pool: Where to run it, so that its death is a finding; None for this process.
 
     Raises:
         BadEpisode: The file holds none.
-        BadDescription, BadData, NotBuilt: The system is not in order.
+        CodedError: The system is not in order.
     """
-    episode = saved_episode(path)
-    rig = rig or Rig()
-    levels = {level.name for level in description(rig.system).levels}
-    for restart in episode.restarts:
-        if restart.level not in levels:
-            raise BadEpisode(f"{path}: there is no level {shown(restart.level)} to start again")
-    return attempt(rig, replace(episode, executor=executor) if executor else episode)
+    episode = saved_episode(path, rig)
+    if executor is not None:
+        episode = replace(episode, executor=executor)
+    return attempt(rig, episode) if pool is None else _survived(rig, episode, pool)

@@ -8,11 +8,9 @@ Source: Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing Input
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any, Generic
 
-from rcsc_cell.episodes.episode import LISTS, Episode
-
-Fails: TypeAlias = Callable[[Episode], bool]
+from rcsc.campaign.rig import E
 
 MOST_TRIES = 400
 _HALVINGS = 12
@@ -23,16 +21,20 @@ class _Spent(Exception):  # noqa: N818  # how a search ends
     """No try is left."""
 
 
-class _Search:
+class _Search(Generic[E]):
     """The best episode so far, and what was tried."""
 
-    def __init__(self, episode: Episode, fails: Fails, tries: int) -> None:
+    def __init__(self, episode: E, fails: Callable[[E], bool], tries: int) -> None:
         self.best = episode
         self._fails, self._left = fails, tries
         self._seen = {episode}
 
-    def try_(self, candidate: Episode) -> bool:
-        """Return whether the simpler candidate fails, too, and keep it if so."""
+    def try_(self, simpler: Callable[[], E]) -> bool:
+        """Return whether the simpler candidate is an episode and fails, too, and keep it if so."""
+        try:
+            candidate = simpler()
+        except ValueError:
+            return False
         if candidate in self._seen:
             return False
         if self._left == 0:
@@ -45,7 +47,7 @@ class _Search:
         return True
 
 
-def shrink(episode: Episode, fails: Fails, tries: int = MOST_TRIES) -> Episode:
+def shrink(episode: E, fails: Callable[[E], bool], tries: int = MOST_TRIES) -> E:
     """Return the simplest episode nearby that still fails.
 
     Args:
@@ -57,22 +59,27 @@ def shrink(episode: Episode, fails: Fails, tries: int = MOST_TRIES) -> Episode:
     try:
         while True:
             before = search.best
-            for name in (
-                LISTS
-            ):  # rows early: a script without its last rows ends sooner, and makes every later try cheaper
-                _remove(search, name)
-            _backend(search)
-            for name in LISTS:
-                for at in range(len(getattr(search.best, name))):
-                    _simplify(search, name, at)
-            _numbers(search, search.best, lambda candidate: candidate)
+            _round(search)
             if search.best == before:
                 return before
     except _Spent:
         return search.best
 
 
-def _remove(search: _Search, name: str) -> None:
+def _round(search: _Search[E]) -> None:
+    """Try everything once; lists first, for an episode without its last orders ends sooner, and makes every later try cheaper."""
+    lists = search.best.LISTS
+    for name in lists:
+        _remove(search, name)
+    for name in search.best.PLAINER:
+        _plainer(search, name)
+    for name in lists:
+        for at in range(len(getattr(search.best, name))):
+            _simplify(search, name, at)
+    _numbers(search, search.best, lambda candidate: candidate)
+
+
+def _remove(search: _Search[E], name: str) -> None:
     """Leaves out runs of elements: all of them, halves, quarters, down to single ones."""
     size = len(getattr(search.best, name))
     while size:
@@ -83,54 +90,61 @@ def _remove(search: _Search, name: str) -> None:
         size //= 2
 
 
-def _put(search: _Search, name: str, value: Sequence[Any]) -> bool:
+def _put(search: _Search[E], name: str, value: Sequence[Any]) -> bool:
     changed: dict[str, Any] = {name: tuple(value)}
-    return search.try_(replace(search.best, **changed))
+    return search.try_(lambda: replace(search.best, **changed))
 
 
-def _backend(search: _Search) -> None:
-    """Try kinematics, which is easier to follow and costs a tenth."""
-    if search.best.backend != "kinematic":
-        search.try_(replace(search.best, backend="kinematic"))
+def _plainer(search: _Search[E], name: str) -> None:
+    """Try a field's default: of the paper's cell kinematics, which is easier to follow and costs a tenth."""
+    [field] = (field for field in fields(search.best) if field.name == name)
+    if getattr(search.best, name) != field.default:
+        changed: dict[str, Any] = {name: field.default}
+        search.try_(lambda: replace(search.best, **changed))
 
 
-def _simplify(search: _Search, name: str, at: int) -> None:
+def _simplify(search: _Search[E], name: str, at: int) -> None:
     """Moves the numbers of one element."""
     held = getattr(search.best, name)
     if is_dataclass(held[at]):
         _numbers(search, held[at], lambda element: _placed(search.best, name, at, element))
 
 
-def _placed(episode: Episode, name: str, at: int, element: Any) -> Episode:
+def _placed(episode: E, name: str, at: int, element: Any) -> E:
     held = getattr(episode, name)
     changed: dict[str, Any] = {name: (*held[:at], element, *held[at + 1 :])}
     return replace(episode, **changed)
 
 
-def _numbers(search: _Search, value: Any, placed: Callable[[Any], Episode]) -> None:
+def _numbers(search: _Search[E], value: Any, placed: Callable[[Any], E]) -> None:
     """Move each number of a value toward the usual one: at once, to a round number, or by halves."""
+    lists = search.best.LISTS
     for field in fields(value):
         for _ in range(_HALVINGS):
             nearer = next(
-                (candidate for candidate in _nearer(value, field) if search.try_(placed(candidate))), None
+                (
+                    {field.name: candidate}
+                    for candidate in _nearer(value, field, lists)
+                    if search.try_(lambda: placed(replace(value, **{field.name: candidate})))  # noqa: B023  # called here
+                ),
+                None,
             )
             if nearer is None:
                 break
-            value = nearer
+            value = replace(value, **nearer)
 
 
-def _nearer(value: Any, field: Field[Any]) -> Iterator[Any]:
-    """Yield the value with one field nearer to the usual; the nearest first."""
+def _nearer(value: Any, field: Field[Any], lists: Sequence[str]) -> Iterator[Any]:
+    """Yield what a field might hold that is nearer to the usual; the nearest first."""
     now, usual = getattr(value, field.name), _usual(value, field)
     if now == usual:
         return
-    if isinstance(now, tuple) and isinstance(usual, tuple) and field.name not in LISTS:
-        yield replace(value, **{field.name: usual})
-    if isinstance(now, bool | str | tuple):
-        return
-    yield replace(value, **{field.name: usual})
-    for number in _between(now, usual):
-        yield replace(value, **{field.name: number})
+    if isinstance(now, tuple) and isinstance(usual, tuple) and field.name not in lists:
+        yield usual
+    numbers = all(isinstance(number, int | float) for number in (now, usual))
+    if numbers and not isinstance(now, bool):
+        yield usual
+        yield from _between(now, usual)
 
 
 def _between(now: float, usual: float) -> Iterator[float]:

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rcsc_cell.campaign.journal import EpisodeRecord
-from rcsc_cell.campaign.rig import LineName
+from rcsc.campaign.journal import EpisodeRecord
+from rcsc.campaign.rig import LineName
 
 NOMINAL = "nominal"
 _FIRST = ("done", "failed", "refused")
@@ -62,7 +62,7 @@ def summary(records: Iterable[EpisodeRecord], lines: Sequence[LineName], faults:
 
     Args:
         records: In any order.
-        lines: Of all tables, as `rcsc_cell.campaign.rig.known_lines` has them.
+        lines: Of all tables, as `rcsc.campaign.rig.known_lines` has them.
         faults: Fault classes, in the order in which they are to be shown.
     """
     sorted_ = sorted(records, key=lambda record: record.index)

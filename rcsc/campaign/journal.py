@@ -7,6 +7,7 @@ is dropped; anything else that is wrong is refused, and the file is left as it i
 import fcntl
 import json
 import os
+import re
 import stat
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,12 +15,12 @@ from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 from rcsc import __version__
+from rcsc.campaign.rig import Rig, digest
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files.plain import read
 from rcsc.host.files.read import json_of
 from rcsc.run.episodes.outcome import EpisodeFinding
-from rcsc_cell.campaign.rig import Rig, digest
 
 FORM = 1
 """Of the file; another is not read."""
@@ -27,6 +28,8 @@ FORM = 1
 MOST_BYTES = 256 * 1024 * 1024
 MOST_DIGITS = 100_000
 """Of the lines that ran: a bit each."""
+_PLANT_CHARACTERS = 40
+"""Of a plant, in the name of a file."""
 _SHOWN = 16
 """Digits of a digest that are shown."""
 
@@ -34,7 +37,7 @@ _OTHERS = {
     "form": "is of another form",
     "rcsc": "was written by another version of rcsc",
     "seed": "is of another seed",
-    "backend": "is of another plant",
+    "plant": "is of another plant",
     "executor": "is of other executors",
     "digest": "is of other tables, data or programs",
 }
@@ -55,7 +58,7 @@ class EpisodeRecord:
         faults: Its fault classes; empty where it is nominal.
         end: As of an outcome, and `crash`, `hang` and `error:NAME`.
         ticks: Of control.
-        lines: Those that ran, as bits; see `rcsc_cell.campaign.rig.mask`.
+        lines: Those that ran, as bits; see `rcsc.campaign.rig.mask`.
         digest: Of every cycle's values.
     """
 
@@ -68,7 +71,7 @@ class EpisodeRecord:
     digest: str
 
 
-def header(rig: Rig, seed: int) -> dict[str, Any]:
+def header(rig: Rig[Any], seed: int) -> dict[str, Any]:
     """Return the first line: campaigns with the same one have the same outcomes.
 
     Raises:
@@ -78,15 +81,16 @@ def header(rig: Rig, seed: int) -> dict[str, Any]:
         "form": FORM,
         "rcsc": __version__,
         "seed": seed,
-        "backend": rig.backend,
+        "plant": rig.plant,
         "executor": rig.executor,
-        "digest": digest(rig.system),
+        "digest": digest(rig),
     }
 
 
-def journal_path(rig: Rig, seed: int, folder: Path) -> Path:
+def journal_path(rig: Rig[Any], seed: int, folder: Path) -> Path:
     """Return the default path of the journal, which depends on the tables."""
-    return folder / "campaign" / f"{seed}-{rig.backend}-{rig.executor}-{digest(rig.system)[:16]}.jsonl"
+    plant = re.sub("[^A-Za-z0-9_]+", "_", rig.plant)[-_PLANT_CHARACTERS:] or "first"
+    return folder / "campaign" / f"{seed}-{plant}-{rig.executor}-{digest(rig)[:16]}.jsonl"
 
 
 class Journal:

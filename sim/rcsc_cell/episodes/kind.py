@@ -1,0 +1,76 @@
+"""The cell's episodes as campaigns take them: what `[plant.mujoco]` and `[plant.kinematic]` of `tables/system.toml` name.
+
+In: what `rcsc.campaign` asks of a kind of episodes. Out: `CELL`. The plant's name is the episode's backend.
+"""
+
+from pathlib import Path
+from typing import get_args
+
+from rcsc.campaign.rig import EpisodeKind, NamedFile, run_sources, sources
+from rcsc.host.files.names import shown
+from rcsc.run.description import BadDescription, description
+from rcsc.run.episodes.outcome import EpisodeOutcome
+from rcsc.run.executors import NotBuilt
+from rcsc_cell.cell.ready import Backend
+from rcsc_cell.database.build import BadData
+from rcsc_cell.episodes.episode import FAULTS, Episode
+from rcsc_cell.episodes.part_faults import fault_classes
+from rcsc_cell.episodes.sampling import draw
+
+_CHUNKS = {"kinematic": 10, "mujoco": 4}
+
+
+def _drawn(seed: int, system: Path, plant: str, script: str) -> Episode:  # noqa: ARG001  # its scripts are drawn, too
+    """The episode of a seed.
+
+    Raises:
+        BadDescription: The plant is not called as one of the cell's.
+    """
+    for backend in get_args(Backend):
+        if plant == backend:
+            return draw(seed, backend)
+    raise BadDescription(
+        f"episodes of the cell are of plants {' and '.join(get_args(Backend))}, not {shown(plant)}"
+    )
+
+
+def _run(episode: Episode, system: Path, log: Path | None) -> EpisodeOutcome:
+    """What became of an episode."""
+    from rcsc_cell.episodes.loop import (
+        run,  # of an extra, which is asked for by its name before anything is run
+    )
+
+    return run(episode, system, log)
+
+
+def _check(episode: Episode, system: Path) -> None:
+    """Refuse what the system has not.
+
+    Raises:
+        ValueError: A level.
+    """
+    levels = {level.name for level in description(system).levels}
+    for restart in episode.restarts:
+        if restart.level not in levels:
+            raise ValueError(f"there is no level {shown(restart.level)} to start again")
+
+
+def _faults(system: Path, plant: str) -> tuple[str, ...]:  # noqa: ARG001  # both plants have all
+    return tuple(FAULTS)
+
+
+def _files(system: Path, plant: str, script: str) -> list[NamedFile]:  # noqa: ARG001  # both plants are of the same
+    """The data, the scripts, and the programs around the executors."""
+    scripts = [(f"scripts/{path.name}", path) for path in sorted(system.parent.glob("scripts/*.csv"))]
+    cell = sources(Path(__file__).parents[1], "live", "pictures")
+    return [("data", description(system).database), *scripts, *run_sources(), *cell]
+
+
+def _chunk(system: Path, plant: str) -> int:  # noqa: ARG001  # a matter of physics alone
+    return _CHUNKS[plant]
+
+
+CELL = EpisodeKind(
+    _drawn, _run, Episode.from_json, _check, fault_classes, _faults, _files,
+    not_in_order=(BadDescription, BadData, NotBuilt), chunk=_chunk, extra="cell", takes_script=False,
+)  # fmt: skip
