@@ -26,6 +26,7 @@ The rooms, in the order in which data flows; each imports only from those before
   with no code of theirs;
 - `emit` writes C and Python of what is proved; `run` runs them, with logs; `testing` holds them against the tables;
 - `diff` and `graph` show what changed and what leads where; `compose` proves levels together, for any delay;
+- `episodes` are runs of a system in which something goes wrong, a `campaign` is many of them;
 - `driver` is the pipeline on one screen; `shell` and `commands` are what people type, `api` what Python calls:
   `rcsc.check`, `rcsc.prove` and so on are imported when they are first asked for.
 

@@ -15,10 +15,10 @@ from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
 from rcsc.emit import TARGETS
 from rcsc.emit.generated import write
+from rcsc.episodes.outcome import EpisodeFinding
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
-from rcsc.run.episodes.outcome import EpisodeFinding
 from rcsc.solvers.options import Options
 from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, PartSpec, Restart
 from rcsc_cell.episodes.loop import Loop

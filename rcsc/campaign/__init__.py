@@ -12,7 +12,7 @@ a test:
     rcsc campaign --again tests/regress/house_is_pressed_into_the_pallet.json
 
 What an episode is, its *kind* says: how one is drawn, run, kept as text, and what can be left out of it. Episodes of any
-system are those of `rcsc.run.episodes`; a plant may have its own, as that of the paper's cell has:
+system are those of `rcsc.episodes`; a plant may have its own, as that of the paper's cell has:
 
 >>> from rcsc.campaign.rig import episode_seed
 >>> len({episode_seed(7, 0), episode_seed(7, 1), episode_seed(8, 0)})

@@ -19,9 +19,9 @@ from rcsc.campaign.work import SURVIVES, TRIES, Shrunk, attempt, logged, shrunk
 from rcsc.campaign.worker_pool import Crashed, WorkerPool
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
+from rcsc.episodes.outcome import EpisodeOutcome
 from rcsc.host.files import write_atomically
 from rcsc.host.files.read import json_of, text
-from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.system import Kind
 
 if TYPE_CHECKING:

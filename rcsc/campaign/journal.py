@@ -18,9 +18,9 @@ from rcsc import __version__
 from rcsc.campaign.rig import Rig, digest
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
+from rcsc.episodes.outcome import EpisodeFinding
 from rcsc.host.files.plain import read
 from rcsc.host.files.read import json_of
-from rcsc.run.episodes.outcome import EpisodeFinding
 
 FORM = 1
 """Of the file; another is not read."""

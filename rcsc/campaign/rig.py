@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar
 
+from rcsc.episodes.outcome import EpisodeOutcome
 from rcsc.run.description import BadDescription, description
-from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.executors import NotBuilt
 from rcsc.run.log.schema import fingerprints
 from rcsc.run.system import Kind, signatures

@@ -16,7 +16,7 @@ from rcsc.campaign.journal import EpisodeRecord, Journal
 from rcsc.campaign.rig import Rig, digest
 from rcsc.campaign.work import CRASH, ENDS, HANG, SURVIVES, no_end, odd, play
 from rcsc.campaign.worker_pool import WorkerPool, WorkersGone
-from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
+from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome
 
 Chunk: TypeAlias = tuple[int, ...]
 Records: TypeAlias = tuple[EpisodeRecord, ...]

@@ -22,8 +22,8 @@ from rcsc.campaign.rig import E, Rig, digest, mask
 from rcsc.campaign.shrink import MOST_TRIES, shrink
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
+from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome
 from rcsc.host.children import scratch
-from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
 
 CRASH, HANG, ERROR = "crash", "hang", "error"
 SURVIVES, ENDS, RAISES = "the process survives", "the run ends in time", "nothing is raised"

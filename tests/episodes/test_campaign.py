@@ -39,7 +39,7 @@ from rcsc.campaign.summary import as_json, as_text, summary
 from rcsc.campaign.work import OtherTables, play
 from rcsc.campaign.worker_pool import WorkerPool, WorkersGone, pool_of, processes
 from rcsc.commands.group import commands
-from rcsc.run.episodes.outcome import EpisodeFinding
+from rcsc.episodes.outcome import EpisodeFinding
 from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,

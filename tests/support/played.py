@@ -14,7 +14,7 @@ from pathlib import Path
 from random import Random
 
 from rcsc.campaign.rig import known_lines
-from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, RowEnd
+from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome, RowEnd
 from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, PartSpec
 from rcsc_cell.episodes.loop import run as run_in_cell
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import get_args
 
 from rcsc.campaign.rig import EpisodeKind, NamedFile, run_sources, sources
+from rcsc.episodes.outcome import EpisodeOutcome
 from rcsc.host.files.names import shown
 from rcsc.run.description import BadDescription, description
-from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.executors import NotBuilt
 from rcsc_cell.cell.ready import Backend
 from rcsc_cell.database.build import BadData

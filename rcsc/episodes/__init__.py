@@ -4,7 +4,7 @@ An *episode* is a value: orders, and what goes wrong while they are under way. R
 ended, which properties did not hold and in which cycle, which lines ran, and a digest of every value of every cycle, by
 which two runs are told to be the same:
 
->>> from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
+>>> from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome
 >>> bumped = EpisodeFinding("rests when it is charged", 12, "drive.speed_mm_s = 400")
 >>> EpisodeOutcome((), (bumped,), "done", 80, frozenset(), "").findings[0].tick
 12
