@@ -690,7 +690,8 @@ class Role:
         rest: The command that rests.
         done, failed: The statuses that answer a command.
         reason: The leaf that says why a command failed; None where there is none.
-        late: Says that a subordinate has not echoed in time; None where it is waited for without end.
+        late: Says that a subordinate has not echoed, or not answered, in time; None where it is waited for without end.
+        answers_in_time: Whether an order is late that is not answered in time, too.
     """
 
     peer: str
@@ -702,6 +703,7 @@ class Role:
     failed: str
     reason: VariableName | None = None
     late: VariableName | None = None
+    answers_in_time: bool = False
 
 
 @dataclass(frozen=True, slots=True)

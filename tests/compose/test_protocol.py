@@ -1,19 +1,22 @@
 """A system whose levels declare whom they serve and command: proved with no line of the protocol by hand, refuted where it is wrong."""
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 
 import pytest
 
+from rcsc.compose.contract.claims import Verdict
 from rcsc.compose.contract.obligations import Sort, unstated
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import essential, prove_level
-from rcsc.compose.proof.system import transition_systems
+from rcsc.compose.proof.system import prove_transition_systems, transition_systems
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
 from rcsc.emit import TARGETS
 from rcsc.lang.model import key_bounds, value_of_key
+from rcsc.lang.protocol import Party, written
 from rcsc.run.adopt import adopt
 from rcsc.run.description import description
 from rcsc.run.system import signatures
@@ -85,6 +88,65 @@ def test_a_table_that_looks_at_what_it_keeps_has_to_look_for_a_new_command(dock:
     drive.write_text(text[: begins[0]] + FORGETS + text[begins[1] :])
     proof = prove_level(transition_systems(dock)["drive"], Effort(walks=6, cycles=40, looks=False))
     assert (Sort.ANSWERED, "goto") in {(one.sort, one.table) for one in essential(proof)}
+
+
+BOUNDED = "else drive_silent answered within 250 cycles else drive_fault"
+
+
+FAULT = "| fault | false       |            |               |       | approaching | failed       ||"
+
+
+def endings(dock: Path) -> tuple[dict[str, bool], tuple[str, ...]]:
+    """Whether each command of the supervisor ends, whatever it rests on below; and what that is, where it is not proved."""
+    systems = transition_systems(dock)
+    whole = prove_transition_systems(systems, None, 1, tuple(systems))
+    ends = {ending.table: ending.proved for ending in whole.levels[0].endings}
+    lacks = whole.of("supervisor", (Sort.ENDS, "dock", "")).lacks
+    return ends, tuple(" ".join(part for part in (level, *key) if part) for level, key in lacks)
+
+
+def test_commands_end_though_a_subordinate_that_is_to_answer_in_time_never_does(dock: Path) -> None:
+    """GOTO of the drive may go on for ever, since nothing bounds the way."""
+    without = endings(dock)
+    edit_file(dock.parent / "supervisor.rcs", ("else drive_silent", BOUNDED))
+    assert (without, endings(dock)) == (
+        (dict.fromkeys(("stop", "dock", "undock"), True), ("drive the command ends goto",)),
+        (dict.fromkeys(("stop", "dock", "undock"), True), ()),
+    )
+
+
+def test_a_supervisor_that_does_not_look_for_a_failure_waits_for_ever(dock: Path) -> None:
+    edit_file(
+        dock.parent / "supervisor.rcs",
+        ("else drive_silent", BOUNDED),
+        (f"{FAULT} refuse(drive_fault)         | stop  | failed ", f"{FAULT} | | executing "),
+    )
+    assert not endings(dock)[0]["dock"]
+
+
+def test_what_is_late_is_no_answer(dock: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lines that see the failure give no order, or what is late would be replaced in the cycle that says so."""
+    bad = "| bad   | false       |            |               |       | bad         |              ||                             |"
+    edit_file(
+        dock.parent / "supervisor.rcs",
+        ("else drive_silent", BOUNDED),
+        (f"{FAULT} refuse(drive_fault)         | stop ", f"{FAULT} refuse(drive_fault) | "),
+        (f"{bad} stop ", f"{bad} "),
+    )
+    lates = (Sort.PROPERTY, "", "drive_late_stays")
+    assert (
+        prove_level(transition_systems(dock)["supervisor"], Effort(looks=False)).verdict(*lates)
+        is Verdict.PROVED
+    )
+    too_late = written._answered_too_late  # the text that is to be wrong
+
+    def forgets(party: Party, most: str) -> Iterator[str]:
+        for line in too_late(party, most):
+            yield line.replace(f"if not {party.name}.late or", "if true or", 1)
+
+    monkeypatch.setattr(written, "_answered_too_late", forgets)
+    proof = prove_level(transition_systems(dock)["supervisor"], Effort(looks=False))
+    assert lates in {obligation.key for obligation in proof.open}
 
 
 def test_a_running_level_adopts_what_the_proof_says_after_a_restart(dock: Path) -> None:

@@ -3,7 +3,7 @@
 The reference is written from sections 8.3 and 9 of Haynes et al. (1984), and knows nothing of the text that the compiler makes.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import pytest
@@ -18,7 +18,7 @@ from rcsc.lang.restart import After, Fixed, SameAs
 WORDS = """
 enum job { rest, work, stow }
 enum status { done, executing, failed }
-enum why { none, broken, silent, begun_anew }
+enum why { none, broken, silent, begun_anew, slow }
 link jobs {
   command : job rest rest
   status : status done done failed failed executing executing
@@ -75,6 +75,7 @@ class Said:
     """What a subordinate was told, and what is known of it."""
 
     within: int | None
+    answered: int | None = None
     number: int = 0
     command: str = "rest"
     width: int = 0
@@ -83,9 +84,13 @@ class Said:
     unechoed: int = 0
     late: bool = False
     resting: bool = False
+    unanswered: int = 0
+    why: str = "silent"
 
-    def look(self, echo: int) -> bool:
+    def look(self, echo: int, status: str) -> bool:
         """Whether the last order is echoed, or given up."""
+        if self.answered is not None:
+            return self.look_for_answers(echo == self.number, status)
         if echo == self.number and (not self.late or self.command == "rest"):
             self.unechoed, self.late = 0, False
         else:
@@ -93,22 +98,39 @@ class Said:
             self.late = self.within is not None and self.unechoed > self.within
         return echo == self.number or self.late
 
+    def look_for_answers(self, echoed: bool, status: str) -> bool:
+        """The same where an order is to be answered in time, too; what is late and does not rest is left alone."""
+        assert self.answered is not None
+        rests = self.command == "rest"
+        if self.late and not rests:
+            return True
+        if echoed and (status == "done" or (status == "failed" and not rests)):
+            if rests:
+                self.unanswered, self.late = 0, False
+            return True
+        most = self.answered if echoed or self.within is None else min(self.within, self.answered)
+        self.late = self.unanswered >= most
+        self.unanswered += not self.late
+        if self.late:
+            self.why = "slow" if self.unanswered >= self.answered else "silent"
+        return echoed or self.late
+
     def hold(self, report: tuple[str, str, str]) -> None:
         """Take what is said of the last order."""
-        self.held = (self.command, "failed", "silent") if self.late else report
+        self.held = (self.command, "failed", self.why) if self.late else report
 
     def give(self) -> None:
         """Number what is new."""
         if (self.command, self.width) != self.numbered:
             self.number, self.numbered = (self.number + 1) % 65536, (self.command, self.width)
-            self.unechoed, self.late = 0, False
+            self.unechoed, self.unanswered, self.late = 0, 0, False
 
 
 @dataclass
 class Level:
     """The level of `LEVEL` by hand."""
 
-    below: dict[str, Said] = field(default_factory=lambda: {"arm": Said(2), "hand": Said(None)})
+    below: dict[str, Said]
     seen: int = 0
     new: bool = False
     answered: bool = False
@@ -121,7 +143,7 @@ class Level:
         self, order: tuple[int, str], reports: dict[str, tuple[int, str, str, str]], choice: str
     ) -> None:
         """One cycle."""
-        heard = [said.look(reports[name][0]) for name, said in self.below.items()]
+        heard = [said.look(reports[name][0], reports[name][2]) for name, said in self.below.items()]
         echoed = all(heard)
         if echoed:
             self.phase = self.pending
@@ -172,7 +194,7 @@ class Level:
 JOBS, STATUSES, WHY = (
     ("rest", "work", "stow"),
     ("done", "executing", "failed"),
-    ("none", "broken", "silent", "begun_anew"),
+    ("none", "broken", "silent", "begun_anew", "slow"),
 )
 CHOICES = ("nothing", "halt", "begin", "wider", "put_away", "let_rest")
 echoes = st.sampled_from(["last", "last", "last", "before", "other"])
@@ -183,15 +205,24 @@ runs = st.lists(st.tuples(a_cycle, idle, st.integers(0, 4)), min_size=4, max_siz
 """Cycles each of which is followed by some in which the level gives no new order, as what waits for an echo does."""
 
 
-@settings(max_examples=150)
-@given(runs, st.sampled_from([0, 0, 65534]))
+BOUNDS = {
+    "within 2 cycles else silent": (2, None),
+    "within 2 cycles else silent answered within 4 cycles else slow": (2, 4),
+    "answered within 3 cycles else slow": (None, 3),
+}
+"""Cycles in which the arm has to echo, and to answer."""
+
+
+@settings(max_examples=250)
+@given(runs, st.sampled_from([0, 0, 65534]), st.sampled_from([*BOUNDS]))
 def test_a_level_that_declares_its_neighbours_keeps_the_protocol_of_the_paper(
-    drawn: list[tuple[Any, Any, int]], begun: int
+    drawn: list[tuple[Any, Any, int]], begun: int, bounds: str
 ) -> None:
     cycles = [one for first, then, often in drawn for one in (first, *[then] * often)]
-    made = program(LEVEL)
+    made = program(LEVEL.replace("within 2 cycles else silent", bounds))
     kinds = {str(v.name): v.type for v in made.variables}
-    by_hand, now, number = Level(), initial(made), 0
+    by_hand = Level({"arm": Said(*BOUNDS[bounds]), "hand": Said(None)})
+    now, number = initial(made), 0
     for name, said in by_hand.below.items():  # numbers near the end wrap
         said.number = now[f"to_{name}.inc_command"] = now[f"from_{name}.inc_command_echo"] = begun
     for new, job, arm, hand, choice in cycles:
@@ -386,6 +417,19 @@ def test_levels_without_a_superior_and_without_subordinates_are_levels() -> None
         ("serves boss : jobs", "serves boss : jobs\nserves other : jobs", "RCS202", "one superior"),
         ("serves boss : jobs", "serves boss : jobs\nstate new_command : bool", "RCS202", "`new_command`"),
         ("within 2 cycles", "within 0 cycles", "RCS301", "at least one cycle"),
+        ("else silent", "answered within 0 cycles", "RCS301", "an answer takes at least one cycle"),
+        (
+            "else silent",
+            "answered within 2 cycles",
+            "RCS301",
+            "answered within 2 cycles, and echoed within 2",
+        ),
+        (
+            "else silent",
+            "else silent answered within 9 cycles else slower",
+            "RCS201",
+            "no reason is called `slower`",
+        ),
         ("phase : phase restart out", "phase : phase restart elsewhere", "RCS201", "elsewhere"),
         ("input choice : choice", "input choice : choice restart halt", "RCS301", "is an input"),
         ("reason why : why restart begun_anew", "reason why : why restart rest", "RCS301", "expected `why`"),

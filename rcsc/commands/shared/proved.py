@@ -42,7 +42,7 @@ def not_looked_at(proof: LevelProof) -> Iterator[str]:
         yield f"{'not looked at' if unstated.applies else 'does not apply'}: {unstated.shown}"
 
 
-def in_context(whole: SystemProof, proof: LevelProof) -> Iterator[str]:
+def in_context(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> Iterator[str]:
     """Describe a level in its context, line by line."""
     seen = proof.context
     if seen is None:
@@ -57,7 +57,13 @@ def in_context(whole: SystemProof, proof: LevelProof) -> Iterator[str]:
     if seen.orders:
         yield from _again(whole, proof.level, seen)
     if proof.endings:
-        yield "given that every order that is not replaced is answered some time, and stays so,"
+        in_time = [below.name for below in ts.links.below if below.answers_in_time]
+        late = (
+            f" (of `{'`, `'.join(in_time)}`, which fails if it is late: every order to rest)"
+            if in_time
+            else ""
+        )
+        yield f"given that every order that is not replaced is answered some time{late}, and stays so,"
         for ending in proof.endings:
             closed = whole.of(proof.level, (Sort.ENDS, ending.table, ""))
             only = (

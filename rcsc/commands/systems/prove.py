@@ -248,7 +248,7 @@ def _say_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> N
     click.echo(
         f"  invariant: {many} clauses over {len(proof.predicates)} features; {proof.walked} states walked, {proof.learnt} learnt"
     )
-    for line in in_context(whole, proof):
+    for line in in_context(ts, whole, proof):
         click.echo(f"  {line}")
 
 

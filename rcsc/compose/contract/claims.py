@@ -26,6 +26,8 @@ RUNS: Key = ("the level runs as its tables say", "", "")
 SAFE: Key = ("every operation is defined and in range", "", "")
 ENDING: Key = ("every command ends", "", "")
 """What termination of the level above rests on."""
+RESTING: Key = ("the command that rests ends", "", "")
+"""What it rests on where the level above fails orders that are not answered in time."""
 CONTRACT, UNREACHED, AGAIN = "the contract", "never reached", "does nothing when it matches again"
 """Sorts of claims that are no obligations of one cycle."""
 
@@ -168,6 +170,7 @@ def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> s
         RUNS: "the level was not looked at",
         SAFE: f"{sort} within a cycle",
         ENDING: "that its commands end was not looked at",
+        RESTING: "that it comes to rest was not looked at",
     }
     words = phrases.get(need[1], " ".join(part for part in (sort, f"`{name}`" if name else "") if part))
     if sort == CONTRACT:

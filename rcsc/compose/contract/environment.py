@@ -65,11 +65,13 @@ class Below(Neighbour):
 
     Attributes:
         late: The flag that it has not echoed in time; None where it is waited for without end.
+        answers_in_time: Whether the flag says so, too, of an order that it has not answered in time.
         held: The command and the status that are held of its report; empty where the level holds them itself.
     """
 
     late: str | None = None
     held: tuple[str, ...] = ()
+    answers_in_time: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +209,8 @@ def _declared(
 def _subordinate(owner: str, role: Role, outside: bool) -> Below:  # as `Neighbour` has it
     late = None if role.late is None else str(role.late)
     held = f"{role.peer}.command", f"{role.peer}.status"
-    return Below(owner, role.order, role.report, outside, late, held, done=role.done, failed=role.failed)
+    own = late, held, role.answers_in_time
+    return Below(owner, role.order, role.report, outside, *own, done=role.done, failed=role.failed)
 
 
 def _asked(system: Description, level: str, program: Program) -> tuple[Asked, ...]:

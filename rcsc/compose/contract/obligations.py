@@ -318,6 +318,12 @@ def pause_of(ts: TransitionSystem) -> str:
     return kind.members[0] if isinstance(kind, Enum) else ""
 
 
+def resting_table(ts: TransitionSystem) -> str:
+    """Return the table of the first command; empty for none."""
+    chosen = ts.level.tables
+    return str(chosen.table if isinstance(chosen, OneTable) else dict(chosen.tables).get(0, ""))
+
+
 def run_by(ts: TransitionSystem) -> list[Table]:
     """List the tables that the level runs."""
     return [table for table in ts.program.tables if table.name in ts.level.tables.names]

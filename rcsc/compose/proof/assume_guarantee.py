@@ -13,6 +13,7 @@ from rcsc.compose.contract.claims import (
     CONTRACT,
     DECLARED,
     ENDING,
+    RESTING,
     RUNS,
     SAFE,
     UNREACHED,
@@ -24,7 +25,7 @@ from rcsc.compose.contract.claims import (
     worst,
 )
 from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER
-from rcsc.compose.contract.obligations import Sort, asks
+from rcsc.compose.contract.obligations import Sort, asks, resting_table
 from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 
@@ -78,6 +79,7 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     if proof.endings:
         every = tuple((name, (Sort.ENDS, ending.table, "")) for ending in proof.endings)
         yield ENDING, Claim(Verdict.PROVED, every)
+        yield RESTING, Claim(Verdict.PROVED, ((name, (Sort.ENDS, resting_table(ts), "")),))
 
 
 def _of_a_refusal(ts: TransitionSystem, level: str) -> Iterator[str]:
@@ -128,14 +130,18 @@ def _of_ending(ts: TransitionSystem, still: Iterable[str], verdict: Verdict) -> 
     """Claim that a command ends, assuming that subordinates answer theirs and that some inputs stand still."""
     name, below = ts.level.name, ts.links.below
     trusts = [
-        f"`{other.name}` answers every order that is not replaced, and stays so"
+        f"`{other.name}` comes to rest some time where it is told to, and stays so"
+        if other.answers_in_time
+        else f"`{other.name}` answers every order that is not replaced, and stays so"
         for other in below
         if other.outside
     ]
     trusts += [f"the values in `{record}` of level `{name}` stand still meanwhile" for record in still]
     if asks(ts.program):
         trusts.append(f"extern procedures of level `{name}` are refused only finitely often")
-    needs = tuple((other.name, ENDING) for other in below if not other.outside)
+    needs = tuple(
+        (other.name, RESTING if other.answers_in_time else ENDING) for other in below if not other.outside
+    )
     return Claim(verdict, ((name, RUNS), *needs), tuple(trusts))
 
 

@@ -2,7 +2,9 @@
 
 In: a transition system, and what was confirmed of it. Out: an `Ending` for each table. A level is *answered* in a cycle when each
 subordinate echoes the last order and reports it *done* or *failed*; the first command, such as PAUSE, *done* only. It is
-assumed that each order, unless another replaces it, is eventually answered and stays so. The same is shown of the level itself:
+assumed that each order, unless another replaces it, is eventually answered and stays so. Of a subordinate that is to answer in a
+declared time this is assumed of orders to rest alone: any other is late for good once it has been unanswered for so many cycles, in
+all, and a late one counts as answered (`rcsc.lang.protocol`). The same is shown of the level itself:
 it is *unanswered* while it reports neither; no other status answers. The argument, for a level that keeps one command:
 
 - Its *table* stays; or, if the command does not select it, tables do not follow one another in a loop.
@@ -97,9 +99,13 @@ def unanswered(ts: TransitionSystem, cycle: Cycle) -> Node:
 
 
 def answered(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
-    """Return the condition that the last order is echoed, and ended."""
+    """Return the condition that the last order is echoed, and ended, or that its answer is late where that counts as one."""
     echoed = values.equal(cycle.taken[below.echo], cycle.before[below.number])
-    return values.both(echoed, _ended(ts, below, cycle.before, cycle.taken))
+    ended = values.both(echoed, _ended(ts, below, cycle.before, cycle.taken))
+    if below.late is None or not below.answers_in_time:
+        return ended
+    rests = values.equal(cycle.before[below.command], values.constant(ts.kinds[below.command], 0))
+    return values.either(ended, values.both(cycle.middle[below.late], values.negation(rests)))
 
 
 def _ended(ts: TransitionSystem, end: Neighbour, ordered: Leaves, reported: Leaves) -> Node:

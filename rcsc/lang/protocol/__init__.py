@@ -6,8 +6,8 @@ a new command, what is held until an echo. So nobody writes them by hand.
 Definitions. A *link* is what a superior and a subordinate say to each other: commands, statuses, further fields of the order and the
 report. A field of an order is *numbered* unless it is a *stream*: where a numbered field changes, the order takes the next number. A
 subordinate's report is *held*: what it says of an older order is not looked at, and all reports are taken together once every last
-order is echoed. A stream is looked at as it comes. An order that is not echoed in time is *late*: it counts as failed, and what is
-said of it from then on is no answer; but to rest is never too late.
+order is echoed. A stream is looked at as it comes. An order that is not echoed in time, or not answered, is *late*: it counts as
+failed, and what is said of it from then on is no answer; but to rest is never too late.
 
     serves fleet : fleet_link               what fleet orders is `fleet`, what is reported to it `to_fleet`
     commands drive : drive_link             what is ordered of it is `to_drive`, what it said of the last order `drive`

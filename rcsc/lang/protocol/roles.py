@@ -21,6 +21,7 @@ class Party:
         without: Standard properties that are not asked.
         within: Cycles after which an order that is not echoed has failed; None where it is waited for without end.
         late: The reason that is then given; None where there is none.
+        answered: Cycles after which an order that is not answered has failed; `unanswered`, the reason. None likewise.
         failed: The place of *failed* among the members of the status.
         numbered: Scalars of the order that change with its number only.
         none: The member of the reason that says that there is none; None where the report has no reason.
@@ -34,6 +35,8 @@ class Party:
     without: tuple[str, ...] = ()
     within: tree.Expr | None = None
     late: str | None = None
+    answered: tree.Expr | None = None
+    unanswered: str | None = None
 
     @property
     def name(self) -> str:
@@ -54,6 +57,11 @@ class Party:
     def last(self) -> str:
         """The order to a subordinate that was numbered last."""
         return f"last_{self.name}"
+
+    @property
+    def bounded(self) -> bool:
+        """Whether an order fails that is not echoed, or not answered, in time."""
+        return self.within is not None or self.answered is not None
 
     @property
     def held(self) -> tuple[tree.LinkField, ...]:
@@ -114,7 +122,7 @@ class _Types:
             if isinstance(d, tree.EnumDecl)
         }
         self._named = {d.name.text: d for d in declarations if isinstance(d, tree.TypeDecl | tree.RecordDecl)}
-        self._lengths = {d.name.text: d.value for d in declarations if isinstance(d, tree.ConstDecl)}
+        self._constants = {d.name.text: d.value for d in declarations if isinstance(d, tree.ConstDecl)}
 
     def scalars(self, path: str, kind: tree.TypeExpr, depth: int = 0) -> Iterator[str]:
         """List the scalars of a field; a type that is not sound is taken for one, and is reported elsewhere."""
@@ -134,12 +142,14 @@ class _Types:
             yield path
 
     def _length(self, written: tree.Expr) -> int | None:
+        length = self.number(written)
+        return length if length is not None and length <= MOST_LENGTH else None
+
+    def number(self, written: tree.Expr) -> int | None:
+        """Return a number, or a constant that is one; None where it has to be reckoned."""
         if isinstance(written, tree.Reference):
-            written = self._lengths.get(written.name.text, written)
-        length = (
-            int(written.text.replace("_", ""), 0) if isinstance(written, tree.IntLiteral) else MOST_LENGTH + 1
-        )
-        return length if length <= MOST_LENGTH else None
+            written = self._constants.get(written.name.text, written)
+        return int(written.text.replace("_", ""), 0) if isinstance(written, tree.IntLiteral) else None
 
     def none(self, link: tree.LinkDecl) -> str | None:
         """Return the first member of the link's reason; None where it has no reason."""
@@ -165,16 +175,33 @@ def _subordinate(
     link = _link(scope, given.link, links)
     if link is None:
         return None
-    late = None if given.late is None else given.late.text
-    party = _party(given.peer, link, types, within=given.within, late=late)
-    if isinstance(given.within, tree.IntLiteral) and not int(given.within.text.replace("_", ""), 0):
-        scope.report(Code.KIND, "an echo takes at least one cycle", given.within.span)
-    if given.late is not None:
+    late, unanswered = (None if reason is None else reason.text for reason in (given.late, given.unanswered))
+    bounds = {"within": given.within, "late": late, "answered": given.answered, "unanswered": unanswered}
+    party = _party(given.peer, link, types, **bounds)
+    _bounds(scope, given, types)
+    for reason in filter(None, (given.late, given.unanswered)):
         if party.reason is None:
-            scope.report(Code.KIND, f"the report of link `{link.name.text}` has no `reason`", given.late.span)
+            scope.report(Code.KIND, f"the report of link `{link.name.text}` has no `reason`", reason.span)
         else:
-            _known_reason(scope, link, given.late, types.members)
+            _known_reason(scope, link, reason, types.members)
     return party
+
+
+def _bounds(scope: Scope, given: tree.CommandsDecl, types: "_Types") -> None:
+    """Report times in which nothing can be echoed or answered; what is no number or constant is checked where it counts."""
+    echo, answer = (
+        None if bound is None else types.number(bound) for bound in (given.within, given.answered)
+    )
+    for bound, cycles, what in ((given.within, echo, "an echo"), (given.answered, answer, "an answer")):
+        if bound is not None and cycles == 0:
+            scope.report(Code.KIND, f"{what} takes at least one cycle", bound.span)
+    if given.answered is not None and echo and answer and answer <= echo:
+        scope.report(
+            Code.KIND,
+            f"an order is to be answered within {answer} cycles, and echoed within {echo}",
+            given.answered.span,
+            "both are counted from the order, and the echo comes first: give the answer more time",
+        )
 
 
 def _known_reason(

@@ -47,8 +47,9 @@ def subordinate(party: Party) -> Iterator[str]:
     """The buffers to and from a subordinate, what it said of the last orders, and the order that was numbered last."""
     name, link = party.name, party.link
     yield f"record {name}_held {{\n  command : {link.command.text}\n  status : {link.status.text}\n  resting : bool"
-    if party.within is not None:
-        yield "  ## The last order was not echoed in time; what is said of it from now on is no answer.\n  late : bool"
+    if party.bounded:
+        what = "echoed" if party.answered is None else "answered"
+        yield f"  ## The last order was not {what} in time; what is said of it from now on is no answer.\n  late : bool"
     yield from _fields(party.held)
     yield f"}}\nrecord {name}_last {{\n  input_command : {link.command.text}"
     yield from _fields([part for part in link.order if part.word != "stream"])
@@ -56,9 +57,10 @@ def subordinate(party: Party) -> Iterator[str]:
     yield f"## Orders to {name}.\noutput {party.told} : {link.name.text}_order"
     yield f"## What {name} says of the last orders, held until they are echoed.\nstate {name} : {name}_held"
     yield f"## The order to {name} that was numbered last.\nstate {party.last} : {name}_last"
-    if party.within is not None:
-        cycles = spell_expr(party.within)
-        yield f"## Cycles for which {name} has not echoed the last order.\nstate {name}_waited : int 0 .. {cycles}"
+    cycles = party.answered or party.within
+    if cycles is not None:
+        what = "echoed" if party.answered is None else "answered"
+        yield f"## Cycles for which {name} has not {what} the last order.\nstate {name}_waited : int 0 .. {spell_expr(cycles)}"
 
 
 ECHOED = "## Every last order is echoed, or too late.\nstate echoed : bool"
@@ -70,10 +72,24 @@ def all_echoed(parties: Parties) -> str:
 
 
 def _echoed_at_first(party: Party) -> str:
-    echoed = f"{party.raw}.inc_command_echo = {party.told}.inc_command"
-    if party.within is None:
+    echoed = _echoes(party)
+    if not party.bounded:
         return echoed
-    return f"({echoed} or {party.name}_waited = {spell_expr(party.within)})"
+    waited = f"{party.name}_waited"
+    if party.answered is None:
+        return f"({echoed} or {waited} = {_cycles(party)})"
+    return f"({echoed} or {waited} >= {_cycles(party)})"
+
+
+def _echoes(party: Party) -> str:
+    return f"{party.raw}.inc_command_echo = {party.told}.inc_command"
+
+
+def _cycles(party: Party) -> str:
+    """The cycles after which an order is late that is not echoed."""
+    cycles = party.within or party.answered
+    assert cycles is not None
+    return spell_expr(cycles)
 
 
 # --- procedures ---
@@ -106,7 +122,7 @@ def taken(parties: Parties) -> Iterator[str]:
     above, below = parties.superior, parties.subordinates
     reads = [part for party in below for part in (party.raw, party.told, party.name)]
     writes = [party.name for party in below] + (["echoed"] if below else [])
-    timed = [f"{party.name}_waited" for party in below if party.within is not None]
+    timed = [f"{party.name}_waited" for party in below if party.bounded]
     if above is not None:
         own = ["inc_command_seen", "new_command", "answered"]
         reads += [above.name, *own]
@@ -130,19 +146,42 @@ def taken(parties: Parties) -> Iterator[str]:
 
 
 def _too_late(party: Party) -> Iterator[str]:
-    if party.within is None:
+    if not party.bounded:
         return
-    name, cycles = party.name, spell_expr(party.within)
-    rests = f"{party.told}.input_command = {party.link.rest.text}"
-    yield f"  if {party.raw}.inc_command_echo = {party.told}.inc_command and (not {name}.late or {rests}) {{"
+    if party.answered is not None:
+        yield from _answered_too_late(party, spell_expr(party.answered))
+        return
+    name, cycles = party.name, _cycles(party)
+    yield f"  if {_echoes(party)} and (not {name}.late or {_rests(party)}) {{"
     yield f"    {name}_waited := 0\n    {name}.late := false"
     yield f"  }} else if {name}_waited < {cycles} {{\n    {name}_waited := {name}_waited + 1"
     yield f"  }} else {{\n    {name}.late := true\n  }}"
 
 
+def _answered_too_late(party: Party, most: str) -> Iterator[str]:
+    """Count cycles in which an order is not answered: one that rests is so by *done* alone, and still when it is late.
+
+    They are counted in all, so that an order is answered for good or late for good, whatever the subordinate reports.
+    """
+    name, link = party.name, party.link
+    status = f"{party.raw}.status_report"
+    answers = f"({status} = {link.done.text} or {status} = {link.failed.text} and not {_rests(party)})"
+    waits = f"{name}_waited < {most}"
+    if party.within is not None:
+        waits = f"{name}_waited < {_cycles(party)} or {_echoes(party)} and {waits}"
+    yield f"  if not {name}.late or {_rests(party)} {{\n    if {_echoes(party)} and {answers} {{"
+    yield f"      if {_rests(party)} {{\n        {name}_waited := 0\n        {name}.late := false\n      }}"
+    yield f"    }} else if {waits} {{"
+    yield f"      {name}_waited := {name}_waited + 1\n      {name}.late := false"
+    yield f"    }} else {{\n      {name}.late := true\n    }}\n  }}"
+
+
+def _rests(party: Party) -> str:
+    return f"{party.told}.input_command = {party.link.rest.text}"
+
+
 def _echoed(party: Party) -> str:
-    echoed = f"{party.raw}.inc_command_echo = {party.told}.inc_command"
-    return echoed if party.within is None else f"({echoed} or {party.name}.late)"
+    return f"({_echoes(party)} or {party.name}.late)" if party.bounded else _echoes(party)
 
 
 def _order_taken(above: Party, echoed: str) -> Iterator[str]:
@@ -159,16 +198,30 @@ def _held(party: Party) -> Iterator[str]:
     name, raw = party.name, party.raw
     plain = [f"{name}.command := {raw}.ref_command_echo", f"{name}.status := {raw}.status_report"]
     plain += [f"{name}.{part.name.text} := {raw}.{part.name.text}" for part in party.held]
-    if party.within is None:
+    if not party.bounded:
         yield from (f"    {line}" for line in plain)
         return
     yield f"    if {name}.late {{"
     yield f"      {name}.command := {party.told}.input_command\n      {name}.status := {party.link.failed.text}"
-    if party.late is not None:
-        yield f"      {name}.{party.reason} := {party.late}"
+    yield from (f"      {line}" for line in _why_late(party))
     yield "    } else {"
     yield from (f"      {line}" for line in plain)
     yield "    }"
+
+
+def _why_late(party: Party) -> Iterator[str]:
+    """Give the reason of what is late: it was not answered, or not even echoed."""
+    silent, slow = (
+        None if reason is None else f"{party.name}.{party.reason} := {reason}"
+        for reason in (party.late, party.unanswered)
+    )
+    if party.answered is None or party.within is None:
+        yield from filter(None, (silent, slow))
+        return
+    if slow is not None:
+        yield f"if {party.name}_waited = {spell_expr(party.answered)} {{\n  {slow}\n}}"
+    if silent is not None:
+        yield f"if {party.name}_waited < {spell_expr(party.answered)} {{\n  {silent}\n}}"
 
 
 def _resting(party: Party, served: bool) -> str:  # whether there is a superior
@@ -187,7 +240,7 @@ def given(parties: Parties) -> Iterator[str]:
     reads = [part for party in below for part in (party.told, party.last)]
     writes = [part for party in below for part in (party.last, f"{party.told}.inc_command")]
     for party in below:
-        writes += [f"{party.name}_waited", f"{party.name}.late"] if party.within is not None else []
+        writes += [f"{party.name}_waited", f"{party.name}.late"] if party.bounded else []
     if above is not None:
         reads += ["new_command", "settling", "inc_command_seen", f"{above.name}.input_command"]
         writes += ["answered", f"{above.told}.inc_command_echo", f"{above.told}.ref_command_echo"]
@@ -205,7 +258,7 @@ def _numbered(party: Party) -> Iterator[str]:
     told, last = party.told, party.last
     yield f"  if {' or '.join(f'{told}.{part} /= {last}.{part}' for part in party.numbered)} {{"
     yield f"    {told}.inc_command := ({told}.inc_command + 1) mod 65536"
-    if party.within is not None:
+    if party.bounded:
         yield f"    {party.name}_waited := 0\n    {party.name}.late := false"
     yield "  }"
     yield f"  {last}.input_command := {told}.input_command"
@@ -221,6 +274,12 @@ def _numbered(party: Party) -> Iterator[str]:
 
 def properties(parties: Parties, own: set[str]) -> Iterator[str]:
     """The properties that come with the protocol, but for those of the program's own of the same name, and those switched off."""
+    for party in parties.subordinates:
+        if party.answered is not None and (name := f"{party.name}_late_stays") not in own:
+            failed = f"{party.name}.late and {party.name}.status = {party.link.failed.text}"
+            number = f"{party.told}.inc_command"
+            yield f"## What comes late of {party.name} is no answer: the order has failed."
+            yield f"property {name} : {failed} and not {_rests(party)} then {failed} or {number} /= was {number}"
     above = parties.superior
     if above is None:
         return

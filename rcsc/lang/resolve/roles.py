@@ -44,11 +44,12 @@ def _role(party: Party, order: str, report: str, scope: Scope) -> Role:
     numbered = tuple(
         leaf for leaf in map(VariableName, scope.leaves) if any(_part_of(leaf, r) for r in records)
     )
-    late = VariableName(f"{party.name}.late") if party.within is not None else None
+    late = VariableName(f"{party.name}.late") if party.bounded else None
     reason = VariableName(f"{report}.{party.reason}") if party.reason is not None else None
     link = party.link
+    words = link.rest.text, link.done.text, link.failed.text
     return Role(
-        party.name, order, report, numbered, link.rest.text, link.done.text, link.failed.text, reason, late
+        party.name, order, report, numbered, *words, reason, late, answers_in_time=party.answered is not None
     )
 
 

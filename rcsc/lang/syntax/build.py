@@ -214,12 +214,16 @@ class Build:
 
     def _commands_decl(self, node: ParseNode) -> tree.CommandsDecl:
         head = self._head(node)
-        peer, link, *within = node.children
-        if not within:
-            return tree.CommandsDecl(self._name(peer), self._name(link), **head)
-        cycles, *late = within[0].children
-        reason = self._name(late[0]) if late else None
-        return tree.CommandsDecl(self._name(peer), self._name(link), self.expr(cycles), reason, **head)
+        peer, link, *bounds = node.children
+        within, answered = (self._bound(self._find(bounds, rule)) for rule in ("within", "answered"))
+        return tree.CommandsDecl(self._name(peer), self._name(link), *within, *answered, **head)
+
+    def _bound(self, node: ParseNode | None) -> tuple[tree.Expr | None, tree.Name | None]:
+        """A number of cycles, and the reason of what takes longer."""
+        if node is None:
+            return None, None
+        cycles, *reason = node.children
+        return self.expr(cycles), self._name(reason[0]) if reason else None
 
     def _adopt_value(self, node: ParseNode) -> tree.AdoptDecl:
         place, value = map(self.expr, node.children)

@@ -129,8 +129,13 @@ def _role(one: tree.ServesDecl | tree.CommandsDecl | tree.AdoptDecl) -> str:
         without = ", ".join(name.text for name in one.without)
         return f"serves {one.peer.text} : {one.link.text}" + (f" without {without}" if without else "")
     text = f"commands {one.peer.text} : {one.link.text}"
-    text += f" within {spell_expr(one.within)} cycles" if one.within is not None else ""
-    return text + (f" else {one.late.text}" if one.late is not None else "")
+    for words, cycles, reason in (
+        ("within", one.within, one.late),
+        ("answered within", one.answered, one.unanswered),
+    ):
+        text += f" {words} {spell_expr(cycles)} cycles" if cycles is not None else ""
+        text += f" else {reason.text}" if reason is not None else ""
+    return text
 
 
 def _variable(variable: tree.VariableDecl) -> str:

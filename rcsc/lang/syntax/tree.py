@@ -568,15 +568,20 @@ class ServesDecl(Documented):
 
 @dataclass(frozen=True, slots=True)
 class CommandsDecl(Documented):
-    """`commands peer : link [within expr cycles [else reason]]`: to whom this level gives orders.
+    """`commands peer : link [within expr cycles [else reason]] [answered within ..]`: to whom this level gives orders.
 
-    An order that is not echoed after so many cycles counts as failed, with the reason.
+    An order that is not echoed after so many cycles counts as failed, with the reason; so does one that is not answered.
+
+    Attributes:
+        late: The reason of an order that is not echoed in time; `unanswered`, of one that is not answered.
     """
 
     peer: Name
     link: Name
     within: Expr | None = None
     late: Name | None = None
+    answered: Expr | None = None
+    unanswered: Name | None = None
 
 
 @dataclass(frozen=True, slots=True)

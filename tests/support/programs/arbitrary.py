@@ -308,13 +308,17 @@ def _roles() -> SearchStrategy[tree.Declaration]:
         max_size=2,
     ).map(tuple)
     names = st.lists(NAMES, max_size=2).map(tuple)
+    bound = expressions(), st.none() | NAMES
     return st.one_of(
         st.builds(tree.LinkDecl, NAMES, *(NAMES for _ in range(6)), fields, fields, **_HEAD),
         st.builds(tree.ServesDecl, NAMES, NAMES, names, **_HEAD),
         st.builds(tree.CommandsDecl, NAMES, NAMES, **_HEAD),
         st.builds(tree.AdoptDecl, places(), expressions(), **_HEAD),
         st.builds(tree.AdoptDecl, places(), places(), st.just(True), **_HEAD),
-        st.builds(tree.CommandsDecl, NAMES, NAMES, expressions(), st.none() | NAMES, **_HEAD),
+        st.builds(tree.CommandsDecl, NAMES, NAMES, *bound, *bound, **_HEAD),
+        st.builds(
+            tree.CommandsDecl, NAMES, NAMES, st.none(), st.none(), expressions(), st.none() | NAMES, **_HEAD
+        ),
     )
 
 
