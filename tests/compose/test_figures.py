@@ -173,6 +173,7 @@ def test_claims_of_a_level_rest_on_these_and_no_others(lower: tuple[TransitionSy
         found += [f"{sort}, {table}: {claim.verdict}", rests][: 1 + bool(rests)]
         assert claim.trusts == ()
     ends = ["every command ends, : proved", "    rests on the command ends,pause,; the command ends,go,"]
+    ends += ["the command that rests ends, : proved", "    rests on the command ends,pause,"]
     assert found == [*RUNNING.splitlines(), *RESTING.splitlines(), *ends]
 
 
