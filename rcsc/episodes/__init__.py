@@ -1,15 +1,30 @@
-"""Episodes: one run of a system with whatever is odd about it, and what became of it.
+"""Episodes: runs of a whole system in which anything goes wrong that its declarations allow, with every property watching.
 
-An *episode* is a value: orders, and what goes wrong while they are under way. Run, it has an *outcome*: how each order
-ended, which properties did not hold and in which cycle, which lines ran, and a digest of every value of every cycle, by
-which two runs are told to be the same:
+In: a description, compiled, and the sources of its levels. An *episode* is a value: orders to the levels that are ordered from outside,
+and faults with the ticks in which they are at work. Nobody writes down what can go wrong; it follows from what is declared. A buffer
+of `[buffers]` can lose, delay, double or repeat values; a level can start anew; a field from outside can hold a value of the edge of its
+range, beside a threshold of a table, or one that the level must refuse; a plant can do what its fields of type `Fault` say:
 
->>> from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome
->>> bumped = EpisodeFinding("rests when it is charged", 12, "drive.speed_mm_s = 400")
->>> EpisodeOutcome((), (bumped,), "done", 80, frozenset(), "").findings[0].tick
-12
+>>> from rcsc.episodes.episode import BufferFault, Episode, OrderSpec, Restart
+>>> order = OrderSpec("supervisor", "dock", wait=3)
+>>> episode = Episode(orders=(order,), harms=(BufferFault("drive.report", "late", 20, 40, ticks=8),))
+>>> Episode.from_json(episode.to_json()) == episode
+True
+>>> print(episode.script(), end="")
+command,cycles
+,3
+dock,
 
-Nothing here is trusted for a proof. What it costs: the run.
+Out: an `EpisodeOutcome`. In each cycle it is asked whether exactly one line matched, every assumption held, every order was taken once and
+answered for good, every command ends in time once nothing goes wrong, and whether the `property` declarations of the tables and the
+plant's own methods with the result `Property` hold. Only an older value that comes again breaks what the proofs rest on; what follows
+from it is *excused*, with the fault that explains it, and so is what a false reading makes untrue of an assumption about it.
 
-Modules: `outcome` (what became of an episode).
+The same seed draws the same episode; the same episode has the same outcome, with the executors in C and those in Python. Trusted:
+the plant, and the reference interpreter for what a property means. An episode proves nothing: that is `rcsc prove`. It costs some 0.1 ms a
+cycle and level.
+
+Modules, in the order the data flows: `episode` and `outcome` (values), `stand` (what a system declares), `harm` (buffers in which something
+goes wrong), `operator` (who orders), `cycle` (what a property sees), `properties`, `explain` (whose fault it is), `loop` (runs one),
+`sampling` (draws one).
 """

@@ -1,6 +1,6 @@
 """What became of an episode: orders, findings, what a fault explains, lines of tables, a digest.
 
-In: what a loop saw. Out: values that travel between processes.
+In: what `rcsc.episodes.loop` saw. Out: values that travel between processes.
 """
 
 from dataclasses import dataclass

@@ -38,7 +38,9 @@ class BadDescription(BadFile):
     """The description says something that cannot be; tells where and what."""
 
 
-LONGEST_MS, MOST_LEVELS = 3_600_000, 10_000
+LONGEST_MS, MOST_LEVELS, MOST_WITHIN = 3_600_000, 10_000, 1_000_000
+WITHIN = 5000
+"""Cycles without a fault in which every command from outside ends, where the description says nothing else."""
 FEED = Record({"into": Member(), "query": Word(), "keys": Listing(Member())})
 LEVEL = Record({"name": Word()}, {"program": Word(), "feed": Listing(FEED)})
 SYSTEM = Record(
@@ -55,6 +57,7 @@ SYSTEM = Record(
         "outside": Listing(Word()),
         "plant": Entries(Anything()),
         "script": Text(),
+        "campaign": Record({}, {"within": Number(1, MOST_WITHIN, whole=True)}),
     },
 )
 PARTIES = Record({key: SYSTEM.needed[key] for key in ("level", "buffers")}, {"outside": Listing(Word())})
@@ -103,6 +106,7 @@ class Description:
         document: The file, for the places of what is wrong with it.
         plants: What may stand outside the levels; the first does when nobody says which.
         script: The orders that are given when nobody says which; None where the description names none.
+        within: Cycles without a fault in which every command from outside is to end when the system is tested.
     """
 
     name: str
@@ -115,6 +119,7 @@ class Description:
     document: Document | None = field(default=None, compare=False, repr=False)
     plants: tuple[PlantSpec, ...] = ()
     script: Path | None = None
+    within: int = WITHIN
 
     def review(self) -> Document:
         """A fresh page for faults, with the places of this description."""
@@ -163,6 +168,7 @@ def _described(path: Path, document: Document, generated: Path, data: Path) -> D
         tuple(Wire(a, b) for a, b in content["buffers"].items()),
         {name: tuple(shown) for name, shown in content.get("displays", {}).items()},
         document,
+        within=content.get("campaign", {}).get("within", WITHIN),
     )
 
 

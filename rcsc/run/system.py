@@ -230,8 +230,8 @@ def _check_ends(page: Document, system: Description, signs: Mapping[str, Signatu
             page.wrong(("buffers", wire.source), f"`{wire.source}` and `{wire.target}` hold other things")
 
 
-def _check_answered(system: Description, queries: Mapping[str, Query]) -> None:
-    """Every question of a feed has somebody who answers it.
+def check_answered(system: Description, queries: Mapping[str, Query]) -> None:
+    """Check that every question of a feed has somebody who answers it.
 
     Raises:
         BadDescription: One has not.
@@ -277,7 +277,7 @@ def assemble(
     """
     refuse_unproved(system)
     signs = signatures(system)
-    _check_answered(system, queries)
+    check_answered(system, queries)
     for name, sign in signs.items():
         if not any(level.name == name for level in sign.levels):
             raise BadDescription(f"program `{sign.program}` has no level `{name}`")

@@ -131,7 +131,7 @@ class ScriptOperator:
         """Opens a line to every level that the script orders."""
         for row in self.rows:
             if row.served is not None and row.served.level not in self._lines:
-                self._lines[row.served.level] = _line(row.served)
+                self._lines[row.served.level] = line_to(row.served)
 
     @property
     def over(self) -> bool:
@@ -213,7 +213,7 @@ class ScriptOperator:
                 return DONE, ""
             if status in (row.served.done, row.served.failed):
                 wanted = "" if row.expect == row.served.done else f", and was to be {row.expect}"
-                return FAILED, f"{_said(row.served, report) or status}{wanted}"
+                return FAILED, f"{answer_reason(row.served, report) or status}{wanted}"
         if row.within is not None and ticks >= row.within:
             answered = "did not end" if report is not None else "is not answered"
             return FAILED, f"{answered} in {row.within} cycles"
@@ -242,13 +242,14 @@ class ScriptOperator:
             self._resting = -1
 
 
-def _line(level: Served) -> Orders:
+def line_to(level: Served) -> Orders:
+    """Return what carries orders to a level, with its range of numbers."""
     high = level.order_leaves[level.number].high
     numbers = int(high) + 1 if high is not None else 2
     return Orders(level.order, level.report, level.echo, level.number, numbers=numbers)
 
 
-def _said(level: Served, report: Values) -> str:
+def answer_reason(level: Served, report: Values) -> str:
     """What a report says beside the protocol: why it failed."""
     fields = [
         f"{field_of(leaf)} {leaf.shown(value)}"

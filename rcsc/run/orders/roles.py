@@ -1,6 +1,6 @@
-"""Which buffers carry orders from outside and the reports on them, and which of their fields say what.
+"""Which buffers carry numbered orders and the reports on them, and which of their fields say what.
 
-In: a description and the signatures of its levels. Out: a `Served` for each level that somebody outside orders. A program
+In: a description and the signatures of its levels. Out: a `Served` for each level that somebody orders. A program
 that declares whom it serves says which records these are, and which members mean rest, done and failed. Of any other the
 names say it (Haynes et al. 1984, section 9): an order has `inc_command` and `input_command`, a report `inc_command_echo`,
 `ref_command_echo` and `status_report`; the first command rests. Scripts know them only here.
@@ -22,11 +22,11 @@ DONE, FAILED = "done", "failed"
 
 @dataclass(frozen=True, slots=True)
 class Served:
-    """A level that is ordered from outside.
+    """A level that takes numbered orders.
 
     Attributes:
         level: Its name.
-        party: Who orders it.
+        party: Who orders it: another level, or somebody outside.
         order: The buffer of orders; `report` that of reports.
         order_leaves: The fields of an order, in the buffer's order; `report_leaves` those of a report.
         number: Where an order has its number; `command` its command.
@@ -51,12 +51,17 @@ class Served:
 
 
 def served(system: Description, signs: Mapping[str, Signature]) -> tuple[Served, ...]:
-    """Find the levels that somebody outside orders by number and who reports back, from the top down."""
+    """Find the levels that somebody outside orders by number and to whom they report, from the top down."""
+    return tuple(level for level in ordered(system, signs) if level.party not in signs)
+
+
+def ordered(system: Description, signs: Mapping[str, Signature]) -> tuple[Served, ...]:
+    """Find the levels that somebody orders by number, a level above or somebody outside, from the top down."""
     wires = [(wire.source, wire.target) for wire in system.wires]
     levels = []
     for source, target in wires:
         party, (level, _, variable) = _owner(source), target.partition(".")
-        if party in signs or level not in signs:
+        if level not in signs:
             continue
         role, order = signs[level].serves, _leaves(signs[level], variable)
         if not _has(order, NUMBER, COMMAND) or (role is not None and variable != role.order):

@@ -25,7 +25,8 @@ is told at its buffer's line (RCS729). Metres become millimetres exactly, a floa
 record is a class with annotated attributes, an array a `list` or `tuple`, an enumeration a `Literal`, an `Enum` or a `str`.
 A method that is named as what a feed asks answers it. An attribute `over` that is true ends the run. A constructor that
 takes `seed` gets it. What `picture` gives, an SVG document, is shown by page and report. A field of type `Fault` makes the
-plant misbehave: whoever tests the system switches it.
+plant misbehave, and a method whose result is a `Property` says whether all is as it must be: whoever tests the system
+switches the one and asks the other.
 
 Trusted: the file of a plant that a description names, which is imported and run; nothing of it is trusted for a proof.
 
@@ -37,9 +38,9 @@ data in `rcsc_cell.bound`.
 
 from typing import Protocol
 
-from rcsc.run.plant.fields import Fault, Range
+from rcsc.run.plant.fields import Fault, Property, Range
 
-__all__ = ["Fault", "Plant", "Range"]
+__all__ = ["Fault", "Plant", "Property", "Range"]
 
 
 class Plant(Protocol):

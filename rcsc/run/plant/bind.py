@@ -113,6 +113,22 @@ class BoundPlant:
             raise ValueError("not the state of a plant")
         put_back(self.plant, state["plant"], self.faults)
 
+    @property
+    def properties(self) -> tuple[str, ...]:
+        """The names of its own properties, methods whose result is a `Property`."""
+        return fields.properties(type(self.plant))
+
+    def shown(self) -> str:
+        """Its fields as they are now, for whoever reports on it."""
+        bound = [*self.takes, *self.gives]
+        return ", ".join(f"{buffer.end} = {self._field(buffer)}" for buffer, _ in bound)
+
+    def _field(self, buffer: Buffer) -> object:
+        value: object = self.plant
+        for part in buffer.field:
+            value = getattr(value, part, None)
+        return value
+
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
         """One tick: fields from the levels, the plant's `step`, fields to the levels.
 

@@ -37,6 +37,15 @@ Fault: TypeAlias = Annotated[bool, FaultSwitch()]
 
 
 @dataclass(frozen=True, slots=True)
+class PropertyMark:
+    """Marks the result of a method that says whether all is as it must be; whoever tests the system asks it after each tick."""
+
+
+Property: TypeAlias = Annotated[bool, PropertyMark()]
+"""The result of such a method: `def upright(self) -> Property: ...`."""
+
+
+@dataclass(frozen=True, slots=True)
 class Number:
     """A whole number, or a float."""
 
@@ -100,6 +109,20 @@ def faults(of: type) -> tuple[str, ...]:
         NoField: As `annotations`.
     """
     return tuple(name for name, hint in annotations(of).items() if FaultSwitch() in _notes(hint))
+
+
+def properties(of: type) -> tuple[str, ...]:
+    """The names of a plant's properties: methods whose result is declared as `Property`, in order of definition."""
+    methods = {name: method for base in reversed(of.__mro__) for name, method in vars(base).items()}
+    return tuple(name for name, method in methods.items() if PropertyMark() in _notes(_result(method)))
+
+
+def _result(method: object) -> Any:
+    """What a method's result is declared as; None where that cannot be read."""
+    try:
+        return typing.get_type_hints(method, include_extras=True).get("return")
+    except (NameError, TypeError, AttributeError):
+        return None
 
 
 def shown(field: FieldType) -> str:

@@ -1,0 +1,188 @@
+"""An episode: one run of a system with all that happens to it from outside, as a value.
+
+In: orders, and what goes wrong from which tick to which. Out: the same as JSON and, without what goes wrong, as a script for `rcsc run`.
+An episode has the same outcome in every process, and with both kinds of executors.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from itertools import chain
+from typing import ClassVar, Literal, TypeAlias, get_args
+
+from rcsc.host.files.names import shown
+from rcsc.host.files.plain import plain, read
+from rcsc.host.files.read import json_of
+from rcsc.run.system import Kind
+
+Harm = Literal["lost", "late", "doubled", "stale"]
+FAULTS = {
+    "lost": "a buffer: what is published in some cycles never arrives, and the value before stays",
+    "late": "a buffer: values arrive some cycles late, in order",
+    "doubled": "a buffer: each value is read in two cycles, and every other one never",
+    "stale": "a buffer: an older value comes again, which breaks what the protocol promises",
+    "reading": "a field from outside: it holds a value of its range's or a table's edge, whatever the plant says",
+    "refused": "a field from outside: it holds a value that the level refuses",
+    "restarted": "a level: it loses its state, and starts anew",
+    "changed order": "an order: it comes before the one before it has ended",
+}
+"""Classes of faults that follow from declarations; those of a plant come by their names."""
+Setting: TypeAlias = bool | int | float | str
+"""A value as a script has it: an enumeration's member by its name."""
+MOST_TICK = 2_000_000
+MOST_ELEMENTS = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class FieldValue:
+    """A field of an order, by its name in the record."""
+
+    name: str
+    value: Setting
+
+
+@dataclass(frozen=True, slots=True)
+class OrderSpec:
+    """An order from outside.
+
+    Attributes:
+        level: Who is ordered.
+        command: By its member's name.
+        fields: Those that are not as the variable is at first.
+        wait: Ticks after the end of the order before it to the same level; 0 is at its very end.
+        interrupts: It comes `wait` ticks after the one before was given, whether that has ended or not.
+    """
+
+    level: str
+    command: str
+    fields: tuple[FieldValue, ...] = ()
+    wait: int = 0
+    interrupts: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class BufferFault:
+    """What happens to a buffer, named by its source, in these ticks, the last included; `ticks` is how late, or how old, a value is."""
+
+    buffer: str
+    kind: Harm
+    first_tick: int
+    last_tick: int
+    ticks: int = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A field from outside holds a value in these ticks, the last included; named as a column of a script is, `base.bumper`."""
+
+    field: str
+    value: Setting
+    first_tick: int
+    last_tick: int
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """A level loses its state before it runs in this tick."""
+
+    tick: int
+    level: str
+
+
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """A fault of the plant's own is on in these ticks, the last included."""
+
+    fault: str
+    first_tick: int
+    last_tick: int
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """One run.
+
+    Attributes:
+        plant: What stands outside, as `--plant` names it; empty for the description's first.
+        seed: For a plant that takes one.
+        ticks: The run takes so many at least.
+
+    Raises:
+        ValueError: A word that is none, or a number out of reach.
+    """
+
+    LISTS: ClassVar[tuple[str, ...]] = ("switches", "readings", "restarts", "harms", "orders")
+    PLAINER: ClassVar[tuple[str, ...]] = ()
+
+    plant: str = ""
+    executor: Kind = "c"
+    seed: int = 0
+    orders: tuple[OrderSpec, ...] = ()
+    harms: tuple[BufferFault, ...] = ()
+    readings: tuple[Reading, ...] = ()
+    restarts: tuple[Restart, ...] = ()
+    switches: tuple[Switch, ...] = ()
+    ticks: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuses what no episode can be."""
+        words = ((self.executor, get_args(Kind)), *((harm.kind, get_args(Harm)) for harm in self.harms))
+        for word, known in words:
+            if word not in known:
+                raise ValueError(f"{shown(word)} is none of {', '.join(known)}")
+        if not 0 <= self.seed < 2**64:
+            raise ValueError(f"the seed {self.seed} lies outside 0 .. {2**64 - 1}")
+        if any(len(getattr(self, name)) > MOST_ELEMENTS for name in self.LISTS):
+            raise ValueError(f"more than {MOST_ELEMENTS} elements in a list")
+        for name, number in self._ticks():
+            if not 0 <= number <= MOST_TICK:
+                raise ValueError(f"`{name}` is {number}, and lies between 0 and {MOST_TICK}")
+
+    def _ticks(self) -> Iterator[tuple[str, int]]:
+        """Yield every number of ticks in it, by the name of its field."""
+        yield "ticks", self.ticks
+        for element in chain.from_iterable(getattr(self, name) for name in self.LISTS):
+            for name in ("wait", "ticks", "tick", "first_tick", "last_tick"):
+                if hasattr(element, name):
+                    yield name, getattr(element, name)
+
+    def to_json(self) -> str:
+        """Return text that `from_json` reads; the same for the same episode."""
+        return json.dumps(plain(self), indent=1) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> "Episode":
+        """Read an episode that `to_json` wrote; what is missing is as usual.
+
+        Raises:
+            ValueError: The text is none.
+        """
+        values = json_of(text)
+        if not isinstance(values, dict):
+            raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
+        if stray := sorted(set(values) - {field.name for field in fields(cls)}):
+            raise ValueError(f"an episode has no {shown(stray[0])}")
+        episode: Episode = read(cls, {**plain(cls()), **values})
+        return episode
+
+    def script(self) -> str:
+        """Return its orders as a script that `rcsc run --script` reads, one after the other."""
+        columns = list(dict.fromkeys(field.name for order in self.orders for field in order.fields))
+        several = len({order.level for order in self.orders}) > 1
+        file = io.StringIO()
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["command", *(["level"] if several else []), *columns, "cycles"])
+        for order, after in zip(self.orders, (*self.orders[1:], None), strict=True):
+            given = {field.name: _cell(field.value) for field in order.fields}
+            if order.wait and not order.interrupts:
+                writer.writerow(["", *([""] if several else []), *("" for _ in columns), str(order.wait)])
+            cycles = str(max(after.wait, 1)) if after is not None and after.interrupts else ""
+            level = [order.level] if several else []
+            writer.writerow([order.command, *level, *(given.get(name, "") for name in columns), cycles])
+        return file.getvalue()
+
+
+def _cell(value: Setting) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

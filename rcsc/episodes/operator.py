@@ -1,0 +1,181 @@
+"""Who gives the orders of an episode: to each level its own, one after the other, at, after or before the end of the one before.
+
+In: orders. Out: what stands in the order buffers, and how each order ended.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rcsc.episodes.episode import OrderSpec, Setting
+from rcsc.episodes.outcome import RowEnd
+from rcsc.run.orders.numbered import Latest, Orders
+from rcsc.run.orders.operator import answer_reason, line_to
+from rcsc.run.orders.roles import DONE, FAILED, Served, field_of
+from rcsc.run.signature import Leaf, Value, Values
+
+CHANGED, WAITING = "changed", "waiting"
+
+
+def value_of(leaf: Leaf, setting: Setting) -> Value:
+    """The value of a leaf that a word or a number means; a number may lie outside its range, or be no member's.
+
+    Raises:
+        ValueError: It is none of the leaf's type.
+    """
+    if leaf.members and type(setting) is not int:
+        if setting not in leaf.members:
+            raise ValueError(f"`{setting}` is no value of `{leaf.name}`")
+        return leaf.members.index(str(setting))
+    kind = {"bool": bool, "double": float}.get(leaf.c_type, int)
+    if type(setting) is kind or (kind is float and type(setting) is int):
+        return kind(setting)
+    raise ValueError(f"`{setting}` is no value of `{leaf.name}`")
+
+
+def setting_of(leaf: Leaf, value: Value) -> Setting:
+    """The word or number that means a value."""
+    return leaf.members[int(value)] if leaf.members and 0 <= value < len(leaf.members) else value
+
+
+def order_of(served: Served, spec: OrderSpec) -> tuple[Value, ...]:
+    """The fields of an order but its number.
+
+    Raises:
+        ValueError: The order has no such field, or a value is none of the field's.
+    """
+    given = {one.name: one.value for one in spec.fields}
+    leaves = {field_of(leaf): leaf for leaf in served.order_leaves}
+    if stray := sorted(set(given) - set(leaves)):
+        raise ValueError(f"an order to `{served.level}` has no field `{stray[0]}`")
+    values = []
+    for place, leaf in enumerate(served.order_leaves):
+        name = field_of(leaf)
+        if place == served.command:
+            values.append(value_of(leaf, spec.command))
+        elif place != served.number:
+            values.append(value_of(leaf, given[name]) if name in given else leaf.initial)
+    return tuple(values)
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """An order that was given.
+
+    Attributes:
+        number: Of the order in the episode, from 1.
+        tick: In which it was given.
+        rests: Whether it is the command that rests.
+    """
+
+    number: int
+    spec: OrderSpec
+    tick: int
+    rests: bool
+
+    @property
+    def text(self) -> str:
+        """As it is shown."""
+        fields = (f"{part.name}={part.value}" for part in self.spec.fields)
+        return " ".join((self.spec.command, *fields))
+
+
+@dataclass(slots=True)
+class OrderLine:
+    """The orders to one level.
+
+    Attributes:
+        given: The order that stands; None before the first.
+        ended: In which tick it was seen to end; None while it is under way.
+    """
+
+    served: Served
+    specs: Sequence[tuple[int, OrderSpec]]
+    line: Orders
+    given: Given | None = None
+    ended: int | None = None
+    at: int = 0
+
+    @property
+    def over(self) -> bool:
+        """Whether the last order has ended."""
+        return self.at >= len(self.specs) and (self.given is None or self.ended is not None)
+
+    def step(self, tick: int, latest: Latest) -> Iterator[RowEnd]:
+        """One tick: what became of the order that stands, and the next where it is due."""
+        self.line.catch_up(latest)
+        if self.given is not None and self.ended is None:
+            state, reason = self._answer(latest)
+            if state:
+                self.ended = tick
+                yield self.end(state, reason, tick)
+        if self.at < len(self.specs) and self._due(tick, self.specs[self.at][1]):
+            if self.given is not None and self.ended is None:
+                yield self.end(CHANGED, "", tick)
+            number, spec = self.specs[self.at]
+            values = order_of(self.served, spec)
+            self.line.send(values)
+            self.at, self.ended = self.at + 1, None
+            leaf = self.served.order_leaves[self.served.command]
+            self.given = Given(number, spec, tick, leaf.members.index(spec.command) == self.served.rest)
+
+    def end(self, state: str, reason: str, tick: int) -> RowEnd:
+        """How the order that stands ended."""
+        assert self.given is not None
+        return RowEnd(self.given.number, self.given.text, state, reason, tick - self.given.tick)
+
+    def _due(self, tick: int, spec: OrderSpec) -> bool:
+        if self.given is None:
+            return tick >= spec.wait
+        since = self.given.tick if spec.interrupts else self.ended
+        return since is not None and tick - since >= spec.wait
+
+    def _answer(self, latest: Latest) -> tuple[str, str]:
+        """`done` or `failed`, and what the report says beside it; empty while the order is under way."""
+        report, served = self.line.answer(latest), self.served
+        status = "" if report is None else served.report_leaves[served.status].shown(report[served.status])
+        if report is None or status not in (served.done, served.failed):
+            return "", ""
+        return (DONE, "") if status == served.done else (FAILED, answer_reason(served, report))
+
+
+@dataclass(slots=True)
+class EpisodeOperator:
+    """Gives the orders of an episode: `rcsc.run.system.Outside`.
+
+    Attributes:
+        ends: Orders that have ended, or that another one changed.
+    """
+
+    lines: tuple[OrderLine, ...]
+    ends: list[RowEnd] = field(default_factory=list)
+
+    @property
+    def over(self) -> bool:
+        """Whether every order was given, and has ended."""
+        return all(line.over for line in self.lines)
+
+    def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
+        """One tick: what stands in the order buffers."""
+        for line in self.lines:
+            self.ends += line.step(tick, latest)
+        return {line.line.order: line.line.sent for line in self.lines if line.line.sent}
+
+
+def operator(served: Sequence[Served], orders: Sequence[OrderSpec]) -> EpisodeOperator:
+    """Who gives these orders.
+
+    Raises:
+        ValueError: An order is to a level that nobody outside orders, or has what the level's orders have not.
+    """
+    by_level = {level.level: level for level in served}
+    for spec in orders:
+        if spec.level not in by_level:
+            raise ValueError(f"no level `{spec.level}` is ordered from outside")
+        order_of(by_level[spec.level], spec)
+    numbered = list(enumerate(orders, 1))
+    return EpisodeOperator(
+        tuple(
+            OrderLine(level, [(at, spec) for at, spec in numbered if spec.level == name], line_to(level))
+            for name, level in by_level.items()
+        )
+    )

@@ -1,0 +1,261 @@
+"""What holds in every cycle of every episode: no state-table error, assumptions, the protocol, ends, the user's own properties.
+
+In: a stand and a plant. Out: a `Property` for each. Those of the tables are evaluated by the reference interpreter.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.episodes.cycle import Broken, Cycle, Property
+from rcsc.episodes.operator import Given
+from rcsc.episodes.stand import Stand
+from rcsc.lang import model
+from rcsc.lang.interpret import UNDEFINED, holds
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import BEFORE, Value
+from rcsc.run.levels import RunningLevel
+from rcsc.run.orders.roles import Served
+from rcsc.run.plant.bind import BoundPlant, raised
+from rcsc.run.signature import FAULTS, STOPPED, Signature, Values
+
+REFUSED = FAULTS.index("input refused")
+NO_ERROR = "no state-table error"
+REFUSES = "refuses what lies out of range"
+
+
+class NoStateTableError:
+    """Exactly one line of each table matches, and no input is refused that lies in its range."""
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """Which level met which fault."""
+        for level in cycle.ran:
+            if level.fault not in (0, STOPPED) and not was_refused(cycle, level):
+                text = f"level `{level.name}`, table `{level.table}`: {level.sign.fault_text(level.values)}"
+                yield Broken(NO_ERROR, text, level.name)
+
+
+def was_refused(cycle: Cycle, level: RunningLevel) -> bool:
+    """Whether the level refused what the episode gives it to refuse."""
+    return level.fault == REFUSED and level.sign.fault_at(level.values) in cycle.refused.get(level.name, ())
+
+
+class Refuses:
+    """A level refuses a value out of range, and nothing but its inputs changes."""
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """Which value was taken, or what changed."""
+        for level in cycle.ran:
+            leaves = cycle.refused.get(level.name)
+            if not leaves:
+                continue
+            if level.fault != REFUSED:
+                name = min(leaves)
+                yield Broken(REFUSES, f"level `{level.name}` took `{name}` = {level.value(name)}", level.name)
+            elif changed := _changed(level, cycle.before[level.name]):
+                yield Broken(REFUSES, f"level `{level.name}` changed `{changed}` in that cycle", level.name)
+
+
+def _changed(level: RunningLevel, before: Values) -> str:
+    """A leaf that is no input and has another value now; an output that is safe may have."""
+    for leaf, was, now in zip(level.sign.leaves, before, level.values, strict=False):
+        if leaf.kind == "state" and was != now:
+            return leaf.name
+    return ""
+
+
+class AssumptionsHold:
+    """What the proofs take for granted and the executors check is so."""
+
+    def __init__(self, stand: Stand) -> None:
+        self._reads = {
+            (name, str(assumption.name)): tuple(dict.fromkeys(map(str, read_by(assumption.condition))))
+            for name, program in stand.programs.items()
+            for assumption in program.assumptions
+        }
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """Which assumptions failed, and on what values."""
+        for level in cycle.ran:
+            if level.fault in (0, STOPPED):
+                for name in level.sign.failures(level.values):
+                    reads = self._reads.get((level.name, name), ())
+                    where = f"level `{level.name}`, table `{level.table}`, line `{level.line}`"
+                    message = f"{where}: {shown(level.sign, level.values, reads)}"
+                    yield Broken(f"{level.name}: assumption {name}", message, level.name, reads)
+
+
+@dataclass(frozen=True, slots=True)
+class LevelProperty:
+    """A property that a program declares, or that comes with the protocol."""
+
+    level: str
+    property: model.Property
+    now: Mapping[str, int]
+    before: Mapping[str, int]
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """The values on which it does not hold."""
+        level = cycle.levels[self.level]
+        if level not in cycle.ran or level.fault:
+            return
+        values, earlier = level.values, cycle.before[self.level]
+        snapshot: dict[str, Value] = {name: values[at] for name, at in self.now.items()}
+        snapshot |= {name: earlier[at] for name, at in self.before.items()}
+        try:
+            if holds(self.property.condition, snapshot):
+                return
+            what = ""
+        except UNDEFINED as error:
+            what = f"not defined ({error}): "
+        leaves = level.sign.leaves
+        words = [f"`{name}` = {leaves[at].shown(values[at])}" for name, at in self.now.items()]
+        words += [f"`{name}` = {leaves[at].shown(earlier[at])}" for name, at in self.before.items()]
+        text = f"`{self.property.text}` is false in line `{level.line}`: {what}{', '.join(words)}"
+        yield Broken(f"{self.level}: {self.property.name}", text, self.level)
+
+
+def _of_level(level: str, sign: Signature, stated: model.Property) -> LevelProperty:
+    reads = list(dict.fromkeys(map(str, read_by(stated.condition))))
+    now = {name: sign.index[name] for name in reads if not name.startswith(BEFORE)}
+    before = {name: sign.index[name.removeprefix(BEFORE)] for name in reads if name.startswith(BEFORE)}
+    return LevelProperty(level, stated, now, before)
+
+
+@dataclass(slots=True)
+class TakesInTurn:
+    """A level answers orders that were given to it, each once, in the order in which they were given."""
+
+    link: Served
+    at: int
+    given: dict[int, int] = field(default_factory=dict)  # when each number was given last
+    count: int = 0
+    latest: int = -1
+    echoed: int = 0
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """An answer to what was never ordered, or to what had been answered before."""
+        said, level = cycle.said.get(self.link.order), cycle.levels[self.link.level]
+        if said is not None and int(said[self.link.number]) != self.latest:
+            self.latest, self.count = int(said[self.link.number]), self.count + 1
+            self.given[self.latest] = self.count
+        if level not in cycle.ran or level.fault:
+            return
+        echo = int(level.values[self.at + self.link.echo])
+        if echo not in self.given:
+            text = f"`{self.link.report}` answers order {echo}, which `{self.link.order}` never had"
+            yield Broken(f"{self.link.level}: answers what was ordered", text, level.name)
+        elif self.given[echo] < self.echoed:
+            text = f"`{self.link.report}` answers order {echo} again, after a later one"
+            yield Broken(f"{self.link.level}: takes each order once", text, level.name)
+        else:
+            self.echoed = self.given[echo]
+
+
+@dataclass(slots=True)
+class AnswerStays:
+    """What was answered of an order stays until the next, but of the order to rest; where the program does not say so itself.
+
+    An order that stands when the level starts anew has failed.
+
+    Attributes:
+        at: Where the level's report begins among its leaves; `order` is where the order does.
+    """
+
+    link: Served
+    at: int
+    order: int
+    last: tuple[int, str] | None = None
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """What it was, and what it became."""
+        link, level = self.link, cycle.levels[self.link.level]
+        if level not in cycle.ran or level.fault:
+            return
+        if level.name in cycle.restarted:
+            self.last = int(cycle.before[level.name][self.order + link.number]), link.failed
+        echo = int(level.values[self.at + link.echo])
+        status = link.report_leaves[link.status].shown(level.values[self.at + link.status])
+        was, self.last = self.last, (echo, status)
+        resting = level.values[self.order + link.command] == link.rest
+        if was is None or was[0] != echo or was[1] == status or resting:
+            return
+        if was[1] in (link.done, link.failed):
+            text = f"order {echo} of `{link.order}` was {was[1]}, and is {status}"
+            yield Broken(f"{link.level}: {was[1]} stays {was[1]}", text, level.name)
+
+
+@dataclass(slots=True)
+class Ends:
+    """A command ends in done or failed, in so many cycles in which no fault is at work."""
+
+    most: int
+    left: dict[str, int] = field(default_factory=dict)
+    known: dict[str, Given] = field(default_factory=dict)
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """That it did not."""
+        for line in cycle.operator.lines:
+            name, given = line.served.level, line.given
+            if given is None or line.ended is not None:
+                self.known.pop(name, None)
+                continue
+            if self.known.get(name) is not given:
+                self.known[name], self.left[name] = given, self.most
+            if not cycle.faulty:
+                self.left[name] -= 1
+            if self.left[name] == 0:
+                level = cycle.levels[name]
+                text = (
+                    f"`{given.text}` has not ended in {self.most} cycles without a fault: line `{level.line}`"
+                )
+                yield Broken(f"{name}: every command ends", text, name)
+
+
+class PlantHolds:
+    """What the plant's own properties say: methods whose result is declared as `Property`."""
+
+    def __init__(self) -> None:
+        self._asked: tuple[tuple[BoundPlant, str], ...] | None = None
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """Those that are false, or that raise."""
+        if self._asked is None:
+            self._asked = tuple((plant, name) for plant in cycle.plants for name in plant.properties)
+        for plant, name in self._asked:
+            try:
+                if getattr(plant.plant, name)():
+                    continue
+                words = plant.shown()
+            except Exception as error:  # noqa: BLE001  # the user's code
+                words = raised(error)
+            yield Broken(f"plant: {name}", words)
+
+
+def shown(sign: Signature, values: Values, names: tuple[str, ...]) -> str:
+    """Leaves with their values, in words."""
+    return ", ".join(
+        f"`{name}` = {sign.leaves[sign.index[name]].shown(values[sign.index[name]])}"
+        for name in names
+        if name in sign.index
+    )
+
+
+def properties(stand: Stand, within: int) -> list[Property]:
+    """Everything that watches an episode of a system.
+
+    Args:
+        stand: The system.
+        within: Cycles without a fault in which every command ends.
+    """
+    watching: list[Property] = [NoStateTableError(), Refuses(), AssumptionsHold(stand)]
+    for name, program in stand.programs.items():
+        watching += [_of_level(name, stand.signs[name], stated) for stated in program.properties]
+    for link in stand.links:
+        sign = stand.signs[link.level]
+        at = sign.record(link.report.partition(".")[2]).start
+        first = int(link.order_leaves[link.number].initial)
+        echo = int(link.report_leaves[link.echo].initial)
+        watching.append(TakesInTurn(link, at, {first: 0, echo: 0}))
+        if stand.programs[link.level].roles is None:  # else its standard properties say it
+            watching.append(AnswerStays(link, at, sign.index[link.order_leaves[0].name]))
+    return [*watching, Ends(within), PlantHolds()]

@@ -1,0 +1,255 @@
+"""Episodes by seed, leaning on edges: orders from the declared commands and ranges, and what goes wrong from the declared buffers.
+
+In: a seed, or whatever else draws as `random.Random` does. Out: an `Episode`. One in five has no fault; the others have one, or several.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from random import Random
+
+from rcsc.diagnostics.coded import CodedError
+from rcsc.episodes.episode import (
+    FAULTS,
+    BufferFault,
+    Episode,
+    FieldValue,
+    Harm,
+    OrderSpec,
+    Reading,
+    Restart,
+    Switch,
+)
+from rcsc.episodes.operator import setting_of, value_of
+from rcsc.episodes.stand import Field, Stand, stand, switches
+from rcsc.run.orders.roles import Served, field_of
+from rcsc.run.orders.script import read_script, script_path
+from rcsc.run.signature import Leaf, Value
+
+NOMINAL, SCRIPTED, PLAIN = 0.2, 0.3, 0.5
+"""How often nothing goes wrong, orders are those of a script, and a field is as at first."""
+MOST_ORDERS, MOST_FAULTS = 4, 4
+LATEST, SOON = 11.0, 300
+"""Binary logarithm of the latest tick at which something begins; half of all begin before `SOON`."""
+LASTING = (1, 2, 5, 20, 60, 200)
+LONG = (1000, 4000)
+"""Ticks of a window: of a buffer, or else of a plant's fault too."""
+UNORDERED = (50, 200, 1000)
+"""Ticks of an episode of a system that nobody orders."""
+
+HARMS: tuple[Harm, ...] = ("lost", "lost", "late", "late", "doubled", "stale")
+"""As often as each is drawn."""
+
+Add = Callable[[Random, Stand, Episode], Episode]
+
+
+def draw(seed: int, system: Path, plant: str = "", script: str = "") -> Episode:
+    """The episode of a seed.
+
+    Args:
+        seed: Which.
+        system: The description, compiled.
+        plant: What stands outside, as `--plant` names it; empty for the description's first.
+        script: The orders to be given, changed a little; empty for drawn ones, and now and then the description's own.
+
+    Raises:
+        CodedError: The system, its plant or the script is not in order.
+    """
+    random = Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
+    return replace(drawn(random, stand(system), plant, script), seed=seed)
+
+
+def drawn(random: Random, its: Stand, plant: str = "", script: str = "") -> Episode:
+    """An episode of what draws.
+
+    Raises:
+        CodedError: As `draw`.
+    """
+    orders = tuple(_orders(random, its, script))
+    ticks = 0 if orders else random.choice(UNORDERED)
+    episode = Episode(plant, orders=orders, ticks=ticks)
+    adds = _kinds(its, switches(its.path, plant))
+    if not adds or random.random() < NOMINAL:
+        return episode
+    for _ in range(1 if random.random() < 0.6 else random.randint(2, MOST_FAULTS)):
+        episode = random.choice(adds)(random, its, episode)
+    return episode
+
+
+# --- orders ---
+
+
+def _orders(random: Random, its: Stand, script: str) -> Iterator[OrderSpec]:
+    """Yield the orders to every level: of a script as they are, or each after, at or before the end of the one before."""
+    rows = scripted(its.path, script)
+    if rows and (script or random.random() < SCRIPTED):
+        for row in rows:
+            wait, interrupts = _when(random, 0.15)
+            yield replace(row, wait=wait, interrupts=interrupts)
+        return
+    for level in its.served:
+        for at in range(random.randint(1, MOST_ORDERS)):
+            yield _order(random, its, level, first=at == 0)
+
+
+def _order(random: Random, its: Stand, level: Served, *, first: bool) -> OrderSpec:
+    fields = []
+    for place, leaf in enumerate(level.order_leaves):
+        if place == level.command:
+            command = random.choice(leaf.members)
+        elif place != level.number and random.random() >= PLAIN:
+            value = between(random, leaf, its.edges[level.level][leaf.name])
+            fields.append(FieldValue(field_of(leaf), setting_of(leaf, value)))
+    wait, interrupts = (random.choice((0, 0, 1, 3)), False) if first else _when(random, 0.3)
+    return OrderSpec(level.level, command, tuple(fields), wait, interrupts)
+
+
+def _when(random: Random, often: float) -> tuple[int, bool]:
+    """When an order is given; `often` it comes before the end of the one before."""
+    if random.random() < often:
+        return tick(random), True
+    return random.choice((0, 0, 0, 1, 2, 30)), False
+
+
+def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
+    """A value of a leaf: mostly an edge, else anywhere in its range."""
+    low, high = leaf.low, leaf.high
+    if leaf.members or leaf.c_type == "bool" or low is None or high is None or random.random() < 0.6:
+        return random.choice(edges)
+    return random.uniform(low, high) if leaf.c_type == "double" else random.randint(int(low), int(high))
+
+
+@lru_cache(maxsize=16)
+def scripted(path: Path, script: str) -> tuple[OrderSpec, ...]:
+    """The orders of a script; of the description's own, if nobody says which, as far as it is one of orders.
+
+    Raises:
+        BadScript: It is not in order.
+    """
+    its = stand(path)
+    own = its.system.script
+    if not script and own is None:
+        return ()
+    try:
+        rows = read_script(script_path(script, path.parent) if script else own or path, its.system, its.signs)
+    except CodedError:
+        if script:
+            raise
+        return ()  # a plant's own kind of script
+    return tuple(
+        OrderSpec(row.served.level, _command(row.served, row.order), tuple(_fields(row.served, row.order)))
+        for row in rows
+        if row.served is not None
+    )
+
+
+def _command(level: Served, order: Sequence[Value]) -> str:
+    return str(dict(_values(level, order))[level.command])
+
+
+def _fields(level: Served, order: Sequence[Value]) -> Iterator[FieldValue]:
+    for place, value in _values(level, order):
+        leaf = level.order_leaves[place]
+        if place != level.command and value != setting_of(leaf, leaf.initial):
+            yield FieldValue(field_of(leaf), value)
+
+
+def _values(level: Served, order: Sequence[Value]) -> Iterator[tuple[int, bool | int | float | str]]:
+    """Yield the place of each field but the number, and what it is in words."""
+    places = [place for place in range(len(level.order_leaves)) if place != level.number]
+    for place, value in zip(places, order, strict=True):
+        yield place, setting_of(level.order_leaves[place], value)
+
+
+# --- what goes wrong ---
+
+
+def tick(random: Random) -> int:
+    """A tick at which something may be under way; early ones oftener than late ones."""
+    return random.randrange(SOON) if random.random() < 0.5 else int(2 ** random.uniform(0, LATEST)) - 1
+
+
+def _window(random: Random, lasting: Sequence[int]) -> tuple[int, int]:
+    first = tick(random)
+    return first, first + random.choice(lasting) - 1
+
+
+def _harm(random: Random, its: Stand, episode: Episode) -> Episode:
+    kind: Harm = random.choice(HARMS)
+    fault = BufferFault(random.choice(its.buffers), kind, *_window(random, LASTING), random.choice((1, 3, 8)))
+    return replace(episode, harms=(*episode.harms, fault))
+
+
+def _restart(random: Random, its: Stand, episode: Episode) -> Episode:
+    restart = Restart(tick(random), random.choice(list(its.signs)))
+    return replace(episode, restarts=(*episode.restarts, restart))
+
+
+def _reading(random: Random, its: Stand, episode: Episode) -> Episode:
+    field = random.choice(its.fields)
+    value = between(random, field.leaf, field.edges)
+    return _held(random, episode, field, value)
+
+
+def _refused(random: Random, its: Stand, episode: Episode) -> Episode:
+    fields = [field for field in its.fields if field.refused]
+    if not fields:
+        return _reading(random, its, episode)
+    field = random.choice(fields)
+    return _held(random, episode, field, random.choice(field.refused))
+
+
+def _held(random: Random, episode: Episode, field: Field, value: Value) -> Episode:
+    finite = not isinstance(value, float) or math.isfinite(value)
+    setting = setting_of(field.leaf, value if finite else (field.leaf.high or 0.0) + 1.0)
+    reading = Reading(field.name, setting, *_window(random, LASTING))
+    return replace(episode, readings=(*episode.readings, reading))
+
+
+def _kinds(its: Stand, faults: Sequence[str]) -> list[Add]:
+    """What can go wrong here, each as often as it is drawn."""
+
+    def switch(random: Random, _: Stand, episode: Episode) -> Episode:
+        window = _window(random, (*LASTING, *LONG))
+        return replace(episode, switches=(*episode.switches, Switch(random.choice(faults), *window)))
+
+    kinds: list[Add] = [_restart] * 2 if its.signs else []
+    kinds += [_harm] * 4 if its.buffers else []
+    kinds += [_reading, _reading, _refused] if its.fields else []
+    return kinds + ([switch] * 3 if faults else [])
+
+
+# --- what it is called ---
+
+
+def fault_names(system: Path, plant: str = "") -> tuple[str, ...]:
+    """Every class of faults of a system, in the order in which summaries show them.
+
+    Raises:
+        CodedError: The system or its plant is not in order.
+    """
+    return (*FAULTS, *switches(system, plant))
+
+
+def fault_classes(episode: Episode, system: Path | None = None) -> tuple[str, ...]:
+    """The classes of faults that an episode has, each once; none where nothing goes wrong in it.
+
+    Args:
+        episode: The episode.
+        system: Its system, which tells what is refused from what is read; without it all that is held is a reading.
+    """
+    fields = {} if system is None else {field.name: field for field in stand(system).fields}
+    has = {
+        *(harm.kind for harm in episode.harms),
+        *("refused" if _is_refused(fields, one) else "reading" for one in episode.readings),
+        *(["restarted"] if episode.restarts else []),
+        *(["changed order"] if any(order.interrupts for order in episode.orders) else []),
+    }
+    return (*(name for name in FAULTS if name in has), *dict.fromkeys(one.fault for one in episode.switches))
+
+
+def _is_refused(fields: Mapping[str, Field], reading: Reading) -> bool:
+    field = fields.get(reading.field)
+    return field is not None and field.refuses(value_of(field.leaf, reading.value))
