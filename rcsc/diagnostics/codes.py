@@ -1349,16 +1349,18 @@ class Code(StrEnum):
     """
     NOT_COMPOSED = """RCS751: a level is not proved in its environment
 
-    `rcsc prove` looks at a level with every command at every moment, and with every delay, repetition and loss in its buffers.
-    Something that should hold in each cycle could not be proved: an assumption of a table, that one line matches, or what a neighbour
-    relies on. Where a run from the first cycle shows it, the shortest is printed, cycle by cycle, as the interpreter ran it: repair the
-    table. Where none is printed, either no run of that length does, or no invariant that rcsc looks for says why it holds; `--trace N`
-    looks further, and `--where "variable = value"` begins elsewhere. *then* says what follows, each with its run: what the superior takes,
-    up to `--follow N` cycles later. A *help* was tried in short runs, and says what else it breaks; that no run shows more is no proof:
-    prove the changed table. A table's assumption that is not proved stays monitored. What *rests on* it is found so only if it holds;
-    what is *not looked at* could not be stated, and is never proved: the manual has every verdict under "What a verdict says". `--log DIR`
-    keeps each trace as a log for `rcsc replay`, `--freeze DIR` as a case that `--case FILE` runs again. `rcsc check` repeats it as a
-    warning, as long as nothing that was looked at has changed: the tables by themselves may well be proved.
+    `rcsc prove` looks at a level with every command at every moment, and with every delay, repetition and loss in its buffers. Something
+    that should hold in each cycle could not be proved: an assumption of a table, that one line matches, or what a neighbour relies on.
+    Where a run from the first cycle shows it, the shortest is printed, cycle by cycle, as the interpreter ran it: repair the table. Where
+    none is found, either no run of that length does, or no invariant that rcsc looks for says why it holds. Then two cycles are shown at
+    which the proof stops, from a state that nobody has seen reached: they tell which line and which values to look at. If the state
+    cannot be, an `invariant` that says so is proved and used; `--trace N` looks further, and `--where "variable = value"` begins
+    elsewhere. *then* says what follows, each with its run: what the superior takes, up to `--follow N` cycles later. A *help* was tried
+    in short runs, and says what else it breaks; that no run shows more is no proof: prove the changed table. A table's assumption that is
+    not proved stays monitored. What *rests on* it is found so only if it holds; what is *not looked at* could not be stated, and is never
+    proved: the manual has every verdict under "What a verdict says". `--log DIR` keeps each trace as a log for `rcsc replay`, `--freeze
+    DIR` as a case that `--case FILE` runs again. `rcsc check` repeats it as a warning, as long as nothing that was looked at has changed:
+    the tables by themselves may well be proved.
     """
     NOT_AGREED = """RCS752: a level assumes what its neighbour does not keep
 

@@ -1,5 +1,6 @@
 """A system whose levels declare whom they serve and command: proved with no line of the protocol by hand, refuted where it is wrong."""
 
+import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,8 +8,10 @@ from random import Random
 
 import pytest
 
+from rcsc.commands import run
 from rcsc.compose.contract.claims import Verdict
 from rcsc.compose.contract.obligations import Sort, unstated
+from rcsc.compose.counterexample.trace import stopping
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import essential, prove_level
 from rcsc.compose.proof.system import prove_transition_systems, transition_systems
@@ -171,3 +174,61 @@ def test_a_running_level_adopts_what_the_proof_says_after_a_restart(dock: Path) 
             assert adopted["inc_command_seen"] == now[ts.links.above.number]
             for below in ts.links.below:
                 assert adopted[below.number] == (now[below.echo] + 1) % 65536
+
+
+# --- where a proof stops, and no run shows it ---
+
+
+def _counting(dock: Path, most: int) -> None:
+    """The drive counts its cycles on the way, and says that there are no more than so many."""
+    more = f"\nstate waited : int 0 .. 2500\nproperty soon : waited <= {most}\n"
+    edit_file(
+        dock.parent / "drive.rcs",
+        (
+            "supervisor.target_mm  ||                     | 400",
+            "supervisor.target_mm  || tick                | 400",
+        ),
+        (
+            "procedure blocked {",
+            f"{more}procedure tick {{\n  waited := min(waited + 1, 2500)\n}}\n\nprocedure blocked {{",
+        ),
+    )
+
+
+def test_where_no_run_is_found_the_cycle_is_shown_at_which_the_proof_stops(
+    dock: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _counting(dock, 40)
+    asked = ["prove", str(dock), "--level", "drive", "--no-cache"]
+    assert run([*asked, "--json", "--trace", "8"]) == 1
+    [missing] = json.loads(capsys.readouterr().out)["findings"]
+    assert (missing["name"], missing["reproduces"], missing["time_line"]) == ("soon", False, [])
+    begins, kept, last = missing["supposed"]
+    assert (begins["leaves"]["waited"], last["leaves"]["waited"]) == ("40", "41")
+    assert kept["wrong"] == ""
+    assert (last["table"], last["line"]) == ("goto", "go")
+    assert last["wrong"] == "property `soon` is broken"
+    assert run(asked) == 1
+    said = capsys.readouterr().err
+    assert "no run of 8 cycles or fewer shows it" in said
+    assert "whether that is ever reached is not known" in said
+    assert run([*asked, "--trace", "0"]) == 1
+    assert "proof stops" not in capsys.readouterr().err, "nothing was looked for"
+
+
+def test_where_a_run_is_found_nothing_is_supposed(dock: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _counting(dock, 4)
+    assert run(["prove", str(dock), "--level", "drive", "--no-cache", "--json"]) == 1
+    [missing] = json.loads(capsys.readouterr().out)["findings"]
+    assert missing["reproduces"]
+    assert missing["supposed"] == []
+
+
+@pytest.mark.parametrize("level", ["drive", "supervisor"])
+def test_a_proof_stops_only_within_the_invariant(level: str, dock: Path) -> None:
+    """Of what is proved nothing stops it; without the invariant something does."""
+    ts = transition_systems(dock)[level]
+    proof = prove_level(ts, Effort(looks=False))
+    every = [obligation for obligation, _ in proof.verdicts]
+    assert not [each for each in every if stopping(ts, each, proof.predicates, proof.clauses)]
+    assert [each for each in every if stopping(ts, each, proof.predicates, ())]

@@ -68,6 +68,7 @@ def say_explanation(
         )
     elif cycles and not explanation.beside:
         click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
+        _say_supposed(systems, explanation)
     for line in explanation.helps:
         click.echo(f"  = help: {line}", err=True)
     if explanation.together:
@@ -118,6 +119,22 @@ def _say_finding(systems: Mapping[str, TransitionSystem], finding: Finding, *, i
     )
     click.echo(f"  = note: {what}{begins}, {run_by}{legal}", err=True)
     _say_time_line((*beginnings(systems, finding), *rows(systems, finding)))
+
+
+def _say_supposed(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> None:
+    """Print the cycle at which the proof stops."""
+    finding = explanation.supposed
+    if finding is None:
+        return
+    click.echo(
+        "  = note: the proof stops here, at a state that it does not exclude; whether that is ever reached is not known",
+        err=True,
+    )
+    _say_time_line((*beginnings(systems, finding), *rows(systems, finding)))
+    click.echo(
+        "  = help: if it is reached, the table has to do otherwise there; if not, an `invariant` that says why is proved, and used here",
+        err=True,
+    )
 
 
 def _say_consequences(
@@ -198,6 +215,12 @@ def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Ex
         "time_line": []
         if finding is None
         else [asdict(row) for row in (*beginnings(systems, finding), *rows(systems, finding))],
+        "supposed": []
+        if explanation.supposed is None
+        else [
+            asdict(row)
+            for row in (*beginnings(systems, explanation.supposed), *rows(systems, explanation.supposed))
+        ],
         "follows": [
             {
                 "how": then.how.value,

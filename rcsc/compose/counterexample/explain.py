@@ -17,7 +17,7 @@ from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
 from rcsc.compose.counterexample.pair import followed_together
 from rcsc.compose.counterexample.repair import TRIED_CYCLES, helps, repairs
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_in_python, record
-from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, traces
+from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, stopping, traces
 from rcsc.compose.proof.level import LevelProof, Verdict, essential
 from rcsc.compose.proof.system import SystemProof
 from rcsc.host.children import scratch
@@ -38,6 +38,8 @@ class Explanation:
         log: Where the run is kept.
         others: Pairs of lines of the same table that no run shows.
         in_c: Whether the C executor ran it, too; it cannot if an extern procedure has to give what no C function can.
+        supposed: A cycle that would break it, from a state that the proof does not exclude and nobody has seen reached; None where
+            there is a finding, or none was looked for.
         together: What the first repairs of all findings of its table do together, at the last of them.
         follows: What comes of it, each with a run that the executors repeated, too; None if that was not looked for.
     """
@@ -53,6 +55,7 @@ class Explanation:
     in_c: bool = True
     follows: tuple[Consequence, ...] | None = None
     together: str = ""
+    supposed: Finding | None = None
 
     @property
     def warns(self) -> bool:
@@ -137,7 +140,20 @@ def _level(
             every_pair = list(_pairs(ts, obligation, parted[obligation.key], results))
             yield from _with_repairs(ts, every_pair, proof, settings)
         else:
-            yield _explanation(ts, obligation, results.get(obligation.key))
+            explanation = _explanation(ts, obligation, results.get(obligation.key))
+            yield (
+                replace(explanation, supposed=_supposed(ts, obligation, proof))
+                if obligation.key not in results
+                else explanation
+            )
+
+
+def _supposed(ts: TransitionSystem, obligation: Obligation, proof: LevelProof) -> Finding | None:
+    """Find a cycle that breaks an obligation of which no run is known, from a state that the invariant leaves open."""
+    if proof.verdict(*obligation.key) is not Verdict.NOT_PROVED or not proof.clauses:
+        return None
+    trace = stopping(ts, obligation, proof.predicates, proof.clauses)
+    return None if trace is None else of_trace(ts, obligation, trace)
 
 
 def _searched(

@@ -14,14 +14,17 @@ from typing import TypeAlias
 
 from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, obligations, pairs
+from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem, successor
 from rcsc.compose.counterexample.cycle_run import CycleRun, Given, broken, ran_on
 from rcsc.compose.counterexample.simplest import Bounded, Simplest, constant_of
+from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.interpret import (
     UNDEFINED,
     initial,
 )
 from rcsc.lang.model import (
+    Bool,
     Int,
     Op,
     Value,
@@ -73,12 +76,14 @@ class TraceSearch:
             before: narrower than the contract, which leaves room for numbers that have gone round and for what stood in the buffers
             before a restart. Such a trace can happen to two levels that begin together.
         start: Leaves that begin with other values than the initial ones.
+        invariant: Begin in any state in which these clauses over these predicates hold, which need not be reached.
     """
 
     most: int = 10
     restarted: bool = False
     legal: bool = False
     start: Mapping[str, Value] = field(default_factory=dict)
+    invariant: tuple[Sequence[Predicate], Sequence[Clause]] | None = None
 
 
 TraceResult: TypeAlias = Trace | NotReproducedError
@@ -109,6 +114,30 @@ def traces(
     return results
 
 
+def stopping(
+    ts: TransitionSystem, obligation: Obligation, predicates: Sequence[Predicate], clauses: Sequence[Clause]
+) -> Trace | None:
+    """Find a cycle that breaks an obligation, and one before it that does not, from a state that the invariant leaves open.
+
+    None if there is no such cycle, if the solver did not decide, or if the interpreter does otherwise. Without a cycle before it that
+    keeps the obligation the one that breaks it stands alone.
+    """
+    for cycles in (2, 1):
+        run = Unrolled(ts, TraceSearch(cycles, invariant=(predicates, clauses)))
+        every = [{each.key: each for each in obligations(ts, run.further())} for _ in range(cycles)]
+        *kept, wrong = (each[obligation.key] for each in every)
+        for before in kept:
+            run.require(before.holds)
+        try:
+            broken_last = wrong_in(wrong, run.cycles[-1])
+            if run.reaches(broken_last):
+                trace = run.reproduced(obligation, broken_last)
+                return trace if isinstance(trace, Trace) else None
+        except GaveUpError:
+            return None
+    return None
+
+
 def wrong_in(obligation: Obligation, cycle: Cycle) -> Node:
     """Return the condition that the cycle breaks the obligation; what it leaves counts only if it does not end early."""
     wrong = values.negation(obligation.holds)
@@ -131,6 +160,9 @@ class Unrolled:
 
     def __post_init__(self) -> None:
         self._start = self.ts.restarted() if self.search.restarted else self.ts.initial()
+        if self.search.invariant is not None:
+            self._start = self.ts.havoc()
+            self._run.add(_within(*self.search.invariant, self._start))
         self._start |= {
             leaf: values.constant(self.ts.kinds[leaf], value) for leaf, value in self.search.start.items()
         }
@@ -233,7 +265,7 @@ class Unrolled:
     def _begins(self, settled: Simplest) -> dict[str, Value]:
         """Fix every leaf before the first cycle."""
         begun = {**initial(self.ts.program), **self.search.start}
-        if self.search.restarted:
+        if self.search.restarted or self.search.invariant is not None:
             # A state adopted from an input has its value.
             of_input = {self._start[name]: begun[name] for name in self.ts.inputs}
             begun = {
@@ -265,6 +297,23 @@ class Unrolled:
             if other:
                 return tuple(other)
         return ("every leaf that the solver spoke of is the same in both",)
+
+
+def _within(predicates: Sequence[Predicate], clauses: Sequence[Clause], state: Leaves) -> Node:
+    """Return the condition that the clauses hold in the state: of each something does not."""
+    nodes = [predicate.node(state) for predicate in predicates]
+
+    def has(at: int, value: int) -> Node:
+        if value < 0:
+            return values.negation(has(at, ~value))
+        node = nodes[at]
+        if isinstance(node.kind, Bool):
+            return node if value else values.negation(node)
+        return values.equal(node, values.constant(node.kind, value))
+
+    return values.all_of(
+        values.negation(values.all_of(has(at, value) for at, value in clause)) for clause in clauses
+    )
 
 
 def in_order(ts: TransitionSystem, before: Leaves, taken: Leaves) -> Node:
