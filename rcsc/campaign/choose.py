@@ -1,4 +1,4 @@
-"""Which kind of episodes a system's plant has: its own, where its description names one.
+"""Which kind of episodes a system's plant has: its own, where its description names one, else that of any system.
 
 In: a description, and a plant as `--plant` names it. Out: the plant's name and its kind of episodes.
 """
@@ -6,6 +6,7 @@ In: a description, and a plant as `--plant` names it. Out: the plant's name and 
 from pathlib import Path
 from typing import Any
 
+from rcsc.campaign.any_system import ANY
 from rcsc.campaign.rig import EpisodeKind
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description
@@ -39,9 +40,7 @@ def kind_of(system: Description, spec: PlantSpec | None) -> EpisodeKind[Any]:
         ModuleNotFoundError: It needs an extra that is not installed.
     """
     if spec is None or not spec.campaign:
-        page = plant_page(system)
-        page.wrong(() if spec is None else spec.path, "no episodes are drawn for this plant")
-        raise page.bad(BadPlant)
+        return ANY
     kind = named(system, spec, spec.campaign, "campaign")
     if isinstance(kind, EpisodeKind):
         return kind

@@ -60,7 +60,7 @@ class EpisodeKind(Generic[E]):
         run: Runs an episode of a system; the third is where the log goes.
         read: Makes an episode of its text; raises ValueError in words where it is none.
         check: Raises ValueError where an episode names what a system has not.
-        fault_classes: Which fault classes an episode has; empty where it is nominal.
+        fault_classes: Which fault classes an episode of a system has; empty where it is nominal.
         faults: Every fault class of a system and plant, in the order in which they are shown.
         files: What outcomes depend on beside the description and the executors.
         not_in_order: What `draw` and `run` raise when the system is not in order, which is no episode's doing.
@@ -74,7 +74,7 @@ class EpisodeKind(Generic[E]):
     run: Callable[[E, Path, Path | None], EpisodeOutcome]
     read: Callable[[str], E]
     check: Callable[[E, Path], None]
-    fault_classes: Callable[[E], tuple[str, ...]]
+    fault_classes: Callable[[E, Path], tuple[str, ...]]
     faults: Callable[[Path, str], tuple[str, ...]]
     files: Callable[[Path, str, str], Iterable[NamedFile]]
     not_in_order: tuple[type[Exception], ...] = (BadDescription, NotBuilt)

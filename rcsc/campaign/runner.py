@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 from rcsc.campaign.journal import EpisodeRecord, Journal
 from rcsc.campaign.rig import Rig, digest
-from rcsc.campaign.work import CRASH, ENDS, HANG, SURVIVES, no_end, odd, play
+from rcsc.campaign.work import CRASH, ENDS, GRACE, HANG, SURVIVES, no_end, odd, play
 from rcsc.campaign.worker_pool import WorkerPool, WorkersGone
 from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome
 
@@ -115,12 +115,13 @@ class _Round:
     def _guilty(self, index: int) -> EpisodeRecord:
         """The record of an episode that a worker died of."""
         outcome = death(self._rig, time.monotonic() - self._since_s)
-        faults = self._rig.kind.fault_classes(self._rig.episode(self._seed, index))
+        rig = self._rig
+        faults = rig.kind.fault_classes(rig.episode(self._seed, index), rig.system)
         return EpisodeRecord(index, faults, outcome.end, 0, outcome.findings, 0, "")
 
 
 def death(rig: Rig[Any], took_s: float) -> EpisodeOutcome:
-    """Return the end of an episode that killed its worker after so long: a hang if past the limit."""
-    if took_s > rig.limit_s:
+    """Return the end of an episode that killed its worker after so long: a hang if the worker was ended for that."""
+    if took_s > GRACE * rig.limit_s:
         return odd(HANG, EpisodeFinding(ENDS, 0, no_end(rig)))
     return odd(CRASH, EpisodeFinding(SURVIVES, 0, "the process that ran it died"))

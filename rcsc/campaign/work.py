@@ -82,7 +82,7 @@ def _same(rig: Rig[Any], wanted: str) -> None:
 def _record(rig: Rig[E], index: int, episode: E) -> EpisodeRecord:
     outcome = attempt(rig, episode)
     lines = mask(outcome.lines, rig.system)
-    faults = rig.kind.fault_classes(episode)
+    faults = rig.kind.fault_classes(episode, rig.system)
     return EpisodeRecord(index, faults, outcome.end, outcome.ticks, outcome.findings, lines, outcome.digest)
 
 
@@ -147,7 +147,7 @@ def logged(rig: Rig[E], episode: E, name: str) -> Shrunk[E]:
 _OWN = threading.Event()
 """Set in a process that is a campaign's worker and nothing else, which may be ended."""
 
-_GRACE = 2.0
+GRACE = 2.0
 """What does not react to being stopped within so many limits is ended with its process."""
 
 
@@ -169,7 +169,7 @@ def within(seconds: float) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         if _OWN.is_set():
             faulthandler.dump_traceback_later(
-                _GRACE * seconds, exit=True, file=stack.enter_context(open(os.devnull, "w"))
+                GRACE * seconds, exit=True, file=stack.enter_context(open(os.devnull, "w"))
             )
             stack.callback(faulthandler.cancel_dump_traceback_later)
         stack.enter_context(stop)

@@ -54,7 +54,7 @@ Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
 @SYSTEM
 @click.option("--plant", "--backend", "plant", default=None, metavar="PLANT",
               help="What stands outside: a file FILE.py or FILE.py:CLASS, or a plant's name in the description; "
-                   "else the one that is `by_hand`, or the first.")  # fmt: skip
+                   "else the one that is `by_hand`, or the first. With --again the episode's own runs.")  # fmt: skip
 @click.option("--script", default=None, metavar="SCRIPT",
               help="The orders: a CSV or TOML file, or the name of one beside the system or in its scripts/.")  # fmt: skip
 @click.option("--episodes", type=click.IntRange(min=1), default=200, show_default=True, metavar="N",
@@ -96,15 +96,18 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     if target is not None and system is not None:
         raise click.UsageError(f"`{target}` is a system, and `--system` names another")
     path, named = meant(None, system_path(target or system), script)
+    rig = _rig(path, plant, executor, named, limit_s)
+    shown = ["--system", str(target or system)] if target or system else []
+    plays = [*([str(target)] if target else shown), *(["--plant", plant] if plant else []), "--again"]
     asked = CampaignOptions(
-        _rig(path, plant, executor, named, limit_s), _again_words(target, system), save, json_
+        rig, shlex.join(["rcsc", "campaign", *plays]), shlex.join(["rcsc", "replay", *shown]), save, json_
     )
     if compiles and not compiled(path, quiet=True):
         return 1
     if again is not None:
-        return _again(again, asked.rig, executor)
+        return _again(again, rig, executor)
     pool = _pool(scheduler, workers or cores())
-    return _campaign(asked, seed, episodes, pool, _journal(asked.rig, seed, journal))
+    return _campaign(asked, seed, episodes, pool, _journal(rig, seed, journal))
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +116,14 @@ class CampaignOptions:
 
     Attributes:
         again: What to type to see an episode again; its file is to be added.
+        replays: What to type to replay a log; its file is to be added.
         folder: Where counterexamples go.
         json: Where the summary goes, too.
     """
 
     rig: Rig[Any]
     again: str
+    replays: str
     folder: Path
     json: Path | None
 
@@ -134,19 +139,12 @@ def _rig(path: Path, plant: str | None, executor: str | None, script: str, limit
     system = description(path)
     spec = plant_of(system, plant)
     kind = kind_of(system, spec)
-    need(kind.extra)
+    need("cell" if spec is not None and spec.model is not None else kind.extra)
     if script and not kind.takes_script:
         raise click.UsageError("the episodes of this plant have scripts of their own, and take none")
     return Rig(
         kind, path.resolve(), plant_name(spec), "python" if executor == "python" else "c", script, limit_s
     )
-
-
-def _again_words(target: Path | None, system: Path | None) -> str:
-    """What to type to see a saved episode again; its file is to be added."""
-    words = ["rcsc", "campaign", *([str(target)] if target else [])]
-    words += ["--system", str(system)] if system else []
-    return f"{shlex.join(words)} --again"
 
 
 def _pool(scheduler: str | None, workers: int) -> AbstractContextManager[WorkerPool]:
@@ -279,7 +277,7 @@ def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool:
             counterexample.finding.message,
         )
         if counterexample.log:
-            click.echo(f"  = help: rcsc replay {place / 'log.mcap'}", err=True)
+            click.echo(f"  = help: {asked.replays} {shlex.quote(str(place / 'log.mcap'))}", err=True)
         click.echo(f"  = help: {asked.again} {shlex.quote(str(place))}", err=True)
     if len(chosen) > MOST:
         click.echo(f"and {len(chosen) - MOST} more kinds of findings, in the journal")
@@ -299,6 +297,10 @@ def _again(path: Path, rig: Rig[Any], executor: str | None) -> int:
     for number, text, state, reason, ticks in outcome.rows:
         click.echo(f"{number:3}  {text:44} {state:8} {ticks:4} cycles{f'  {reason}' if reason else ''}")
     click.echo(f"{outcome.end} after {outcome.ticks} cycles")
+    for excused in outcome.excused:
+        click.echo(
+            f"cycle {excused.tick}: `{excused.property}` does not hold: {excused.message}: {excused.because}"
+        )
     for finding in outcome.findings:
         _tell(str(path), finding.property, finding.tick, finding.message)
     return 1 if outcome.findings else 0

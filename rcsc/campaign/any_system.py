@@ -1,0 +1,87 @@
+"""Episodes of any system as campaigns take them: drawn from what its description and its programs declare.
+
+In: what `rcsc.campaign` asks of a kind of episodes. Out: `ANY`.
+"""
+
+import importlib.util
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from rcsc.campaign.rig import EpisodeKind, NamedFile, run_sources, sources, usual_chunk
+from rcsc.episodes.episode import Episode
+from rcsc.episodes.loop import check, run
+from rcsc.episodes.sampling import draw, fault_classes, fault_names
+from rcsc.lang.project import load
+from rcsc.run.declared_plant import PlantSpec
+from rcsc.run.description import BadDescription, Description, description, places
+from rcsc.run.executors import NotBuilt
+from rcsc.run.orders.script import BadScript, script_path
+from rcsc.run.plant.bind import BadPlant
+from rcsc.run.plant.load import chosen
+
+_MODEL_FILES = frozenset(
+    {".xml", ".mjcf", ".urdf", ".stl", ".obj", ".msh", ".dae", ".skn", ".png", ".hf", ".bin"}
+)
+"""What a model may be made of, beside its own file and below it."""
+_PHYSICS_CHUNK = 4
+
+
+def _files(system: Path, plant: str, script: str) -> list[NamedFile]:
+    """Sources, data, scripts, the plant, and the programs that run them.
+
+    Raises:
+        BadDescription, BadPlant: The system is not in order, or has no such plant.
+    """
+    described = description(system)
+    scripts = [script_path(script, system.parent)] if script else []
+    scripts += [described.script] if described.script else []
+    spec = chosen(described, plant or None)
+    own = [
+        *_programs(described, system),
+        described.database,
+        *scripts,
+        *([] if spec is None else _plant(spec)),
+    ]
+    seen = dict.fromkeys(file.resolve() for file in own)
+    named = [(Path(os.path.relpath(file, system.parent.resolve())).as_posix(), file) for file in seen]
+    package = Path(__file__).parents[1]
+    return [*named, *run_sources(), *sources(package / "episodes")]
+
+
+def _programs(described: Description, system: Path) -> Iterator[Path]:
+    """The sources of the levels, with all that they use: properties are told by them, and leave no trace in executors."""
+    roots = (
+        place for level in described.levels for place in places(system, level.program) if place.is_file()
+    )
+    yield from sorted(map(Path, load([str(root) for root in roots]).files))
+
+
+def _plant(spec: PlantSpec) -> Iterator[Path]:
+    """The files that a plant is made of: with a file in Python those beside it, which it may import."""
+    file = spec.python.partition(":")[0]
+    if spec.model is not None:
+        yield spec.model
+        yield from (path for path in _below(spec.model.parent) if path.suffix.lower() in _MODEL_FILES)
+    elif file.endswith(".py"):
+        yield from sorted((spec.folder / file).parent.glob("*.py"))
+    elif (found := importlib.util.find_spec(file)) is not None and found.origin is not None:
+        yield Path(found.origin)
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """Every file below a folder, but for hidden ones."""
+    for name, folders, files in os.walk(folder):
+        folders[:] = sorted(below for below in folders if not below.startswith("."))
+        yield from (Path(name, file) for file in sorted(files) if not file.startswith("."))
+
+
+def _chunk(system: Path, plant: str) -> int:
+    spec = chosen(description(system), plant or None)
+    return _PHYSICS_CHUNK if spec is not None and spec.model is not None else usual_chunk(system, plant)
+
+
+ANY = EpisodeKind(
+    draw, run, Episode.from_json, check, fault_classes, fault_names, _files,
+    not_in_order=(BadDescription, BadPlant, BadScript, NotBuilt, ModuleNotFoundError), chunk=_chunk,
+)  # fmt: skip

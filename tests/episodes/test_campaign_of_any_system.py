@@ -1,0 +1,239 @@
+"""Campaigns of a system that rcsc knows nothing of but its files: the docking robot, with plants that break, die, hang and raise."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rcsc import commands
+from rcsc.campaign.any_system import ANY
+from rcsc.campaign.counterexamples import BadEpisode, again, saved_episode
+from rcsc.campaign.journal import Journal, header
+from rcsc.campaign.rig import EpisodeKind, Rig, digest
+from rcsc.campaign.runner import campaign
+from rcsc.campaign.work import play
+from rcsc.campaign.worker_pool import processes
+from rcsc.episodes.episode import Episode, OrderSpec, Switch
+from rcsc.run.plant.bind import BadPlant
+
+HALL = '''
+    def stays_in_the_hall(self) -> Property:
+        """There is a wall at one metre."""
+        return self.travelled < 1.0
+'''
+WILD = """
+import os
+import time
+from rcsc.run.plant import Fault
+
+
+class Base:
+    speed: int = 0
+    travelled: float = 0.0
+    lateral: float = 0.0
+    bumper: bool = False
+    beacon: bool = True
+    contact: bool = False
+    dies: Fault = False
+    hangs: Fault = False
+    is_stuck: Fault = False
+    fails: Fault = False
+
+    def step(self, seconds: float) -> None:
+        if self.dies:
+            os._exit(7)
+        while self.hangs:
+            time.sleep(0.01)
+        if self.is_stuck:
+            import ctypes
+
+            ctypes.PyDLL(None).sleep(3600)  # with the interpreter's lock: nothing in the process can end it
+        if self.fails:
+            raise ArithmeticError("no such place")
+"""
+
+
+def rcsc(*args: object) -> int:
+    return commands.run([str(arg) for arg in args])
+
+
+@pytest.fixture
+def hall(dock: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of a dock whose plant has a property that backing out breaks; commands run beside it."""
+    base = dock / "base.py"
+    text = base.read_text(encoding="utf-8").replace("import Fault, Range", "import Fault, Property, Range")
+    base.write_text(text + HALL, encoding="utf-8")
+    monkeypatch.chdir(dock.parent)
+    return dock
+
+
+def test_a_campaign_finds_shrinks_saves_and_shows_again_what_a_plant_says_must_not_be(
+    hall: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    played = ("campaign", "dock", "--no-compile", "--workers", 1, "--episodes", 5, "--json", "s.json")
+    assert rcsc(*played) == 1
+    said = capsys.readouterr()
+    assert "5 episodes, " in said.out
+    [place] = Path("campaign").iterdir()
+    assert sorted(path.name for path in place.iterdir()) == [
+        "episode.json", "finding.json", "log.mcap", "script.csv",
+    ]  # fmt: skip
+    assert said.err.splitlines()[-2:] == [
+        f"  = help: rcsc replay --system dock {place}/log.mcap",
+        f"  = help: rcsc campaign dock --again {place}",
+    ]
+    facts = json.loads((place / "finding.json").read_text())
+    assert facts["property"] == "plant: stays_in_the_hall"
+    assert "base.travelled = 1.0" in facts["said"]
+    assert saved_episode(place, Rig(ANY, hall / "system.toml")) == Episode(
+        orders=(OrderSpec("supervisor", "undock"),)
+    )
+    shown = (
+        f"error[RCS743]: {place}, cycle {facts['tick']}: `{facts['property']}` does not hold: {facts['said']}"
+    )
+    assert rcsc("campaign", "dock", "--no-compile", "--again", place) == 1
+    assert shown in capsys.readouterr().err
+    assert rcsc("replay", "--system", "dock", place / "log.mcap") == 0
+    assert "nothing differs" in capsys.readouterr().out
+    assert rcsc("run", "dock", "--no-compile", "--quiet", "--script", place / "script.csv") == 0
+    assert rcsc(*played) == 1
+    said = capsys.readouterr()
+    assert ", 0 played now" not in said.out
+    assert (said.err, f"saved before: {place}" in said.out) == ("", True)
+    summed = json.loads(Path("s.json").read_text())
+    assert (summed["played_now"], summed["episodes"], summed["episodes_with_findings"]) == (0, 5, 1)
+    assert {line["level"] for line in summed["lines"]} == {"supervisor", "drive"}
+
+
+def test_a_plant_that_dies_hangs_or_raises_is_a_finding_and_not_the_end(dock: Path, tmp_path: Path) -> None:
+    (dock / "wild.py").write_text(WILD, encoding="utf-8")
+    plant = str(dock / "wild.py")
+    rig = Rig(ANY, dock / "system.toml", plant)
+    told = {}
+    with processes(1) as pool:
+        for fault, limit_s in (("fails", 120.0), ("dies", 120.0), ("hangs", 0.4), ("is_stuck", 0.4)):
+            episode = Episode(
+                plant=plant,
+                orders=(OrderSpec("supervisor", "dock"),),
+                switches=(Switch(fault, 5, 90),),
+            )
+            (tmp_path / "episode.json").write_text(episode.to_json(), encoding="utf-8")
+            [finding] = again(tmp_path, replace(rig, limit_s=limit_s), pool=pool).findings
+            told[fault] = (finding.property, finding.tick, finding.message)
+    assert told.pop("dies") == ("the process survives", 0, "the process that ran it died")
+    assert told.pop("hangs") == told.pop("is_stuck") == ("the run ends in time", 0, "no end within 0.4 s")
+    [(name, tick, message)] = told.values()
+    assert name == "the plant raises nothing"
+    assert tick in {5, 6}
+    assert "ArithmeticError: no such place" in message
+
+
+def test_a_campaign_ends_where_the_plant_is_not_in_order(
+    dock: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """That is no episode's doing: it is told once, with its place, and no journal holds a thousand findings."""
+    monkeypatch.chdir(dock)
+    (dock / "base.py").write_text("class Base:\n    pass\n", encoding="utf-8")
+    assert rcsc("campaign", "--no-compile", "--workers", 1, "--episodes", 2) == 1
+    assert "error[RCS729]: `base.py` has no class with `step(self, seconds)`" in capsys.readouterr().err
+    with pytest.raises(BadPlant):
+        play(rig := Rig(ANY, dock / "system.toml"), digest(rig), 0, [0])
+
+
+def test_a_campaign_of_any_system_goes_on_after_a_kill(dock: Path, tmp_path: Path) -> None:
+    """Its journal has what was played, with any number of workers; what is left is played, and nothing twice."""
+    rig = Rig(ANY, dock / "system.toml", executor="python")
+    expected = play(rig, digest(rig), 3, range(4))
+    with Journal(tmp_path / "j", header(rig, 3)) as journal:
+        journal.add(expected[:2])
+    text = (tmp_path / "j").read_bytes()
+    (tmp_path / "j").write_bytes(text + text.splitlines(keepends=True)[1][:20])  # cut off in the third record
+    with processes(2) as pool, Journal(tmp_path / "j", header(rig, 3)) as journal:
+        new = [record.index for records in campaign(rig, 3, 4, pool, journal) for record in records]
+        assert sorted(new) == [2, 3]
+        assert [journal.records[at] for at in range(4)] == list(expected)
+    compiled = replace(rig, executor="c")
+    digests = [record.digest for record in play(compiled, digest(compiled), 3, range(4))]
+    assert digests == [record.digest for record in expected]
+
+
+def test_the_digest_covers_tables_scripts_and_the_files_of_the_plant_that_is_meant(dock: Path) -> None:
+    system = dock / "system.toml"
+
+    def taken(plant: str = "", script: str = "") -> str:
+        digest.cache_clear()
+        return digest(Rig(ANY, system, plant, script=script))
+
+    def changed(name: str, plant: str = "", script: str = "") -> bool:
+        before, path = taken(plant, script), dock / name
+        path.write_text(path.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+        return taken(plant, script) != before
+
+    (dock / "wheels.py").write_text("", encoding="utf-8")  # which the plant may import
+    (dock / "pin.stl").write_text("", encoding="utf-8")  # of which the model may be made
+    for name in ("system.toml", "words.rcs", "drive.rcs", "dock.csv", "base.py", "wheels.py"):
+        assert changed(name), name
+    assert changed("generated/c/drive.c")
+    assert not any(changed(name) for name in ("in.csv", "robot.xml", "pin.stl"))
+    assert changed("robot.xml", "mujoco")
+    assert changed("pin.stl", "mujoco")
+    assert not changed("base.py", "mujoco")
+    assert changed("in.csv", script="in")
+    assert taken("mujoco") != taken()
+
+
+def test_an_episode_of_another_system_is_refused(dock: Path, tmp_path: Path) -> None:
+    rig = Rig(ANY, dock / "system.toml")
+    for text, why in (
+        ('{"restarts": [{"tick": 3, "level": "task"}]}', "no level `task`"),
+        ('{"switches": [{"fault": "slips", "first_tick": 1, "last_tick": 2}]}', "no fault `slips`"),
+        ('{"backend": "kinematic"}', "an episode has no `backend`"),
+        ("{", ""),
+    ):
+        (tmp_path / "episode.json").write_text(text, encoding="utf-8")
+        with pytest.raises(BadEpisode, match=f"episode.json: .*{why}"):
+            saved_episode(tmp_path, rig)
+
+
+KIND = """
+import dataclasses
+from rcsc.campaign.any_system import ANY
+
+NONE = 3
+
+
+def calm(seed, system, plant, script):
+    return dataclasses.replace(ANY.draw(seed, system, plant, script), switches=(), harms=(), readings=())
+
+
+CALM = dataclasses.replace(ANY, draw=calm, takes_script=False)
+"""
+
+
+def test_a_plant_may_name_a_kind_of_episodes_of_its_own(
+    dock: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As that of the paper's cell does."""
+    (dock / "calm_episodes.py").write_text(KIND, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(dock))
+    monkeypatch.chdir(dock)
+    system = dock / "system.toml"
+    text = system.read_text(encoding="utf-8")
+
+    def names(kind: str) -> int:
+        system.write_text(text.replace('python = "base.py"', f'python = "base.py"\ncampaign = "{kind}"'))
+        return rcsc("campaign", "--no-compile", "--workers", 1, "--episodes", 1, "--script", "in")
+
+    assert names("calm_episodes:CALM") == 2
+    assert "take none" in capsys.readouterr().err
+    for kind, why in (
+        ("calm_episodes:NONE", "`calm_episodes:NONE` is no `rcsc.campaign.rig.EpisodeKind`"),
+        ("calm_episodes:CLAM", "`calm_episodes:CLAM` cannot be imported"),
+        ("no_episodes:CALM", "`no_episodes:CALM` cannot be imported"),
+    ):
+        assert names(kind) == 1
+        said = capsys.readouterr().err
+        assert why in said
+        assert "campaign = " in said  # the line that names it
+    assert isinstance(ANY, EpisodeKind)
