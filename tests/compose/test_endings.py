@@ -1,5 +1,6 @@
 """That commands end: what is shown to stop does, what may go on for ever is named, and by which numbers a line stops."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -394,3 +395,17 @@ def test_the_enumeration_sees_order_after_order_and_what_stands_still() -> None:
     assert endless(round_, "work", ()) == "order after order"
     assert endless(round_, "work", ("in",)) == ""
     assert endless(round_, "rest", ()) == ""
+
+
+def test_a_system_that_is_not_wholly_proved_says_what_rests_on_what(
+    repo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(
+        repo / "tests/data/composed", tmp_path / "s", ignore=shutil.ignore_patterns(".rcsc-cache")
+    )
+    assert run(["prove", str(tmp_path / "s"), "--level", "upper", "--no-cache"]) == 0
+    *_, summary = capsys.readouterr().out.partition("not wholly proved: ")
+    many, _, rest = summary.partition("\n")
+    assert int(many.split()[0]) > 3
+    assert "rest on level `lower`, which was not looked at" in rest
+    assert "not looked at;" not in rest, "a level that was not looked at is told once, not claim by claim"

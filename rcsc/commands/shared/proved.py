@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from rcsc.compose.contract.claims import AGAIN, RUNS, UNREACHED, Key, Need, declared, spelled
+from rcsc.compose.contract.claims import AGAIN, ENDING, RUNS, UNREACHED, Key, Need, declared, spelled
 from rcsc.compose.contract.obligations import Sort, pause_of
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.proof.context import Context
@@ -32,8 +32,11 @@ def trusting(whole: SystemProof, level: str, keys: Sequence[Key]) -> str:
 
 
 def named(whole: SystemProof, level: str, needs: Sequence[Need]) -> str:
-    """Claims in words."""
-    return report.named([spelled(need, level, whole.closed) for need in needs])
+    """Claims in words; of a level that was not looked at itself, that alone."""
+    looked_at = {proof.level for proof in whole.levels}
+    others = dict.fromkeys(owner for owner, _ in needs if owner not in looked_at)
+    claims = [spelled(need, level, whole.closed) for need in needs if need[0] in looked_at]
+    return report.named([*(f"level `{other}`, which was not looked at" for other in others), *claims])
 
 
 def not_looked_at(proof: LevelProof) -> Iterator[str]:
@@ -100,7 +103,8 @@ def left_out(whole: SystemProof) -> Iterator[str]:
     if whole.whole or not whole.proved:
         return
     unstated = sum(missing.applies for level in whole.levels for missing in level.unstated)
-    rests = sum(closed.accepted and not closed.proved for closed in whole.closed.values())
+    resting = _resting(whole)
+    rests = sum(map(len, resting.values()))
     ends = sum(not ending.proved for level in whole.levels for ending in level.endings)
     reasons = [
         f"{unstated} not looked at" if unstated else "",
@@ -108,6 +112,18 @@ def left_out(whole: SystemProof) -> Iterator[str]:
         f"{ends} not shown to end" if ends else "",
     ]
     yield f"not wholly proved: {', '.join(reason for reason in reasons if reason)}"
+    for lacks, claims in resting.items():
+        yield f"  {report.named(claims)}: {'rests' if len(claims) == 1 else 'rest'} on {lacks}"
+
+
+def _resting(whole: SystemProof) -> dict[str, list[str]]:
+    """Claims that rest on what is not proved, by what that is; those of a whole level say no more than each of its own."""
+    looked_at = {proof.level for proof in whole.levels}
+    resting: dict[str, list[str]] = {}
+    for (level, key), closed in whole.closed.items():
+        if level in looked_at and key not in {ENDING, RUNS} and closed.accepted and not closed.proved:
+            resting.setdefault(named(whole, "", closed.lacks), []).append(spelled((level, key), ""))
+    return resting
 
 
 def _ends(ending: Ending) -> str:
