@@ -4,7 +4,7 @@ In: `system.toml`. Out: a frozen `Description`. The names of buffers and of thei
 rest is automatic (Haynes et al. 1984, section 9).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -120,6 +120,18 @@ class Description:
     plants: tuple[PlantSpec, ...] = ()
     script: Path | None = None
     within: int = WITHIN
+
+    def unfilled(self, inputs: Iterable[str]) -> tuple[str, ...]:
+        """Which of these inputs, `level.variable`, no buffer and no feed fills: they stay as they are at first."""
+        filled = {wire.target for wire in self.wires}
+        filled |= {f"{level.name}.{feed.into}" for level in self.levels for feed in level.feeds}
+        return tuple(name for name in inputs if name not in filled)
+
+    def untaken(self, outputs: Iterable[str]) -> tuple[str, ...]:
+        """Which of these outputs, `level.variable`, no buffer takes; by `display` a page goes where there are displays."""
+        taken = {wire.source for wire in self.wires}
+        taken |= {f"{level.name}.display" for level in self.levels if self.displays}
+        return tuple(name for name in outputs if name not in taken)
 
     def review(self) -> Document:
         """A fresh page for faults, with the places of this description."""

@@ -184,6 +184,11 @@ class Signature:
         types = (FORMATS[self.leaves[at].c_type] for at in run)
         return "<" + "".join("B" if code == "?" else code for code in types)
 
+    def variables(self, kind: str) -> tuple[str, ...]:
+        """The declared variables of a kind, `input` or `output`, in order."""
+        names = (re.split(r"[.\[]", leaf.name, maxsplit=1)[0] for leaf in self.leaves if leaf.kind == kind)
+        return tuple(dict.fromkeys(names))
+
     def record(self, name: str) -> range:
         """Positions of the leaves of a variable: a record's or array's are next to each other; the pending value of one is not its part.
 

@@ -17,7 +17,7 @@ from rcsc.run.orders.roles import served
 from rcsc.run.orders.script import BadScript, read_script, script_path
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.system import System, assemble, signatures
-from tests.support.programs.texts import edited
+from tests.support.programs.texts import edit_file, edited
 
 Said = Callable[[], str]
 
@@ -123,7 +123,7 @@ def test_without_a_script_it_runs_for_so_many_cycles(here: Path, capsys: pytest.
     (here / "system.toml").write_text(edited(system, ('script = "dock.csv"\n', "")), encoding="utf-8")
     assert run(["run", "dock", "--no-compile", "--executor", "python"]) == 0
     first, second, *_ = capsys.readouterr().out.splitlines()
-    assert first == "nobody outside filled `fleet.order`: these inputs stayed as at first"
+    assert first == "nobody filled `supervisor.command`: these inputs stayed as at first"
     assert second.startswith("1000 cycles, 40.0 s of control time")
     assert run(["run", "dock", "--no-compile", "--executor", "python", "--cycles", "7"]) == 0
     assert "\n7 cycles" in capsys.readouterr().out
@@ -131,6 +131,32 @@ def test_without_a_script_it_runs_for_so_many_cycles(here: Path, capsys: pytest.
     (here / "base.py").write_text(base + "        self.over = True\n", encoding="utf-8")
     assert run(["run", "dock", "--no-compile", "--executor", "python"]) == 0
     assert "\n1 cycles" in capsys.readouterr().out
+
+
+def test_a_buffer_that_was_forgotten_is_named(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By what is proved without it, too: any value of an input that nothing fills."""
+    assert run(["run", "dock", "--no-compile", "--executor", "python"]) == 0
+    assert run(["prove", "dock", "--level", "drive", "--trace", "0"]) == 0
+    said = capsys.readouterr().out
+    assert "nobody filled" not in said
+    assert "no buffer" not in said
+    edit_file(
+        here / "system.toml",
+        ('"base.bumper" = "drive.bumper"\n', ""),
+        ('"drive.speed_mm_s" = "base.speed"\n', ""),
+        ('"base.bumper" = { value = false }\n', ""),
+        ("[plant.mujoco.actuators]\n", "[plant.mujoco.actuators]\n#"),
+    )
+    assert run(["run", "dock", "--no-compile", "--executor", "python", "--cycles", "5"]) == 1, (
+        "it stands still"
+    )
+    said = capsys.readouterr().out
+    assert "nobody filled `drive.bumper`: these inputs stayed as at first" in said
+    assert "no buffer takes `drive.speed_mm_s`" in said
+    assert run(["prove", "dock", "--level", "drive", "--trace", "0"]) == 0
+    said = capsys.readouterr().out
+    assert "no buffer fills `drive.bumper`: proved for any value" in said
+    assert "no buffer takes `drive.speed_mm_s`" in said
 
 
 def test_without_a_plant_nothing_moves_but_what_the_script_sets(here: Path) -> None:

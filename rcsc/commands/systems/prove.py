@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,7 +48,8 @@ from rcsc.compose.proof.system import (
 from rcsc.diagnostics.codes import Code
 from rcsc.host.cache import open_cache
 from rcsc.host.files import write_atomically
-from rcsc.run.description import description
+from rcsc.lang.model import Kind
+from rcsc.run.description import Description, description
 from rcsc.solvers.smt import Limits
 
 _WORTH_PROCESSES = 40
@@ -148,6 +149,8 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
             _say_invariants(proof)
         _say_agreements(proof)
         _say_whole(systems, proof)
+        for line in _unconnected(systems, description(path)):
+            click.echo(line)
     keep = _Keep(path, logs, freeze, variants)
     explanations = _explanations(systems, proof, search, keep, quiet=as_json)
     if as_json:
@@ -271,6 +274,23 @@ def _say_whole(systems: dict[str, TransitionSystem], proof: SystemProof) -> None
     ):
         click.echo(line)
     click.echo(f"{proof.seconds:.1f} s in all")
+
+
+def _unconnected(systems: Mapping[str, TransitionSystem], system: Description) -> Iterator[str]:
+    """Which inputs nothing fills, and which outputs nothing takes: perhaps a buffer was forgotten."""
+    named = {
+        kind: [
+            f"{name}.{declared.name}"
+            for name, ts in systems.items()
+            for declared in ts.program.declared
+            if declared.kind is kind
+        ]
+        for kind in (Kind.INPUT, Kind.OUTPUT)
+    }
+    if missing := system.unfilled(named[Kind.INPUT]):
+        yield f"no buffer fills {', '.join(f'`{name}`' for name in missing)}: proved for any value"
+    if idle := system.untaken(named[Kind.OUTPUT]):
+        yield f"no buffer takes {', '.join(f'`{name}`' for name in idle)}"
 
 
 def _say_agreements(proof: SystemProof) -> None:

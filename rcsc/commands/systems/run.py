@@ -4,7 +4,7 @@ import contextlib
 import shlex
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -378,7 +378,7 @@ def _closing(
     run = witness.run
     again = _kept(run, resume, asked)
     if not asked.quiet:
-        for line in (*witness.closing(), *_unfilled(run), _figures(run, seconds)):
+        for line in (*witness.closing(), *_unconnected(run), _figures(run, seconds)):
             click.echo(line)
         here = log.relative_to(Path.cwd()) if log.is_relative_to(Path.cwd()) else log
         click.echo(f"log: {here}" + (f"; report: {asked.report}" if asked.report else ""))
@@ -399,17 +399,25 @@ def _closing(
     return 0
 
 
-def _unfilled(run: ScriptedRun) -> Iterator[str]:
-    """Which buffers from outside nobody filled: a plant or a script that a newcomer forgot."""
-    levels = {level.name for level in run.system.levels}
-    sources = dict.fromkeys(wire.source for wire in run.system.description.wires)
-    missing = [
-        source
-        for source in sources
-        if source.partition(".")[0] not in levels and run.system.buffers.latest(source) is None
+def _unconnected(run: ScriptedRun) -> Iterator[str]:
+    """Which inputs nobody filled and which outputs nobody takes: a buffer, a plant or a script that a newcomer forgot."""
+    system = run.system.description
+    levels = {level.name: level.sign for level in run.system.levels}
+    silent = [
+        wire.target
+        for wire in system.wires
+        if wire.source.partition(".")[0] not in levels and run.system.buffers.latest(wire.source) is None
     ]
+    missing = [*silent, *system.unfilled(_named(levels, "input"))]
     if missing:
-        yield f"nobody outside filled {', '.join(f'`{source}`' for source in missing)}: these inputs stayed as at first"
+        yield f"nobody filled {', '.join(f'`{name}`' for name in missing)}: these inputs stayed as at first"
+    idle = system.untaken(_named(levels, "output"))
+    if idle:
+        yield f"no buffer takes {', '.join(f'`{name}`' for name in idle)}"
+
+
+def _named(levels: Mapping[str, Signature], kind: str) -> list[str]:
+    return [f"{name}.{variable}" for name, sign in levels.items() for variable in sign.variables(kind)]
 
 
 def _figures(run: ScriptedRun, seconds: float) -> str:
