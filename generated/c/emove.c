@@ -177,6 +177,15 @@ static void emove_do_departure_position_fingers(emove_t *s)
     s->to_primitive.input_command = (uint8_t)INT64_C(4);
 }
 
+/* So that vision sees the whole scene (section 4.1). */
+static void emove_do_open_fully(emove_t *s)
+{
+    s->to_primitive.obj_ptr = (uint8_t)INT64_C(7);
+    s->to_primitive.grasp = (uint8_t)INT64_C(0);
+    s->to_primitive.input_command = (uint8_t)INT64_C(4);
+    s->to_vision.input_command = (uint8_t)INT64_C(0);
+}
+
 /* Procedure immed_grasp. */
 static void emove_do_immed_grasp(emove_t *s)
 {
@@ -400,7 +409,7 @@ static void emove_admit(emove_t *s)
             s->fault_at = 1;
         }
     }
-    if (((int64_t)s->task.obj_ptr > INT64_C(6))) {
+    if (((int64_t)s->task.obj_ptr > INT64_C(7))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 2;
@@ -418,7 +427,7 @@ static void emove_admit(emove_t *s)
             s->fault_at = 5;
         }
     }
-    if (((int64_t)s->task.gripped_obj_ptr > INT64_C(6))) {
+    if (((int64_t)s->task.gripped_obj_ptr > INT64_C(7))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 7;
@@ -662,7 +671,7 @@ static void emove_settle(emove_t *s)
 static void emove_run_locate(emove_t *s)
 {
     /* locate_in_step */
-    if (!(((!(!s->new_command)) || ((((((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(0))) || ((int64_t)s->cur_state == INT64_C(1))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->primitive.command == INT64_C(4)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(1)))) || (((((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->primitive.command == INT64_C(1))) && ((int64_t)s->vision.command == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(9)) && ((int64_t)s->primitive.command == INT64_C(3))) && ((int64_t)s->vision.command == INT64_C(0))))))) {
+    if (!(((!(!s->new_command)) || ((((((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(0))) || ((int64_t)s->cur_state == INT64_C(1))) || ((((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->primitive.command == INT64_C(4))) && ((int64_t)s->vision.command == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(1)))) || (((((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->primitive.command == INT64_C(1))) && ((int64_t)s->vision.command == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(9)) && ((int64_t)s->primitive.command == INT64_C(3))) && ((int64_t)s->vision.command == INT64_C(0))))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
     }
     s->line = emove_locate_line(s);
@@ -679,7 +688,7 @@ static void emove_run_locate(emove_t *s)
         break;
     case 2: /* emove/locate.rcs line 2 */
         emove_do_nextstate(s, INT64_C(5));
-        emove_do_departure_position_fingers(s);
+        emove_do_open_fully(s);
         emove_do_executing(s);
         break;
     case 3: /* emove/locate.rcs line 3 */
@@ -1242,7 +1251,7 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && (((int64_t)s->to_primitive.input_command > INT64_C(5)))) {
         at = 22;
     }
-    if ((at < 0) && (((int64_t)s->to_primitive.obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->to_primitive.obj_ptr > INT64_C(7)))) {
         at = 23;
     }
     if ((at < 0) && (((int64_t)s->to_primitive.grasp > INT64_C(9)))) {
@@ -1281,7 +1290,7 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && (((int64_t)s->last_primitive.input_command > INT64_C(5)))) {
         at = 35;
     }
-    if ((at < 0) && (((int64_t)s->last_primitive.obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->last_primitive.obj_ptr > INT64_C(7)))) {
         at = 36;
     }
     if ((at < 0) && (((int64_t)s->last_primitive.grasp > INT64_C(9)))) {
@@ -1308,7 +1317,7 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && (((int64_t)s->to_vision.input_command > INT64_C(2)))) {
         at = 54;
     }
-    if ((at < 0) && (((int64_t)s->to_vision.obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->to_vision.obj_ptr > INT64_C(7)))) {
         at = 55;
     }
     if ((at < 0) && (!((s->to_vision.expected_range_mm >= 0.0) && (s->to_vision.expected_range_mm <= 2000.0)))) {
@@ -1329,7 +1338,7 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && (((int64_t)s->last_vision.input_command > INT64_C(2)))) {
         at = 61;
     }
-    if ((at < 0) && (((int64_t)s->last_vision.obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->last_vision.obj_ptr > INT64_C(7)))) {
         at = 62;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->origin.known) > 1u)) {

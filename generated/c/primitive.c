@@ -390,7 +390,7 @@ static void primitive_admit(primitive_t *s)
             s->fault_at = 1;
         }
     }
-    if (((int64_t)s->emove.obj_ptr > INT64_C(6))) {
+    if (((int64_t)s->emove.obj_ptr > INT64_C(7))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 2;

@@ -446,7 +446,7 @@ static void task_admit(task_t *s)
             s->fault_at = 1;
         }
     }
-    if (((int64_t)s->workstation.obj > INT64_C(6))) {
+    if (((int64_t)s->workstation.obj > INT64_C(7))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 2;
@@ -1199,7 +1199,7 @@ int32_t task_check(const task_t *s)
     if ((at < 0) && (((int64_t)s->to_workstation.status_report > INT64_C(2)))) {
         at = 10;
     }
-    if ((at < 0) && (((int64_t)s->to_workstation.status_parameter > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->to_workstation.status_parameter > INT64_C(7)))) {
         at = 11;
     }
     if ((at < 0) && (((int64_t)s->to_workstation.failure > INT64_C(15)))) {
@@ -1220,7 +1220,7 @@ int32_t task_check(const task_t *s)
     if ((at < 0) && (((int64_t)s->to_emove.input_command > INT64_C(5)))) {
         at = 23;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->to_emove.obj_ptr > INT64_C(7)))) {
         at = 24;
     }
     if ((at < 0) && (((int64_t)s->to_emove.grasp > INT64_C(9)))) {
@@ -1232,7 +1232,7 @@ int32_t task_check(const task_t *s)
     if ((at < 0) && ((*(const uint8_t *)&s->to_emove.apoint_pos_flag) > 1u)) {
         at = 28;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.gripped_obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->to_emove.gripped_obj_ptr > INT64_C(7)))) {
         at = 29;
     }
     if ((at < 0) && (((int64_t)s->emove.command > INT64_C(5)))) {
@@ -1250,7 +1250,7 @@ int32_t task_check(const task_t *s)
     if ((at < 0) && (((int64_t)s->last_emove.input_command > INT64_C(5)))) {
         at = 34;
     }
-    if ((at < 0) && (((int64_t)s->last_emove.obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->last_emove.obj_ptr > INT64_C(7)))) {
         at = 35;
     }
     if ((at < 0) && (((int64_t)s->last_emove.grasp > INT64_C(9)))) {
@@ -1322,7 +1322,7 @@ int32_t task_check(const task_t *s)
     if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
         at = 69;
     }
-    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(7)))) {
         at = 70;
     }
     if ((at < 0) && (((int64_t)s->grasp_now > INT64_C(9)))) {
@@ -1464,7 +1464,7 @@ int32_t task_move_line(const task_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint32_t t0[7];
+        uint32_t t0[8];
         uint32_t t1[2];
         uint32_t t2[6];
         uint32_t t3[3];
@@ -1477,7 +1477,7 @@ int32_t task_move_line(const task_t *s)
         uint32_t t10[2];
     } t = {
         {
-            0xffe7fu, 0xffe7fu, 0xffe7fu, 0xffe7fu, 0xffe7fu, 0xfffbfu, 0xffe7fu
+            0xffe7fu, 0xffe7fu, 0xffe7fu, 0xffe7fu, 0xffe7fu, 0xfffbfu, 0xffe7fu, 0xffe7fu
         },
         {
             0xffe00u, 0x1ffu

@@ -198,7 +198,7 @@ static void vision_admit(vision_t *s)
             s->fault_at = 1;
         }
     }
-    if (((int64_t)s->emove.obj_ptr > INT64_C(6))) {
+    if (((int64_t)s->emove.obj_ptr > INT64_C(7))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 2;
@@ -492,7 +492,7 @@ int32_t vision_check(const vision_t *s)
     if ((at < 0) && (((int64_t)s->to_camera.fire > INT64_C(2)))) {
         at = 30;
     }
-    if ((at < 0) && (((int64_t)s->to_camera.obj_ptr > INT64_C(6)))) {
+    if ((at < 0) && (((int64_t)s->to_camera.obj_ptr > INT64_C(7)))) {
         at = 31;
     }
     return at;

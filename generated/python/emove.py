@@ -83,6 +83,7 @@ class object_(IntEnum):
     hous = 4
     close_grip = 5
     unknown_object = 6
+    open_grip = 7
 
 
 class reason(IntEnum):
@@ -932,6 +933,14 @@ def _do_departure_position_fingers(s):
     s.to_primitive_input_command = 4
 
 
+def _do_open_fully(s):
+    """So that vision sees the whole scene (section 4.1)."""
+    s.to_primitive_obj_ptr = 7
+    s.to_primitive_grasp = 0
+    s.to_primitive_input_command = 4
+    s.to_vision_input_command = 0
+
+
 def _do_immed_grasp(s):
     """Procedure immed_grasp."""
     s.to_primitive_obj_ptr = s.task_obj_ptr
@@ -1137,7 +1146,7 @@ def check(s):
         return 21
     if not (isinstance(s.to_primitive_input_command, int) and 0 <= s.to_primitive_input_command <= 5):
         return 22
-    if not (isinstance(s.to_primitive_obj_ptr, int) and 0 <= s.to_primitive_obj_ptr <= 6):
+    if not (isinstance(s.to_primitive_obj_ptr, int) and 0 <= s.to_primitive_obj_ptr <= 7):
         return 23
     if not (isinstance(s.to_primitive_grasp, int) and 0 <= s.to_primitive_grasp <= 9):
         return 24
@@ -1163,7 +1172,7 @@ def check(s):
         return 34
     if not (isinstance(s.last_primitive_input_command, int) and 0 <= s.last_primitive_input_command <= 5):
         return 35
-    if not (isinstance(s.last_primitive_obj_ptr, int) and 0 <= s.last_primitive_obj_ptr <= 6):
+    if not (isinstance(s.last_primitive_obj_ptr, int) and 0 <= s.last_primitive_obj_ptr <= 7):
         return 36
     if not (isinstance(s.last_primitive_grasp, int) and 0 <= s.last_primitive_grasp <= 9):
         return 37
@@ -1183,7 +1192,7 @@ def check(s):
         return 53
     if not (isinstance(s.to_vision_input_command, int) and 0 <= s.to_vision_input_command <= 2):
         return 54
-    if not (isinstance(s.to_vision_obj_ptr, int) and 0 <= s.to_vision_obj_ptr <= 6):
+    if not (isinstance(s.to_vision_obj_ptr, int) and 0 <= s.to_vision_obj_ptr <= 7):
         return 55
     if not (isinstance(s.to_vision_expected_range_mm, (int, float)) and 0.0 <= s.to_vision_expected_range_mm <= 2000.0):
         return 56
@@ -1197,7 +1206,7 @@ def check(s):
         return 60
     if not (isinstance(s.last_vision_input_command, int) and 0 <= s.last_vision_input_command <= 2):
         return 61
-    if not (isinstance(s.last_vision_obj_ptr, int) and 0 <= s.last_vision_obj_ptr <= 6):
+    if not (isinstance(s.last_vision_obj_ptr, int) and 0 <= s.last_vision_obj_ptr <= 7):
         return 62
     if not (isinstance(s.origin_known, int) and 0 <= s.origin_known <= 1):
         return 63
@@ -1264,7 +1273,7 @@ def _admit(s):
     if not 0 <= i1 <= 5:
         return _refused(s, 1)
     i2 = _whole(s.task_obj_ptr)
-    if not 0 <= i2 <= 6:
+    if not 0 <= i2 <= 7:
         return _refused(s, 2)
     i3 = _whole(s.task_grasp)
     if not 0 <= i3 <= 9:
@@ -1279,7 +1288,7 @@ def _admit(s):
     if not 0 <= i6 <= 1:
         return _refused(s, 6)
     i7 = _whole(s.task_gripped_obj_ptr)
-    if not 0 <= i7 <= 6:
+    if not 0 <= i7 <= 7:
         return _refused(s, 7)
     i8 = _whole(s.from_primitive_inc_command_echo)
     if not 0 <= i8 <= 65535:
@@ -1483,7 +1492,7 @@ def locate_lines(states):
 
 def _run_locate(s):
     """Matches table locate and runs the line."""
-    if not (not (not s.new_command) or (((((((((s.cur_state == 0) and (s.primitive_command == 0)) and (s.vision_command == 0)) or (s.cur_state == 1)) or ((s.cur_state == 5) and (s.primitive_command == 4))) or (((s.cur_state == 6) and (s.primitive_command == 0)) and (s.vision_command == 1))) or (((s.cur_state in (7, 10, 11,)) and (s.primitive_command == 1)) and (s.vision_command == 0))) or (((s.cur_state == 8) and (s.primitive_command == 0)) and (s.vision_command == 2))) or (((s.cur_state == 9) and (s.primitive_command == 3)) and (s.vision_command == 0)))):  # locate_in_step
+    if not (not (not s.new_command) or (((((((((s.cur_state == 0) and (s.primitive_command == 0)) and (s.vision_command == 0)) or (s.cur_state == 1)) or (((s.cur_state == 5) and (s.primitive_command == 4)) and (s.vision_command == 0))) or (((s.cur_state == 6) and (s.primitive_command == 0)) and (s.vision_command == 1))) or (((s.cur_state in (7, 10, 11,)) and (s.primitive_command == 1)) and (s.vision_command == 0))) or (((s.cur_state == 8) and (s.primitive_command == 0)) and (s.vision_command == 2))) or (((s.cur_state == 9) and (s.primitive_command == 3)) and (s.vision_command == 0)))):  # locate_in_step
         s.assumptions_failed |= 1 << 0
     line = locate_line(s)
     if line < 0:
@@ -1510,7 +1519,7 @@ def _locate_1(s):
 def _locate_2(s):
     """emove/locate.rcs line 2"""
     _do_nextstate(s, 5)
-    _do_departure_position_fingers(s)
+    _do_open_fully(s)
     _do_executing(s)
 
 

@@ -83,6 +83,7 @@ class object_(IntEnum):
     hous = 4
     close_grip = 5
     unknown_object = 6
+    open_grip = 7
 
 
 class reason(IntEnum):

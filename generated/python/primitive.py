@@ -83,6 +83,7 @@ class object_(IntEnum):
     hous = 4
     close_grip = 5
     unknown_object = 6
+    open_grip = 7
 
 
 class reason(IntEnum):
@@ -1241,7 +1242,7 @@ def _admit(s):
     if not 0 <= i1 <= 5:
         return _refused(s, 1)
     i2 = _whole(s.emove_obj_ptr)
-    if not 0 <= i2 <= 6:
+    if not 0 <= i2 <= 7:
         return _refused(s, 2)
     i3 = _whole(s.emove_grasp)
     if not 0 <= i3 <= 9:

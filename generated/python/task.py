@@ -83,6 +83,7 @@ class object_(IntEnum):
     hous = 4
     close_grip = 5
     unknown_object = 6
+    open_grip = 7
 
 
 class reason(IntEnum):
@@ -496,6 +497,7 @@ _MOVE_0 = (
     0xffe7f,
     0xffe7f,
     0xfffbf,
+    0xffe7f,
     0xffe7f,
 )
 _MOVE_1 = (
@@ -1004,7 +1006,7 @@ def check(s):
         return 9
     if not (isinstance(s.to_workstation_status_report, int) and 0 <= s.to_workstation_status_report <= 2):
         return 10
-    if not (isinstance(s.to_workstation_status_parameter, int) and 0 <= s.to_workstation_status_parameter <= 6):
+    if not (isinstance(s.to_workstation_status_parameter, int) and 0 <= s.to_workstation_status_parameter <= 7):
         return 11
     if not (isinstance(s.to_workstation_failure, int) and 0 <= s.to_workstation_failure <= 15):
         return 12
@@ -1022,7 +1024,7 @@ def check(s):
         return 22
     if not (isinstance(s.to_emove_input_command, int) and 0 <= s.to_emove_input_command <= 5):
         return 23
-    if not (isinstance(s.to_emove_obj_ptr, int) and 0 <= s.to_emove_obj_ptr <= 6):
+    if not (isinstance(s.to_emove_obj_ptr, int) and 0 <= s.to_emove_obj_ptr <= 7):
         return 24
     if not (isinstance(s.to_emove_grasp, int) and 0 <= s.to_emove_grasp <= 9):
         return 25
@@ -1032,7 +1034,7 @@ def check(s):
         return 27
     if not (isinstance(s.to_emove_apoint_pos_flag, int) and 0 <= s.to_emove_apoint_pos_flag <= 1):
         return 28
-    if not (isinstance(s.to_emove_gripped_obj_ptr, int) and 0 <= s.to_emove_gripped_obj_ptr <= 6):
+    if not (isinstance(s.to_emove_gripped_obj_ptr, int) and 0 <= s.to_emove_gripped_obj_ptr <= 7):
         return 29
     if not (isinstance(s.emove_command, int) and 0 <= s.emove_command <= 5):
         return 30
@@ -1044,7 +1046,7 @@ def check(s):
         return 33
     if not (isinstance(s.last_emove_input_command, int) and 0 <= s.last_emove_input_command <= 5):
         return 34
-    if not (isinstance(s.last_emove_obj_ptr, int) and 0 <= s.last_emove_obj_ptr <= 6):
+    if not (isinstance(s.last_emove_obj_ptr, int) and 0 <= s.last_emove_obj_ptr <= 7):
         return 35
     if not (isinstance(s.last_emove_grasp, int) and 0 <= s.last_emove_grasp <= 9):
         return 36
@@ -1098,7 +1100,7 @@ def check(s):
         return 68
     if not (isinstance(s.obj_acquired, int) and 0 <= s.obj_acquired <= 1):
         return 69
-    if not (isinstance(s.obj_now_in_gripper, int) and 0 <= s.obj_now_in_gripper <= 6):
+    if not (isinstance(s.obj_now_in_gripper, int) and 0 <= s.obj_now_in_gripper <= 7):
         return 70
     if not (isinstance(s.grasp_now, int) and 0 <= s.grasp_now <= 9):
         return 71
@@ -1133,7 +1135,7 @@ def _admit(s):
     if not 0 <= i1 <= 5:
         return _refused(s, 1)
     i2 = _whole(s.workstation_obj)
-    if not 0 <= i2 <= 6:
+    if not 0 <= i2 <= 7:
         return _refused(s, 2)
     i3 = _whole(s.workstation_grasp)
     if not 0 <= i3 <= 9:
@@ -1563,7 +1565,7 @@ def clear_step(s):
 def move_line(s):
     """The line of table move that matches admitted inputs: its position; -1 none, -2 several."""
     try:
-        return _MOVE_ONE[0][_MOVE_G0[s.cur_state * 42 + s.workstation_obj * 6 + s.emove_command] & _MOVE_G1[s.emove_status * 128 + s.new_command * 64 + s.emove_resting * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]]
+        return _MOVE_ONE[0][_MOVE_G0[s.cur_state * 48 + s.workstation_obj * 6 + s.emove_command] & _MOVE_G1[s.emove_status * 128 + s.new_command * 64 + s.emove_resting * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]]
     except KeyError:
         return -2
 

@@ -83,6 +83,7 @@ class object_(IntEnum):
     hous = 4
     close_grip = 5
     unknown_object = 6
+    open_grip = 7
 
 
 class reason(IntEnum):
@@ -673,7 +674,7 @@ def check(s):
         return 29
     if not (isinstance(s.to_camera_fire, int) and 0 <= s.to_camera_fire <= 2):
         return 30
-    if not (isinstance(s.to_camera_obj_ptr, int) and 0 <= s.to_camera_obj_ptr <= 6):
+    if not (isinstance(s.to_camera_obj_ptr, int) and 0 <= s.to_camera_obj_ptr <= 7):
         return 31
     return -1
 
@@ -690,7 +691,7 @@ def _admit(s):
     if not 0 <= i1 <= 2:
         return _refused(s, 1)
     i2 = _whole(s.emove_obj_ptr)
-    if not 0 <= i2 <= 6:
+    if not 0 <= i2 <= 7:
         return _refused(s, 2)
     i3 = _real(s.emove_expected_range_mm)
     if not 0.0 <= i3 <= 2000.0:

@@ -71,7 +71,7 @@ REACHES: dict[str, tuple[Episode, str]] = {
     "hand_weak": (replace(ACQUIRE, faults=(FaultSpec("hand_weak", 0, EVER),)), "failed:pic"),
     "jammed": (replace(ACQUIRE, faults=(FaultSpec("jammed", 0, EVER),)), "failed:loc"),
     "slips": (replace(AGAIN, faults=(FaultSpec("slips", 0, 400),)), "failed:nothing_gripped"),
-    "drops": (replace(AGAIN, faults=(FaultSpec("drops", 200, 210),)), "failed:nothing_gripped"),
+    "drops": (replace(AGAIN, faults=(FaultSpec("drops", 222, 232),)), "failed:nothing_gripped"),
     "blind": (replace(ACQUIRE, faults=(FaultSpec("blind", 0, EVER),)), "failed:loc"),
     "dark": (replace(ACQUIRE, faults=(FaultSpec("dark", 0, EVER),)), "failed:loc"),
     "late_ticks": (replace(ACQUIRE, faults=(FaultSpec("late_ticks", 0, EVER, 120.0),)), "failed:loc"),
@@ -145,12 +145,12 @@ class CountsWithoutExcuse(CountsTrue):
 OPEN: dict[str, tuple[PropertyClass, Episode, str]] = {
     "a PICKUP that is changed is counted": (
         CountsWithoutExcuse,
-        replace(ACQUIRE, interruptions=(Interruption(166, "MOVE,,,WS-SAFE,"),)),
+        replace(ACQUIRE, interruptions=(Interruption(188, "MOVE,,,WS-SAFE,"),)),
         "TASK counts +1 more",
     ),
     "nobody looks at the hand after the end of the way": (
         DoneWithoutExcuse,
-        replace(ACQUIRE, rows=(*ACQUIRE.rows, "MOVE,,,WS-SAFE,"), faults=(FaultSpec("drops", 249, 254),)),
+        replace(ACQUIRE, rows=(*ACQUIRE.rows, "MOVE,,,WS-SAFE,"), faults=(FaultSpec("drops", 271, 276),)),
         "nothing is between the pads",
     ),
 }

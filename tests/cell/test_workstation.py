@@ -23,7 +23,7 @@ from rcsc_cell.workstation.script import ScriptRow, read_script
 from tests.support.cells import REPO, SYSTEM
 from tests.support.programs.texts import one_row_a_line
 
-PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object")
+PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object", "open_grip")
 DATA = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
 HEAD = "command,part,source,dest,end_at\n"
 

@@ -14,7 +14,7 @@ from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import about_z
 from rcsc_cell.episodes.witness import placements
 from rcsc_cell.workstation.prepared import prepare
-from tests.support.cells import PAUSE_ENDS, SCRIPT, SYSTEM, Cell, through_script
+from tests.support.cells import COMMAND_ENDS, PAUSE_ENDS, SCRIPT, SYSTEM, Cell, through_script
 
 
 def world(database: Database) -> tuple[Plant]:
@@ -167,6 +167,23 @@ def test_without_a_source_a_robot_on_its_way_takes_nothing() -> None:
     assert cell.do("acquire", obj="tbox", grasp=2) == "failed"
     assert cell.reason() == "cmd"
     assert cell.do("move", dest="WS-SAFE") == "done"
+
+
+def test_vision_looks_past_a_hand_that_is_opened_fully() -> None:
+    """Section 4.1: before the first picture as wide as it goes, and after the second one as the part wants it."""
+    cell = Cell()
+    assert cell.do("move", dest="BUFFER-VUPOS") == "done"
+    cell.tell("acquire", obj="tbox", grasp=2, source="BUFFER")
+    gripper, vision, openings = cell.system.level("gripper"), cell.system.level("vision"), []
+    for _ in range(COMMAND_ENDS):
+        number = vision.value("to_camera.number")
+        cell.system.step()
+        if vision.value("to_camera.number") != number:
+            openings.append(gripper.value("hand.opening_mm"))
+        if cell.answer == "done":
+            break
+    assert openings == pytest.approx([130.0, 130.0], abs=0.6)
+    assert gripper.value("hand.opening_mm") == pytest.approx(60.0, abs=1.0)
 
 
 def test_a_second_command_while_a_part_is_held_is_refused() -> None:
