@@ -6,12 +6,14 @@ In: what `rcsc.campaign` asks of a kind of episodes. Out: `ANY`.
 import importlib.util
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from rcsc.campaign.rig import EpisodeKind, NamedFile, run_sources, sources, usual_chunk
 from rcsc.episodes.episode import Episode
 from rcsc.episodes.loop import check, run
 from rcsc.episodes.sampling import draw, fault_classes, fault_names
+from rcsc.host.files.names import shown
 from rcsc.lang.project import load
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import BadDescription, Description, description, places
@@ -76,12 +78,27 @@ def _below(folder: Path) -> Iterator[Path]:
         yield from (Path(name, file) for file in sorted(files) if not file.startswith("."))
 
 
+def _admit(episode: Episode, system: Path, plant: str) -> Episode:
+    """A saved episode as it is to run here: a file's name in it is no leave to import that file.
+
+    Raises:
+        ValueError: It names what the system has not.
+    """
+    names = [spec.name for spec in description(system).plants]
+    if episode.plant and episode.plant not in names:
+        if not plant or plant in names:
+            raise ValueError(f"the description has no plant {shown(episode.plant)}; `--plant` names one")
+        episode = replace(episode, plant=plant)
+    check(episode, system)
+    return episode
+
+
 def _chunk(system: Path, plant: str) -> int:
     spec = chosen(description(system), plant or None)
     return _PHYSICS_CHUNK if spec is not None and spec.model is not None else usual_chunk(system, plant)
 
 
 ANY = EpisodeKind(
-    draw, run, Episode.from_json, check, fault_classes, fault_names, _files,
+    draw, run, Episode.from_json, _admit, fault_classes, fault_names, _files,
     not_in_order=(BadDescription, BadPlant, BadScript, NotBuilt, ModuleNotFoundError), chunk=_chunk,
 )  # fmt: skip

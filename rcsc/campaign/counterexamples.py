@@ -176,13 +176,11 @@ def saved_episode(path: Path, rig: Rig[E]) -> E:
     """
     file = path / "episode.json" if path.is_dir() else path
     try:
-        episode = rig.kind.read(text(file))
-        rig.kind.check(episode, rig.system)
+        return rig.kind.admit(rig.kind.read(text(file)), rig.system, rig.plant)
     except OSError as error:
         raise BadEpisode(f"{file} cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise BadEpisode(f"{file}: {error}") from error
-    return episode
 
 
 def again(

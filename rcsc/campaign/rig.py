@@ -59,7 +59,8 @@ class EpisodeKind(Generic[E]):
         draw: Makes the episode of a seed, for a system, a plant and a script by their names; empty for its own.
         run: Runs an episode of a system; the third is where the log goes.
         read: Makes an episode of its text; raises ValueError in words where it is none.
-        check: Raises ValueError where an episode names what a system has not.
+        admit: Gives a saved episode, which may come from anybody, as it is to run on a system and a plant; raises ValueError where it
+            names what they have not.
         fault_classes: Which fault classes an episode of a system has; empty where it is nominal.
         faults: Every fault class of a system and plant, in the order in which they are shown.
         files: What outcomes depend on beside the description and the executors.
@@ -73,7 +74,7 @@ class EpisodeKind(Generic[E]):
     draw: Callable[[int, Path, str, str], E]
     run: Callable[[E, Path, Path | None], EpisodeOutcome]
     read: Callable[[str], E]
-    check: Callable[[E, Path], None]
+    admit: Callable[[E, Path, str], E]
     fault_classes: Callable[[E, Path], tuple[str, ...]]
     faults: Callable[[Path, str], tuple[str, ...]]
     files: Callable[[Path, str, str], Iterable[NamedFile]]

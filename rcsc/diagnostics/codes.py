@@ -1190,7 +1190,7 @@ class Code(StrEnum):
     EXTRA_MISSING = """RCS705: a package is missing
 
     `pip install rcsc` brings what checking, compiling, proving and the hooks need. The rest comes with extras, which the help names:
-    `log` for logs and so for `rcsc run`, `cell` for the paper's cell, models for MuJoCo and `rcsc campaign`, `plot` for pictures of
+    `log` for logs and so for `rcsc run` and `rcsc campaign`, `cell` for the paper's cell and models for MuJoCo, `plot` for pictures of
     logs, `parquet` for Parquet files, `live` for the page that follows a run, `certify` for cvc5, `graph` for drawings of tables,
     `cluster` for a campaign on a cluster. In a checkout: `pip install -e '.[cell]'`.
     """
@@ -1338,9 +1338,9 @@ class Code(StrEnum):
     """
     PROPERTY_BROKEN = """RCS743: a property does not hold
 
-    In an episode of a campaign something happened that the paper or the safety of the cell excludes. The message names the property,
-    the cycle and what was seen; the counterexample's folder has the episode as small as it could be made, its script, and its log for
-    `rcsc replay`.
+    In an episode of a campaign something happened that a property of the tables, of the protocol or of the plant excludes. The message
+    names the property, the cycle and what was seen; the counterexample's folder has the episode as small as it could be made, its
+    script, and its log for `rcsc replay`.
     """
     WORKERS_GONE = """RCS744: nobody is left to play
 

@@ -188,12 +188,25 @@ def test_an_episode_of_another_system_is_refused(dock: Path, tmp_path: Path) -> 
     for text, why in (
         ('{"restarts": [{"tick": 3, "level": "task"}]}', "no level `task`"),
         ('{"switches": [{"fault": "slips", "first_tick": 1, "last_tick": 2}]}', "no fault `slips`"),
+        ('{"plant": "evil.py"}', "the description has no plant `evil.py`; `--plant` names one"),
         ('{"backend": "kinematic"}', "an episode has no `backend`"),
         ("{", ""),
     ):
         (tmp_path / "episode.json").write_text(text, encoding="utf-8")
         with pytest.raises(BadEpisode, match=f"episode.json: .*{why}"):
             saved_episode(tmp_path, rig)
+
+
+def test_an_episode_imports_no_file_that_it_names(dock: Path, tmp_path: Path) -> None:
+    """It may come from anybody; what is imported, the user names."""
+    evil, mine = str(tmp_path / "evil.py"), str(tmp_path / "mine.py")
+    Path(evil).write_text("raise SystemExit\n", encoding="utf-8")
+    Path(mine).write_text((dock / "base.py").read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "episode.json").write_text(Episode(plant=evil).to_json(), encoding="utf-8")
+    for plant in ("", "mujoco"):
+        with pytest.raises(BadEpisode, match=r"has no plant .*; `--plant` names one"):
+            saved_episode(tmp_path, Rig(ANY, dock / "system.toml", plant))
+    assert saved_episode(tmp_path, Rig(ANY, dock / "system.toml", mine)).plant == mine
 
 
 KIND = """

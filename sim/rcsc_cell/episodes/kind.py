@@ -43,7 +43,7 @@ def _run(episode: Episode, system: Path, log: Path | None) -> EpisodeOutcome:
     return run(episode, system, log)
 
 
-def _check(episode: Episode, system: Path) -> None:
+def _admit(episode: Episode, system: Path, plant: str) -> Episode:  # noqa: ARG001  # it runs on its own
     """Refuse what the system has not.
 
     Raises:
@@ -53,6 +53,7 @@ def _check(episode: Episode, system: Path) -> None:
     for restart in episode.restarts:
         if restart.level not in levels:
             raise ValueError(f"there is no level {shown(restart.level)} to start again")
+    return episode
 
 
 def _classes(episode: Episode, system: Path) -> tuple[str, ...]:  # noqa: ARG001  # an episode of the cell says all
@@ -75,6 +76,6 @@ def _chunk(system: Path, plant: str) -> int:  # noqa: ARG001  # a matter of phys
 
 
 CELL = EpisodeKind(
-    _drawn, _run, Episode.from_json, _check, _classes, _faults, _files,
+    _drawn, _run, Episode.from_json, _admit, _classes, _faults, _files,
     not_in_order=(BadDescription, BadData, NotBuilt), chunk=_chunk, extra="cell", takes_script=False,
 )  # fmt: skip
