@@ -727,7 +727,7 @@ class Roles:
             "settling",
             "inc_command_seen",
             "echoed",
-            *(f"{peer}_waited" for peer in peers),
+            *(f"{peer}_{word}" for peer in peers for word in ("waited", "again")),
         }
         return leaf in own or leaf.partition(".")[0] in records
 

@@ -199,7 +199,9 @@ def _match(part: _Part, table: Table) -> str:
     execute(part.program, [action.statement for action in line.actions], part.now, {})
     # The line is kept in the trace as the level's own only where it is of the table that the level would run.
     part.trace = (at, 0, -1, part.trace[-1]) if table is _chosen(part) else part.trace
-    done = "; ".join(action.text for action in line.actions)
+    done = "; ".join(
+        text for _, text in dict.fromkeys((action.heading, action.text) for action in line.actions)
+    )
     return f"table `{table.name}`, line {line.name}: {done or 'nothing'}{warned}"
 
 

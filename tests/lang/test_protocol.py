@@ -3,7 +3,7 @@
 The reference is written from sections 8.3 and 9 of Haynes et al. (1984), and knows nothing of the text that the compiler makes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
@@ -275,6 +275,119 @@ def test_what_a_level_adopts_that_starts_anew_is_declared() -> None:
         "phase": Fixed(1),
         "phase.next": Fixed(1),
     }
+
+
+# --- orders with fields ---
+
+ORDERS = (
+    WORDS
+    + """
+enum choice { wait, cell, action, called, once, several }
+commands arm : jobs
+commands hand : jobs
+input choice : choice
+input wanted : int 0 .. 9 [mm]
+procedure far(arm : int 0 .. 9 [mm]) { hand := work(width_mm := arm) }
+procedure anew { if choice = called { arm := work(again) } }
+table t {
+  | line | choice  || procedures                                       | arm                                        |
+  |------|---------||--------------------------------------------------|--------------------------------------------|
+  | 1    | wait    ||                                                  | rest                                       |
+  | 2    | cell    ||                                                  | work(width_mm := wanted, seen_mm := 3) |
+  | 3    | action  || arm := stow; hand := rest                        |                                            |
+  | 4    | called  || far(4 [mm]); anew                                     |                                            |
+  | 5    | once    ||                                                  | stow(again)                                |
+  | 6    | several || hand := work; hand := stow(width_mm := 2, again) | stow(again)                                |
+}
+level l { table t }
+"""
+)
+"""`far` has a parameter that is called as a subordinate is."""
+
+
+@dataclass
+class Ordering:
+    """The level of `ORDERS`, cycle by cycle."""
+
+    made: Program = field(default_factory=lambda: program(ORDERS))
+    now: dict[str, Any] = field(default_factory=dict)
+
+    def cycle(self, choice: str, *, echoes: str = "arm hand", wanted: int = 7) -> "Ordering":
+        """One more; those that echo do so of their last order."""
+        self.now = self.now or dict(initial(self.made))
+        for name in echoes.split():
+            self.now[f"from_{name}.inc_command_echo"] = self.now[f"to_{name}.inc_command"]
+        words = "wait cell action called once several".split()
+        given = {"choice": words.index(choice), "wanted": wanted}
+        outcome = cycle(self.made, self.made.levels[0], self.now | given)
+        assert outcome.fault is Fault.OK
+        self.now = dict(outcome.snapshot)
+        return self
+
+    def order(self, name: str) -> tuple[int, str, int]:
+        """Its number, command and width."""
+        number, command, width = (
+            self.now[f"to_{name}.{part}"] for part in ("inc_command", "input_command", "width_mm")
+        )
+        return number, JOBS[command], width
+
+
+def test_an_order_gives_the_command_and_the_fields_that_it_names_and_keeps_the_others() -> None:
+    level = Ordering()
+    assert level.cycle("cell").order("arm") == (1, "work", 7)
+    assert level.now["to_arm.seen_mm"] == 3
+    assert level.cycle("action").order("arm") == (2, "stow", 7)
+    assert level.cycle("called").order("hand") == (1, "work", 4)
+    assert level.order("arm") == (3, "work", 7)
+    assert level.now["to_arm.seen_mm"] == 3
+    assert level.cycle("wait").order("arm") == (4, "rest", 7)
+
+
+def test_on_one_path_the_last_order_counts() -> None:
+    assert Ordering().cycle("several").order("hand") == (1, "stow", 2)
+
+
+def test_the_same_order_comes_once_more_when_every_last_order_is_echoed() -> None:
+    level = Ordering().cycle("once").cycle("once")
+    assert level.order("arm") == (2, "stow", 0)
+    assert level.cycle("once", echoes="").order("arm") == (2, "stow", 0)
+    assert level.cycle("action").order("arm") == (2, "stow", 0)  # what did not count is not made up for
+    assert level.cycle("several").order("arm") == (3, "stow", 0)
+    assert level.cycle("several", echoes="arm").order("arm") == (3, "stow", 0)  # the hand has not echoed
+    assert level.cycle("several").order("arm") == (4, "stow", 0)
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "code", "message"),
+    [
+        ("stow(again) ", "stw(again) ", "RCS201", "called `stw`"),
+        ("width_mm := 2", "width := 2", "RCS201", "no field is called `width`"),
+        ("width_mm := 2", "inc_command := 2", "RCS206", "the protocol writes `inc_command`"),
+        ("width_mm := 2", "width_mm := 2, width_mm := 3", "RCS202", "`width_mm` is given twice"),
+        ("width_mm := 2", "width_mm := true", "RCS301", "`true`, which is bool"),
+        ("hand := work;", "hnad := work(again);", "RCS201", "no variable is called `hnad`"),
+        ("choice = called", "choice = called(again)", "RCS301", "is an order, and no value"),
+        ("hand := work;", "next hand := work;", "RCS", ""),
+        ("commands hand : jobs", "state hand : job", "RCS301", "is an order, and no value"),
+        ("if choice", "local hand : job := work(again) if choice", "RCS301", "is an order, and no value"),
+    ],
+)
+def test_what_is_wrong_with_an_order_is_said_where_it_stands(
+    was: str, now: str, code: str, message: str
+) -> None:
+    text = ORDERS.replace(was, now, 1)
+    assert text != ORDERS
+    diagnostics = compile_text(text)
+    assert isinstance(diagnostics, tuple)
+    assert any(one.code.value.startswith(code) and message in one.message for one in diagnostics), diagnostics
+    assert all(one.primary.span.file == "case.rcs" and one.primary.span.end > 0 for one in diagnostics)
+
+
+@pytest.mark.parametrize("cell", ["work(3)", "work()", "work(width_mm = 3)"])
+def test_an_order_whose_fields_have_no_names_is_told_how_they_are_written(cell: str) -> None:
+    diagnostics = compile_text(ORDERS.replace("stow(again)  ", cell, 1))
+    assert isinstance(diagnostics, tuple)
+    assert any("names its fields: `work(FIELD := VALUE)`" in one.help[0] for one in diagnostics)
 
 
 # --- which state goes with which orders ---

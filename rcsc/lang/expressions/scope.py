@@ -48,6 +48,7 @@ class Scope:
         cell: The table cell that is being resolved.
         depth: How deep the expression that is being resolved nests.
         copied: Statements that copies of records and arrays came to so far.
+        orders: Of each subordinate that is commanded, the output with its orders, and the flag that the same order comes once more.
         no_before: Why `was` cannot stand in the expression that is being resolved; empty where it can.
     """
 
@@ -71,6 +72,7 @@ class Scope:
     cell: Cell | None = None
     depth: int = 0
     copied: int = 0
+    orders: dict[str, tuple[str, str]] = field(default_factory=dict)
     no_before: str = "`was` stands in a property only"
 
     def report(

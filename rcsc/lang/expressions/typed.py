@@ -82,6 +82,14 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
             return _in_range(scope, body, written)
         case tree.Apply():
             return _function(scope, body, written)
+        case tree.Order(command):
+            scope.report(
+                Code.KIND, f"`{command.text}(...)` is an order, and no value", written.span, ORDER_STANDS
+            )
+            return None
+
+
+ORDER_STANDS = "an order stands in a column headed by the subordinate, or after `SUBORDINATE := `"
 
 
 def boolean(scope: Scope, body: Body, written: tree.Expr) -> Expr | None:

@@ -21,6 +21,7 @@ class Party:
         without: Standard properties that are not asked.
         within: Cycles after which an order that is not echoed has failed; None where it is waited for without end.
         late: The reason that is then given; None where there is none.
+        again: Whether some line gives it the same order once more.
         answered: Cycles after which an order that is not answered has failed; `unanswered`, the reason. None likewise.
         failed: The place of *failed* among the members of the status.
         numbered: Scalars of the order that change with its number only.
@@ -37,6 +38,7 @@ class Party:
     late: str | None = None
     answered: tree.Expr | None = None
     unanswered: str | None = None
+    again: bool = False
 
     @property
     def name(self) -> str:
@@ -62,6 +64,11 @@ class Party:
     def bounded(self) -> bool:
         """Whether an order fails that is not echoed, or not answered, in time."""
         return self.within is not None or self.answered is not None
+
+    @property
+    def once_more(self) -> str:
+        """The flag that the same order is given once more."""
+        return f"{self.name}_again"
 
     @property
     def held(self) -> tuple[tree.LinkField, ...]:
@@ -104,8 +111,41 @@ def declared(scope: Scope, declarations: Sequence[tree.Declaration]) -> Parties:
     for more in served[1:]:
         scope.report(Code.DUPLICATE_NAME, "a level serves one superior", more.span)
     superior = _superior(scope, served[0], links, types) if served else None
-    below = (_subordinate(scope, d, links, types) for d in declarations if isinstance(d, tree.CommandsDecl))
+    again = {name for declaration in declarations for name in _ordered_again(declaration)}
+    below = (
+        _subordinate(scope, d, links, types, again=d.peer.text in again)
+        for d in declarations
+        if isinstance(d, tree.CommandsDecl)
+    )
     return Parties(superior, tuple(party for party in below if party is not None), types.members)
+
+
+def _ordered_again(node: Any) -> Iterator[str]:
+    """Yield the subordinates to which a declaration, or a statement, gives the same order once more."""
+    match node:
+        case tree.Assign(tree.Reference(name), tree.Order(again=True)):
+            yield name.text
+        case tree.TableDecl():
+            for at, heading in enumerate(node.actions):
+                if isinstance(heading.subject, tree.Reference) and any(
+                    isinstance(cell := row.actions[at], tree.Comparison)
+                    and isinstance(cell.value, tree.Order)
+                    and cell.value.again
+                    for row in node.rows
+                ):
+                    yield heading.subject.name.text
+            yield from _ordered_again(tuple(row.actions for row in node.rows))
+        case tuple():
+            for part in node:
+                yield from _ordered_again(part)
+        case tree.ProcedureDecl(body=parts) | tree.Arm(body=parts):
+            yield from _ordered_again(parts)
+        case tree.If(_, then, orelse):
+            yield from _ordered_again((then, orelse))
+        case tree.Case(_, arms, orelse):
+            yield from _ordered_again((arms, orelse))
+        case tree.For(body=parts):
+            yield from _ordered_again(parts)
 
 
 class _Types:
@@ -170,14 +210,19 @@ def _superior(
 
 
 def _subordinate(
-    scope: Scope, given: tree.CommandsDecl, links: Mapping[str, tree.LinkDecl], types: "_Types"
+    scope: Scope,
+    given: tree.CommandsDecl,
+    links: Mapping[str, tree.LinkDecl],
+    types: "_Types",
+    *,
+    again: bool,
 ) -> Party | None:
     link = _link(scope, given.link, links)
     if link is None:
         return None
     late, unanswered = (None if reason is None else reason.text for reason in (given.late, given.unanswered))
     bounds = {"within": given.within, "late": late, "answered": given.answered, "unanswered": unanswered}
-    party = _party(given.peer, link, types, **bounds)
+    party = _party(given.peer, link, types, again=again, **bounds)
     _bounds(scope, given, types)
     for reason in filter(None, (given.late, given.unanswered)):
         if party.reason is None:

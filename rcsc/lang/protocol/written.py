@@ -57,6 +57,8 @@ def subordinate(party: Party) -> Iterator[str]:
     yield f"## Orders to {name}.\noutput {party.told} : {link.name.text}_order"
     yield f"## What {name} says of the last orders, held until they are echoed.\nstate {name} : {name}_held"
     yield f"## The order to {name} that was numbered last.\nstate {party.last} : {name}_last"
+    if party.again:
+        yield f"## The same order is given to {name} once more.\nstate {party.once_more} : bool"
     cycles = party.answered or party.within
     if cycles is not None:
         what = "echoed" if party.answered is None else "answered"
@@ -241,6 +243,9 @@ def given(parties: Parties) -> Iterator[str]:
     writes = [part for party in below for part in (party.last, f"{party.told}.inc_command")]
     for party in below:
         writes += [f"{party.name}_waited", f"{party.name}.late"] if party.bounded else []
+        reads += [party.once_more] if party.again else []
+        writes += [party.once_more] if party.again else []
+    reads += ["echoed"] if any(party.again for party in below) else []
     if above is not None:
         reads += ["new_command", "settling", "inc_command_seen", f"{above.name}.input_command"]
         writes += ["answered", f"{above.told}.inc_command_echo", f"{above.told}.ref_command_echo"]
@@ -256,11 +261,14 @@ def given(parties: Parties) -> Iterator[str]:
 
 def _numbered(party: Party) -> Iterator[str]:
     told, last = party.told, party.last
-    yield f"  if {' or '.join(f'{told}.{part} /= {last}.{part}' for part in party.numbered)} {{"
+    differs = " or ".join(f"{told}.{part} /= {last}.{part}" for part in party.numbered)
+    yield f"  if {differs}{f' or {party.once_more} and echoed' if party.again else ''} {{"
     yield f"    {told}.inc_command := ({told}.inc_command + 1) mod 65536"
     if party.bounded:
         yield f"    {party.name}_waited := 0\n    {party.name}.late := false"
     yield "  }"
+    if party.again:
+        yield f"  {party.once_more} := false"
     yield f"  {last}.input_command := {told}.input_command"
     yield from (
         f"  {last}.{part.name.text} := {told}.{part.name.text}"

@@ -89,6 +89,7 @@ class _Resolver:
         """The program, or what is wrong."""
         scope = self.scope
         parties = declared(scope, all_)
+        scope.orders = {party.name: (party.told, party.once_more) for party in parties.subordinates}
         if scope.diagnostics:  # what would be made of it would only repeat this
             return tuple(sorted(set(scope.diagnostics), key=sort_key))
         deferred = [d.name.text for d in all_ if isinstance(d, tree.VariableDecl) and d.deferred]

@@ -1,6 +1,6 @@
 """Statements: places found, values and arguments checked, locals renamed apart."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import assert_never
 
 from rcsc.diagnostics.codes import Code
@@ -85,8 +85,34 @@ class Statements:
         """One assignment a leaf."""
         if isinstance(place, tree.Reference) and place.name.text in self.body.visible:
             return self._assign_local(place, value, deferred, span)
+        if isinstance(place, tree.Reference) and place.name.text in self.scope.orders and not deferred:
+            return self.order(place.name.text, value, span)
         target = self.place(place, deferred)
         return () if target is None else self.store(target, value, deferred, span)
+
+    def order(self, subordinate: str, value: tree.Expr, span: Span) -> tuple[Statement, ...]:
+        """An order to a subordinate: the command, then each field that is named; the others are kept."""
+        told, once_more = self.scope.orders[subordinate]
+        if not isinstance(value, tree.Order):
+            return self.assign(_part(told, tree.Name("input_command", value.span)), value, False, span)
+        command = _part(told, tree.Name("input_command", value.command.span))
+        statements = [*self.assign(command, tree.Reference(value.command, value.command.span), False, span)]
+        named: set[str] = set()
+        for part in value.fields:
+            if part.name.text in {"inc_command", "input_command"}:
+                helps = "the command stands before the parentheses; `again` gives the same order a new number"
+                self.scope.report(
+                    Code.NOT_WRITABLE, f"the protocol writes `{part.name.text}`", part.name.span, helps
+                )
+            elif part.name.text in named:
+                self.scope.report(Code.DUPLICATE_NAME, f"`{part.name.text}` is given twice", part.name.span)
+            else:
+                statements += self.assign(_part(told, part.name), part.value, False, span)
+            named.add(part.name.text)
+        if value.again:
+            flag = tree.Reference(tree.Name(once_more, value.span), value.span)
+            statements += self.assign(flag, tree.BoolLiteral(True, value.span), False, span)
+        return tuple(statements)
 
     def place(self, place: tree.Expr, deferred: bool) -> Path | None:
         """Resolve the target of an assignment outside the locals; None after an error."""
@@ -301,6 +327,11 @@ class Statements:
                 return ()
             args.append(argument.expr)
         return (Call(ProcedureName(written.name.text), tuple(args), written.span),)
+
+
+def _part(record: str, name: tree.Name) -> tree.Expr:
+    """A field of a variable, at the place of its name."""
+    return tree.FieldOf(tree.Reference(replace(name, text=record), name.span), name, name.span)
 
 
 def _suffixes(kind: Type, prefix: str = "") -> list[tuple[str, Scalar]]:

@@ -110,6 +110,13 @@ class _Cells:
         self.scope.cell = None
         return None if path is None else (path, heading.cell)
 
+    def _subordinate(self, column: int) -> str | None:
+        """The subordinate to which a column holds orders; None for other columns."""
+        target = self.places[column]
+        place = None if target is None else target[0].names
+        orders = self.scope.orders.items()
+        return next((name for name, (told, _) in orders if place == (f"{told}.input_command",)), None)
+
     def tests(self, row: tree.Row) -> tuple[Test | None, ...]:
         """One test a condition column."""
         known = self.known.known
@@ -150,6 +157,9 @@ class _Cells:
             target = self.places[column]
             if target is None:
                 return []
+            subordinate = self._subordinate(column)
+            if isinstance(written.value, tree.Order) and subordinate is not None:
+                return [(text, each) for each in statements.order(subordinate, written.value, written.span)]
             path = replaced(target[0], target[1])
             return [(text, action) for action in statements.store(path, written.value, False, written.span)]
         pieces = [piece.strip() for piece in text.split(";")]

@@ -337,6 +337,12 @@ class Build:
     def _reference(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.Reference(self._name(parts[0]), span)
 
+    def _order(self, parts: list[Any], span: Span) -> tree.Expr:
+        command, *given = parts
+        fields = [part.children for part in given if len(part.children) > 1]
+        named = tuple(tree.OrderField(self._name(name), self.expr(value)) for name, value in fields)
+        return tree.Order(self._name(command), named, len(fields) < len(given), span)
+
     def _apply(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.Apply(self._name(parts[0]), tuple(self.expr(part) for part in parts[1:]), span)
 

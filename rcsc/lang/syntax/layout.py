@@ -86,12 +86,15 @@ def _atoms(text: str, *, heading: bool) -> list[str]:
     ['begin; ', 'set_source; ', 'nextstate(state_4)']
     >>> _atoms("/= vis_reqd or width - wanted > 2 [mm]", heading=False)
     ['/= vis_reqd ', 'or width - wanted > 2 [mm]']
+    >>> _atoms("move(target_mm := far_mm, speed := 3)", heading=False)
+    ['move(target_mm := ', 'far_mm, ', 'speed := 3)']
     """
     atoms: list[str] = []
     words = _BLANK.split(text)
     for at, word in enumerate(words):
         pieces = _IN_NAMES.split(word) if heading else [word]
-        if atoms and _stays(words[at - 1], word, heading=heading):
+        in_order = at > 1 and words[at - 1] == ":=" and "(" in words[at - 2]
+        if atoms and not in_order and _stays(words[at - 1], word, heading=heading):
             atoms[-1] += f" {pieces.pop(0)}"
         elif atoms:
             atoms[-1] += " "

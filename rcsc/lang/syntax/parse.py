@@ -26,9 +26,12 @@ from rcsc.lang.syntax.rows import (
     CALL_UNDER,
     EMPTY_CELL,
     NAME,
+    NAMED_FIELDS,
     NEW_PART,
+    ORDER,
     PIECES,
     SAME_LINES,
+    TO_WHOM,
     Cell,
     Cells,
     cut,
@@ -355,8 +358,12 @@ class _Rows:
         if not cell.text:
             return ()
         if heading.subject is None:
-            return cast("tuple[tree.Statement, ...]", self._parse("actions", cell) or ())
+            order = ORDER.search(cell.text) if ":=" in cell.text else None
+            helps = TO_WHOM.format(order[1]) if order is not None else ""
+            return cast("tuple[tree.Statement, ...]", self._parse("actions", cell, helps) or ())
         helps = CALL_UNDER if CALL.match(cell.text) else ""
+        if helps and (order := ORDER.match(cell.text)) is not None:
+            helps = f"{NAMED_FIELDS.format(order[1])}; {helps}"
         value = self._parse("when", cell, helps)
         return () if value is None else tree.Comparison("=", value, Span("", 0, len(cell.text)))
 

@@ -21,6 +21,10 @@ NAME = re.compile(r"[A-Za-z0-9_]+$")
 CALL = re.compile(r"(?!(?:abs|min|max|int|real|not)\b)[A-Za-z_][A-Za-z0-9_]*\s*\(|[^=]*:=")
 """What looks like a call or an assignment, and stands perhaps where a value should."""
 CALL_UNDER = "a call or an assignment stands under `procedures`, `command_out` or `status_out`"
+ORDER = re.compile(r"(\w+)\s*\(")
+"""What begins as an order does that has fields."""
+NAMED_FIELDS = "an order to a subordinate names its fields: `{}(FIELD := VALUE)`"
+TO_WHOM = "an order says to whom: `SUBORDINATE := {}(FIELD := VALUE)`"
 EMPTY_CELL = "an empty cell is `| |`, with a blank; `||` stands once in a row, between conditions and actions"
 """What helps where cells of a row are missing, or stand on the wrong side."""
 NEW_PART = "a heading that begins another part of the table has a row `|---|` below it"

@@ -40,10 +40,17 @@ def _expr(expr: tree.Expr) -> tuple[str, int]:
                 f"{spell_expr(subject, SUM)} in {spell_expr(low, SUM)} .. {spell_expr(high, SUM)}",
                 RELATION,
             )
-        case tree.Apply(function, args):
-            return f"{function.text}({', '.join(spell_expr(arg) for arg in args)})", POSTFIX
+        case tree.Apply() | tree.Order():
+            return _with_arguments(expr), POSTFIX
         case _:
             assert_never(expr)
+
+
+def _with_arguments(expr: tree.Apply | tree.Order) -> str:
+    if isinstance(expr, tree.Apply):
+        return f"{expr.function.text}({', '.join(spell_expr(arg) for arg in expr.args)})"
+    parts = [f"{part.name.text} := {spell_expr(part.value)}" for part in expr.fields]
+    return f"{expr.command.text}({', '.join([*parts, *(['again'] if expr.again else [])])})"
 
 
 def _binary(op: str, left: tree.Expr, right: tree.Expr) -> tuple[str, int]:

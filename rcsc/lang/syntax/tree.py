@@ -166,6 +166,24 @@ class Apply:
     span: Span = at()
 
 
+@dataclass(frozen=True, slots=True)
+class OrderField:
+    """`name := value` in an order."""
+
+    name: Name
+    value: "Expr"
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """`command(field := value, again)`: a command with fields of its order; `again` gives the same order a new number."""
+
+    command: Name
+    fields: "tuple[OrderField, ...]"
+    again: bool = False
+    span: Span = at()
+
+
 Expr: TypeAlias = (
     BoolLiteral
     | IntLiteral
@@ -179,6 +197,7 @@ Expr: TypeAlias = (
     | InSet
     | InRange
     | Apply
+    | Order
 )
 
 

@@ -67,6 +67,13 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
         st.builds(tree.Apply, st.sampled_from(["min", "max"]).map(Name), two),
         st.builds(tree.FieldOf, REFERENCES, NAMES),
         st.builds(tree.IndexOf, REFERENCES, inner),
+        st.builds(
+            tree.Order,
+            NAMES,
+            st.lists(st.builds(tree.OrderField, NAMES, inner), min_size=1, max_size=2).map(tuple),
+            st.booleans(),
+        ),
+        st.builds(tree.Order, NAMES, st.just(()), st.just(True)),
     )
 
 
