@@ -3,10 +3,13 @@
 In: proved programs and their generated files. Out: what the suite found, and its figures as text.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from rcsc.campaign.choose import plant_name, plant_of
+from rcsc.campaign.shrink import MOST_TRIES, shrink
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
@@ -15,12 +18,18 @@ from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import Conclusion, Settings, TestEffort
 from rcsc.emit import TARGETS, emitted
 from rcsc.emit.generated import write
+from rcsc.episodes.episode import Episode
+from rcsc.episodes.outcome import EpisodeFinding
+from rcsc.episodes.search import KINDS, Searched, found_again, search
+from rcsc.episodes.stand import Stand, stand
 from rcsc.host import children
 from rcsc.host.files import write_atomically
 from rcsc.lang.model import Expr, Program, Snapshot, Table
 from rcsc.link import Linked, drawing, run_beside, script
-from rcsc.run.description import description
+from rcsc.run.declared_plant import PlantSpec
+from rcsc.run.description import BadDescription, description
 from rcsc.run.executors import NotBuilt
+from rcsc.run.system import Kind
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic.encode import declared, encode
@@ -35,6 +44,10 @@ from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
 
 MOST_TICKS_EACH = 5
 """Ticks of a whole system for each example of a table."""
+EXAMPLES_EACH = 10
+"""Examples of a table for each episode of a whole system."""
+SAVED = Path("campaign")
+"""Where an episode goes that breaks a property."""
 
 
 def test(settings: Settings, effort: TestEffort) -> Conclusion:
@@ -56,10 +69,11 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
         diagnostics += failures
         figures.append(text)
     for path in systems:
-        settings.progress(f"running {path}")
-        difference, text = _beside(path, project, effort)
-        diagnostics += difference
-        figures.append(text)
+        for trial in (_beside, _in_plant):
+            settings.progress(f"running {path}")
+            wrong, text = trial(path, project, effort)
+            diagnostics += wrong
+            figures.append(text)
     if effort.vectors is not None:
         diagnostics += _write_vectors(
             [proved_program.program for _, proved_program in project.executable],
@@ -72,10 +86,7 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
 
 def _beside(path: Path, project: Proved, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
     """Run the C of a system beside the Python system; the first difference, and what was run."""
-    generated = Generated(tuple(TARGETS), defensive=False)
-    for root, program in project.executable:
-        generated.add_program(root, program)
-    generated.add_system(path)
+    generated = _generated(path, project)
     if generated.clashes:
         return tuple(generated.clashes), ""
     whole = generated.systems[path]
@@ -98,6 +109,84 @@ def _beside(path: Path, project: Proved, effort: TestEffort) -> tuple[tuple[Diag
         return (), figure
     message = f"the C of system `{whole.word}` and the Python system differ: {ran.difference}"
     return (Diagnostic(Code.EXECUTORS_DISAGREE, message, Label(Span(str(path), 0, 0))),), ""
+
+
+def _generated(path: Path, project: Proved) -> Generated:
+    """The executors of a system's programs, and the C of the whole."""
+    generated = Generated(tuple(TARGETS), defensive=False)
+    for root, program in project.executable:
+        generated.add_program(root, program)
+    generated.add_system(path)
+    return generated
+
+
+def _in_plant(path: Path, project: Proved, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
+    """Run drawn episodes of a system in its plant; the first that breaks a property, made small and saved, and what was run."""
+    generated = _generated(path, project)
+    if generated.clashes:
+        return (), ""
+    whole = generated.systems[path]
+    extern = any(p.extern for program in whole.programs for p in program.plan.program.procedures)
+    kinds = KINDS[1:] if extern else KINDS
+    with children.scratch("episodes") as folder:
+        write(generated.files, str(folder))
+        try:
+            its = stand(path.resolve(), folder)
+            spec = plant_of(its.system, None)
+            plant = plant_name(spec)
+            searched = search(its, max(1, effort.examples // EXAMPLES_EACH), plant, kinds)
+        except ModuleNotFoundError as error:
+            extra = "hypothesis" if error.name == "hypothesis" else "cell"
+            return (
+                (),
+                f"system {whole.word}: no episodes: `{error.name}` is not installed: pip install 'rcsc[{extra}]'",
+            )
+        except BadDescription as error:  # nobody answers a feed
+            return (), f"system {whole.word}: no episodes: {error}"
+        except NotBuilt as error:
+            return (Diagnostic(Code.NO_C_COMPILER, str(error), Label(Span(str(path), 0, 0))),), ""
+        diagnostics = (
+            () if searched.falsified is None else (_falsified(path, its, searched.falsified, kinds),)
+        )
+    return diagnostics, _figure(whole.word, its, searched, kinds, spec)
+
+
+def _figure(word: str, its: Stand, searched: Searched, kinds: Sequence[str], spec: PlantSpec | None) -> str:
+    """What was run of a system's episodes, and what was left out."""
+    lines = sum(
+        len(its.signs[level.name].tables[table])
+        for level in its.system.levels
+        for table in its.signs[level.name].tables
+    )
+    where = "without a plant" if spec is None else f"in plant `{spec.name or spec.python}`"
+    same = "C and Python the same" if len(kinds) > 1 else "in Python alone: extern procedures have no C here"
+    excused = f", {searched.excused} with what a stale or forged value explains" if searched.excused else ""
+    return (
+        f"system {word}: {searched.episodes} episodes {where}, {searched.cycles} cycles, {len(searched.lines)} of {lines} lines, "
+        f"{same}{excused}"
+    )
+
+
+def _falsified(
+    path: Path, its: Stand, falsified: tuple[Episode, EpisodeFinding], kinds: Sequence[Kind]
+) -> Diagnostic:
+    """Make an episode small, save it, and say what it breaks."""
+    episode, finding = falsified
+    name = finding.property
+    least = shrink(episode, lambda simpler: found_again(simpler, its, name, kinds) is not None, MOST_TRIES)
+    shown = found_again(least, its, name, kinds) or finding
+    folder = SAVED / f"test-{re.sub('[^a-z0-9]+', '-', name.lower()).strip('-')}"
+    help_ = f"`rcsc campaign {path} --again {folder}` runs it again"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(folder / "episode.json", least.to_json().encode())
+        write_atomically(folder / "script.csv", least.script().encode())
+    except OSError as error:
+        help_ = f"`{folder}` cannot be written: {error.strerror}"
+    message = f"in an episode of `{its.system.name}`, cycle {shown.tick}: `{shown.property}` does not hold: {shown.message}"
+    return Diagnostic(
+        Code.PROPERTY_BROKEN, message, Label(Span(str(path), 0, 0)), notes=least.told(), help=(help_,)
+    )
 
 
 def _alone(system: Linked) -> str:

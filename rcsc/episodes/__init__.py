@@ -26,5 +26,5 @@ cycle and level.
 
 Modules, in the order the data flows: `episode` and `outcome` (values), `stand` (what a system declares), `harm` (buffers in which something
 goes wrong), `operator` (who orders), `cycle` (what a property sees), `properties`, `explain` (whose fault it is), `loop` (runs one),
-`sampling` (draws one).
+`sampling` (draws one), `search` (looks for one that breaks a property, with Hypothesis).
 """

@@ -75,12 +75,18 @@ class BufferFault:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A field from outside holds a value in these ticks, the last included; named as a column of a script is, `base.bumper`."""
+    """A field from outside holds a value in these ticks, the last included.
+
+    Attributes:
+        field: Named as a column of a script is, `base.bumper`.
+        refused: Whether the value is one that the level must refuse.
+    """
 
     field: str
     value: Setting
     first_tick: int
     last_tick: int
+    refused: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +173,22 @@ class Episode:
         episode: Episode = read(cls, {**plain(cls()), **values})
         return episode
 
+    def told(self) -> tuple[str, ...]:
+        """What happens in it, in words, a line each."""
+        return (
+            *(
+                _order_told(order, first=all(order.level != before.level for before in self.orders[:at]))
+                for at, order in enumerate(self.orders)
+            ),
+            *(f"{_window(harm)}: buffer `{harm.buffer}` {_HARMS[harm.kind]}" for harm in self.harms),
+            *(f"{_window(reading)}: `{reading.field}` = {_cell(reading.value)}" for reading in self.readings),
+            *(
+                f"before tick {restart.tick}: level `{restart.level}` starts anew"
+                for restart in self.restarts
+            ),
+            *(f"{_window(switch)}: the plant's fault `{switch.fault}`" for switch in self.switches),
+        )
+
     def script(self) -> str:
         """Return its orders as a script that `rcsc run --script` reads, one after the other."""
         columns = list(dict.fromkeys(field.name for order in self.orders for field in order.fields))
@@ -182,6 +204,32 @@ class Episode:
             level = [order.level] if several else []
             writer.writerow([order.command, *level, *(given.get(name, "") for name in columns), cycles])
         return file.getvalue()
+
+
+_HARMS = {
+    "lost": "loses what is published",
+    "late": "is late",
+    "doubled": "gives each value twice",
+    "stale": "gives older values again",
+}
+
+
+def _window(window: BufferFault | Reading | Switch) -> str:
+    if window.first_tick == window.last_tick:
+        return f"tick {window.first_tick}"
+    return f"ticks {window.first_tick} .. {window.last_tick}"
+
+
+def _order_told(order: OrderSpec, *, first: bool) -> str:
+    fields = "".join(f" {field.name}={_cell(field.value)}" for field in order.fields)
+    after = (
+        "the beginning"
+        if first
+        else "the order before it"
+        if order.interrupts
+        else "the end of the one before"
+    )
+    return f"`{order.level}` is ordered `{order.command}`{fields}, {order.wait} ticks after {after}"
 
 
 def _cell(value: Setting) -> str:

@@ -67,6 +67,9 @@ def held(its: Stand, readings: tuple[Reading, ...]) -> Iterator[tuple[Field, Hel
         if its_field is None:
             raise ValueError(f"`{reading.field}` is no field from outside that can be held")
         value = value_of(its_field.leaf, reading.value)
+        if its_field.refuses(value) != reading.refused:
+            said = "is refused" if reading.refused else "can be read"
+            raise ValueError(f"`{reading.field}` = {reading.value} is none that {said}")
         yield (
             its_field,
             Held(its_field.buffer, its_field.place, value, reading.first_tick, reading.last_tick),

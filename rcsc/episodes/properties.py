@@ -14,7 +14,7 @@ from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import BEFORE, Value
 from rcsc.run.levels import RunningLevel
-from rcsc.run.orders.roles import Served
+from rcsc.run.orders.roles import Served, field_of
 from rcsc.run.plant.bind import BoundPlant, raised
 from rcsc.run.signature import FAULTS, STOPPED, Signature, Values
 
@@ -152,6 +152,46 @@ class TakesInTurn:
 
 
 @dataclass(slots=True)
+class NumbersOrders:
+    """A level gives an order that differs from its last one the next number.
+
+    Attributes:
+        places: Of the fields that may not change without one.
+    """
+
+    link: Served
+    places: tuple[int, ...]
+    last: Values | None = None
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """The field that changed."""
+        was, now = self.last, cycle.said.get(self.link.order)
+        self.last = now
+        if was is None or now is None or was[self.link.number] != now[self.link.number]:
+            return
+        leaves = self.link.order_leaves
+        for at in (at for at in self.places if was[at] != now[at]):
+            field_ = field_of(leaves[at])
+            text = (
+                f"`{self.link.order}.{field_}` was {leaves[at].shown(was[at])} and is {leaves[at].shown(now[at])} "
+                f"in order {now[self.link.number]}"
+            )
+            yield Broken(f"{self.link.party}: numbers each order", text, self.link.party)
+
+
+def _numbered(stand: Stand, link: Served) -> tuple[int, ...]:
+    """Places of an order's fields that change with its number only: those that its giver does not declare as streams."""
+    roles, record = stand.programs[link.party].roles, link.order.partition(".")[2]
+    named = None
+    for role in () if roles is None else roles.subordinates:
+        named = set(map(str, role.numbered)) if role.order == record else named
+    fields = {
+        at: f"{record}.{field_of(leaf)}" for at, leaf in enumerate(link.order_leaves) if at != link.number
+    }
+    return tuple(at for at, name in fields.items() if named is None or name in named)
+
+
+@dataclass(slots=True)
 class AnswerStays:
     """What was answered of an order stays until the next, but of the order to rest; where the program does not say so itself.
 
@@ -256,6 +296,8 @@ def properties(stand: Stand, within: int) -> list[Property]:
         first = int(link.order_leaves[link.number].initial)
         echo = int(link.report_leaves[link.echo].initial)
         watching.append(TakesInTurn(link, at, {first: 0, echo: 0}))
+        if link.party in stand.programs:
+            watching.append(NumbersOrders(link, _numbered(stand, link)))
         if stand.programs[link.level].roles is None:  # else its standard properties say it
             watching.append(AnswerStays(link, at, sign.index[link.order_leaves[0].name]))
     return [*watching, Ends(within), PlantHolds()]

@@ -1,12 +1,11 @@
 """Episodes by seed, leaning on edges: orders from the declared commands and ranges, and what goes wrong from the declared buffers.
 
-In: a seed, or whatever else draws as `random.Random` does. Out: an `Episode`. One in five has no fault; the others have one, or several.
+In: a seed. Out: an `Episode`. One in five has no fault; the others have one, or several.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from random import Random
 
@@ -22,8 +21,8 @@ from rcsc.episodes.episode import (
     Restart,
     Switch,
 )
-from rcsc.episodes.operator import setting_of, value_of
-from rcsc.episodes.stand import Field, Stand, stand, switches
+from rcsc.episodes.operator import setting_of
+from rcsc.episodes.stand import Stand, stand, switches
 from rcsc.run.orders.roles import Served, field_of
 from rcsc.run.orders.script import read_script, script_path
 from rcsc.run.signature import Leaf, Value
@@ -57,20 +56,20 @@ def draw(seed: int, system: Path, plant: str = "", script: str = "") -> Episode:
     Raises:
         CodedError: The system, its plant or the script is not in order.
     """
-    random = Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
-    return replace(drawn(random, stand(system), plant, script), seed=seed)
+    return draw_on(stand(system), seed, plant, script)
 
 
-def drawn(random: Random, its: Stand, plant: str = "", script: str = "") -> Episode:
-    """An episode of what draws.
+def draw_on(its: Stand, seed: int, plant: str = "", script: str = "") -> Episode:
+    """The episode of a seed, on a stand.
 
     Raises:
         CodedError: As `draw`.
     """
+    random = Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
     orders = tuple(_orders(random, its, script))
     ticks = 0 if orders else random.choice(UNORDERED)
-    episode = Episode(plant, orders=orders, ticks=ticks)
-    adds = _kinds(its, switches(its.path, plant))
+    episode = Episode(plant, seed=seed, orders=orders, ticks=ticks)
+    adds = _kinds(its, switches(its, plant))
     if not adds or random.random() < NOMINAL:
         return episode
     for _ in range(1 if random.random() < 0.6 else random.randint(2, MOST_FAULTS)):
@@ -83,8 +82,8 @@ def drawn(random: Random, its: Stand, plant: str = "", script: str = "") -> Epis
 
 def _orders(random: Random, its: Stand, script: str) -> Iterator[OrderSpec]:
     """Yield the orders to every level: of a script as they are, or each after, at or before the end of the one before."""
-    rows = scripted(its.path, script)
-    if rows and (script or random.random() < SCRIPTED):
+    rows = scripted(its, script) if script or random.random() < SCRIPTED else ()
+    if rows:
         for row in rows:
             wait, interrupts = _when(random, 0.15)
             yield replace(row, wait=wait, interrupts=interrupts)
@@ -121,19 +120,18 @@ def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
     return random.uniform(low, high) if leaf.c_type == "double" else random.randint(int(low), int(high))
 
 
-@lru_cache(maxsize=16)
-def scripted(path: Path, script: str) -> tuple[OrderSpec, ...]:
+def scripted(its: Stand, script: str) -> tuple[OrderSpec, ...]:
     """The orders of a script; of the description's own, if nobody says which, as far as it is one of orders.
 
     Raises:
         BadScript: It is not in order.
     """
-    its = stand(path)
     own = its.system.script
-    if not script and own is None:
+    file = script_path(script, its.path.parent) if script else own
+    if file is None:
         return ()
     try:
-        rows = read_script(script_path(script, path.parent) if script else own or path, its.system, its.signs)
+        rows = read_script(file, its.system, its.signs)
     except CodedError:
         if script:
             raise
@@ -168,7 +166,7 @@ def _values(level: Served, order: Sequence[Value]) -> Iterator[tuple[int, bool |
 
 def tick(random: Random) -> int:
     """A tick at which something may be under way; early ones oftener than late ones."""
-    return random.randrange(SOON) if random.random() < 0.5 else int(2 ** random.uniform(0, LATEST)) - 1
+    return random.randint(0, SOON) if random.random() < 0.5 else int(2 ** random.uniform(0, LATEST)) - 1
 
 
 def _window(random: Random, lasting: Sequence[int]) -> tuple[int, int]:
@@ -190,21 +188,19 @@ def _restart(random: Random, its: Stand, episode: Episode) -> Episode:
 def _reading(random: Random, its: Stand, episode: Episode) -> Episode:
     field = random.choice(its.fields)
     value = between(random, field.leaf, field.edges)
-    return _held(random, episode, field, value)
+    return _held(episode, Reading(field.name, setting_of(field.leaf, value), *_window(random, LASTING)))
 
 
 def _refused(random: Random, its: Stand, episode: Episode) -> Episode:
-    fields = [field for field in its.fields if field.refused]
-    if not fields:
-        return _reading(random, its, episode)
-    field = random.choice(fields)
-    return _held(random, episode, field, random.choice(field.refused))
+    field = random.choice([field for field in its.fields if field.refused])
+    value = random.choice(field.refused)
+    if isinstance(value, float) and not math.isfinite(value):
+        value = (field.leaf.high or 0.0) + 1.0  # of what is refused; JSON has no NaN
+    window = _window(random, LASTING)
+    return _held(episode, Reading(field.name, setting_of(field.leaf, value), *window, refused=True))
 
 
-def _held(random: Random, episode: Episode, field: Field, value: Value) -> Episode:
-    finite = not isinstance(value, float) or math.isfinite(value)
-    setting = setting_of(field.leaf, value if finite else (field.leaf.high or 0.0) + 1.0)
-    reading = Reading(field.name, setting, *_window(random, LASTING))
+def _held(episode: Episode, reading: Reading) -> Episode:
     return replace(episode, readings=(*episode.readings, reading))
 
 
@@ -217,7 +213,8 @@ def _kinds(its: Stand, faults: Sequence[str]) -> list[Add]:
 
     kinds: list[Add] = [_restart] * 2 if its.signs else []
     kinds += [_harm] * 4 if its.buffers else []
-    kinds += [_reading, _reading, _refused] if its.fields else []
+    kinds += [_reading] * 2 if its.fields else []
+    kinds += [_refused] if any(field.refused for field in its.fields) else []
     return kinds + ([switch] * 3 if faults else [])
 
 
@@ -230,26 +227,15 @@ def fault_names(system: Path, plant: str = "") -> tuple[str, ...]:
     Raises:
         CodedError: The system or its plant is not in order.
     """
-    return (*FAULTS, *switches(system, plant))
+    return (*FAULTS, *switches(stand(system), plant))
 
 
-def fault_classes(episode: Episode, system: Path | None = None) -> tuple[str, ...]:
-    """The classes of faults that an episode has, each once; none where nothing goes wrong in it.
-
-    Args:
-        episode: The episode.
-        system: Its system, which tells what is refused from what is read; without it all that is held is a reading.
-    """
-    fields = {} if system is None else {field.name: field for field in stand(system).fields}
+def fault_classes(episode: Episode, system: Path | None = None) -> tuple[str, ...]:  # noqa: ARG001  # as every kind of episodes has it
+    """The classes of faults that an episode has, each once; none where nothing goes wrong in it."""
     has = {
         *(harm.kind for harm in episode.harms),
-        *("refused" if _is_refused(fields, one) else "reading" for one in episode.readings),
+        *("refused" if reading.refused else "reading" for reading in episode.readings),
         *(["restarted"] if episode.restarts else []),
         *(["changed order"] if any(order.interrupts for order in episode.orders) else []),
     }
     return (*(name for name in FAULTS if name in has), *dict.fromkeys(one.fault for one in episode.switches))
-
-
-def _is_refused(fields: Mapping[str, Field], reading: Reading) -> bool:
-    field = fields.get(reading.field)
-    return field is not None and field.refuses(value_of(field.leaf, reading.value))

@@ -5,7 +5,7 @@ there are, the values at which something may turn. It is read once as long as no
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -62,6 +62,7 @@ class Stand:
         outside: Those that no level fills.
         edges: By level and leaf, the values at which something may turn.
         fields: From outside, but those that the protocol fills.
+        files: All that this was read from, with the times of the files.
     """
 
     path: Path
@@ -73,6 +74,7 @@ class Stand:
     outside: tuple[OutsideBuffer, ...]
     edges: Mapping[str, Mapping[str, tuple[Value, ...]]] = field(repr=False)
     fields: tuple[Field, ...] = field(repr=False)
+    files: tuple[tuple[str, int], ...] = field(repr=False)
 
     @property
     def served(self) -> tuple[Served, ...]:
@@ -85,35 +87,40 @@ class Stand:
         return frozenset(name for link in self.links for name in (link.order, link.report))
 
 
-def stand(path: Path) -> Stand:
+def stand(path: Path, generated: Path | None = None) -> Stand:
     """The stand of a description; the same as long as none of its files changes.
+
+    Args:
+        path: Of the description.
+        generated: Where its executors are; None for where it says itself.
 
     Raises:
         BadDescription: The description is not in order, a program is not compiled, or its source is not there.
     """
-    return _stand(path, _known(path))
+    return _stand(path, generated, _files(path, generated))
 
 
-def _known(path: Path) -> tuple[tuple[str, int], ...]:
+def _files(path: Path, generated: Path | None) -> tuple[tuple[str, int], ...]:
     """Every file that a stand is made of, with its time: all sources, plants and models beside the description and its levels."""
     system = description(path)
     tried = [place for spec in system.levels for place in places(path, spec.program)]
     folders = dict.fromkeys((path.parent, *(place.parent for place in tried)))
     files = [file for folder in folders for end in SOURCES for file in sorted(folder.glob(end))]
-    symbols = [generated_files(system.generated, spec.program)[0] for spec in system.levels]
+    symbols = [generated_files(generated or system.generated, spec.program)[0] for spec in system.levels]
     return tuple((str(file), file.stat().st_mtime_ns) for file in (path, *files, *symbols) if file.is_file())
 
 
 @lru_cache(maxsize=8)
-def _stand(path: Path, _files: tuple[tuple[str, int], ...]) -> Stand:
+def _stand(path: Path, generated: Path | None, files: tuple[tuple[str, int], ...]) -> Stand:
     system = description(path)
+    system = replace(system, generated=generated or system.generated)
     signs = signatures(system)
     programs = {spec.name: _program(path, spec.program) for spec in system.levels}
     edges = {name: _edges(program) for name, program in programs.items()}
     buffers = outside_buffers(system, signs)
     return Stand(
         path, system, signs, programs, ordered(system, signs), tuple(wire.source for wire in system.wires),
-        buffers, edges, tuple(_fields(system, buffers, programs, edges)),
+        buffers, edges, tuple(_fields(system, buffers, programs, edges)), files,
     )  # fmt: skip
 
 
@@ -181,17 +188,18 @@ def _fields(
     return fields
 
 
-def switches(path: Path, plant: str = "") -> tuple[str, ...]:
+_SWITCHES: dict[tuple[tuple[tuple[str, int], ...], str], tuple[str, ...]] = {}
+"""What plants declare, by the stand's files and the plant's name: to ask a plant is to make one."""
+
+
+def switches(its: Stand, plant: str = "") -> tuple[str, ...]:
     """The faults that a plant declares, in order.
 
     Raises:
         CodedError: The plant is not in order.
     """
-    return _switches(path, plant, _known(path))
-
-
-@lru_cache(maxsize=8)
-def _switches(path: Path, plant: str, known: tuple[tuple[str, int], ...]) -> tuple[str, ...]:
-    its = _stand(path, known)
-    stage = staged(StageOrder(str(path), plant), its.system, its.signs)
-    return tuple(dict.fromkeys(name for part in stage.switched for name in part.faults))
+    key = its.files, plant
+    if key not in _SWITCHES:
+        stage = staged(StageOrder(str(its.path), plant), its.system, its.signs)
+        _SWITCHES[key] = tuple(dict.fromkeys(name for part in stage.switched for name in part.faults))
+    return _SWITCHES[key]

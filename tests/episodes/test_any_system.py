@@ -1,12 +1,13 @@
 """Episodes of any system: what is drawn, what each fault does, what is found of seeded defects, and what a fault explains."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
 
 from rcsc.commands import run as rcsc
+from rcsc.episodes.cycle import Broken
 from rcsc.episodes.episode import (
     BufferFault,
     Episode,
@@ -17,9 +18,14 @@ from rcsc.episodes.episode import (
     Restart,
     Switch,
 )
-from rcsc.episodes.loop import check, run
+from rcsc.episodes.explain import Explanations
+from rcsc.episodes.loop import Loop, check, run
 from rcsc.episodes.outcome import EpisodeOutcome
 from rcsc.episodes.sampling import draw, fault_classes, fault_names
+from rcsc.episodes.search import episodes, search
+from rcsc.episodes.stand import stand
+from rcsc.run.signature import Value
+from tests.support.programs.texts import edit_file
 
 DOCK, UNDOCK = OrderSpec("supervisor", "dock"), OrderSpec("supervisor", "undock")
 
@@ -30,20 +36,39 @@ def robot(dock_compiled: Path) -> Path:
     return dock_compiled / "system.toml"
 
 
-def found(outcome: EpisodeOutcome) -> set[str]:
+def names(outcome: EpisodeOutcome) -> set[str]:
     return {finding.property for finding in outcome.findings}
 
 
 def changed(dock: Path, file: str, *edits: tuple[str, str]) -> Path:
-    """The docking robot with a defect, compiled whether it proves or not."""
-    text = (dock / file).read_text()
-    for before, after in edits:
-        assert before in text
-        text = text.replace(before, after)
-    (dock / file).write_text(text)
+    """The docking robot with a defect, compiled."""
+    edit_file(dock / file, *edits)
     if file.endswith(".rcs"):
         assert rcsc(["compile", "-q", str(dock), "--out", str(dock / "generated")]) == 0
     return dock / "system.toml"
+
+
+def watched(path: Path, episode: Episode) -> list[dict[str, dict[str, Value]]]:
+    """What every level's leaves were after each cycle."""
+    loop, seen = Loop(episode, stand(path)), []
+    while not loop.over:
+        loop.step()
+        seen.append(
+            {
+                level.name: {leaf.name: level.value(leaf.name) for leaf in level.sign.leaves}
+                for level in loop.system.levels
+            }
+        )
+    return seen
+
+
+def first_found(path: Path, most: int = 120) -> tuple[set[str], int]:
+    """What the first episode breaks that breaks anything, and its seed."""
+    for seed in range(most):
+        outcome = run(draw(seed, path), path)
+        if outcome.findings:
+            return names(outcome), seed
+    raise AssertionError(f"nothing in {most} episodes")
 
 
 class TestAnEpisode:
@@ -99,11 +124,11 @@ class TestAnEpisode:
         assert len(set(drawn)) == 200
 
     def test_has_every_class_of_faults_some_time(self, robot: Path) -> None:
-        classes = {name for seed in range(300) for name in fault_classes(draw(seed, robot), robot)}
+        classes = {name for seed in range(300) for name in fault_classes(draw(seed, robot))}
         assert classes == set(fault_names(robot)) - {
             "refused"
         }  # no field of the robot's is refused: bools, and clamped
-        nominal = sum(not fault_classes(draw(seed, robot), robot) for seed in range(300))
+        nominal = sum(not fault_classes(draw(seed, robot)) for seed in range(300))
         assert 20 < nominal < 120
 
 
@@ -132,18 +157,224 @@ class TestTheDockingRobot:
         assert outcome.rows[0].ticks == 5
 
 
-Measure = Callable[[EpisodeOutcome], object]
-
-
 class TestEveryFault:
     """Each kind does what it says: an episode with it differs from the one without in what is named here."""
 
     @pytest.mark.parametrize(("kind", "later"), [("lost", 20), ("late", 8), ("doubled", 1), ("stale", 0)])
-    def test_of_a_buffer(self, robot: Path, kind: Harm, later: int) -> None:
+    def test_of_the_first_order(self, robot: Path, kind: Harm, later: int) -> None:
         plain = run(Episode(orders=(DOCK,)), robot)
         harm = BufferFault("fleet.order", kind, 0, 19, ticks=8)
         outcome = run(Episode(orders=(DOCK,), harms=(harm,)), robot)
-        assert outcome.rows[0].ticks - plain.rows[0].ticks == later
+        assert outcome.rows[0].ticks - plain.rows[0].ticks == later  # nothing is older than the first order
+
+    def test_a_stale_report_repeats_an_older_one(self, robot: Path) -> None:
+        stale = BufferFault("drive.report", "stale", 6, 9, ticks=6)
+        seen = watched(robot, Episode(orders=(UNDOCK, DOCK), harms=(stale,)))
+        echoes = [tick["supervisor"]["drive.inc_command_echo"] for tick in seen]
+        assert echoes[2:12] == [0, 1, 1, 1, 1, 0, 0, 1, 1, 1]
+
+    def test_a_reading_is_held_for_its_window_over_the_plant(self, robot: Path) -> None:
+        held = Reading("base.travelled", 19_999, 5, 9)
+        seen = watched(robot, Episode(orders=(UNDOCK,), readings=(held,)))
+        read = [tick["drive"]["travelled_mm"] for tick in seen]
+        assert [at for at, value in enumerate(read) if value == 19_999] == [5, 6, 7, 8, 9]
+        assert 0 < int(read[10]) < 1000
+
+    def test_a_reading_is_held_where_no_plant_says_anything(self, dock: Path) -> None:
+        path = dock / "system.toml"
+        path.write_text(path.read_text().partition("[plant]")[0])
+        seen = watched(path, Episode(readings=(Reading("base.bumper", True, 3, 4),), ticks=9))
+        assert [tick["drive"]["bumper"] for tick in seen[:7]] == [
+            False,
+            False,
+            False,
+            True,
+            True,
+            False,
+            False,
+        ]
+
+    def test_a_restart_makes_an_order_fail(self, robot: Path) -> None:
+        outcome = run(Episode(orders=(UNDOCK,), restarts=(Restart(30, "supervisor"),)), robot)
+        assert outcome.rows[0].state == "failed"
+
+    def test_a_switch_makes_the_plant_misbehave_for_its_window(self, robot: Path) -> None:
+        plain = run(Episode(orders=(UNDOCK,)), robot)
+        slips = run(Episode(orders=(UNDOCK,), switches=(Switch("wheel_slips", 10, 49),)), robot)
+        assert slips.rows[0].ticks - plain.rows[0].ticks == 40
+
+    def test_a_value_out_of_range_is_refused_and_changes_nothing(self, dock: Path) -> None:
+        path = changed(
+            dock,
+            "drive.rcs",
+            ("travelled_mm : int 0 .. 20000 [mm] clamp", "travelled_mm : int 0 .. 20000 [mm]"),
+        )
+        beyond = Reading("base.travelled", 20_001, 10, 14, refused=True)
+        plain = run(Episode(orders=(UNDOCK,)), path)
+        outcome = run(Episode(orders=(UNDOCK,), readings=(beyond,)), path)
+        assert not outcome.findings
+        assert outcome.rows[0].state == "done"
+        assert outcome.ticks == plain.ticks  # the wheels turned on: an output is as it was
+        assert outcome.digest != plain.digest
+        with pytest.raises(ValueError, match="is none that can be read"):
+            check(Episode(readings=(replace(beyond, refused=False),)), path)
+        with pytest.raises(ValueError, match="is none that is refused"):
+            check(Episode(readings=(replace(beyond, value=20_000),)), path)
+
+
+class TestWhatAFaultExplains:
+    def test_an_older_order_again_is_no_finding_and_says_so(self, robot: Path) -> None:
+        stale = BufferFault("supervisor.to_drive", "stale", 24, 30, ticks=8)
+        episode = Episode(orders=(UNDOCK, replace(DOCK, wait=20, interrupts=True)))
+        assert not run(episode, robot).excused
+        outcome = run(replace(episode, harms=(stale,)), robot)
+        assert not outcome.findings
+        assert [(excused.property, excused.because) for excused in outcome.excused] == [
+            ("drive: takes each order once", "buffer `supervisor.to_drive` is stale in ticks 24 .. 30")
+        ]
+
+    def test_a_late_order_explains_nothing(self, robot: Path) -> None:
+        explained = Explanations(stand(robot))
+        explained.note({})
+        assert not explained.because(Broken("p", "", "drive"))
+        explained.note({"drive.report": "it is stale"})
+        assert explained.because(Broken("p", "", "supervisor")) == "it is stale"
+        assert not explained.because(Broken("p", "", "drive"))
+        explained.note({})
         assert (
-            outcome.digest != plain.digest or kind == "stale"
-        )  # before the first order there is nothing older
+            explained.because(Broken("p", "", "drive")) == "it is stale"
+        )  # what it is told follows from that
+
+    def test_a_reading_explains_an_assumption_about_it_and_no_other(self, robot: Path) -> None:
+        explained = Explanations(stand(robot))
+        explained.note({"base.travelled": "it is forged"})
+        assert not explained.because(Broken("p", "", "drive"))
+        assert not explained.because(Broken("a", "", "drive", ("bumper",)))
+        assert explained.because(Broken("plant: p", "")) == "it is forged"
+        assert explained.because(Broken("a", "", "drive", ("travelled_mm",))) == "it is forged"
+
+
+class TestSeededDefects:
+    """What is wrong on purpose is found, and by which property."""
+
+    def test_a_drive_that_forgets_what_it_did_when_it_starts_anew(self, dock: Path) -> None:
+        path = changed(dock, "drive.rcs", (" restart bad", ""))
+        found, seed = first_found(path)
+        assert found == {"drive: failed stays failed"}
+        assert "restarted" in fault_classes(draw(seed, path))
+
+    def test_a_level_that_does_not_number_a_new_order(self, dock: Path) -> None:
+        path = changed(dock, "supervisor.rcs", (" or to_drive.target_mm /= old_order.target_mm", ""))
+        broken, seed = first_found(path)
+        assert broken == {"supervisor: numbers each order"}
+        assert "changed order" in fault_classes(draw(seed, path))
+        assert not run(Episode(orders=(DOCK, UNDOCK, DOCK)), path).findings  # `stop` comes between
+
+    def test_a_plant_whose_wheel_slips_for_good(self, dock: Path) -> None:
+        path = changed(dock, "base.py", ("if not self.wheel_slips:", "if self.travelled < 0.3:"))
+        edit_file(path, ("tick_ms = 40\n", "tick_ms = 40\ncampaign = { within = 400 }\n"))
+        outcome = run(Episode(orders=(UNDOCK,)), path)
+        assert names(outcome) == {"supervisor: every command ends"}
+        assert outcome.end == "hang"
+        assert outcome.ticks == 400
+        within = run(
+            Episode(orders=(UNDOCK,)), changed(dock, "system.toml", ("within = 400", "within = 4000"))
+        )
+        assert (within.end, names(within)) == ("failed:reason drive_fault", set())
+
+    def test_a_property_that_is_false(self, dock: Path) -> None:
+        said = "property slow : speed_mm_s <= 100\n\nlevel drive"
+        path = changed(dock, "drive.rcs", ("level drive", said))
+        outcome = run(Episode(orders=(UNDOCK,)), path)
+        assert names(outcome) == {"drive: slow"}
+        [finding] = outcome.findings
+        assert finding.message == "`speed_mm_s <= 100` is false in line `start`: `speed_mm_s` = 400"
+
+    def test_a_property_of_two_cycles_is_not_asked_across_a_restart(self, dock: Path) -> None:
+        said = "property on : was speed_mm_s = 400 implies speed_mm_s /= 400\n\nlevel drive"
+        path = changed(dock, "drive.rcs", ("level drive", said))
+        outcome = run(Episode(orders=(UNDOCK,)), path)
+        assert [(one.property, "`was speed_mm_s` = 400" in one.message) for one in outcome.findings] == [
+            ("drive: on", True)
+        ]
+        restarts = tuple(Restart(tick, "drive") for tick in range(1, 60))
+        assert not names(run(Episode(orders=(UNDOCK,), restarts=restarts), path))
+
+    def test_a_property_of_the_plant_that_is_false(self, dock: Path) -> None:
+        method = "    def stays_near(self) -> Property:\n        return self.travelled < 1\n\n    def step("
+        path = changed(
+            dock,
+            "base.py",
+            ("    def step(", method),
+            ("import Fault, Range", "import Fault, Property, Range"),
+        )
+        outcome = run(Episode(orders=(UNDOCK,)), path)
+        [finding] = outcome.findings
+        assert finding.property == "plant: stays_near"
+        assert "base.travelled = 1.0" in finding.message
+        assert not names(run(Episode(orders=(DOCK,)), path))
+
+    def test_a_plant_that_raises(self, dock: Path) -> None:
+        path = changed(
+            dock, "base.py", ("self.contact = ", "self.contact = 1 / (self.travelled < 0.5) > 0 and ")
+        )
+        outcome = run(Episode(orders=(UNDOCK,)), path)
+        assert (names(outcome), outcome.end) == ({"the plant raises nothing"}, "plant failed")
+
+
+class TestTheSearch:
+    def test_says_what_it_tried(self, robot: Path) -> None:
+        searched = search(stand(robot), 6)
+        assert searched.falsified is None
+        assert searched.episodes == 6
+        assert searched == search(stand(robot), 6)
+
+    def test_finds_a_plant_that_does_not_repeat_itself(self, dock: Path) -> None:
+        text = "import random\nfrom typing import Annotated"
+        path = changed(
+            dock,
+            "base.py",
+            ("from typing import Annotated", text),
+            ("self.lateral *= 0.9", "self.lateral *= random.random()"),
+        )
+        searched = search(stand(path), 20)
+        assert searched.falsified is not None
+        assert searched.falsified[1].property == "the plant does the same again"
+
+    def test_finds_executors_that_differ(self, dock: Path) -> None:
+        python = dock / "generated/python/drive.py"
+        python.write_text(python.read_text().replace("s.speed_mm_s = 400", "s.speed_mm_s = 401"))
+        searched = search(stand(dock / "system.toml"), 20)
+        assert searched.falsified is not None
+        finding = searched.falsified[1]
+        assert finding.property == "C and Python do the same"
+        assert finding.message == "`drive.speed_mm_s` is 400 with c and 401 with python"
+
+    def test_is_a_strategy_for_tests_of_one_s_own(self, robot: Path) -> None:
+        @settings(max_examples=5)
+        @given(episodes(robot))
+        def holds(episode: Episode) -> None:
+            assert not run(episode, robot).findings
+
+        holds()
+
+    def test_is_part_of_rcsc_test(
+        self, dock: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        edit_file(dock / "drive.rcs", (" restart bad", ""))
+        quick = ["test", "--examples", "60", "--mutants", "0", "--no-cortex"]
+        assert rcsc([*quick, str(dock)]) == 1
+        said = "".join(capsys.readouterr())
+        assert (
+            "`drive: failed stays failed` does not hold: order 1 of `supervisor.to_drive` was failed, and is done"
+            in said
+        )
+        assert "note: `supervisor` is ordered `dock`, 0 ticks after the beginning" in said
+        assert "before tick 2: level `drive` starts anew" in said
+        [folder] = (tmp_path / "campaign").iterdir()
+        assert f"--again campaign/{folder.name}" in said
+        again = ["campaign", str(dock), "--again", str(folder)]
+        assert rcsc(again) == 1
+        edit_file(dock / "drive.rcs", ("state stage : stage", "state stage : stage restart bad"))
+        assert rcsc(again) == 0

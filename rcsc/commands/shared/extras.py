@@ -15,6 +15,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "cell": ("mujoco", "mcap", "zstandard"),
     "certify": ("cvc5",),
     "cluster": ("distributed",),
+    "hypothesis": ("hypothesis",),
     "live": ("aiohttp",),
     "parquet": ("pyarrow",),
     "plot": ("matplotlib",),

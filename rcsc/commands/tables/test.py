@@ -17,12 +17,12 @@ from rcsc.solvers.options import Options
 Examples:
   rcsc test tables/task             interpreter = Python = C, every line reached
   rcsc test --deep acquire.rcs      also prove the C, and mutate it; minutes
-  rcsc test robot/system.toml       a system's levels, and the C of the whole beside the Python system
+  rcsc test robot/system.toml       a system: its levels, the C of the whole, and episodes in its plant
   rcsc test --vectors v.json a.rcs  also write test vectors for each condition""",
 )
 @PATHS
 @click.option("--examples", type=click.IntRange(min=1), default=200, show_default=True, metavar="N",
-              help="How many inputs and how many sequences of cycles are tried a table.")  # fmt: skip
+              help="How many inputs and how many sequences of cycles are tried a table; of a system a tenth as many episodes.")  # fmt: skip
 @click.option("--mutants", type=click.IntRange(min=-1), default=24, show_default=True, metavar="N",
               help="How many mutants of each table (with --deep, of the C too) are tried; -1 for all.")  # fmt: skip
 @click.option("--deep", is_flag=True,
@@ -46,8 +46,10 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     against the table for every value of every variable. That takes seconds; --deep takes minutes. What a tool
     could not decide is a figure and no failure. Of a system, given by its system.toml or its folder, also the C of the whole is run
     beside the Python system, with outside values at the edges of their ranges, restarts and refused inputs: every value after
-    every tick is compared. Extern procedures are stand-ins, and nothing of the user's is
-    imported or linked. Needs a C compiler.
+    every tick is compared. And it is run in its plant, in a tenth as many episodes as --examples says, with orders and faults that
+    Hypothesis draws: lost, late, doubled and stale buffers, restarts, readings at edges, faults of the plant. An episode that breaks a
+    property is made small and saved in campaign/ for `rcsc campaign --again`. The plant is imported and run; else extern
+    procedures are stand-ins, and nothing of the user's is imported or linked. Needs a C compiler.
     """
     esbmc_s = (60.0 if deep else 0.0) if esbmc is None else esbmc
     effort = TestEffort(examples, deep=deep, esbmc_s=esbmc_s, cortex=cortex, mutants=mutants, vectors=vectors)
