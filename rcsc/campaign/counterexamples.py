@@ -15,11 +15,12 @@ from rcsc.campaign.journal import EpisodeRecord
 from rcsc.campaign.rig import E, Rig, digest
 from rcsc.campaign.runner import death
 from rcsc.campaign.shrink import MOST_TRIES, shrink
-from rcsc.campaign.work import SURVIVES, TRIES, Shrunk, attempt, logged, shrunk
+from rcsc.campaign.work import SURVIVES, TRIES, Shrunk, attempt, counterexample, dated, logged, shrunk
 from rcsc.campaign.worker_pool import Crashed, WorkerPool
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.episodes.outcome import EpisodeOutcome
+from rcsc.host.children import scratch
 from rcsc.host.files import write_atomically
 from rcsc.host.files.read import json_of, text
 from rcsc.run.system import Kind
@@ -105,19 +106,18 @@ def _carefully(rig: Rig[E], seed: int, choice: Choice, pool: WorkerPool) -> Shru
 
     tries = TRIES.get(choice.property, MOST_TRIES)
     least = shrink(rig.episode(seed, choice.index), fails, tries)
-    try:
-        return pool.call(logged, rig, least, choice.property)
-    except Crashed:
-        finding = next(
-            finding for finding in _survived(rig, least, pool).findings if finding.property == choice.property
-        )
-        return Shrunk(least, finding, b"")
+    with scratch("campaign") as folder:
+        log = folder / "log.mcap"
+        try:
+            return pool.call(logged, rig, least, choice.property, log)
+        except Crashed:
+            return counterexample(least, _survived(rig, least, pool), choice.property, log)
 
 
-def _survived(rig: Rig[E], episode: E, pool: WorkerPool) -> EpisodeOutcome:
+def _survived(rig: Rig[E], episode: E, pool: WorkerPool, log: Path | None = None) -> EpisodeOutcome:
     begun_s = time.monotonic()
     try:
-        return pool.call(attempt, rig, episode)
+        return pool.call(attempt, rig, episode, log)
     except Crashed:
         return death(rig, time.monotonic() - begun_s)
 
@@ -201,4 +201,9 @@ def again(
     episode = saved_episode(path, rig)
     if executor is not None:
         episode = replace(episode, executor=executor)
-    return attempt(rig, episode) if pool is None else _survived(rig, episode, pool)
+    if pool is None:
+        return attempt(rig, episode)
+    with scratch("campaign") as folder:
+        log = folder / "log.mcap"
+        outcome = _survived(rig, episode, pool, log)
+        return replace(outcome, findings=tuple(dated(finding, log) for finding in outcome.findings))

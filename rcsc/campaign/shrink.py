@@ -116,8 +116,8 @@ def _placed(episode: E, name: str, at: int, element: Any) -> E:
     return replace(episode, **changed)
 
 
-def _numbers(search: _Search[E], value: Any, placed: Callable[[Any], E]) -> None:
-    """Move each number of a value toward the usual one: at once, to a round number, or by halves."""
+def _numbers(search: _Search[E], value: Any, placed: Callable[[Any], E]) -> Any:
+    """Move each number of a value toward the usual one: at once, to a round number, or by halves; return what it came to."""
     lists = search.best.LISTS
     for field in fields(value):
         for _ in range(_HALVINGS):
@@ -132,6 +132,26 @@ def _numbers(search: _Search[E], value: Any, placed: Callable[[Any], E]) -> None
             if nearer is None:
                 break
             value = replace(value, **nearer)
+        if field.name not in lists and isinstance(getattr(value, field.name), tuple):
+            value = _inner(search, value, field.name, placed)
+    return value
+
+
+def _inner(search: _Search[E], value: Any, name: str, placed: Callable[[Any], E]) -> Any:
+    """Leave out what a tuple within an element can do without, and move the numbers of the rest."""
+
+    def with_held(*held: Any) -> Any:
+        return replace(value, **{name: held})
+
+    for at in reversed(range(len(getattr(value, name)))):
+        held = getattr(value, name)
+        before, item, after = held[:at], held[at], held[at + 1 :]
+        if search.try_(lambda: placed(with_held(*before, *after))):  # noqa: B023  # called here
+            value = with_held(*before, *after)
+        elif is_dataclass(item):
+            item = _numbers(search, item, lambda new: placed(with_held(*before, new, *after)))  # noqa: B023
+            value = with_held(*before, item, *after)
+    return value
 
 
 def _nearer(value: Any, field: Field[Any], lists: Sequence[str]) -> Iterator[Any]:

@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import FrameType
@@ -27,6 +27,7 @@ from rcsc.host.children import scratch
 
 CRASH, HANG, ERROR = "crash", "hang", "error"
 SURVIVES, ENDS, RAISES = "the process survives", "the run ends in time", "nothing is raised"
+ODD = frozenset({SURVIVES, ENDS, RAISES})
 """Properties that only a campaign can look at."""
 
 TRIES = {SURVIVES: 60, ENDS: 12}
@@ -38,6 +39,13 @@ class OtherTables(CodedError):  # noqa: N818  # what happened, not an error of o
 
     code = Code.WORKERS_GONE
     helps = ("what is done is kept: the same command goes on from there",)
+
+
+class NotDrawn(CodedError):  # noqa: N818  # likewise
+    """Episodes cannot be drawn: of the plant not even its faults can be had."""
+
+    code = Code.BAD_PLANT
+    helps = ("a plant's constructor has to come back: what takes time belongs into `step`",)
 
 
 class _OutOfTime(BaseException):
@@ -68,15 +76,29 @@ def play(rig: Rig[Any], wanted: str, seed: int, indices: Sequence[int]) -> tuple
 
     Raises:
         OtherTables: They have not.
+        NotDrawn: No episode can be had.
         CodedError: The system is not in order here.
     """
     _same(rig, wanted)
-    return tuple(_record(rig, index, rig.episode(seed, index)) for index in indices)
+    return tuple(_record(rig, index, _drawn(rig, seed, index)) for index in indices)
 
 
 def _same(rig: Rig[Any], wanted: str) -> None:
     if digest(rig) != wanted:
         raise OtherTables("a worker has other tables, data or programs than this campaign")
+
+
+def _drawn(rig: Rig[E], seed: int, index: int) -> E:
+    """An episode of a campaign.
+
+    Raises:
+        NotDrawn: A plant that is asked for its faults does not come back.
+    """
+    try:
+        with within(rig.limit_s):
+            return rig.episode(seed, index)
+    except _OutOfTime:
+        raise NotDrawn(f"no episode could be drawn within {rig.limit_s:g} s") from None
 
 
 def _record(rig: Rig[E], index: int, episode: E) -> EpisodeRecord:
@@ -130,16 +152,41 @@ def fails_in(rig: Rig[E], name: str, episode: E) -> bool:
     return any(finding.property == name for finding in attempt(rig, episode).findings)
 
 
-def logged(rig: Rig[E], episode: E, name: str) -> Shrunk[E]:
-    """Return the counterexample with its log, which holds the run up to where it ended."""
+def logged(rig: Rig[E], episode: E, name: str, log: Path | None = None) -> Shrunk[E]:
+    """Return the counterexample with its log, which holds the run up to where it ended.
+
+    Args:
+        rig: On what.
+        episode: Which shows it.
+        name: The property's.
+        log: Where the log goes, so that it is left if this process is not; None for a place of its own.
+    """
     with scratch("campaign") as folder:
-        path = folder / "log.mcap"
-        outcome = attempt(rig, episode, path)
-        finding = next(
-            (finding for finding in outcome.findings if finding.property == name),
-            EpisodeFinding(name, 0, outcome.end),
-        )
-        return Shrunk(episode, finding, path.read_bytes() if path.is_file() else b"")
+        kept = folder / "log.mcap" if log is None or not log.parent.is_dir() else log
+        return counterexample(episode, attempt(rig, episode, kept), name, kept)
+
+
+def counterexample(episode: E, outcome: EpisodeOutcome, name: str, log: Path) -> Shrunk[E]:
+    """Return an episode with how it broke a property, and what its log holds."""
+    finding = next(
+        (finding for finding in outcome.findings if finding.property == name),
+        EpisodeFinding(name, 0, outcome.end),
+    )
+    return Shrunk(episode, dated(finding, log), log.read_bytes() if log.is_file() else b"")
+
+
+def dated(finding: EpisodeFinding, log: Path) -> EpisodeFinding:
+    """The finding in the cycle in which its log ends, where only a campaign saw that the run ended there."""
+    if finding.property not in ODD or not log.is_file():
+        return finding
+    from rcsc.run.log.read import UnreadableLog, read  # of an extra
+
+    try:
+        last = read(log).last
+    except UnreadableLog:
+        return finding
+    lost = f", at most a second after cycle {last}" if finding.property == SURVIVES else ""
+    return replace(finding, tick=last, message=finding.message + lost)
 
 
 # --- the limit of time ---

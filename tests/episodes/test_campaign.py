@@ -632,7 +632,7 @@ def test_what_kills_its_process_is_shrunk_all_the_same() -> None:
     assert [(fault.name, fault.first_tick == fault.last_tick) for fault in made.episode.faults] == [
         (fake.KILLS, True)
     ]
-    assert (made.finding.property, made.log) == ("the process survives", b"")
+    assert (made.finding.property, made.log) == ("the process survives", b"begun")
 
 
 def test_a_file_without_an_episode_is_refused(tmp_path: Path) -> None:

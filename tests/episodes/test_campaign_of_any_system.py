@@ -12,9 +12,10 @@ from rcsc.campaign.counterexamples import BadEpisode, again, saved_episode
 from rcsc.campaign.journal import Journal, header
 from rcsc.campaign.rig import EpisodeKind, Rig, digest
 from rcsc.campaign.runner import campaign
-from rcsc.campaign.work import play
+from rcsc.campaign.shrink import shrink
+from rcsc.campaign.work import NotDrawn, play
 from rcsc.campaign.worker_pool import processes
-from rcsc.episodes.episode import Episode, OrderSpec, Switch
+from rcsc.episodes.episode import Episode, FieldValue, OrderSpec, Switch
 from rcsc.run.plant.bind import BadPlant
 
 HALL = '''
@@ -24,6 +25,7 @@ HALL = '''
 '''
 WILD = """
 import os
+import signal
 import time
 from rcsc.run.plant import Fault
 
@@ -48,6 +50,7 @@ class Base:
         if self.is_stuck:
             import ctypes
 
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
             ctypes.PyDLL(None).sleep(3600)  # with the interpreter's lock: nothing in the process can end it
         if self.fails:
             raise ArithmeticError("no such place")
@@ -112,20 +115,27 @@ def test_a_plant_that_dies_hangs_or_raises_is_a_finding_and_not_the_end(dock: Pa
     rig = Rig(ANY, dock / "system.toml", plant)
     told = {}
     with processes(1) as pool:
-        for fault, limit_s in (("fails", 120.0), ("dies", 120.0), ("hangs", 0.4), ("is_stuck", 0.4)):
+        for fault, limit_s in (("fails", 120.0), ("dies", 120.0), ("hangs", 1.0), ("is_stuck", 1.0)):
             episode = Episode(
                 plant=plant,
                 orders=(OrderSpec("supervisor", "dock"),),
-                switches=(Switch(fault, 5, 90),),
+                switches=(Switch(fault, 60, 90),),
             )
             (tmp_path / "episode.json").write_text(episode.to_json(), encoding="utf-8")
             [finding] = again(tmp_path, replace(rig, limit_s=limit_s), pool=pool).findings
             told[fault] = (finding.property, finding.tick, finding.message)
-    assert told.pop("dies") == ("the process survives", 0, "the process that ran it died")
-    assert told.pop("hangs") == told.pop("is_stuck") == ("the run ends in time", 0, "no end within 0.4 s")
+    lost = "the process that ran it died, at most a second after cycle 50"
+    assert told.pop("dies") == ("the process survives", 50, lost)
+    for fault, latest in (
+        ("hangs", 61),
+        ("is_stuck", 50),
+    ):  # the last cycle of the log; how far it came, the clock says
+        name, tick, message = told.pop(fault)
+        assert (name, message) == ("the run ends in time", "no end within 1 s")
+        assert tick <= latest
     [(name, tick, message)] = told.values()
     assert name == "the plant raises nothing"
-    assert tick in {5, 6}
+    assert tick in {60, 61}
     assert "ArithmeticError: no such place" in message
 
 
@@ -137,8 +147,12 @@ def test_a_campaign_ends_where_the_plant_is_not_in_order(
     (dock / "base.py").write_text("class Base:\n    pass\n", encoding="utf-8")
     assert rcsc("campaign", "--no-compile", "--workers", 1, "--episodes", 2) == 1
     assert "error[RCS729]: `base.py` has no class with `step(self, seconds)`" in capsys.readouterr().err
+    rig = Rig(ANY, dock / "system.toml", limit_s=0.2)
     with pytest.raises(BadPlant):
-        play(rig := Rig(ANY, dock / "system.toml"), digest(rig), 0, [0])
+        play(rig, digest(rig), 0, [0])
+    (dock / "base.py").write_text(WILD + "\n    def __init__(self) -> None:\n        time.sleep(900)\n")
+    with pytest.raises(NotDrawn, match=r"no episode could be drawn within 0\.2 s"):
+        play(rig, digest(rig), 0, [0])
 
 
 def test_a_campaign_of_any_system_goes_on_after_a_kill(dock: Path, tmp_path: Path) -> None:
@@ -250,3 +264,18 @@ def test_a_plant_may_name_a_kind_of_episodes_of_its_own(
         assert why in said
         assert "campaign = " in said  # the line that names it
     assert isinstance(ANY, EpisodeKind)
+
+
+def test_what_is_within_an_order_shrinks_too() -> None:
+    """Fields of an order go one by one, and their numbers come to nought by halves."""
+    fields = (FieldValue("target_mm", 900), FieldValue("way", "left"), FieldValue("speed", 40))
+    orders = (OrderSpec("drive", "goto", fields, wait=30), OrderSpec("drive", "stop"))
+
+    def fails(episode: Episode) -> bool:
+        held = [field for order in episode.orders for field in order.fields]
+        return any(field.name == "target_mm" and int(field.value) > 100 for field in held)
+
+    [order] = shrink(Episode(orders=orders), fails).orders
+    [field] = order.fields
+    assert (order.command, order.wait, field.name) == ("goto", 0, "target_mm")
+    assert 100 < int(field.value) <= 225
