@@ -15,6 +15,7 @@ from rcsc.api.proofs import PathLike
 from rcsc.diagnostics.coded import CodedError
 from rcsc.driver.compile import compile_system
 from rcsc.run.description import Description, description
+from rcsc.run.faults import faults_of, switch
 from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
 from rcsc.run.orders.roles import COMMAND, Served, field_of, served
 from rcsc.run.plant.load import Staged
@@ -82,6 +83,19 @@ class LoadedSystem:
         """The object of the plant's own class; None where there is none, or several."""
         plants = self._staged.plants
         return plants[0].plant if len(plants) == 1 else None
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """The names of the plant's faults."""
+        return faults_of(self._staged.outside)
+
+    def switch(self, fault: str, *, on: bool = True) -> None:
+        """Switch a fault of the plant on or off.
+
+        Raises:
+            UnknownFault: It has none of this name.
+        """
+        switch(self._staged.outside, fault, on=on)
 
     @property
     def levels(self) -> tuple[str, ...]:

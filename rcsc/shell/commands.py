@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
+from rcsc.run.faults import UnknownFault, faults_of, switch
 from rcsc.run.levels import RunningLevel
 from rcsc.shell import typed_names
 from rcsc.shell.part_runs import call_of, part_names
@@ -42,6 +43,8 @@ run to [LEVEL.]TABLE.LINE
 run to cycle N          until N cycles are done
 break CONDITION         stop `run` where it comes to hold; a line, too: break task.acquire.5
 breaks, delete N        the breakpoints; one less
+faults                  the plant's faults
+fault NAME [off]        switch one on, or off
 undo [N]                go back to before the last cycle, or the last N
 reload [LEVEL] [anyway] prove and take a level's tables as they are now, with what they do otherwise; `anyway` even
                         where the present state is one in which the next cycle does otherwise
@@ -87,7 +90,8 @@ class Commands:
         return {
             "break": self._break, "breaks": self._breaks, "buffers": self._buffers, "delete": self._delete,
             "diff": self._diff,
-            "expect": self._expect, "help": self._help, "level": self._level, "levels": self._levels,
+            "expect": self._expect, "fault": self._fault, "faults": self._faults,
+            "help": self._help, "level": self._level, "levels": self._levels,
             "lines": self._lines, "quit": self._quit, "reload": self._reload, "run": self._run, "show": self._show,
             "step": self._step, "undo": self._undo,
         }  # fmt: skip
@@ -102,6 +106,20 @@ class Commands:
                 yield from (f"{level.name}.{table}.{line}" for line in level.sign.tables[table])
         yield from (leaf.name for leaf in self.session.level.sign.leaves)
         yield from self._parts(self.session.level)
+
+    def _faults(self, _rest: str) -> Output:
+        return list(faults_of(self.session.system.outside)) or ["no plant has any"]
+
+    def _fault(self, rest: str) -> Output:
+        name, _, to = rest.partition(" ")
+        if to.strip() not in {"", "on", "off"}:
+            raise Refused(Code.SHELL_COMMAND, f"`{to.strip()}` is neither `on` nor `off`")
+        on = to.strip() != "off"
+        try:
+            switch(self.session.system.outside, name, on=on)
+        except UnknownFault as error:
+            raise Refused(Code.SHELL_COMMAND, str(error), *error.helps) from error
+        return [f"{name} is {'on' if on else 'off'}"]
 
     # --- by name ---
 

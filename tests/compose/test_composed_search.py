@@ -19,6 +19,7 @@ from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
 from rcsc.compose.invariant.search import Effort, FoundInvariant, search
+from rcsc.compose.proof import context as context_
 from rcsc.compose.proof import level as level_proof
 from rcsc.compose.proof.context import RepeatedLine
 from rcsc.compose.proof.kept import keep, recall
@@ -354,6 +355,29 @@ def test_a_line_that_counts_when_it_matches_again_is_named(tmp_path: Path, befor
     assert found.open == ()
     assert found.context is not None
     assert found.context.repeated == (RepeatedLine("work", "1", ("tries",)),)
+
+
+def test_what_a_line_changes_when_it_matches_again_is_told_in_declared_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In whichever order models name it: another one, asked again, and the certificate would not be confirmed."""
+    upper = small_text(
+        "upper",
+        (COUNTER, f"{COUNTER}\nstate tries : int 0 .. 9\nstate more : int 0 .. 9\nstate most : int 0 .. 9"),
+        (
+            "procedure begin {",
+            "procedure again { most := min(most + 1, 9) tries := min(tries + 1, 9) more := min(more + 1, 9) }\n\nprocedure begin {",
+        ),
+        ("|| begin; nextstate(going) | go ", "|| begin; again; nextstate(going) | go "),
+    )
+    shown = context_._shown
+    named = []
+    for turn in (1, -1):
+        monkeypatch.setattr(context_, "_shown", lambda *asked, turn=turn: list(shown(*asked))[::turn])
+        _, proof = proved_level(tmp_path, "upper", upper=upper)
+        assert proof.context is not None
+        named.append(proof.context.repeated)
+    assert named == [(RepeatedLine("work", "1", ("tries", "more", "most")),)] * 2
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """`rcsc run SYSTEM`: the docking robot with a plant of its own, by both executors, in one process and in several, by scripts of orders."""
 
+import csv
 import json
 import os
 import re
@@ -243,6 +244,53 @@ def test_the_shell_steps_the_plant_and_takes_it_back(here: Path, capsys: pytest.
     assert run(["shell", "dock", "--executor", "python", "--plant", "none.py", "--script", os.devnull]) == 1
 
 
+@pytest.mark.parametrize(
+    ("plant", "fault"),
+    [([], "wheel_slips"), (["--plant", "mujoco"], "wheels_stuck")],
+    ids=["python", "model"],
+)
+def test_a_fault_is_on_for_a_row_or_for_a_run(
+    plant: list[str], fault: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "mine.csv").write_text(f"command,fault,cycles\ndock,{fault},20\ndock,,\n", encoding="utf-8")
+    quick = ["--no-compile", "--executor", "python"]
+    assert run(["run", "dock", *quick, *plant, "--script", "mine", "--log", "stuck.mcap"]) == 0
+    moved = [tick["drive"]["travelled_mm"] for tick in _ticks(Path("stuck.mcap"), capsys)]
+    assert moved[19] <= 5 < moved[60]
+    capsys.readouterr()
+    assert (
+        run(["run", "dock", *quick, *plant, "--fault", fault, "--cycles", "60", "--log", "whole.mcap"]) == 1
+    )
+    moved = [tick["drive"]["travelled_mm"] for tick in _ticks(Path("whole.mcap"), capsys)]
+    assert moved[-1] <= 5
+    capsys.readouterr()
+    assert run(["run", "dock", *quick, *plant, "--fault", fault[:-1]]) == 1
+    assert f"no plant has a fault `{fault[:-1]}`\n  = help: did you mean `{fault}`?" in stopped(capsys)
+
+
+def _ticks(log: Path, capsys: pytest.CaptureFixture[str]) -> list[dict[str, dict[str, int]]]:
+    """Each tick's values, by level."""
+    assert run(["log", str(log), "--csv", "out.csv"]) == 0
+    capsys.readouterr()
+    rows = list(csv.DictReader(Path("out.csv").read_text(encoding="utf-8").splitlines()))
+    return [{"drive": {"travelled_mm": int(row["drive.travelled_mm"])}} for row in rows]
+
+
+def test_the_shell_switches_faults(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    commands = (
+        "faults", "fault wheel_slips", "step", "command.inc_command = 1", "command.input_command = dock", "run 20",
+        "expect drive.travelled_mm = 0", "fault wheel_slips off", "run 20", "expect drive.travelled_mm > 5",
+    )  # fmt: skip
+    (here / "steps.txt").write_text("\n".join(commands), encoding="utf-8")
+    asked = ["shell", "dock", "--executor", "python", "--script"]
+    assert run([*asked, str(here / "steps.txt")]) == 0, capsys.readouterr()
+    said = capsys.readouterr().out.splitlines()
+    assert said[:2] == ["wheel_slips", "wheel_slips is on"]
+    (here / "steps.txt").write_text("fault wheel_slip", encoding="utf-8")
+    assert run([*asked, str(here / "steps.txt")]) == 1
+    assert "did you mean `wheel_slips`?" in stopped(capsys)
+
+
 # --- scripts ---
 
 
@@ -265,7 +313,7 @@ command = "undock"
 within = 200
 """
     assert played(here, text, end=".toml") == [
-        ("done", "", 2),
+        ("done", "failed as expected: reason no_beacon", 2),
         ("done", "", 4),
         ("done", "", 3),
         ("done", "", 95),

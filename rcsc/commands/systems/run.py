@@ -90,6 +90,8 @@ Examples:
 @DATABASE
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
               help="Of what is random in the plant; the same seed gives the same log.")  # fmt: skip
+@click.option("--fault", "faults", multiple=True, metavar="NAME",
+              help="A fault of the plant that is on from the first cycle (repeatable).")  # fmt: skip
 @click.option("--cycles", type=click.IntRange(min=1), default=None, metavar="N",
               help=f"How many cycles at most; without a script {UNORDERED_TICKS}, if nobody says.")  # fmt: skip
 @click.option("--log", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
@@ -111,7 +113,7 @@ Examples:
 @click.option("-q", "--quiet", is_flag=True, help="Only what stops the script.")
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str,
-    database: Path | None, seed: int, cycles: int | None, log: Path | None, report: Path | None, live: bool,
+    database: Path | None, seed: int, faults: tuple[str, ...], cycles: int | None, log: Path | None, report: Path | None, live: bool,
     compiles: bool, processes: bool, rate: float | None, from_row: int | None, resumes: bool, quiet: bool,
 ) -> int:  # fmt: skip
     """Run SYSTEM with its plant and its script, or SCRIPT in the system that is here.
@@ -137,6 +139,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         named or (str(described.script) if described.script else ""),
         str(database or ""),
         seed,
+        faults,
     )
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     paced = rate or (WATCHED_RATE if live or processes else None)
@@ -290,13 +293,13 @@ def _watch(run: ScriptedRun, asked: RunOptions) -> float:
     begun = time.perf_counter()
     for result in run.steps(asked.most or (UNORDERED_TICKS if run.operator is None else MOST_TICKS)):
         if not asked.quiet:
-            _say(result.row.number, result.row.text, result.state, result.ticks)
+            _say(result.row.number, result.row.text, result.state, result.reason, result.ticks)
     return time.perf_counter() - begun
 
 
-def _say(number: int, text: str, state: str, ticks: int) -> None:
-    shown = state if state != "done" else click.style("done", fg="green")
-    click.echo(f"{number:3}  {text:42} {shown}  {ticks:5} cycles")
+def _say(number: int, text: str, state: str, reason: str, ticks: int) -> None:
+    shown, why = (state, "") if state != "done" else (click.style("done", fg="green"), reason)
+    click.echo(f"{number:3}  {text:42} {shown}  {ticks:5} cycles{f'  ({why})' if why else ''}")
     sys.stdout.flush()
 
 
@@ -352,8 +355,8 @@ def _rows_apart(asked: RunOptions, system: Description, first: int, results: Pat
 
     def show() -> None:
         new = [json_of(line) for line in content(results).decode().splitlines()[len(rows) :]]
-        for number, text, state, _reason, ticks in [] if asked.quiet else new:
-            _say(number, text, state, ticks)
+        for number, text, state, reason, ticks in [] if asked.quiet else new:
+            _say(number, text, state, reason, ticks)
         rows.extend(new)
 
     results.touch()

@@ -137,13 +137,16 @@ def _restless(ts: TransitionSystem, asked: Confirmation, start: _Start) -> bool:
 def _every_repeated(
     ts: TransitionSystem, asked: Confirmation, every: Sequence[_Start]
 ) -> Iterator[RepeatedLine]:
-    """Merge, line by line, the leaves that a second match may change after any start."""
-    by_line: dict[LineName, dict[str, None]] = {}
+    """Merge, line by line, the leaves that a second match may change after any start, in declared order.
+
+    Models name them in any order, another one each time that it is asked.
+    """
+    by_line: dict[LineName, set[str]] = {}
     for start in every:
         for line, leaves in _repeated(ts, asked, start):
-            by_line.setdefault(line, {}).update(dict.fromkeys(leaves))
+            by_line.setdefault(line, set()).update(leaves)
     for where, changed in by_line.items():
-        yield RepeatedLine(*where, tuple(changed))
+        yield RepeatedLine(*where, tuple(leaf for leaf in _of_lines(ts) if leaf in changed))
 
 
 def _repeated(

@@ -154,6 +154,11 @@ class ScriptOperator:
         """What buffers from outside hold because of the row under way."""
         return {} if self.over or self._since < 0 else self.rows[self.at].set
 
+    @property
+    def faults(self) -> frozenset[str]:
+        """The plant's faults that are on because of the row under way."""
+        return frozenset(() if self.over or self._since < 0 else self.rows[self.at].faults)
+
     def begin_at(self, row: int) -> None:
         """Goes on at another row, as if those between were done.
 
@@ -210,7 +215,8 @@ class ScriptOperator:
         if report is not None:
             status = row.served.report_leaves[row.served.status].shown(report[row.served.status])
             if status == row.expect:
-                return DONE, ""
+                said = answer_reason(row.served, report) if status == row.served.failed else ""
+                return DONE, f"{status} as expected: {said}" if said else ""
             if status in (row.served.done, row.served.failed):
                 wanted = "" if row.expect == row.served.done else f", and was to be {row.expect}"
                 return FAILED, f"{answer_reason(row.served, report) or status}{wanted}"

@@ -6,7 +6,8 @@ the field that has the command), the end of a buffer from outside (`base.bumper`
 - `level`: which level is ordered, where several can be;
 - `cycles`: how long the row takes, whatever is reported; without it an order takes until it is done or failed;
 - `within`: how many cycles it may take at most;
-- `expect`: how it is to end where that is not `done`.
+- `expect`: how it is to end where that is not `done`;
+- `fault`: the plant's faults that are on while the row is under way, parted by spaces.
 
     command,target_mm,expect
     goto,500,
@@ -23,11 +24,12 @@ from rcsc.diagnostics.codes import Code
 from rcsc.host.described import nearest
 from rcsc.host.files.read import MIB, Malformed, table_of, text, toml_of
 from rcsc.run.description import Description
+from rcsc.run.faults import UnknownFault
 from rcsc.run.orders.roles import DONE, PROTOCOL, Served, field_of, served
 from rcsc.run.signature import Leaf, Signature, Value
 
-COMMAND, LEVEL, CYCLES, WITHIN, EXPECT = "command", "level", "cycles", "within", "expect"
-OWN = (COMMAND, LEVEL, CYCLES, WITHIN, EXPECT)
+COMMAND, LEVEL, CYCLES, WITHIN, EXPECT, FAULT = "command", "level", "cycles", "within", "expect", "fault"
+OWN = (COMMAND, LEVEL, CYCLES, WITHIN, EXPECT, FAULT)
 """Columns that are no field of an order."""
 MOST_ROWS, MOST_CYCLES = 100_000, 10_000_000
 
@@ -51,6 +53,7 @@ class OrderRow:
         cycles: How long it takes; None until it is answered.
         within: How many cycles it may take; None for any number.
         expect: The status that it is to end with.
+        faults: The plant's faults that are on meanwhile.
     """
 
     number: int
@@ -61,6 +64,7 @@ class OrderRow:
     cycles: int | None = None
     within: int | None = None
     expect: str = DONE
+    faults: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +115,16 @@ def script_path(name: str, folder: Path) -> Path:
     return next((place for place in places if place.is_file()), places[0])
 
 
-def read_script(path: Path, system: Description, signs: Mapping[str, Signature]) -> tuple[OrderRow, ...]:
+def read_script(
+    path: Path, system: Description, signs: Mapping[str, Signature], faults: Sequence[str] = ()
+) -> tuple[OrderRow, ...]:
     """The rows of a script.
+
+    Args:
+        path: The file.
+        system: The description.
+        signs: The signatures of its levels, by name.
+        faults: The names of the plant's faults.
 
     Raises:
         BadScript: The file cannot be read, or a row says what cannot be; all that is wrong is told.
@@ -126,7 +138,7 @@ def read_script(path: Path, system: Description, signs: Mapping[str, Signature])
         raise BadScript(f"{path}: {error}") from error
     if len(lines) > MOST_ROWS:
         raise BadScript(f"{path} has {len(lines)} rows, more than {MOST_ROWS}")
-    reader = _Reader(served(system, signs), outside_buffers(system, signs))
+    reader = _Reader(served(system, signs), outside_buffers(system, signs), tuple(faults))
     wrong = [f"{path}: {message}" for message in reader.check_columns(lines)]
     rows = []
     for number, line in enumerate(lines, 1) if not wrong else ():
@@ -162,6 +174,7 @@ class _Reader:
 
     levels: tuple[Served, ...]
     buffers: tuple[OutsideBuffer, ...]
+    faults: tuple[str, ...]
 
     def check_columns(self, lines: Sequence[Mapping[str, str]]) -> Iterator[str]:
         """What is wrong with the names of columns."""
@@ -203,7 +216,16 @@ class _Reader:
             1 if level is None and cycles is None else cycles,
             within,
             expect,
+            self._faults(line),
         )
+
+    def _faults(self, line: Mapping[str, str]) -> tuple[str, ...]:
+        names = tuple(line.get(FAULT, "").split())
+        for name in names:
+            if name not in self.faults:
+                error = UnknownFault(name, self.faults)
+                raise ValueError("; ".join((str(error), *error.helps)))
+        return names
 
     def _level(self, line: Mapping[str, str]) -> Served:
         if not self.levels:

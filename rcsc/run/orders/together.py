@@ -13,6 +13,7 @@ from typing import Any
 
 from rcsc.host.files.names import shown
 from rcsc.host.files.plain import read
+from rcsc.run.faults import faults_of, switch
 from rcsc.run.orders.numbered import Latest
 from rcsc.run.orders.operator import Operator, ScriptOperator
 from rcsc.run.orders.stopped import Restorable
@@ -47,6 +48,7 @@ class Together:
     _between: dict[str, Values] = field(default_factory=dict)
     _set: dict[str, Values] = field(default_factory=dict)
     _written: int = 0
+    _on: frozenset[str] = frozenset()
 
     @property
     def over(self) -> bool:
@@ -60,8 +62,9 @@ class Together:
         def seen(name: str) -> Values | None:
             return latest(name) if name in self.shared else self._between.get(name)
 
-        parts: tuple[Outside, ...] = self.others if self.operator is None else (self.operator, *self.others)
-        published = {name: values for part in parts for name, values in part.step(tick, seen).items()}
+        published = {} if self.operator is None else dict(self.operator.step(tick, seen))
+        self._switch()
+        published |= {name: values for part in self.others for name, values in part.step(tick, seen).items()}
         self._between |= {name: values for name, values in published.items() if name not in self.shared}
         self._write()
         shared = {name: values for name, values in published.items() if name in self.shared}
@@ -108,6 +111,22 @@ class Together:
             self._set[name] = _placed(base, values)
         still = {name: values for name, values in self._set.items() if name in held or name not in published}
         return published | still
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """The names of all faults of the plants."""
+        return faults_of(self.others)
+
+    def switch(self, fault: str, *, on: bool) -> None:
+        """Switches a fault on or off."""
+        switch(self.others, fault, on=on)
+
+    def _switch(self) -> None:
+        """Switches on what the row under way wants, and off what the one before wanted."""
+        wanted = self.operator.faults if isinstance(self.operator, ScriptOperator) else frozenset()
+        for fault in sorted(self._on ^ wanted):
+            switch(self.others, fault, on=fault in wanted)
+        self._on = wanted
 
     def _write(self) -> None:
         if self.operator is None or self.results is None:

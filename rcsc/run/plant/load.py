@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol, TypeAlias, runtime_checkable
+from typing import Any, TypeAlias
 
 from rcsc.host.described import KeyPath, nearest
 from rcsc.host.files.names import BadName, within
 from rcsc.lang.project import project_root
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description
+from rcsc.run.faults import Switched
 from rcsc.run.levels import Query
 from rcsc.run.orders.operator import Operator, ScriptedRun
 from rcsc.run.orders.stopped import StoppedRuns
@@ -51,20 +52,6 @@ class Setup:
     script: str = ""
     database: Path | None = None
     answers_only: bool = False
-
-
-@runtime_checkable
-class Switched(Protocol):
-    """A plant that misbehaves where somebody switches a fault on."""
-
-    @property
-    def faults(self) -> tuple[str, ...]:
-        """The names of its faults."""
-        ...
-
-    def switch(self, fault: str, *, on: bool) -> None:
-        """Switches a fault on or off."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

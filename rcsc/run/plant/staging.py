@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.run.description import Description, description
+from rcsc.run.faults import faults_of, switch
 from rcsc.run.levels import Query
 from rcsc.run.orders.operator import Operator, ScriptOperator
 from rcsc.run.orders.script import outside_buffers, read_script, script_path
@@ -29,6 +30,7 @@ class StageOrder:
         plant: As `load` has it; empty for the description's first.
         script: Its name; empty for none.
         database: Path of one to be used as it is; empty for the system's own.
+        faults: Of the plant, that are on from the first tick.
     """
 
     system: str
@@ -36,6 +38,7 @@ class StageOrder:
     script: str = ""
     database: str = ""
     seed: int = 0
+    faults: tuple[str, ...] = ()
 
 
 def staged(
@@ -50,9 +53,14 @@ def staged(
         system, signs, order.plant or None, seed=order.seed, script=order.script,
         database=Path(order.database) if order.database else None, answers_only=answers_only,
     )  # fmt: skip
-    if stage.operator is not None or not order.script or answers_only:
+    if answers_only:
         return stage
-    rows = read_script(script_path(order.script, Path(order.system).parent), system, signs)
+    for fault in order.faults:
+        switch(stage.outside, fault, on=True)
+    if stage.operator is not None or not order.script:
+        return stage
+    path = script_path(order.script, Path(order.system).parent)
+    rows = read_script(path, system, signs, faults_of(stage.outside))
     operator: Operator = ScriptOperator(rows)
     keeps = all(isinstance(part, Restorable) for part in stage.outside)
     return replace(stage, operator=operator, resume=StoppedRuns(system) if keeps else None)
