@@ -57,6 +57,15 @@ def test_a_system_is_wholly_proved_and_passes_its_own_tests(project: Path) -> No
     assert int(ran.stdout.split(" passed")[0].split()[-1]) >= 3
 
 
+@pytest.mark.parametrize("project", SYSTEMS, indirect=True)
+def test_a_system_of_a_template_keeps_its_properties_whatever_goes_wrong(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["campaign", "--episodes", "4", "--workers", "1"]) == 0
+    assert "4 episodes, " in capsys.readouterr().out
+    assert not (project / "campaign").exists()
+
+
 @pytest.mark.parametrize("project", ["level", *SYSTEMS, "nbs"], indirect=True)
 def test_names_are_the_project_s_and_hidden_files_are_hidden(project: Path) -> None:
     texts = {path: path.read_text(encoding="utf-8") for path in project.rglob("*") if path.is_file()}
