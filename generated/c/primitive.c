@@ -285,8 +285,8 @@ static void primitive_do_advance_thru(primitive_t *s)
 /* The same, but slower where what is left is needed to stop. */
 static void primitive_do_advance(primitive_t *s)
 {
-    if (((s->speed_mm_s * s->speed_mm_s) >= ((2.0 * s->goal.accel_mm_s2) * primitive_max_f64(0.0, (s->length_mm - s->travelled_mm))))) {
-        primitive_do_advance_at(s, primitive_max_f64(20.0, (s->speed_mm_s - (s->goal.accel_mm_s2 * 0.04))) + 0.0);
+    if (((s->speed_mm_s * s->speed_mm_s) >= ((2.0 * s->goal.decel_mm_s2) * primitive_max_f64(0.0, (s->length_mm - s->travelled_mm))))) {
+        primitive_do_advance_at(s, primitive_max_f64(20.0, (s->speed_mm_s - (s->goal.decel_mm_s2 * 0.04))) + 0.0);
     } else {
         primitive_do_advance_thru(s);
     }
@@ -652,10 +652,18 @@ static void primitive_admit(primitive_t *s)
     } else {
         s->goal.accel_mm_s2 = s->goal.accel_mm_s2 + 0.0;
     }
-    if (!((s->goal.breakpoint_mm >= 0.0) && (s->goal.breakpoint_mm <= 500.0))) {
+    if (!((s->goal.decel_mm_s2 >= 10.0) && (s->goal.decel_mm_s2 <= 10000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 78;
+        }
+    } else {
+        s->goal.decel_mm_s2 = s->goal.decel_mm_s2 + 0.0;
+    }
+    if (!((s->goal.breakpoint_mm >= 0.0) && (s->goal.breakpoint_mm <= 500.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 79;
         }
     } else {
         s->goal.breakpoint_mm = s->goal.breakpoint_mm + 0.0;
@@ -663,7 +671,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.approach_mm >= 0.0) && (s->fingers.approach_mm <= 200.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 80;
+            s->fault_at = 81;
         }
     } else {
         s->fingers.approach_mm = s->fingers.approach_mm + 0.0;
@@ -671,7 +679,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.departure_mm >= 0.0) && (s->fingers.departure_mm <= 200.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 81;
+            s->fault_at = 82;
         }
     } else {
         s->fingers.departure_mm = s->fingers.departure_mm + 0.0;
@@ -679,7 +687,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.grip_mm >= 0.0) && (s->fingers.grip_mm <= 200.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 82;
+            s->fault_at = 83;
         }
     } else {
         s->fingers.grip_mm = s->fingers.grip_mm + 0.0;
@@ -687,7 +695,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.tolerance_mm >= 0.0) && (s->fingers.tolerance_mm <= 50.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 83;
+            s->fault_at = 84;
         }
     } else {
         s->fingers.tolerance_mm = s->fingers.tolerance_mm + 0.0;
@@ -695,7 +703,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.force_n >= 0.0) && (s->fingers.force_n <= 1000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 84;
+            s->fault_at = 85;
         }
     } else {
         s->fingers.force_n = s->fingers.force_n + 0.0;
@@ -703,7 +711,7 @@ static void primitive_admit(primitive_t *s)
     if (!((s->fingers.speed_mm_s >= 0.0) && (s->fingers.speed_mm_s <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 85;
+            s->fault_at = 86;
         }
     } else {
         s->fingers.speed_mm_s = s->fingers.speed_mm_s + 0.0;
@@ -1152,6 +1160,7 @@ void primitive_init(primitive_t *s)
     s->goal.plate[8] = (-4000.0);
     s->goal.speed_mm_s = 1.0;
     s->goal.accel_mm_s2 = 10.0;
+    s->goal.decel_mm_s2 = 10.0;
     s->goal.breakpoint_mm = 0.0;
     s->fingers.known = false;
     s->fingers.approach_mm = 0.0;
@@ -1304,103 +1313,103 @@ int32_t primitive_check(const primitive_t *s)
         at = 66;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->fingers.known) > 1u)) {
-        at = 79;
+        at = 80;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
-        at = 86;
-    }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(3)))) {
         at = 87;
     }
-    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(3)))) {
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(3)))) {
         at = 88;
     }
-    if ((at < 0) && (!((s->from[0] >= (-4000.0)) && (s->from[0] <= 4000.0)))) {
+    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(3)))) {
         at = 89;
     }
-    if ((at < 0) && (!((s->from[1] >= (-4000.0)) && (s->from[1] <= 4000.0)))) {
+    if ((at < 0) && (!((s->from[0] >= (-4000.0)) && (s->from[0] <= 4000.0)))) {
         at = 90;
     }
-    if ((at < 0) && (!((s->from[2] >= (-4000.0)) && (s->from[2] <= 4000.0)))) {
+    if ((at < 0) && (!((s->from[1] >= (-4000.0)) && (s->from[1] <= 4000.0)))) {
         at = 91;
     }
-    if ((at < 0) && (!((s->from[3] >= (-4000.0)) && (s->from[3] <= 4000.0)))) {
+    if ((at < 0) && (!((s->from[2] >= (-4000.0)) && (s->from[2] <= 4000.0)))) {
         at = 92;
     }
-    if ((at < 0) && (!((s->from[4] >= (-4000.0)) && (s->from[4] <= 4000.0)))) {
+    if ((at < 0) && (!((s->from[3] >= (-4000.0)) && (s->from[3] <= 4000.0)))) {
         at = 93;
     }
-    if ((at < 0) && (!((s->from[5] >= (-4000.0)) && (s->from[5] <= 4000.0)))) {
+    if ((at < 0) && (!((s->from[4] >= (-4000.0)) && (s->from[4] <= 4000.0)))) {
         at = 94;
     }
-    if ((at < 0) && (!((s->from[6] >= (-4000.0)) && (s->from[6] <= 4000.0)))) {
+    if ((at < 0) && (!((s->from[5] >= (-4000.0)) && (s->from[5] <= 4000.0)))) {
         at = 95;
     }
-    if ((at < 0) && (!((s->from[7] >= (-4000.0)) && (s->from[7] <= 4000.0)))) {
+    if ((at < 0) && (!((s->from[6] >= (-4000.0)) && (s->from[6] <= 4000.0)))) {
         at = 96;
     }
-    if ((at < 0) && (!((s->from[8] >= (-4000.0)) && (s->from[8] <= 4000.0)))) {
+    if ((at < 0) && (!((s->from[7] >= (-4000.0)) && (s->from[7] <= 4000.0)))) {
         at = 97;
     }
-    if ((at < 0) && (!((s->to[0] >= (-4000.0)) && (s->to[0] <= 4000.0)))) {
+    if ((at < 0) && (!((s->from[8] >= (-4000.0)) && (s->from[8] <= 4000.0)))) {
         at = 98;
     }
-    if ((at < 0) && (!((s->to[1] >= (-4000.0)) && (s->to[1] <= 4000.0)))) {
+    if ((at < 0) && (!((s->to[0] >= (-4000.0)) && (s->to[0] <= 4000.0)))) {
         at = 99;
     }
-    if ((at < 0) && (!((s->to[2] >= (-4000.0)) && (s->to[2] <= 4000.0)))) {
+    if ((at < 0) && (!((s->to[1] >= (-4000.0)) && (s->to[1] <= 4000.0)))) {
         at = 100;
     }
-    if ((at < 0) && (!((s->to[3] >= (-4000.0)) && (s->to[3] <= 4000.0)))) {
+    if ((at < 0) && (!((s->to[2] >= (-4000.0)) && (s->to[2] <= 4000.0)))) {
         at = 101;
     }
-    if ((at < 0) && (!((s->to[4] >= (-4000.0)) && (s->to[4] <= 4000.0)))) {
+    if ((at < 0) && (!((s->to[3] >= (-4000.0)) && (s->to[3] <= 4000.0)))) {
         at = 102;
     }
-    if ((at < 0) && (!((s->to[5] >= (-4000.0)) && (s->to[5] <= 4000.0)))) {
+    if ((at < 0) && (!((s->to[4] >= (-4000.0)) && (s->to[4] <= 4000.0)))) {
         at = 103;
     }
-    if ((at < 0) && (!((s->to[6] >= (-4000.0)) && (s->to[6] <= 4000.0)))) {
+    if ((at < 0) && (!((s->to[5] >= (-4000.0)) && (s->to[5] <= 4000.0)))) {
         at = 104;
     }
-    if ((at < 0) && (!((s->to[7] >= (-4000.0)) && (s->to[7] <= 4000.0)))) {
+    if ((at < 0) && (!((s->to[6] >= (-4000.0)) && (s->to[6] <= 4000.0)))) {
         at = 105;
     }
-    if ((at < 0) && (!((s->to[8] >= (-4000.0)) && (s->to[8] <= 4000.0)))) {
+    if ((at < 0) && (!((s->to[7] >= (-4000.0)) && (s->to[7] <= 4000.0)))) {
         at = 106;
     }
-    if ((at < 0) && (!((s->length_mm >= 1.0) && (s->length_mm <= 30000.0)))) {
+    if ((at < 0) && (!((s->to[8] >= (-4000.0)) && (s->to[8] <= 4000.0)))) {
         at = 107;
     }
-    if ((at < 0) && (!((s->travelled_mm >= 0.0) && (s->travelled_mm <= 30000.0)))) {
+    if ((at < 0) && (!((s->length_mm >= 1.0) && (s->length_mm <= 30000.0)))) {
         at = 108;
     }
-    if ((at < 0) && (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0)))) {
+    if ((at < 0) && (!((s->travelled_mm >= 0.0) && (s->travelled_mm <= 30000.0)))) {
         at = 109;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->near_) > 1u)) {
+    if ((at < 0) && (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0)))) {
         at = 110;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->there) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->near_) > 1u)) {
         at = 111;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->settled) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->there) > 1u)) {
         at = 112;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->settled) > 1u)) {
         at = 113;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->closed) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
         at = 114;
     }
-    if ((at < 0) && (((int64_t)s->waited > INT64_C(250)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->closed) > 1u)) {
         at = 115;
     }
-    if ((at < 0) && (((int64_t)s->display > INT64_C(1)))) {
+    if ((at < 0) && (((int64_t)s->waited > INT64_C(250)))) {
         at = 116;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+    if ((at < 0) && (((int64_t)s->display > INT64_C(1)))) {
         at = 117;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+        at = 118;
     }
     return at;
 }

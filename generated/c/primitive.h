@@ -120,24 +120,24 @@ typedef struct {
     vocabulary_gripper_order_t to_gripper; /* 53 to 57: output; Orders to gripper. */
     primitive_common_gripper_held_t gripper; /* 58 to 61: state; What gripper says of the last orders, held until they are echoed. */
     primitive_common_gripper_last_t last_gripper; /* 62 to 65: state; The order to gripper that was numbered last. */
-    primitive_common_goal_point_t goal; /* 66 to 78: input; From the database: the point of the command. */
-    primitive_common_end_effector_t fingers; /* 79 to 85: input; From the database: how the part of the command is gripped. */
-    bool idle; /* 86: state; Both controllers rest. */
-    primitive_common_primitive_state_t cur_state; /* 87: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
-    primitive_common_primitive_state_t cur_state_next; /* 88: state; the deferred next value of cur_state */
-    double from[9]; /* 89 to 97: state; -4000.0 .. 4000.0 mm; The straight line under way. */
-    double to[9]; /* 98 to 106: state; -4000.0 .. 4000.0 mm */
-    double length_mm; /* 107: state; 1.0 .. 30000.0 mm */
-    double travelled_mm; /* 108: state; 0.0 .. 30000.0 mm */
-    double speed_mm_s; /* 109: state; 0.0 .. 2000.0 mm*s^-1 */
-    bool near_; /* 110: state; The end of the line is within the breakpoint distance; the line is at its end. */
-    bool there; /* 111: state */
-    bool settled; /* 112: state; The robot says that it is at the end of the line: its status may be that of an earlier pose. Looked at while it follows. */
-    bool fits; /* 113: state; The finger spacing is that of the part; the fingers touch each other. */
-    bool closed; /* 114: state */
-    uint8_t waited; /* 115: state; 0 .. 250; Cycles that the robot has been waited for. */
-    primitive_common_display_t display; /* 116: output; To whoever looks. */
-    bool echoed; /* 117: state; Every last order is echoed, or too late. */
+    primitive_common_goal_point_t goal; /* 66 to 79: input; From the database: the point of the command. */
+    primitive_common_end_effector_t fingers; /* 80 to 86: input; From the database: how the part of the command is gripped. */
+    bool idle; /* 87: state; Both controllers rest. */
+    primitive_common_primitive_state_t cur_state; /* 88: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
+    primitive_common_primitive_state_t cur_state_next; /* 89: state; the deferred next value of cur_state */
+    double from[9]; /* 90 to 98: state; -4000.0 .. 4000.0 mm; The straight line under way. */
+    double to[9]; /* 99 to 107: state; -4000.0 .. 4000.0 mm */
+    double length_mm; /* 108: state; 1.0 .. 30000.0 mm */
+    double travelled_mm; /* 109: state; 0.0 .. 30000.0 mm */
+    double speed_mm_s; /* 110: state; 0.0 .. 2000.0 mm*s^-1 */
+    bool near_; /* 111: state; The end of the line is within the breakpoint distance; the line is at its end. */
+    bool there; /* 112: state */
+    bool settled; /* 113: state; The robot says that it is at the end of the line: its status may be that of an earlier pose. Looked at while it follows. */
+    bool fits; /* 114: state; The finger spacing is that of the part; the fingers touch each other. */
+    bool closed; /* 115: state */
+    uint8_t waited; /* 116: state; 0 .. 250; Cycles that the robot has been waited for. */
+    primitive_common_display_t display; /* 117: output; To whoever looks. */
+    bool echoed; /* 118: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */

@@ -28,6 +28,7 @@ typedef struct {
     double plate[9]; /* -4000.0 .. 4000.0 mm */
     double speed_mm_s; /* 1.0 .. 2000.0 mm*s^-1 */
     double accel_mm_s2; /* 10.0 .. 10000.0 mm*s^-2 */
+    double decel_mm_s2; /* 10.0 .. 10000.0 mm*s^-2 */
     double breakpoint_mm; /* 0.0 .. 500.0 mm */
 } primitive_common_goal_point_t;
 

@@ -225,6 +225,7 @@ class State:
         "goal_plate_8",
         "goal_speed_mm_s",
         "goal_accel_mm_s2",
+        "goal_decel_mm_s2",
         "goal_breakpoint_mm",
         "fingers_known",
         "fingers_approach_mm",
@@ -350,6 +351,7 @@ class State:
         self.goal_plate_8 = -4000.0  # From the database: the point of the command.
         self.goal_speed_mm_s = 1.0  # From the database: the point of the command.
         self.goal_accel_mm_s2 = 10.0  # From the database: the point of the command.
+        self.goal_decel_mm_s2 = 10.0  # From the database: the point of the command.
         self.goal_breakpoint_mm = 0.0  # From the database: the point of the command.
         self.fingers_known = False  # From the database: how the part of the command is gripped.
         self.fingers_approach_mm = 0.0  # From the database: how the part of the command is gripped.
@@ -1007,8 +1009,8 @@ def _do_advance_thru(s):
 
 def _do_advance(s):
     """The same, but slower where what is left is needed to stop."""
-    if ((s.speed_mm_s * s.speed_mm_s) >= ((2.0 * s.goal_accel_mm_s2) * _max(0.0, (s.length_mm - s.travelled_mm)))):
-        _do_advance_at(s, _max(20.0, (s.speed_mm_s - (s.goal_accel_mm_s2 * 0.04))) + 0.0)
+    if ((s.speed_mm_s * s.speed_mm_s) >= ((2.0 * s.goal_decel_mm_s2) * _max(0.0, (s.length_mm - s.travelled_mm)))):
+        _do_advance_at(s, _max(20.0, (s.speed_mm_s - (s.goal_decel_mm_s2 * 0.04))) + 0.0)
     else:
         _do_advance_thru(s)
 
@@ -1162,71 +1164,71 @@ def check(s):
     if not (isinstance(s.goal_known, int) and 0 <= s.goal_known <= 1):
         return 66
     if not (isinstance(s.fingers_known, int) and 0 <= s.fingers_known <= 1):
-        return 79
+        return 80
     if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
-        return 86
-    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 3):
         return 87
-    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 3):
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 3):
         return 88
-    if not (isinstance(s.from_0, (int, float)) and -4000.0 <= s.from_0 <= 4000.0):
+    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 3):
         return 89
-    if not (isinstance(s.from_1, (int, float)) and -4000.0 <= s.from_1 <= 4000.0):
+    if not (isinstance(s.from_0, (int, float)) and -4000.0 <= s.from_0 <= 4000.0):
         return 90
-    if not (isinstance(s.from_2, (int, float)) and -4000.0 <= s.from_2 <= 4000.0):
+    if not (isinstance(s.from_1, (int, float)) and -4000.0 <= s.from_1 <= 4000.0):
         return 91
-    if not (isinstance(s.from_3, (int, float)) and -4000.0 <= s.from_3 <= 4000.0):
+    if not (isinstance(s.from_2, (int, float)) and -4000.0 <= s.from_2 <= 4000.0):
         return 92
-    if not (isinstance(s.from_4, (int, float)) and -4000.0 <= s.from_4 <= 4000.0):
+    if not (isinstance(s.from_3, (int, float)) and -4000.0 <= s.from_3 <= 4000.0):
         return 93
-    if not (isinstance(s.from_5, (int, float)) and -4000.0 <= s.from_5 <= 4000.0):
+    if not (isinstance(s.from_4, (int, float)) and -4000.0 <= s.from_4 <= 4000.0):
         return 94
-    if not (isinstance(s.from_6, (int, float)) and -4000.0 <= s.from_6 <= 4000.0):
+    if not (isinstance(s.from_5, (int, float)) and -4000.0 <= s.from_5 <= 4000.0):
         return 95
-    if not (isinstance(s.from_7, (int, float)) and -4000.0 <= s.from_7 <= 4000.0):
+    if not (isinstance(s.from_6, (int, float)) and -4000.0 <= s.from_6 <= 4000.0):
         return 96
-    if not (isinstance(s.from_8, (int, float)) and -4000.0 <= s.from_8 <= 4000.0):
+    if not (isinstance(s.from_7, (int, float)) and -4000.0 <= s.from_7 <= 4000.0):
         return 97
-    if not (isinstance(s.to_0, (int, float)) and -4000.0 <= s.to_0 <= 4000.0):
+    if not (isinstance(s.from_8, (int, float)) and -4000.0 <= s.from_8 <= 4000.0):
         return 98
-    if not (isinstance(s.to_1, (int, float)) and -4000.0 <= s.to_1 <= 4000.0):
+    if not (isinstance(s.to_0, (int, float)) and -4000.0 <= s.to_0 <= 4000.0):
         return 99
-    if not (isinstance(s.to_2, (int, float)) and -4000.0 <= s.to_2 <= 4000.0):
+    if not (isinstance(s.to_1, (int, float)) and -4000.0 <= s.to_1 <= 4000.0):
         return 100
-    if not (isinstance(s.to_3, (int, float)) and -4000.0 <= s.to_3 <= 4000.0):
+    if not (isinstance(s.to_2, (int, float)) and -4000.0 <= s.to_2 <= 4000.0):
         return 101
-    if not (isinstance(s.to_4, (int, float)) and -4000.0 <= s.to_4 <= 4000.0):
+    if not (isinstance(s.to_3, (int, float)) and -4000.0 <= s.to_3 <= 4000.0):
         return 102
-    if not (isinstance(s.to_5, (int, float)) and -4000.0 <= s.to_5 <= 4000.0):
+    if not (isinstance(s.to_4, (int, float)) and -4000.0 <= s.to_4 <= 4000.0):
         return 103
-    if not (isinstance(s.to_6, (int, float)) and -4000.0 <= s.to_6 <= 4000.0):
+    if not (isinstance(s.to_5, (int, float)) and -4000.0 <= s.to_5 <= 4000.0):
         return 104
-    if not (isinstance(s.to_7, (int, float)) and -4000.0 <= s.to_7 <= 4000.0):
+    if not (isinstance(s.to_6, (int, float)) and -4000.0 <= s.to_6 <= 4000.0):
         return 105
-    if not (isinstance(s.to_8, (int, float)) and -4000.0 <= s.to_8 <= 4000.0):
+    if not (isinstance(s.to_7, (int, float)) and -4000.0 <= s.to_7 <= 4000.0):
         return 106
-    if not (isinstance(s.length_mm, (int, float)) and 1.0 <= s.length_mm <= 30000.0):
+    if not (isinstance(s.to_8, (int, float)) and -4000.0 <= s.to_8 <= 4000.0):
         return 107
-    if not (isinstance(s.travelled_mm, (int, float)) and 0.0 <= s.travelled_mm <= 30000.0):
+    if not (isinstance(s.length_mm, (int, float)) and 1.0 <= s.length_mm <= 30000.0):
         return 108
-    if not (isinstance(s.speed_mm_s, (int, float)) and 0.0 <= s.speed_mm_s <= 2000.0):
+    if not (isinstance(s.travelled_mm, (int, float)) and 0.0 <= s.travelled_mm <= 30000.0):
         return 109
-    if not (isinstance(s.near, int) and 0 <= s.near <= 1):
+    if not (isinstance(s.speed_mm_s, (int, float)) and 0.0 <= s.speed_mm_s <= 2000.0):
         return 110
-    if not (isinstance(s.there, int) and 0 <= s.there <= 1):
+    if not (isinstance(s.near, int) and 0 <= s.near <= 1):
         return 111
-    if not (isinstance(s.settled, int) and 0 <= s.settled <= 1):
+    if not (isinstance(s.there, int) and 0 <= s.there <= 1):
         return 112
-    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
+    if not (isinstance(s.settled, int) and 0 <= s.settled <= 1):
         return 113
-    if not (isinstance(s.closed, int) and 0 <= s.closed <= 1):
+    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
         return 114
-    if not (isinstance(s.waited, int) and 0 <= s.waited <= 250):
+    if not (isinstance(s.closed, int) and 0 <= s.closed <= 1):
         return 115
-    if not (isinstance(s.display, int) and 0 <= s.display <= 1):
+    if not (isinstance(s.waited, int) and 0 <= s.waited <= 250):
         return 116
-    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+    if not (isinstance(s.display, int) and 0 <= s.display <= 1):
         return 117
+    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+        return 118
     return -1
 
 
@@ -1381,37 +1383,41 @@ def _admit(s):
     if not 10.0 <= i39 <= 10000.0:
         return _refused(s, 77)
     i39 = i39 + 0.0
-    i40 = _real(s.goal_breakpoint_mm)
-    if not 0.0 <= i40 <= 500.0:
+    i40 = _real(s.goal_decel_mm_s2)
+    if not 10.0 <= i40 <= 10000.0:
         return _refused(s, 78)
     i40 = i40 + 0.0
-    i41 = _whole(s.fingers_known)
-    if not 0 <= i41 <= 1:
+    i41 = _real(s.goal_breakpoint_mm)
+    if not 0.0 <= i41 <= 500.0:
         return _refused(s, 79)
-    i42 = _real(s.fingers_approach_mm)
-    if not 0.0 <= i42 <= 200.0:
+    i41 = i41 + 0.0
+    i42 = _whole(s.fingers_known)
+    if not 0 <= i42 <= 1:
         return _refused(s, 80)
-    i42 = i42 + 0.0
-    i43 = _real(s.fingers_departure_mm)
+    i43 = _real(s.fingers_approach_mm)
     if not 0.0 <= i43 <= 200.0:
         return _refused(s, 81)
     i43 = i43 + 0.0
-    i44 = _real(s.fingers_grip_mm)
+    i44 = _real(s.fingers_departure_mm)
     if not 0.0 <= i44 <= 200.0:
         return _refused(s, 82)
     i44 = i44 + 0.0
-    i45 = _real(s.fingers_tolerance_mm)
-    if not 0.0 <= i45 <= 50.0:
+    i45 = _real(s.fingers_grip_mm)
+    if not 0.0 <= i45 <= 200.0:
         return _refused(s, 83)
     i45 = i45 + 0.0
-    i46 = _real(s.fingers_force_n)
-    if not 0.0 <= i46 <= 1000.0:
+    i46 = _real(s.fingers_tolerance_mm)
+    if not 0.0 <= i46 <= 50.0:
         return _refused(s, 84)
     i46 = i46 + 0.0
-    i47 = _real(s.fingers_speed_mm_s)
-    if not 0.0 <= i47 <= 500.0:
+    i47 = _real(s.fingers_force_n)
+    if not 0.0 <= i47 <= 1000.0:
         return _refused(s, 85)
     i47 = i47 + 0.0
+    i48 = _real(s.fingers_speed_mm_s)
+    if not 0.0 <= i48 <= 500.0:
+        return _refused(s, 86)
+    i48 = i48 + 0.0
     s.emove_inc_command = i0
     s.emove_input_command = i1
     s.emove_obj_ptr = i2
@@ -1452,14 +1458,15 @@ def _admit(s):
     s.goal_plate_8 = i37
     s.goal_speed_mm_s = i38
     s.goal_accel_mm_s2 = i39
-    s.goal_breakpoint_mm = i40
-    s.fingers_known = i41
-    s.fingers_approach_mm = i42
-    s.fingers_departure_mm = i43
-    s.fingers_grip_mm = i44
-    s.fingers_tolerance_mm = i45
-    s.fingers_force_n = i46
-    s.fingers_speed_mm_s = i47
+    s.goal_decel_mm_s2 = i40
+    s.goal_breakpoint_mm = i41
+    s.fingers_known = i42
+    s.fingers_approach_mm = i43
+    s.fingers_departure_mm = i44
+    s.fingers_grip_mm = i45
+    s.fingers_tolerance_mm = i46
+    s.fingers_force_n = i47
+    s.fingers_speed_mm_s = i48
     return 0
 
 

@@ -64,7 +64,7 @@ def queries() -> dict[str, Query]:
         return (True, 40.0, 30.0, 0.0)
 
     def point(number: int) -> Values:
-        return (True, *(float(number + at) for at in range(9)), 100.0, 1000.0, 5.0)
+        return (True, *(float(number + at) for at in range(9)), 100.0, 1000.0, 1000.0, 5.0)
 
     def fingers(*_: object) -> Values:
         return (True, 60.0, 70.0, 30.0, 2.0, 10.0, 50.0)

@@ -1,6 +1,7 @@
 """The whole system without physics: MAKE BOXT, PAUSE and new commands at every cycle, faults, and what is reported of them."""
 
 import shutil
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from rcsc_cell.cell.ready import Lying, plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import about_z
 from rcsc_cell.episodes.witness import placements
-from rcsc_cell.workstation.prepared import prepare
+from rcsc_cell.workstation.prepared import ScriptDraft, prepare
 from tests.support.cells import COMMAND_ENDS, PAUSE_ENDS, SCRIPT, SYSTEM, Cell, through_script
 
 
@@ -238,21 +239,45 @@ def test_a_fault_below_is_reported_upward(
     assert cell.failed == []
 
 
-def test_a_station_moves_in_the_data_and_nothing_is_compiled_again(tmp_path: Path) -> None:
-    data = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
-    moved = data.replace("at = { x = 560.0, y = 0.0, z = 560.0", "at = { x = 530.0, y = 40.0, z = 550.0")
-    assert moved != data
+DATA = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
+
+
+def with_data(data: str, folder: Path, *rows: str) -> ScriptDraft:
+    """A script in a cell of other data, by the executors that are there."""
+    assert data != DATA
     system = SYSTEM.read_text(encoding="utf-8").replace('"../generated"', '"generated"')
-    shutil.copytree(SYSTEM.parents[1] / "generated", tmp_path / "generated")
-    (tmp_path / "cell.toml").write_text(moved, encoding="utf-8")
-    (tmp_path / "system.toml").write_text(system, encoding="utf-8")
-    script = tmp_path / "go.csv"
-    script.write_text("command,part,source,dest,end_at\nMOVE,,,WS-SAFE,\n", encoding="utf-8")
-    run = prepare(tmp_path / "system.toml", str(script), "c", world)
+    shutil.copytree(SYSTEM.parents[1] / "generated", folder / "generated")
+    (folder / "cell.toml").write_text(data, encoding="utf-8")
+    (folder / "system.toml").write_text(system, encoding="utf-8")
+    script = folder / "go.csv"
+    script.write_text("\n".join(("command,part,source,dest,end_at", *rows)), encoding="utf-8")
+    return prepare(folder / "system.toml", str(script), "c", world)
+
+
+def test_a_station_moves_in_the_data_and_nothing_is_compiled_again(tmp_path: Path) -> None:
+    moved = DATA.replace("at = { x = 560.0, y = 0.0, z = 560.0", "at = { x = 530.0, y = 40.0, z = 550.0")
+    run = with_data(moved, tmp_path, "MOVE,,,WS-SAFE,")
     assert [result.state for result in run.steps()] == ["done"]
     made = run.system.outside[1]
     assert isinstance(made, Plant)
     assert made.plate[:3] == pytest.approx((530.0, 40.0, 715.0))
+
+
+@pytest.mark.parametrize("decel_mm_s2", [300.0, 2400.0])
+def test_the_robot_brakes_as_its_data_says(decel_mm_s2: float, tmp_path: Path) -> None:
+    """Section 4.3: maximum speed, acceleration and deceleration of each point."""
+    braked = DATA.replace("decel_mm_s2 = 1200.0", f"decel_mm_s2 = {decel_mm_s2}")
+    run = with_data(braked, tmp_path, "MOVE,,,WS-SAFE,", "MOVE,,,FIX-SAFE,")
+    primitive, speeds = run.system.level("primitive"), [0.0]
+
+    def watch(*_: object) -> None:
+        speeds.append(float(primitive.value("speed_mm_s")))
+
+    run.system.watch.append(watch)
+    assert [result.state for result in run.steps()] == ["done"] * 2
+    changes = [after - before for before, after in pairwise(speeds) if after > 20.0]
+    assert max(changes) == pytest.approx(1200.0 * 0.04)
+    assert min(changes) == pytest.approx(-decel_mm_s2 * 0.04)
 
 
 def test_the_script_of_these_tests_has_every_command() -> None:

@@ -24,7 +24,7 @@ from rcsc_cell.database.pose import Pose, Vector, about_z, pose_of
 NO_PLACE: Values = (False, False, False, 0, 0)
 NO_ROUTE: Values = (False, 0, 0, 0, 0, 0, 0, 0)
 NO_PART: Values = (False, 0.0, 0.0, 0.0)
-NO_POINT: Values = (False, *(0.0,) * 9, 1.0, 10.0, 0.0)
+NO_POINT: Values = (False, *(0.0,) * 9, 1.0, 10.0, 10.0, 0.0)
 NO_FINGERS: Values = (False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -115,7 +115,7 @@ class Database:
         return self._parts.get(number, NO_PART)
 
     def point(self, number: int) -> Values:
-        """known, nine numbers in mm, speed in mm/s, acceleration in mm/s^2, breakpoint distance in mm."""
+        """known, nine numbers in mm, speed in mm/s, acceleration and deceleration in mm/s^2, breakpoint distance in mm."""
         return self._points.get(number, NO_POINT)
 
     def fingers(self, number: int, grasp: int) -> Values:

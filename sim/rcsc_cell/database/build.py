@@ -46,7 +46,7 @@ create table grasps (object integer not null references objects, grasp integer n
 create table locations (number integer primary key, name text unique not null, vision integer not null, buffer integer not null,
   vupos integer references locations, safe integer references locations);
 create table trajectories (name text primary key not null, speed_mm_s room real not null,
-  accel_mm_s2 rate real not null, breakpoint_mm size real not null);
+  accel_mm_s2 rate real not null, decel_mm_s2 rate real not null, breakpoint_mm size real not null);
 create table points (number integer primary key, location integer not null references locations, sector integer not null,
   role text not null,
   x0 real not null, y0 real not null, z0 real not null,
@@ -98,7 +98,9 @@ LENGTH, SIZE, ROOM = Number(-10_000, 10_000), Number(0, 10_000), Number(0.001, 1
 ANGLE, FORCE, RATE = Number(-360, 360), Number(0, 100_000), Number(0.001, 1_000_000)
 POSE = Record({"x": LENGTH, "y": LENGTH, "z": LENGTH, "yaw": ANGLE}, {"tilt": ANGLE})
 ON_STATION = Record({"x": LENGTH, "y": LENGTH, "yaw": ANGLE}, {"z": LENGTH})
-MOTION: Mapping[str, Kind] = {"speed_mm_s": ROOM, "accel_mm_s2": RATE, "breakpoint_mm": SIZE}
+MOTION: Mapping[str, Kind] = {
+    "speed_mm_s": ROOM, "accel_mm_s2": RATE, "decel_mm_s2": RATE, "breakpoint_mm": SIZE,
+}  # fmt: skip
 GRASP: Mapping[str, Kind] = {
     "approach_mm": SIZE, "departure_mm": SIZE, "grip_mm": SIZE, "tolerance_mm": SIZE, "force_n": FORCE,
     "speed_mm_s": ROOM,
