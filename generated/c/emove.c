@@ -92,7 +92,7 @@ static void emove_do_look_below(emove_t *s)
 static void emove_do_measure(emove_t *s)
 {
     if (s->new_command) {
-        s->path_length = emove_u8_of_i64(((int64_t)s->origin.depart_count + (int64_t)s->target.approach_count));
+        s->path_length = emove_u8_of_i64(((int64_t)s->path.depart_count + (int64_t)s->path.approach_count));
     }
     if (((!s->answered) || (((int64_t)s->last_primitive.input_command == INT64_C(1)) || ((int64_t)s->last_primitive.input_command == INT64_C(2))))) {
         s->lost = ((((int64_t)s->task.gripped_obj_ptr == INT64_C(1)) || ((int64_t)s->task.gripped_obj_ptr == INT64_C(2)) || ((int64_t)s->task.gripped_obj_ptr == INT64_C(3)) || ((int64_t)s->task.gripped_obj_ptr == INT64_C(4))) && (!s->from_primitive.holds));
@@ -210,11 +210,12 @@ static void emove_do_line_flash(emove_t *s)
     s->to_vision.input_command = (uint8_t)INT64_C(2);
 }
 
-/* The departure is kept, and the robot is nowhere until it arrives. */
+/* The path is kept, and the robot is nowhere until it arrives. */
 static void emove_do_depart(emove_t *s)
 {
-    s->depart_first = (uint16_t)(int64_t)s->origin.depart_first;
-    s->depart_count = (uint8_t)(int64_t)s->origin.depart_count;
+    s->depart_first = (uint16_t)(int64_t)s->path.depart_first;
+    s->depart_count = (uint8_t)(int64_t)s->path.depart_count;
+    s->approach_first = (uint16_t)(int64_t)s->path.approach_first;
     s->here_next = (uint8_t)INT64_C(0);
 }
 
@@ -237,7 +238,7 @@ static void emove_do_aim(emove_t *s, int64_t v_at)
         s->to_primitive.displaced.x = s->displaced_here.x + 0.0;
         s->to_primitive.displaced.y = s->displaced_here.y + 0.0;
     } else {
-        s->to_primitive.pose_ptr = emove_u16_of_i64(emove_min_i64((((int64_t)s->target.approach_first + v_at) - (int64_t)s->depart_count), INT64_C(9999)));
+        s->to_primitive.pose_ptr = emove_u16_of_i64(emove_min_i64((((int64_t)s->approach_first + v_at) - (int64_t)s->depart_count), INT64_C(9999)));
         s->to_primitive.displaced.z = s->lift_mm + 0.0;
     }
 }
@@ -509,94 +510,52 @@ static void emove_admit(emove_t *s)
     } else {
         s->from_vision.range_mm = s->from_vision.range_mm + 0.0;
     }
-    if (((int64_t)s->origin.depart_first > INT64_C(9999))) {
+    if (((int64_t)s->path.depart_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 64;
         }
     }
-    if (((int64_t)s->origin.depart_count > INT64_C(31))) {
+    if (((int64_t)s->path.depart_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 65;
         }
     }
-    if (((int64_t)s->origin.approach_first > INT64_C(9999))) {
+    if (((int64_t)s->path.approach_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 66;
         }
     }
-    if (((int64_t)s->origin.approach_count > INT64_C(31))) {
+    if (((int64_t)s->path.approach_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 67;
         }
     }
-    if (((int64_t)s->origin.hover_point > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 68;
-        }
-    }
-    if (((int64_t)s->origin.grasp_point > INT64_C(9999))) {
+    if (((int64_t)s->target.hover_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 69;
         }
     }
-    if (((int64_t)s->origin.view_point > INT64_C(9999))) {
+    if (((int64_t)s->target.grasp_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 70;
         }
     }
-    if (((int64_t)s->target.depart_first > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 72;
-        }
-    }
-    if (((int64_t)s->target.depart_count > INT64_C(31))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 73;
-        }
-    }
-    if (((int64_t)s->target.approach_first > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 74;
-        }
-    }
-    if (((int64_t)s->target.approach_count > INT64_C(31))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 75;
-        }
-    }
-    if (((int64_t)s->target.hover_point > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 76;
-        }
-    }
-    if (((int64_t)s->target.grasp_point > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 77;
-        }
-    }
     if (((int64_t)s->target.view_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 78;
+            s->fault_at = 71;
         }
     }
     if (!((s->object_data.expected_range_mm >= 0.0) && (s->object_data.expected_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 80;
+            s->fault_at = 73;
         }
     } else {
         s->object_data.expected_range_mm = s->object_data.expected_range_mm + 0.0;
@@ -604,7 +563,7 @@ static void emove_admit(emove_t *s)
     if (!((s->object_data.grip_range_mm >= 0.0) && (s->object_data.grip_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 81;
+            s->fault_at = 74;
         }
     } else {
         s->object_data.grip_range_mm = s->object_data.grip_range_mm + 0.0;
@@ -612,7 +571,7 @@ static void emove_admit(emove_t *s)
     if (!((s->object_data.lift_mm >= (-500.0)) && (s->object_data.lift_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 82;
+            s->fault_at = 75;
         }
     } else {
         s->object_data.lift_mm = s->object_data.lift_mm + 0.0;
@@ -620,7 +579,7 @@ static void emove_admit(emove_t *s)
     if (!((s->held_data.expected_range_mm >= 0.0) && (s->held_data.expected_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 84;
+            s->fault_at = 77;
         }
     } else {
         s->held_data.expected_range_mm = s->held_data.expected_range_mm + 0.0;
@@ -628,7 +587,7 @@ static void emove_admit(emove_t *s)
     if (!((s->held_data.grip_range_mm >= 0.0) && (s->held_data.grip_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 85;
+            s->fault_at = 78;
         }
     } else {
         s->held_data.grip_range_mm = s->held_data.grip_range_mm + 0.0;
@@ -636,7 +595,7 @@ static void emove_admit(emove_t *s)
     if (!((s->held_data.lift_mm >= (-500.0)) && (s->held_data.lift_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 86;
+            s->fault_at = 79;
         }
     } else {
         s->held_data.lift_mm = s->held_data.lift_mm + 0.0;
@@ -1173,19 +1132,12 @@ void emove_init(emove_t *s)
     s->vision.failure = (uint8_t)INT64_C(0);
     s->last_vision.input_command = (uint8_t)INT64_C(0);
     s->last_vision.obj_ptr = (uint8_t)INT64_C(0);
-    s->origin.known = false;
-    s->origin.depart_first = (uint16_t)INT64_C(0);
-    s->origin.depart_count = (uint8_t)INT64_C(0);
-    s->origin.approach_first = (uint16_t)INT64_C(0);
-    s->origin.approach_count = (uint8_t)INT64_C(0);
-    s->origin.hover_point = (uint16_t)INT64_C(0);
-    s->origin.grasp_point = (uint16_t)INT64_C(0);
-    s->origin.view_point = (uint16_t)INT64_C(0);
+    s->path.known = false;
+    s->path.depart_first = (uint16_t)INT64_C(0);
+    s->path.depart_count = (uint8_t)INT64_C(0);
+    s->path.approach_first = (uint16_t)INT64_C(0);
+    s->path.approach_count = (uint8_t)INT64_C(0);
     s->target.known = false;
-    s->target.depart_first = (uint16_t)INT64_C(0);
-    s->target.depart_count = (uint8_t)INT64_C(0);
-    s->target.approach_first = (uint16_t)INT64_C(0);
-    s->target.approach_count = (uint8_t)INT64_C(0);
     s->target.hover_point = (uint16_t)INT64_C(0);
     s->target.grasp_point = (uint16_t)INT64_C(0);
     s->target.view_point = (uint16_t)INT64_C(0);
@@ -1209,6 +1161,7 @@ void emove_init(emove_t *s)
     s->here_sector_asked = (uint8_t)INT64_C(0);
     s->depart_first = (uint16_t)INT64_C(0);
     s->depart_count = (uint8_t)INT64_C(0);
+    s->approach_first = (uint16_t)INT64_C(0);
     s->path_length = (uint8_t)INT64_C(0);
     s->displaced_here.x = (-500.0);
     s->displaced_here.y = (-500.0);
@@ -1341,71 +1294,74 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && (((int64_t)s->last_vision.obj_ptr > INT64_C(7)))) {
         at = 62;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->origin.known) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->path.known) > 1u)) {
         at = 63;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->target.known) > 1u)) {
-        at = 71;
+        at = 68;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->object_data.known) > 1u)) {
-        at = 79;
+        at = 72;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->held_data.known) > 1u)) {
-        at = 83;
+        at = 76;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
-        at = 87;
+        at = 80;
     }
     if ((at < 0) && (((int64_t)s->cur_state > INT64_C(13)))) {
-        at = 88;
+        at = 81;
     }
     if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(13)))) {
-        at = 89;
+        at = 82;
     }
     if ((at < 0) && (((int64_t)s->path_at > INT64_C(62)))) {
-        at = 90;
+        at = 83;
     }
     if ((at < 0) && (((int64_t)s->path_at_next > INT64_C(62)))) {
-        at = 91;
+        at = 84;
     }
     if ((at < 0) && (((int64_t)s->here_sector > INT64_C(99)))) {
-        at = 94;
+        at = 87;
     }
     if ((at < 0) && (((int64_t)s->here_sector_asked > INT64_C(99)))) {
-        at = 96;
+        at = 89;
     }
     if ((at < 0) && (((int64_t)s->depart_first > INT64_C(9999)))) {
-        at = 97;
+        at = 90;
     }
     if ((at < 0) && (((int64_t)s->depart_count > INT64_C(31)))) {
-        at = 98;
+        at = 91;
+    }
+    if ((at < 0) && (((int64_t)s->approach_first > INT64_C(9999)))) {
+        at = 92;
     }
     if ((at < 0) && (((int64_t)s->path_length > INT64_C(62)))) {
-        at = 99;
+        at = 93;
     }
     if ((at < 0) && (!((s->displaced_here.x >= (-500.0)) && (s->displaced_here.x <= 500.0)))) {
-        at = 100;
+        at = 94;
     }
     if ((at < 0) && (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0)))) {
-        at = 101;
+        at = 95;
     }
     if ((at < 0) && (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0)))) {
-        at = 102;
+        at = 96;
     }
     if ((at < 0) && (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0)))) {
-        at = 103;
+        at = 97;
     }
     if ((at < 0) && (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0)))) {
-        at = 104;
+        at = 98;
     }
     if ((at < 0) && (!((s->lift_mm >= (-500.0)) && (s->lift_mm <= 500.0)))) {
-        at = 105;
+        at = 99;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->lost) > 1u)) {
-        at = 106;
+        at = 100;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
-        at = 107;
+        at = 101;
     }
     return at;
 }

@@ -32,10 +32,14 @@ typedef struct {
     uint8_t depart_count; /* 0 .. 31 */
     uint16_t approach_first; /* 0 .. 9999 */
     uint8_t approach_count; /* 0 .. 31 */
+} emove_common_path_t;
+
+typedef struct {
+    bool known;
     uint16_t hover_point; /* 0 .. 9999 */
     uint16_t grasp_point; /* 0 .. 9999 */
     uint16_t view_point; /* 0 .. 9999 */
-} emove_common_route_t;
+} emove_common_spot_t;
 
 typedef struct {
     bool known;

@@ -78,12 +78,14 @@ static void nbs_robot_take_emove(nbs_robot_t *s)
     s->emove.from_vision = s->between.vision_to_emove;
     const uint8_t k0_0 = s->emove.here;
     const uint8_t k0_1 = s->emove.here_sector;
+    const uint8_t k0_2 = s->emove.task.locpt_ptr;
+    const uint8_t k0_3 = s->emove.task.sector;
     const uint8_t k1_0 = s->emove.task.locpt_ptr;
     const uint8_t k1_1 = s->emove.task.sector;
     const vocabulary_object_t k2_0 = s->emove.task.obj_ptr;
     const vocabulary_object_t k3_0 = s->emove.task.gripped_obj_ptr;
-    nbs_robot_route(k0_0, k0_1, &s->emove.origin);
-    nbs_robot_route(k1_0, k1_1, &s->emove.target);
+    nbs_robot_path(k0_0, k0_1, k0_2, k0_3, &s->emove.path);
+    nbs_robot_target(k1_0, k1_1, &s->emove.target);
     nbs_robot_part(k2_0, &s->emove.object_data);
     nbs_robot_part(k3_0, &s->emove.held_data);
 }

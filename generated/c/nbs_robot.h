@@ -115,8 +115,11 @@ typedef struct {
 /* yours: task.source of workstation.source_locpt; task.dest of workstation.dest_locpt; task.end_at of workstation.end_at_locpt; task.here of current_loc; asked in every cycle, so that the same keys must always get the same answer */
 extern void nbs_robot_place(uint8_t key_0, task_common_place_t *answer);
 
-/* yours: emove.origin of here, here_sector; emove.target of task.locpt_ptr, task.sector; asked in every cycle, so that the same keys must always get the same answer */
-extern void nbs_robot_route(uint8_t key_0, uint8_t key_1, emove_common_route_t *answer);
+/* yours: emove.path of here, here_sector, task.locpt_ptr, task.sector; asked in every cycle, so that the same keys must always get the same answer */
+extern void nbs_robot_path(uint8_t key_0, uint8_t key_1, uint8_t key_2, uint8_t key_3, emove_common_path_t *answer);
+
+/* yours: emove.target of task.locpt_ptr, task.sector; asked in every cycle, so that the same keys must always get the same answer */
+extern void nbs_robot_target(uint8_t key_0, uint8_t key_1, emove_common_spot_t *answer);
 
 /* yours: emove.object_data of task.obj_ptr; emove.held_data of task.gripped_obj_ptr; asked in every cycle, so that the same keys must always get the same answer */
 extern void nbs_robot_part(vocabulary_object_t key_0, emove_common_part_t *answer);

@@ -213,19 +213,12 @@ class State:
         "vision_failure",
         "last_vision_input_command",
         "last_vision_obj_ptr",
-        "origin_known",
-        "origin_depart_first",
-        "origin_depart_count",
-        "origin_approach_first",
-        "origin_approach_count",
-        "origin_hover_point",
-        "origin_grasp_point",
-        "origin_view_point",
+        "path_known",
+        "path_depart_first",
+        "path_depart_count",
+        "path_approach_first",
+        "path_approach_count",
         "target_known",
-        "target_depart_first",
-        "target_depart_count",
-        "target_approach_first",
-        "target_approach_count",
         "target_hover_point",
         "target_grasp_point",
         "target_view_point",
@@ -249,6 +242,7 @@ class State:
         "here_sector_asked",
         "depart_first",
         "depart_count",
+        "approach_first",
         "path_length",
         "displaced_here_x",
         "displaced_here_y",
@@ -328,19 +322,12 @@ class State:
         self.vision_failure = 0  # What vision says of the last orders, held until they are echoed.
         self.last_vision_input_command = 0  # The order to vision that was numbered last.
         self.last_vision_obj_ptr = 0  # The order to vision that was numbered last.
-        self.origin_known = False  # From the database: where the robot is.
-        self.origin_depart_first = 0  # From the database: where the robot is.
-        self.origin_depart_count = 0  # From the database: where the robot is.
-        self.origin_approach_first = 0  # From the database: where the robot is.
-        self.origin_approach_count = 0  # From the database: where the robot is.
-        self.origin_hover_point = 0  # From the database: where the robot is.
-        self.origin_grasp_point = 0  # From the database: where the robot is.
-        self.origin_view_point = 0  # From the database: where the robot is.
+        self.path_known = False  # From the database: the way from where the robot is to the location of the task.
+        self.path_depart_first = 0  # From the database: the way from where the robot is to the location of the task.
+        self.path_depart_count = 0  # From the database: the way from where the robot is to the location of the task.
+        self.path_approach_first = 0  # From the database: the way from where the robot is to the location of the task.
+        self.path_approach_count = 0  # From the database: the way from where the robot is to the location of the task.
         self.target_known = False  # From the database: the location of the task.
-        self.target_depart_first = 0  # From the database: the location of the task.
-        self.target_depart_count = 0  # From the database: the location of the task.
-        self.target_approach_first = 0  # From the database: the location of the task.
-        self.target_approach_count = 0  # From the database: the location of the task.
         self.target_hover_point = 0  # From the database: the location of the task.
         self.target_grasp_point = 0  # From the database: the location of the task.
         self.target_view_point = 0  # From the database: the location of the task.
@@ -362,8 +349,9 @@ class State:
         self.here_sector = 0
         self.here_asked = 0  # What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before.
         self.here_sector_asked = 0
-        self.depart_first = 0  # The departure of the path under way, kept because `here` is forgotten as soon as the robot moves.
+        self.depart_first = 0  # The path under way, kept because `here` is forgotten as soon as the robot moves.
         self.depart_count = 0
+        self.approach_first = 0
         self.path_length = 0  # How many points the path has.
         self.displaced_here_x = -500.0  # How far the part that was located here was displaced: the departure is displaced as far.
         self.displaced_here_y = -500.0  # How far the part that was located here was displaced: the departure is displaced as far.
@@ -862,7 +850,7 @@ def _do_look_below(s):
 def _do_measure(s):
     """How long the path would be that begins now; whether the part is still there."""
     if s.new_command:
-        s.path_length = (s.origin_depart_count + s.target_approach_count)
+        s.path_length = (s.path_depart_count + s.path_approach_count)
     if ((not s.answered) or (s.last_primitive_input_command in (1, 2,))):
         s.lost = ((s.task_gripped_obj_ptr in (1, 2, 3, 4,)) and (not s.from_primitive_holds))
     if (s.task_input_command == 2):
@@ -963,9 +951,10 @@ def _do_line_flash(s):
 
 
 def _do_depart(s):
-    """The departure is kept, and the robot is nowhere until it arrives."""
-    s.depart_first = s.origin_depart_first
-    s.depart_count = s.origin_depart_count
+    """The path is kept, and the robot is nowhere until it arrives."""
+    s.depart_first = s.path_depart_first
+    s.depart_count = s.path_depart_count
+    s.approach_first = s.path_approach_first
     s.here_next = 0
 
 
@@ -986,7 +975,7 @@ def _do_aim(s, v_at):
         s.to_primitive_displaced_x = s.displaced_here_x + 0.0
         s.to_primitive_displaced_y = s.displaced_here_y + 0.0
     else:
-        s.to_primitive_pose_ptr = _min(((s.target_approach_first + v_at) - s.depart_count), 9999)
+        s.to_primitive_pose_ptr = _min(((s.approach_first + v_at) - s.depart_count), 9999)
         s.to_primitive_displaced_z = s.lift_mm + 0.0
 
 
@@ -1208,56 +1197,58 @@ def check(s):
         return 61
     if not (isinstance(s.last_vision_obj_ptr, int) and 0 <= s.last_vision_obj_ptr <= 7):
         return 62
-    if not (isinstance(s.origin_known, int) and 0 <= s.origin_known <= 1):
+    if not (isinstance(s.path_known, int) and 0 <= s.path_known <= 1):
         return 63
     if not (isinstance(s.target_known, int) and 0 <= s.target_known <= 1):
-        return 71
+        return 68
     if not (isinstance(s.object_data_known, int) and 0 <= s.object_data_known <= 1):
-        return 79
+        return 72
     if not (isinstance(s.held_data_known, int) and 0 <= s.held_data_known <= 1):
-        return 83
+        return 76
     if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
-        return 87
+        return 80
     if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 13):
-        return 88
+        return 81
     if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 13):
-        return 89
+        return 82
     if not (isinstance(s.path_at, int) and 0 <= s.path_at <= 62):
-        return 90
+        return 83
     if not (isinstance(s.path_at_next, int) and 0 <= s.path_at_next <= 62):
-        return 91
+        return 84
     if not (isinstance(s.here, int) and 0 <= s.here <= 255):
-        return 92
+        return 85
     if not (isinstance(s.here_next, int) and 0 <= s.here_next <= 255):
-        return 93
+        return 86
     if not (isinstance(s.here_sector, int) and 0 <= s.here_sector <= 99):
-        return 94
+        return 87
     if not (isinstance(s.here_asked, int) and 0 <= s.here_asked <= 255):
-        return 95
+        return 88
     if not (isinstance(s.here_sector_asked, int) and 0 <= s.here_sector_asked <= 99):
-        return 96
+        return 89
     if not (isinstance(s.depart_first, int) and 0 <= s.depart_first <= 9999):
-        return 97
+        return 90
     if not (isinstance(s.depart_count, int) and 0 <= s.depart_count <= 31):
-        return 98
+        return 91
+    if not (isinstance(s.approach_first, int) and 0 <= s.approach_first <= 9999):
+        return 92
     if not (isinstance(s.path_length, int) and 0 <= s.path_length <= 62):
-        return 99
+        return 93
     if not (isinstance(s.displaced_here_x, (int, float)) and -500.0 <= s.displaced_here_x <= 500.0):
-        return 100
+        return 94
     if not (isinstance(s.displaced_here_y, (int, float)) and -500.0 <= s.displaced_here_y <= 500.0):
-        return 101
+        return 95
     if not (isinstance(s.displaced_here_z, (int, float)) and -500.0 <= s.displaced_here_z <= 500.0):
-        return 102
+        return 96
     if not (isinstance(s.displaced_here_c, (int, float)) and -1.0 <= s.displaced_here_c <= 1.0):
-        return 103
+        return 97
     if not (isinstance(s.displaced_here_s, (int, float)) and -1.0 <= s.displaced_here_s <= 1.0):
-        return 104
+        return 98
     if not (isinstance(s.lift_mm, (int, float)) and -500.0 <= s.lift_mm <= 500.0):
-        return 105
+        return 99
     if not (isinstance(s.lost, int) and 0 <= s.lost <= 1):
-        return 106
+        return 100
     if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
-        return 107
+        return 101
     return -1
 
 
@@ -1337,84 +1328,63 @@ def _admit(s):
     if not 0.0 <= i21 <= 2000.0:
         return _refused(s, 52)
     i21 = i21 + 0.0
-    i22 = _whole(s.origin_known)
+    i22 = _whole(s.path_known)
     if not 0 <= i22 <= 1:
         return _refused(s, 63)
-    i23 = _whole(s.origin_depart_first)
+    i23 = _whole(s.path_depart_first)
     if not 0 <= i23 <= 9999:
         return _refused(s, 64)
-    i24 = _whole(s.origin_depart_count)
+    i24 = _whole(s.path_depart_count)
     if not 0 <= i24 <= 31:
         return _refused(s, 65)
-    i25 = _whole(s.origin_approach_first)
+    i25 = _whole(s.path_approach_first)
     if not 0 <= i25 <= 9999:
         return _refused(s, 66)
-    i26 = _whole(s.origin_approach_count)
+    i26 = _whole(s.path_approach_count)
     if not 0 <= i26 <= 31:
         return _refused(s, 67)
-    i27 = _whole(s.origin_hover_point)
-    if not 0 <= i27 <= 9999:
+    i27 = _whole(s.target_known)
+    if not 0 <= i27 <= 1:
         return _refused(s, 68)
-    i28 = _whole(s.origin_grasp_point)
+    i28 = _whole(s.target_hover_point)
     if not 0 <= i28 <= 9999:
         return _refused(s, 69)
-    i29 = _whole(s.origin_view_point)
+    i29 = _whole(s.target_grasp_point)
     if not 0 <= i29 <= 9999:
         return _refused(s, 70)
-    i30 = _whole(s.target_known)
-    if not 0 <= i30 <= 1:
+    i30 = _whole(s.target_view_point)
+    if not 0 <= i30 <= 9999:
         return _refused(s, 71)
-    i31 = _whole(s.target_depart_first)
-    if not 0 <= i31 <= 9999:
+    i31 = _whole(s.object_data_known)
+    if not 0 <= i31 <= 1:
         return _refused(s, 72)
-    i32 = _whole(s.target_depart_count)
-    if not 0 <= i32 <= 31:
+    i32 = _real(s.object_data_expected_range_mm)
+    if not 0.0 <= i32 <= 2000.0:
         return _refused(s, 73)
-    i33 = _whole(s.target_approach_first)
-    if not 0 <= i33 <= 9999:
+    i32 = i32 + 0.0
+    i33 = _real(s.object_data_grip_range_mm)
+    if not 0.0 <= i33 <= 2000.0:
         return _refused(s, 74)
-    i34 = _whole(s.target_approach_count)
-    if not 0 <= i34 <= 31:
+    i33 = i33 + 0.0
+    i34 = _real(s.object_data_lift_mm)
+    if not -500.0 <= i34 <= 500.0:
         return _refused(s, 75)
-    i35 = _whole(s.target_hover_point)
-    if not 0 <= i35 <= 9999:
+    i34 = i34 + 0.0
+    i35 = _whole(s.held_data_known)
+    if not 0 <= i35 <= 1:
         return _refused(s, 76)
-    i36 = _whole(s.target_grasp_point)
-    if not 0 <= i36 <= 9999:
+    i36 = _real(s.held_data_expected_range_mm)
+    if not 0.0 <= i36 <= 2000.0:
         return _refused(s, 77)
-    i37 = _whole(s.target_view_point)
-    if not 0 <= i37 <= 9999:
+    i36 = i36 + 0.0
+    i37 = _real(s.held_data_grip_range_mm)
+    if not 0.0 <= i37 <= 2000.0:
         return _refused(s, 78)
-    i38 = _whole(s.object_data_known)
-    if not 0 <= i38 <= 1:
+    i37 = i37 + 0.0
+    i38 = _real(s.held_data_lift_mm)
+    if not -500.0 <= i38 <= 500.0:
         return _refused(s, 79)
-    i39 = _real(s.object_data_expected_range_mm)
-    if not 0.0 <= i39 <= 2000.0:
-        return _refused(s, 80)
-    i39 = i39 + 0.0
-    i40 = _real(s.object_data_grip_range_mm)
-    if not 0.0 <= i40 <= 2000.0:
-        return _refused(s, 81)
-    i40 = i40 + 0.0
-    i41 = _real(s.object_data_lift_mm)
-    if not -500.0 <= i41 <= 500.0:
-        return _refused(s, 82)
-    i41 = i41 + 0.0
-    i42 = _whole(s.held_data_known)
-    if not 0 <= i42 <= 1:
-        return _refused(s, 83)
-    i43 = _real(s.held_data_expected_range_mm)
-    if not 0.0 <= i43 <= 2000.0:
-        return _refused(s, 84)
-    i43 = i43 + 0.0
-    i44 = _real(s.held_data_grip_range_mm)
-    if not 0.0 <= i44 <= 2000.0:
-        return _refused(s, 85)
-    i44 = i44 + 0.0
-    i45 = _real(s.held_data_lift_mm)
-    if not -500.0 <= i45 <= 500.0:
-        return _refused(s, 86)
-    i45 = i45 + 0.0
+    i38 = i38 + 0.0
     s.task_inc_command = i0
     s.task_input_command = i1
     s.task_obj_ptr = i2
@@ -1437,30 +1407,23 @@ def _admit(s):
     s.from_vision_c = i19
     s.from_vision_s = i20
     s.from_vision_range_mm = i21
-    s.origin_known = i22
-    s.origin_depart_first = i23
-    s.origin_depart_count = i24
-    s.origin_approach_first = i25
-    s.origin_approach_count = i26
-    s.origin_hover_point = i27
-    s.origin_grasp_point = i28
-    s.origin_view_point = i29
-    s.target_known = i30
-    s.target_depart_first = i31
-    s.target_depart_count = i32
-    s.target_approach_first = i33
-    s.target_approach_count = i34
-    s.target_hover_point = i35
-    s.target_grasp_point = i36
-    s.target_view_point = i37
-    s.object_data_known = i38
-    s.object_data_expected_range_mm = i39
-    s.object_data_grip_range_mm = i40
-    s.object_data_lift_mm = i41
-    s.held_data_known = i42
-    s.held_data_expected_range_mm = i43
-    s.held_data_grip_range_mm = i44
-    s.held_data_lift_mm = i45
+    s.path_known = i22
+    s.path_depart_first = i23
+    s.path_depart_count = i24
+    s.path_approach_first = i25
+    s.path_approach_count = i26
+    s.target_known = i27
+    s.target_hover_point = i28
+    s.target_grasp_point = i29
+    s.target_view_point = i30
+    s.object_data_known = i31
+    s.object_data_expected_range_mm = i32
+    s.object_data_grip_range_mm = i33
+    s.object_data_lift_mm = i34
+    s.held_data_known = i35
+    s.held_data_expected_range_mm = i36
+    s.held_data_grip_range_mm = i37
+    s.held_data_lift_mm = i38
     return 0
 
 

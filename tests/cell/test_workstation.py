@@ -57,6 +57,18 @@ WRONG_DATA = {
     "too many in stock": ("stock = 10", "stock = 200", "from 0 to 99, not `200`"),
     "vision without a view": ('vupos = "BUFFER-VUPOS"\n', "", "`vupos`"),
     "a missing value": ("breakpoint_mm = 30.0\n", "", "breakpoint_mm"),
+    "a path to nowhere": ('to = "STATION"', 'to = "STATON"', "no location is called `STATON`"),
+    "a path that says nothing": (
+        'to = "STATION"\napproach = [200.0]\n',
+        'to = "STATION"\n',
+        "path 1, from `V-BLK2` to `STATION`: says neither",
+    ),
+    "a path twice": (
+        "[[path]]",
+        '[[path]]\nfrom = "V-BLK2"\nto = "STATION"\napproach = []\n[[path]]',
+        "path 2, .* such a path with a `approach` already",
+    ),
+    "a path out of reach": ("approach = [200.0]\n\n# What", "approach = [2000.0]\n\n# What", "out of reach"),
     "no TOML": ("[robot]", "[robot", "not TOML"),
 }
 
@@ -100,6 +112,8 @@ FOREIGN = {
     "text that is not UTF-8": "update trajectories set name = cast(x'ff' as text) where name = 'fast'",
     "a part that is not described": "update parts set object = 99",
     "a way without its points": "update places set approach_count = 1000000",
+    "a path without its points": "update approaches set count = 1000000",
+    "a path without an end": "update approaches set count = 0",
     "no robot": "delete from robot",
     "a fixture without its numbers": "update stations set vise = '{}' where name = 'fixture'",
     "a fixture that is nested deep": "update stations set vise = replace(hex(zeroblob(5000)), '0', '[')",
@@ -145,6 +159,41 @@ def test_a_pallet_has_a_place_for_each_sector_and_others_ignore_it(tmp_path: Pat
     assert len({held.point(point)[1:3] for point in grasps}) == 4
     assert held.route(station, 4)[0] is False
     assert held.route(safe, 3) == held.route(safe, 0)
+
+
+def test_a_path_goes_by_both_its_ends(tmp_path: Path) -> None:
+    """Section 4.3: by the pair if it has one, else the departure of the one and the approach of the other."""
+    (tmp_path / "cell.toml").write_text(DATA, encoding="utf-8")
+    build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", PARTS)
+    held = open_database(tmp_path / "cell.sqlite")
+    station, block, fixture = (held.locations[name] for name in ("STATION", "V-BLK2", "FIX-MAC5"))
+    for sector in range(4):
+        there = held.route(station, sector)
+        assert held.path(fixture, 0, station, sector) == (True, *held.route(fixture, 0)[1:3], *there[3:5])
+        _, leaves, many, first, count = held.path(block, 7, station, sector)
+        assert (leaves, many, count) == (0, 0, int(there[4]) - 1)
+        for at in (1, 2):  # the same points, without the one above the V-block
+            assert (
+                held.point(int(first) + int(count) - at)[1:]
+                == held.point(int(there[3]) + int(there[4]) - at)[1:]
+            )
+    assert held.path(block, 0, station, 4)[0] is False
+    assert held.path(0, 0, fixture, 0) == (True, 0, 0, *held.route(fixture, 0)[3:5])
+
+
+def test_a_robot_that_is_there_goes_straight_to_it(tmp_path: Path) -> None:
+    """But not where vision finds the part: there it may stand beside the location."""
+    (tmp_path / "cell.toml").write_text(DATA, encoding="utf-8")
+    build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", PARTS)
+    held = open_database(tmp_path / "cell.sqlite")
+    station, fixture, buffer = (held.locations[name] for name in ("STATION", "FIX-MAC5", "BUFFER"))
+    _, leaves, many, first, count = held.path(fixture, 0, fixture, 3)
+    assert (leaves, many, count) == (0, 0, 1)
+    assert held.point(int(first))[1:10] == held.point(int(held.target(fixture, 0)[2]))[1:10]
+    assert held.path(station, 2, station, 2)[2:] == (0, held.path(station, 2, station, 2)[3], 1)
+    assert held.path(station, 1, station, 2)[2] == held.route(station, 1)[2]
+    assert held.path(buffer, 0, buffer, 0) == held.route(buffer, 0)[:5]
+    assert held.path(0, 0, 0, 0)[0] is False
 
 
 QUICK = ("--no-compile", "--plant", "kinematic")

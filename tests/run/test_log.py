@@ -57,8 +57,11 @@ def queries() -> dict[str, Query]:
     def place(location: int) -> Values:
         return (True, False, False, location % 7, location % 3)
 
-    def route(*_: object) -> Values:
-        return (True, 1, 2, 3, 2, 5, 6, 7)
+    def path(*_: object) -> Values:
+        return (True, 1, 2, 3, 2)
+
+    def target(*_: object) -> Values:
+        return (True, 5, 6, 7)
 
     def part(_: int) -> Values:
         return (True, 40.0, 30.0, 0.0)
@@ -69,7 +72,7 @@ def queries() -> dict[str, Query]:
     def fingers(*_: object) -> Values:
         return (True, 60.0, 70.0, 30.0, 2.0, 10.0, 50.0)
 
-    return {"place": place, "route": route, "part": part, "point": point, "fingers": fingers}
+    return {"place": place, "path": path, "target": target, "part": part, "point": point, "fingers": fingers}
 
 
 def system(kind: Kind, generated: Path | None = None) -> System:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.run.levels import RunningLevel
+from rcsc.run.signature import Value
 from rcsc.run.system import System
 from rcsc_cell.cell.mujoco_model import Body
 from rcsc_cell.cell.plant import Plant
@@ -261,6 +262,27 @@ def test_a_station_moves_in_the_data_and_nothing_is_compiled_again(tmp_path: Pat
     made = run.system.outside[1]
     assert isinstance(made, Plant)
     assert made.plate[:3] == pytest.approx((530.0, 40.0, 715.0))
+
+
+def test_the_way_to_a_place_depends_on_where_the_robot_comes_from(tmp_path: Path) -> None:
+    path = (
+        '[[path]]\nfrom = "FIX-SAFE"\nto = "WS-SAFE"\ndeparture = [150.0]\napproach = [[-80.0, 0.0, 0.0]]\n'
+    )
+    rows = ("MOVE,,,FIX-SAFE,", "MOVE,,,WS-SAFE,", "MOVE,,,V-BLK2,", "MOVE,,,WS-SAFE,")
+    run = with_data(DATA + path, tmp_path, *rows)
+    emove, orders = run.system.level("emove"), [list[tuple[str, Value]]() for _ in rows]
+
+    def watch(*_: object) -> None:
+        order = emove.shown("to_primitive.input_command"), emove.value("to_primitive.pose_ptr")
+        seen = orders[min(run.station.at, len(rows) - 1)]
+        if order[0] != "pause" and order not in seen:
+            seen.append(order)
+
+    run.system.watch.append(watch)
+    assert [result.state for result in run.steps()] == ["done"] * 4
+    commands = [[command for command, _ in seen] for seen in orders]
+    assert commands == [["goto"], ["gothru", "gothru", "goto"], ["goto"], ["goto"]]
+    assert run.database.point(int(orders[1][1][1]))[1] == pytest.approx(480.0)
 
 
 @pytest.mark.parametrize("decel_mm_s2", [300.0, 2400.0])

@@ -93,6 +93,18 @@ def _problems(database: Database, start: Joints) -> Iterator[str]:
         for b, second in stops.items():
             if a != b and not _passes([first[-1], second[0]], start):
                 yield f"the arm cannot go from {a} to {b}"
+    for pair in database.pairs():
+        if not _passes(_whole(database, pair), start):
+            yield f"the arm cannot go along the path from `{names[pair[0]]}` to `{names[pair[2]]}`"
+
+
+def _whole(database: Database, pair: tuple[int, int, int, int]) -> list[tuple[float, ...]]:
+    """The plate at every point of a path of two places, from where the robot stands at the first."""
+    _, _, _, comes, more, *_ = database.route(*pair[:2])
+    _, leaves, many, first, count = database.path(*pair)
+    points = [int(comes) + int(more) - 1]
+    points += [int(leaves) + at for at in range(int(many))]
+    return [_plate(database, point) for point in (*points, *range(int(first), int(first) + int(count)))]
 
 
 def _plate(database: Database, point: int) -> tuple[float, ...]:

@@ -95,6 +95,8 @@ class Database:
     _parts: Mapping[int, Values]
     _points: Mapping[int, Values]
     _fingers: Mapping[tuple[int, int], Values]
+    _departures: Mapping[tuple[int, int, int], tuple[int, int]]
+    _approaches: Mapping[tuple[int, int, int], tuple[int, int]]
 
     def place(self, location: int) -> Values:
         """known, vision, buffer, vupos, safe."""
@@ -103,9 +105,47 @@ class Database:
     def route(self, location: int, sector: int) -> Values:
         """known, departure (first point, count), approach (first point, count), points to hover, to grasp and to look from."""
         known = self._routes.get((location, sector))
-        if known is None and (location, 1) not in self._routes:  # no pallet: it has no sectors
+        if known is None and not self._is_pallet(location):  # it has no sectors
             known = self._routes.get((location, 0))
         return known or NO_ROUTE
+
+    def target(self, location: int, sector: int) -> Values:
+        """known, points to hover, to grasp and to look from."""
+        known, *_, hover, grasp, view = self.route(location, sector)
+        return known, hover, grasp, view
+
+    def path(self, here: int, here_sector: int, location: int, sector: int) -> Values:
+        """known, departure (first point, count), approach (first point, count) of the way from one location to another.
+
+        Those of the pair, else the departure of the one and the approach of the other. A robot that is there already stays, but for
+        a location where vision says where a part is: there it may stand beside it.
+        """
+        known, *_ = there = self.route(location, sector)
+        leaves = (
+            self._pair(self._departures, (here, here_sector, location)) or self.route(here, here_sector)[1:3]
+        )
+        comes = self._pair(self._approaches, (location, sector, here)) or there[3:5]
+        if (
+            known
+            and here == location
+            and self._same_sector(here, here_sector, sector)
+            and not self.place(here)[1]
+        ):
+            first, count = comes
+            leaves, comes = (0, 0), (first + count - 1, 1)
+        return known, *leaves, *comes
+
+    def _pair(
+        self, ways: Mapping[tuple[int, int, int], tuple[int, int]], key: tuple[int, int, int]
+    ) -> tuple[int, int] | None:
+        at, sector, other = key
+        return ways.get((at, sector if self._is_pallet(at) else 0, other))
+
+    def _is_pallet(self, location: int) -> bool:
+        return (location, 1) in self._routes
+
+    def _same_sector(self, location: int, one: int, other: int) -> bool:
+        return one == other or not self._is_pallet(location)
 
     def part(self, number: int) -> Values:
         """known, ranges in mm from the camera to its top as it lies, and at which its top is where the pads take it; lift in mm.
@@ -142,12 +182,22 @@ class Database:
         """Every route with its location and sector."""
         return tuple((location, sector, row) for (location, sector), row in self._routes.items())
 
+    def pairs(self) -> tuple[tuple[int, int, int, int], ...]:
+        """Every two places with a path of their own: location and sector of the one and of the other."""
+        return tuple(
+            (*here, *there)
+            for here in self._routes
+            for there in self._routes
+            if (*here, there[0]) in self._departures or (*there, here[0]) in self._approaches
+        )
+
     @property
     def queries(self) -> dict[str, Callable[..., Values]]:
         """Return the queries by name, for the levels' feeds."""
         return {
             "place": self.place,
-            "route": self.route,
+            "target": self.target,
+            "path": self.path,
             "part": self.part,
             "point": self.point,
             "fingers": self.fingers,
@@ -297,6 +347,12 @@ def _read(held: Mapping[str, tuple[tuple[Any, ...], ...]]) -> Database:
             for number, _, _, _, *plate, trajectory in held["points"]
         },
         _fingers={(number, grasp): (True, *rest) for number, grasp, *rest in held["grasps"]},
+        _departures={
+            (at, sector, other): (first, count) for at, sector, other, first, count in held["departures"]
+        },
+        _approaches={
+            (at, sector, other): (first, count) for at, sector, other, first, count in held["approaches"]
+        },
     )
 
 
@@ -307,6 +363,12 @@ def _check_ways(held: Mapping[str, tuple[tuple[Any, ...], ...]]) -> None:
         ways = [leaves, leaves + many - 1] * (many > 0) + [comes, comes + more - 1, hover, grasp, view]
         if more == 0 or max(many, more) > len(points) or not points.issuperset(ways):
             raise Malformed("a place of it has a way without its points")
+    for table, least in (("departures", 0), ("approaches", 1)):
+        for *_, first, count in held[table]:
+            if not least <= count <= len(points) or (
+                count and not points.issuperset((first, first + count - 1))
+            ):
+                raise Malformed("a path of it has a way without its points")
 
 
 def _station(name: str, row: Sequence[Any]) -> Station:

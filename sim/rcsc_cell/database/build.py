@@ -58,6 +58,12 @@ create table stations (name text primary key not null, x_mm real not null, y_mm 
 create table places (location integer not null references locations, sector integer not null, depart_first integer not null,
   depart_count integer not null, approach_first integer not null, approach_count integer not null, hover integer not null,
   grasp integer not null, view integer not null, primary key (location, sector));
+create table departures (location integer not null references locations, sector integer not null,
+  toward integer not null references locations, first integer not null, count integer not null,
+  primary key (location, sector, toward));
+create table approaches (location integer not null references locations, sector integer not null,
+  origin integer not null references locations, first integer not null, count integer not null,
+  primary key (location, sector, origin));
 create table robot (
   x0 real not null, y0 real not null, z0 real not null,
   x1 real not null, y1 real not null, z1 real not null,
@@ -143,6 +149,7 @@ LOCATION = Record(
         "trajectory": Text(),
     },
 )
+PATH = Record({"from": Text(), "to": Text()}, {"departure": WAY, "approach": WAY})
 CELL = Record(
     {
         "robot": ROBOT,
@@ -152,6 +159,7 @@ CELL = Record(
     },
     {
         "station": Entries(STATION),
+        "path": Listing(PATH),
         "part": Listing(Record({"object": Text(), "at": ON_STATION}, {"station": Text()})),
     },
 )
@@ -293,6 +301,14 @@ class _Rows:
             "trajectories": list(self._trajectories()),
         }
         places = list(self._places())
+        self.ways: dict[str, dict[tuple[int, int, int], tuple[int, int]]] = {
+            "departures": {},
+            "approaches": {},
+        }
+        for number, path in enumerate(toml.get("path", ())):
+            self._pair(number, path)
+        for table, ways in self.ways.items():
+            self.tables[table] = [(*key, *points) for key, points in ways.items()]
         self.tables |= {"points": self.points, "places": places, "parts": list(self._parts())}
         robot = toml["robot"]
         at = At("home", ("robot", "home"))
@@ -452,27 +468,64 @@ class _Rows:
 
     def _places(self) -> Iterator[tuple[Any, ...]]:
         for name, location in self.toml["location"].items():
-            where = At(f"location `{name}`", ("location", name))
-            reference = self._place(location["at"], location.get("station"), where)
-            for sector, (x_mm, y_mm) in enumerate(location.get("sectors", [[0.0, 0.0]])):
-                yield self._row(name, location, sector, reference.moved(float(x_mm), float(y_mm), 0.0))
+            for sector, place in self._sectors(name):
+                yield self._row(name, location, sector, place)
+
+    def _sectors(self, name: str) -> Iterator[tuple[int, Location]]:
+        """Yield each sector of a location, which is sector 0 of itself where it is no pallet."""
+        location = self.toml["location"][name]
+        reference = self._place(
+            location["at"], location.get("station"), At(f"location `{name}`", ("location", name))
+        )
+        for sector, (x_mm, y_mm) in enumerate(location.get("sectors", [[0.0, 0.0]])):
+            yield sector, reference.moved(float(x_mm), float(y_mm), 0.0)
+
+    def _pair(self, number: int, path: Mapping[str, Any]) -> None:
+        """Note the departure and the approach that a path from one location to another has of its own."""
+        where = At(f"path {number + 1}, from `{path['from']}` to `{path['to']}`", ("path", number))
+        ends = [self._named(path[key], At(where.words, (*where.path, key))) for key in ("from", "to")]
+        if None in ends:
+            return
+        if not {"departure", "approach"} & path.keys():
+            self.wrong(where, "says neither `departure` nor `approach`")
+        for key, table, (at, other) in (
+            ("departure", "departures", ("from", "to")),
+            ("approach", "approaches", ("to", "from")),
+        ):
+            for sector, place in self._sectors(path[at]) if key in path else ():
+                line = self.numbers[path[at]], sector, self.numbers[path[other]]
+                if line in self.ways[table]:
+                    self.wrong(where, f"there is such a path with a `{key}` already")
+                points = self._way(path[at], sector, place, key, path[key], where)
+                self.ways[table][line] = points[0] if points else 0, len(points)
+                self._within("path", (*self.ways[table][line],) * 2, where)
+
+    def _way(
+        self, name: str, sector: int, place: Location, role: str, steps: Sequence[Any], where: At
+    ) -> list[int]:
+        """Return the points of a departure from a location, or of an approach to it: that ends there."""
+        location = self.toml["location"][name]
+        key, through = (self.numbers[name], sector), location.get("trajectory", "fast")
+        points = [self._point(where, key, role, to, through) for to in self._path(place, steps, where)]
+        if role == "approach":
+            fine = "fine" if location.get("via") or location.get("approach") else "fast"
+            points.append(self._point(where, key, "arrival", place, fine))
+        return points
 
     def _row(self, name: str, location: Mapping[str, Any], sector: int, place: Location) -> tuple[Any, ...]:
         key = self.numbers[name], sector
         where = At(f"location `{name}`, sector {sector}", ("location", name))
-        fine = "fine" if location.get("via") or location.get("approach") else "fast"
-        through = location.get("trajectory", "fast")
         out = location.get("departure", location.get("via", ())[::-1])
-        departs = [self._point(where, key, "departure", to, through) for to in self._path(place, out, where)]
+        departs = self._way(name, sector, place, "departure", out, where)
         into = location.get("approach", location.get("via", ()))
-        comes = [self._point(where, key, "approach", to, through) for to in self._path(place, into, where)]
-        comes.append(self._point(where, key, "arrival", place, fine))
+        comes = self._way(name, sector, place, "approach", into, where)
         hover = self._point(where, key, "hover", place.moved(0.0, 0.0, HOVER_MM), "fast")
         grasp = self._point(where, key, "grasp", place, "fine")
         view = self._point(where, key, "view", self._viewpoint(place, location, where), "fast")
-        ways = departs[0] if departs else 0, len(departs), comes[0], len(comes), hover, grasp, view
-        self._within("route", ways, where)
-        return *key, *ways
+        ways = departs[0] if departs else 0, len(departs), comes[0], len(comes)
+        self._within("path", ways, where)
+        self._within("target", (hover, grasp, view), where)
+        return *key, *ways, hover, grasp, view
 
     def _path(self, place: Location, steps: Sequence[Any], where: At) -> list[Location]:
         """Return the locations on the way; each step is a height, an offset or another location."""

@@ -215,7 +215,7 @@ class DrawnCell:
         for spec in self.system.levels:
             for feed in spec.feeds:
                 if spec.name == level.name:
-                    yield _Key(feed.query, feed.keys)
+                    yield _Key(feed.query, feed.keys[:2])  # of a path, where it begins
                 for wire in self.system.wires:
                     giver, _, source = wire.source.partition(".")
                     taker, _, target = wire.target.partition(".")
@@ -245,7 +245,7 @@ class DrawnCell:
 
 
 _OF_PARTS = frozenset({"part", "fingers"})
-_ASKED = _OF_PARTS | {"place", "route", "point"}
+_ASKED = _OF_PARTS | {"place", "target", "path", "point"}
 """Questions whose answers stand somewhere in the cell."""
 
 
