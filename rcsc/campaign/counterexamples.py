@@ -138,6 +138,8 @@ def save(folder: Path, rig: Rig[E], seed: int, choice: Choice, shrunk: Shrunk[E]
         "said": shrunk.finding.message,
         "faults": list(choice.faults),
     }
+    if told := rig.kind.told(shrunk.episode):
+        facts["happens"] = list(told)
     write_atomically(place / "episode.json", shrunk.episode.to_json().encode())
     write_atomically(place / "script.csv", shrunk.episode.script().encode())
     if shrunk.log:

@@ -51,6 +51,10 @@ def usual_chunk(system: Path, plant: str) -> int:  # noqa: ARG001  # a kind may 
     return 10
 
 
+def _untold(episode: EpisodeValue) -> tuple[str, ...]:  # noqa: ARG001  # of a kind without words
+    return ()
+
+
 @dataclass(frozen=True, slots=True)
 class EpisodeKind(Generic[E]):
     """Episodes of one kind. It travels to workers, so its functions stand in modules; a system is the path of its description.
@@ -69,6 +73,7 @@ class EpisodeKind(Generic[E]):
             which is all that a kill loses.
         extra: The extra of the package that it needs.
         takes_script: Whether `draw` takes a script.
+        told: What happens in an episode, in words, a line each.
     """
 
     draw: Callable[[int, Path, str, str], E]
@@ -82,6 +87,7 @@ class EpisodeKind(Generic[E]):
     chunk: Callable[[Path, str], int] = usual_chunk
     extra: str = "log"
     takes_script: bool = True
+    told: Callable[[E], tuple[str, ...]] = _untold
 
 
 @dataclass(frozen=True, slots=True)

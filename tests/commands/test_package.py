@@ -207,17 +207,18 @@ def test_the_core_proves_levels_certifies_and_says_what_the_rest_needs(tmp_path:
         ["certify", "--certify", table],
         ["run", "make_boxt", *cell],
         ["campaign", "--episodes", "1", *cell],
+        ["campaign", "--episodes", "1", "--no-compile", str(REPO / "tests" / "data" / "dock")],
         ["log", "any.mcap"],
         ["replay", "any.mcap"],
         folder=tmp_path,
     )
-    assert statuses == [0, 1, 0, *[1] * 7]
+    assert statuses == [0, 1, 0, *[1] * 8]
     errors = re.findall(
         r"^error\[RCS705\]: `\w+` is not installed\n  = help: pip install 'rcsc\[(\w+)\]'$",
         said,
         re.MULTILINE,
     )
-    assert errors == ["log", "certify", "certify", "cell", "cell", "log", "log"]
+    assert errors == ["log", "certify", "certify", "cell", "cell", "log", "log", "log"]
     assert said.count("error[RCS705]") == len(errors)
     assert not imported & {"mujoco", "hypothesis", "mcap"}
 

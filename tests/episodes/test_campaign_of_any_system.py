@@ -89,6 +89,9 @@ def test_a_campaign_finds_shrinks_saves_and_shows_again_what_a_plant_says_must_n
     facts = json.loads((place / "finding.json").read_text())
     assert facts["property"] == "plant: stays_in_the_hall"
     assert "base.travelled = 1.0" in facts["said"]
+    [happens] = facts["happens"]
+    assert happens.startswith("`supervisor` is ordered `undock`")
+    assert f"\n  = note: {happens}\n" in said.err
     assert saved_episode(place, Rig(ANY, hall / "system.toml")) == Episode(
         orders=(OrderSpec("supervisor", "undock"),)
     )

@@ -4,6 +4,7 @@ import json
 import shlex
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from rcsc.campaign.counterexamples import (
     counterexamples,
     is_saved,
     save,
+    saved_episode,
 )
 from rcsc.campaign.journal import EpisodeRecord, Journal, header, journal_path
 from rcsc.campaign.rig import Rig, known_lines
@@ -275,6 +277,7 @@ def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool:
             counterexample.finding.property,
             counterexample.finding.tick,
             counterexample.finding.message,
+            rig.kind.told(counterexample.episode),
         )
         if counterexample.log:
             click.echo(f"  = help: {asked.replays} {shlex.quote(str(place / 'log.mcap'))}", err=True)
@@ -283,17 +286,21 @@ def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool:
         click.echo(f"and {len(chosen) - MOST} more kinds of findings, in the journal")
 
 
-def _tell(where: str, name: str, tick: int, reason: str) -> None:
+def _tell(where: str, name: str, tick: int, reason: str, happens: Sequence[str]) -> None:
+    """Say what does not hold, and what happens in the episode that shows it."""
     click.echo(
         f"error[{Code.PROPERTY_BROKEN.value}]: {where}, cycle {tick}: `{name}` does not hold: {reason}",
         err=True,
     )
+    for line in happens:
+        click.echo(f"  = note: {line}", err=True)
 
 
 def _again(path: Path, rig: Rig[Any], executor: str | None) -> int:
     """Run a saved episode, in a process of its own: it may take that with it."""
     with processes(1) as pool:
         outcome = again(path, rig, None if executor is None else rig.executor, pool)
+    happens = rig.kind.told(saved_episode(path, rig)) if outcome.findings else ()
     for number, text, state, reason, ticks in outcome.rows:
         click.echo(f"{number:3}  {text:44} {state:8} {ticks:4} cycles{f'  {reason}' if reason else ''}")
     click.echo(f"{outcome.end} after {outcome.ticks} cycles")
@@ -302,5 +309,5 @@ def _again(path: Path, rig: Rig[Any], executor: str | None) -> int:
             f"cycle {excused.tick}: `{excused.property}` does not hold: {excused.message}: {excused.because}"
         )
     for finding in outcome.findings:
-        _tell(str(path), finding.property, finding.tick, finding.message)
+        _tell(str(path), finding.property, finding.tick, finding.message, happens)
     return 1 if outcome.findings else 0
