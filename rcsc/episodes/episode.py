@@ -196,7 +196,8 @@ class Episode:
         file = io.StringIO()
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["command", *(["level"] if several else []), *columns, "cycles"])
-        for order, after in zip(self.orders, (*self.orders[1:], None), strict=True):
+        for at, order in enumerate(self.orders):
+            after = self.orders[at + 1] if at + 1 < len(self.orders) else None
             given = {field.name: _cell(field.value) for field in order.fields}
             if order.wait and not order.interrupts:
                 writer.writerow(["", *([""] if several else []), *("" for _ in columns), str(order.wait)])

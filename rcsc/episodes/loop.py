@@ -32,7 +32,7 @@ RAISES = "the plant raises nothing"
 RESTARTS = "starts anew"
 
 
-def run(episode: Episode, system: Path, log: Path | None = None) -> EpisodeOutcome:
+def run(episode: Episode, system: str | Path, log: Path | None = None) -> EpisodeOutcome:
     """Runs it to its end, with every property watching.
 
     Args:
@@ -45,7 +45,7 @@ def run(episode: Episode, system: Path, log: Path | None = None) -> EpisodeOutco
         ValueError: The episode names what the system has not.
         OSError: The log cannot be written.
     """
-    loop = Loop(episode, stand(system))
+    loop = Loop(episode, stand(Path(system)))
     if log is None:
         return loop.finish()
     from rcsc.run.log.recorder import Recorder  # of an extra

@@ -24,14 +24,14 @@ REPEATS = "the plant does the same again"
 KINDS: tuple[Kind, ...] = ("c", "python")
 
 
-def episodes(system: Path, plant: str = "") -> "SearchStrategy[Episode]":
-    """Episodes of a system, for tests of one's own: `@given(episodes(Path("system.toml")))`.
+def episodes(system: str | Path, plant: str = "") -> "SearchStrategy[Episode]":
+    """Episodes of a system, for tests of one's own: `@given(episodes("system.toml"))`.
 
     Args:
         system: The description, compiled.
         plant: What stands outside, as `--plant` names it; empty for the description's first.
     """
-    return _strategy(stand(system), plant)
+    return _strategy(stand(Path(system)), plant)
 
 
 def _strategy(its: Stand, plant: str) -> "SearchStrategy[Episode]":
@@ -131,7 +131,13 @@ def disagreement(episode: Episode, its: Stand, first: Kind, second: Kind) -> Epi
 def found_again(
     episode: Episode, its: Stand, name: str, kinds: Sequence[Kind] = KINDS
 ) -> EpisodeFinding | None:
-    """What an episode breaks of a property; None for nothing."""
+    """What an episode breaks of a property; None for nothing, and of an episode that is none of the system's."""
+    with contextlib.suppress(ValueError):
+        return _found_again(episode, its, name, kinds)
+    return None
+
+
+def _found_again(episode: Episode, its: Stand, name: str, kinds: Sequence[Kind]) -> EpisodeFinding | None:
     if name in (AGREE, REPEATS):
         found = disagreement(episode, its, kinds[0], kinds[-1])
         return found if found is not None and found.property == name else None

@@ -169,6 +169,7 @@ def _fields(
     """The fields from outside that are not the protocol's: of an order none, of a report those that a device measures."""
     level_of = {wire.source: wire.target.partition(".")[0] for wire in system.wires}
     fields = []
+    keys = {(spec.name, key) for spec in system.levels for feed in spec.feeds for key in feed.keys}
     for buffer in buffers:
         level = level_of[buffer.name]
         repeated = {
@@ -181,7 +182,8 @@ def _fields(
             if (numbered and field_of(leaf) in PROTOCOL) or leaf.name in repeated:
                 continue
             variable = programs[level].variable(leaf.name)
-            refused = outside(variable.type) if variable.admit is Admit.REJECT else ()
+            asked = (level, leaf.name) in keys  # a feed is asked about it before the level refuses it
+            refused = outside(variable.type) if variable.admit is Admit.REJECT and not asked else ()
             fields.append(
                 Field(column, buffer.name, place, level, leaf, edges[level][leaf.name], tuple(refused))
             )

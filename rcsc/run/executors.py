@@ -147,7 +147,22 @@ def _built(compiler: str, generated: Path, signs: Sequence[Signature], layout: s
         ran = children.run(command)
         if ran.status != 0:
             raise NotBuilt(ran.err.strip().splitlines()[0] if ran.err.strip() else "the compiler failed")
-        return Library(ctypes.CDLL(str(library)))  # it stays mapped when the folder is gone
+        return _loaded(library)
+
+
+def _loaded(library: Path) -> Library:
+    """The library; it stays mapped when its folder is gone.
+
+    Raises:
+        NotBuilt: It calls what nobody defines.
+    """
+    try:
+        return Library(ctypes.CDLL(str(library)))
+    except OSError as error:
+        called = str(error).partition("undefined symbol: ")[2] or str(error)
+        refusal = NotBuilt(f"the C executors call `{called}`, which is a function of yours and not linked")
+        refusal.helps = ("`--executor python` calls extern procedures in Python",)
+        raise refusal from error
 
 
 def _layout(sign: Signature) -> str:

@@ -352,9 +352,9 @@ class TestTheSearch:
 
     def test_is_a_strategy_for_tests_of_one_s_own(self, robot: Path) -> None:
         @settings(max_examples=5)
-        @given(episodes(robot))
+        @given(episodes(str(robot)))
         def holds(episode: Episode) -> None:
-            assert not run(episode, robot).findings
+            assert not run(episode, str(robot)).findings
 
         holds()
 
