@@ -74,17 +74,20 @@ def hall(dock: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_campaign_finds_shrinks_saves_and_shows_again_what_a_plant_says_must_not_be(
     hall: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    played = ("campaign", "dock", "--no-compile", "--workers", 1, "--episodes", 5, "--json", "s.json")
+    played = ("campaign", "dock", "--no-compile", "--workers", 1, "--episodes", 8, "--json", "s.json")
     assert rcsc(*played) == 1
     said = capsys.readouterr()
-    assert "5 episodes, " in said.out
-    [place] = Path("campaign").iterdir()
+    assert "8 episodes, " in said.out
+    place, other = sorted(Path("campaign").iterdir())
     assert sorted(path.name for path in place.iterdir()) == [
         "episode.json", "finding.json", "log.mcap", "script.csv",
     ]  # fmt: skip
-    assert said.err.splitlines()[-2:] == [
+    assert (place / "episode.json").read_bytes() == (other / "episode.json").read_bytes()
+    seen = f"rcsc campaign dock --again {place}"
+    assert said.err.splitlines()[-3:] == [
         f"  = help: rcsc replay --system dock {place}/log.mcap",
-        f"  = help: rcsc campaign dock --again {place}",
+        f"  = help: {seen}",
+        f"episode {other.name.split('-')[1]} comes to the same: {seen}",
     ]
     facts = json.loads((place / "finding.json").read_text())
     assert facts["property"] == "plant: stays_in_the_hall"
@@ -105,10 +108,11 @@ def test_a_campaign_finds_shrinks_saves_and_shows_again_what_a_plant_says_must_n
     assert rcsc("run", "dock", "--no-compile", "--quiet", "--script", place / "script.csv") == 0
     assert rcsc(*played) == 1
     said = capsys.readouterr()
-    assert ", 0 played now" not in said.out
-    assert (said.err, f"saved before: {place}" in said.out) == ("", True)
+    assert "; 0 played now in " in said.out
+    assert said.err == ""
+    assert f"saved before: {place}: {seen}\n" in said.out
     summed = json.loads(Path("s.json").read_text())
-    assert (summed["played_now"], summed["episodes"], summed["episodes_with_findings"]) == (0, 5, 1)
+    assert (summed["played_now"], summed["episodes"], summed["episodes_with_findings"]) == (0, 8, 2)
     assert {line["level"] for line in summed["lines"]} == {"supervisor", "drive"}
 
 

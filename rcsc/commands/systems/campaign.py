@@ -23,15 +23,17 @@ from rcsc.campaign.counterexamples import (
     saved_episode,
 )
 from rcsc.campaign.journal import EpisodeRecord, Journal, header, journal_path
-from rcsc.campaign.rig import Rig, known_lines
+from rcsc.campaign.rig import EpisodeValue, Rig, known_lines
 from rcsc.campaign.runner import campaign as play
 from rcsc.campaign.summary import as_json, as_text, summary
+from rcsc.campaign.work import Shrunk
 from rcsc.campaign.worker_pool import WorkerPool, cluster, processes
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.options import cores
 from rcsc.commands.shared.show import Progress, put, writing
 from rcsc.commands.shared.systems import SYSTEM, compiled, meant, system_path
 from rcsc.diagnostics.codes import Code
+from rcsc.episodes.outcome import EpisodeFinding
 from rcsc.run.description import description
 
 _TO = click.Path(dir_okay=False, path_type=Path)
@@ -268,28 +270,36 @@ def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool:
     wanted = [choice for choice in chosen[:MOST] if not is_saved(folder, rig, seed, choice)]
     for choice in chosen[:MOST]:
         if choice not in wanted:
-            click.echo(f"saved before: {folder / choice.name(seed)}")
+            place = folder / choice.name(seed)
+            click.echo(f"saved before: {place}: {asked.again} {shlex.quote(str(place))}")
+    shown: dict[tuple[str, EpisodeValue], Path] = {}
     for choice, counterexample in counterexamples(rig, seed, wanted, pool):
         with writing(folder / choice.name(seed)):
             place = save(folder, rig, seed, choice, counterexample)
-        _tell(
-            f"episode {choice.index}",
-            counterexample.finding.property,
-            counterexample.finding.tick,
-            counterexample.finding.message,
-            rig.kind.told(counterexample.episode),
-        )
-        if counterexample.log:
-            click.echo(f"  = help: {asked.replays} {shlex.quote(str(place / 'log.mcap'))}", err=True)
-        click.echo(f"  = help: {asked.again} {shlex.quote(str(place))}", err=True)
+        first = shown.setdefault((choice.property, counterexample.episode), place)
+        if first != place:
+            click.echo(
+                f"episode {choice.index} comes to the same: {asked.again} {shlex.quote(str(first))}", err=True
+            )
+            continue
+        _show(asked, choice.index, counterexample, place)
     if len(chosen) > MOST:
         click.echo(f"and {len(chosen) - MOST} more kinds of findings, in the journal")
 
 
-def _tell(where: str, name: str, tick: int, reason: str, happens: Sequence[str]) -> None:
+def _show(asked: CampaignOptions, index: int, counterexample: Shrunk[Any], place: Path) -> None:
+    """Say what a counterexample shows, and what to type to see it again."""
+    finding, happens = counterexample.finding, asked.rig.kind.told(counterexample.episode)
+    _tell(f"episode {index}", finding, happens)
+    if counterexample.log:
+        click.echo(f"  = help: {asked.replays} {shlex.quote(str(place / 'log.mcap'))}", err=True)
+    click.echo(f"  = help: {asked.again} {shlex.quote(str(place))}", err=True)
+
+
+def _tell(where: str, finding: EpisodeFinding, happens: Sequence[str]) -> None:
     """Say what does not hold, and what happens in the episode that shows it."""
     click.echo(
-        f"error[{Code.PROPERTY_BROKEN.value}]: {where}, cycle {tick}: `{name}` does not hold: {reason}",
+        f"error[{Code.PROPERTY_BROKEN.value}]: {where}, cycle {finding.tick}: `{finding.property}` does not hold: {finding.message}",
         err=True,
     )
     for line in happens:
@@ -309,5 +319,5 @@ def _again(path: Path, rig: Rig[Any], executor: str | None) -> int:
             f"cycle {excused.tick}: `{excused.property}` does not hold: {excused.message}: {excused.because}"
         )
     for finding in outcome.findings:
-        _tell(str(path), finding.property, finding.tick, finding.message, happens)
+        _tell(str(path), finding, happens)
     return 1 if outcome.findings else 0
