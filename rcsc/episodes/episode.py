@@ -8,7 +8,7 @@ import csv
 import io
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from itertools import chain
 from typing import ClassVar, Literal, TypeAlias, get_args
 
@@ -170,6 +170,9 @@ class Episode:
             raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
         if stray := sorted(set(values) - {field.name for field in fields(cls)}):
             raise ValueError(f"an episode has no {shown(stray[0])}")
+        for name, kind in _ELEMENTS.items():
+            if isinstance(values.get(name), list):
+                values[name] = [_filled(kind, element) for element in values[name]]
         episode: Episode = read(cls, {**plain(cls()), **values})
         return episode
 
@@ -205,6 +208,21 @@ class Episode:
             level = [order.level] if several else []
             writer.writerow([order.command, *level, *(given.get(name, "") for name in columns), cycles])
         return file.getvalue()
+
+
+_ELEMENTS: dict[str, type] = {
+    "orders": OrderSpec,
+    "harms": BufferFault,
+    "readings": Reading,
+    "restarts": Restart,
+    "switches": Switch,
+}
+
+
+def _filled(kind: type, element: object) -> object:
+    """An element of a list as it was read, with the defaults of what it does not say."""
+    usual = {field.name: plain(field.default) for field in fields(kind) if field.default is not MISSING}
+    return {**usual, **element} if isinstance(element, dict) else element
 
 
 _HARMS = {

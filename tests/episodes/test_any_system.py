@@ -77,6 +77,10 @@ class TestAnEpisode:
             episode = draw(seed, robot)
             assert Episode.from_json(episode.to_json()) == episode
 
+    def test_is_read_with_its_defaults(self) -> None:
+        text = '{"orders": [{"level": "supervisor", "command": "dock"}], "harms": []}'
+        assert Episode.from_json(text) == Episode(orders=(DOCK,))
+
     @pytest.mark.parametrize(
         ("text", "why"),
         [
@@ -85,6 +89,9 @@ class TestAnEpisode:
             ('{"order": []}', "has no `order`"),
             ('{"executor": "rust"}', "`rust` is none of"),
             ('{"harms": [{"buffer": "x", "kind": "gone", "first_tick": 0, "last_tick": 1, "ticks": 1}]}', "gone"),
+            ('{"orders": [3]}', "not the values of a OrderSpec"),
+            ('{"orders": 3}', "is no list"),
+            ('{"orders": [{"level": "supervisor"}]}', "not the values of a OrderSpec"),
             ('{"ticks": -1}', "`ticks` is -1"),
             ('{"seed": -1}', "the seed"),
         ],
