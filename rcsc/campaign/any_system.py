@@ -3,6 +3,7 @@
 In: what `rcsc.campaign` asks of a kind of episodes. Out: `ANY`.
 """
 
+import contextlib
 import importlib.util
 import os
 from collections.abc import Iterator
@@ -20,13 +21,16 @@ from rcsc.run.description import BadDescription, Description, description, place
 from rcsc.run.executors import NotBuilt
 from rcsc.run.orders.script import BadScript, script_path
 from rcsc.run.plant.bind import BadPlant
-from rcsc.run.plant.load import chosen
+from rcsc.run.plant.load import MODELS, chosen
 
 _MODEL_FILES = frozenset(
     {".xml", ".mjcf", ".urdf", ".stl", ".obj", ".msh", ".dae", ".skn", ".png", ".hf", ".bin"}
 )
 """What a model may be made of, beside its own file and below it."""
 _PHYSICS_CHUNK = 4
+_PACKAGE = Path(__file__).parents[1]
+_ROOMS = ("episodes", "lang", "testing/executors")
+"""What draws episodes and watches them: properties are evaluated by the interpreter, edges taken from tests of the tables."""
 
 
 def _files(system: Path, plant: str, script: str) -> list[NamedFile]:
@@ -47,8 +51,13 @@ def _files(system: Path, plant: str, script: str) -> list[NamedFile]:
     ]
     seen = dict.fromkeys(file.resolve() for file in own)
     named = [(Path(os.path.relpath(file, system.parent.resolve())).as_posix(), file) for file in seen]
-    package = Path(__file__).parents[1]
-    return [*named, *run_sources(), *sources(package / "episodes")]
+    installed = [] if spec is None else _module(spec)
+    return [
+        *named,
+        *installed,
+        *run_sources(),
+        *(module for room in _ROOMS for module in sources(_PACKAGE / room)),
+    ]
 
 
 def _programs(described: Description, system: Path) -> Iterator[Path]:
@@ -60,15 +69,22 @@ def _programs(described: Description, system: Path) -> Iterator[Path]:
 
 
 def _plant(spec: PlantSpec) -> Iterator[Path]:
-    """The files that a plant is made of: with a file in Python those beside it, which it may import."""
+    """The files of the user's that a plant is made of: with a file in Python those beside it, which it may import."""
     file = spec.python.partition(":")[0]
     if spec.model is not None:
         yield spec.model
         yield from (path for path in _below(spec.model.parent) if path.suffix.lower() in _MODEL_FILES)
     elif file.endswith(".py"):
         yield from sorted((spec.folder / file).parent.glob("*.py"))
-    elif (found := importlib.util.find_spec(file)) is not None and found.origin is not None:
-        yield Path(found.origin)
+
+
+def _module(spec: PlantSpec) -> Iterator[NamedFile]:
+    """The installed module that a plant is, or that binds its model, wherever it is installed."""
+    name = (spec.python if spec.model is None else MODELS).partition(":")[0]
+    with contextlib.suppress(ModuleNotFoundError, ValueError):  # which is told when the plant is loaded
+        found = None if name.endswith(".py") else importlib.util.find_spec(name)
+        if found is not None and found.origin is not None:
+            yield name, Path(found.origin)
 
 
 def _below(folder: Path) -> Iterator[Path]:

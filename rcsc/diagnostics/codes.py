@@ -1334,7 +1334,8 @@ class Code(StrEnum):
     """
     BAD_EPISODE = """RCS742: an episode cannot be read
 
-    `rcsc campaign --again FILE` runs an episode that a campaign saved: `episode.json`, or the folder that has it. This file is none.
+    `rcsc campaign --again FILE` runs an episode that a campaign saved: `episode.json`, or the folder that has it. This file is none, or
+    names a level, a buffer, a field, a command, a fault or a plant that the system has not.
     """
     PROPERTY_BROKEN = """RCS743: a property does not hold
 

@@ -7,10 +7,10 @@ Each module has its click command under the name `command`. Without a descriptio
 >>> command.params[0].name
 'system'
 
-Nothing here is trusted for a verdict. What it costs: the cell's commands import MuJoCo, and those about logs the
-package that reads them; each says which extra brings it.
+Nothing here is trusted for a verdict. What it costs: what moves a model imports MuJoCo, and what reads or writes logs
+their package; each says which extra brings it.
 
-Modules: `prove` proves the levels together, and `explained` says what it does not prove; `run` runs a script in the
-cell, `campaign` many episodes of it, `shell` puts a system under somebody's hands; `log` says what a recorded run did
+Modules: `prove` proves the levels together, and `explained` says what it does not prove; `run` runs a system with
+its plant, `campaign` many episodes of it, `shell` puts a system under somebody's hands; `log` says what a recorded run did
 and `replay` runs it again; `db` is about the cell's database.
 """
