@@ -459,6 +459,27 @@ def test_a_table_is_offered_which_state_goes_with_which_order(lines: str, seen: 
     assert sees(lines) == seen
 
 
+def test_a_line_that_waits_for_its_echo_leaves_what_the_answer_set() -> None:
+    """It looks at `answered`: what the table sees is what it is without the line."""
+    before = STEPS.replace("new_command | arm.resting", "new_command | answered | arm.resting")
+    before = before.replace("|-------------|-------------|", "|-------------|----------|-------------|", 1)
+    before = before.replace("| true        | false       |", "| true        | false    | false       |")
+    before = before.replace("| true        | true        |", "| true        | false    | true        |")
+    wait = "  | wait | true | true | | | | || | | |\n"
+    made = program(
+        before.replace("LINES", wait + END.replace("| false       |", "| false       |          |"))
+    )
+    offered = {one.name: one for one in made.assumptions}[AssumptionName("reach_in_step")]
+    now = initial(made) | {"new_command": False}
+    seen = {
+        (phase, job)
+        for at, phase in enumerate(("home", "reaching", "lost"))
+        for number, job in enumerate(JOBS)
+        if holds(offered.condition, now | {"phase": at, "arm.command": number})
+    }
+    assert seen == {*BEGINS, ("reaching", "work")}
+
+
 def test_an_assumption_of_ones_own_takes_the_place_of_the_one_offered() -> None:
     own = "assume reach_in_step monitored : new_command or phase /= lost\n"
     made = program(own + STEPS.replace("LINES", END))

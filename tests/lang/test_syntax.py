@@ -223,6 +223,14 @@ def test_cell_spans_point_into_the_file() -> None:
     )
 
 
+def test_a_range_in_a_cell_may_be_written_as_in_an_expression() -> None:
+    text = "table t {{\n  | line | x | when ||\n  | a    | {} | x in 2 .. 5 ||\n}}\n"
+    files_ = [parse(Source("case.rcs", text.format(cell))) for cell in ("in 2 .. 5", "2 .. 5")]
+    with_in, plain = (format_file(file) for file in files_ if isinstance(file, tree.File))
+    assert with_in == plain
+    assert "| 2 .. 5 | x in 2 .. 5 ||" in plain
+
+
 CASES = [
     ("input x : = 3", [("RCS101", 1)]),
     ("enum a {", [("RCS101", 1)]),

@@ -72,9 +72,10 @@ class Watched:
 
 @dataclass(frozen=True, slots=True)
 class Flags:
-    """The flag of a new command, and the one that puts off its answer; empty where no orders are taken."""
+    """The flag of a new command, the one that it is answered, and the one that puts off its answer; empty where no orders are taken."""
 
     new: str
+    answered: str
     settling: str
 
 
@@ -100,7 +101,7 @@ def in_step(
         return None
     seen = set(product(*(sorted(one.begins) for one in watched)))
     for line, ends in ways:
-        for way in ends if flags.new and _may(line, flags.new, 1) else ():
+        for way in ends if flags.new and _may(line, flags.new, 1) and _may(line, flags.answered, 0) else ():
             if not way.get(flags.settling):
                 seen |= set(_answers(line, way, watched))
     before: set[Seen] = set()
@@ -108,6 +109,10 @@ def in_step(
         before = set(seen)
         for line, ends in ways:
             sees = [one for one in before if _matches(line, watched, one)] if _may(line, flags.new, 0) else []
+            if flags.new and not _may(
+                line, flags.answered, 0
+            ):  # what the answer left is pending still, whatever the line sees
+                sees = list(before)
             seen |= {after for way in ends for one in sees for after in _follows(way, watched, one)}
     read = [at for at, one in enumerate(watched) if one.leaf in map(str, table.variables)]
     told = {tuple(one[at] for at in read) for one in seen}

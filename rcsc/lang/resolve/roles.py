@@ -143,7 +143,9 @@ def offered(
         return (), tuple(tables)
     bodies = {str(procedure.name): procedure for procedure in procedures}
     watched = tuple(_watched(scope, parties, deferred))
-    flags = Flags("new_command", "settling") if parties.superior is not None else Flags("", "")
+    flags = (
+        Flags("new_command", "answered", "settling") if parties.superior is not None else Flags("", "", "")
+    )
     assumptions: list[Assumption] = []
     resting: list[Table] = []
     for table in tables:
