@@ -41,6 +41,7 @@ SENSOR = Record(
         "scale": Number(),
         "over": Number(),
         "under": Number(),
+        "values": Entries(Number()),
         "value": Anything(),
     },
 )

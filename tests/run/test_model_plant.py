@@ -3,6 +3,7 @@
 import copy
 from pathlib import Path
 
+import mujoco
 import pytest
 
 from rcsc.commands import run
@@ -13,6 +14,7 @@ from rcsc.run.signature import Leaf, Values
 from rcsc.run.system import signatures
 from rcsc_cell.bound.bindings import Binder
 from rcsc_cell.bound.model_plant import BoundModel
+from rcsc_cell.bound.model_units import driven_in
 from tests.support.programs.texts import edited
 
 SPEED = '"base.speed" = { actuator = "wheels", scale = 0.001 }'
@@ -185,7 +187,7 @@ def test_a_word_drives_by_its_own_control(c_type: str, members: tuple[str, ...],
     assert binder.actuators(buffer, {"base.lamp": {"ignore": True}}) == []
     assert page.faults == []
     wrong = (
-        ({words[0]: 0.0}, f"`values` lacks a control for `{words[1]}`"),
+        ({words[0]: 0.0}, f"`values` lacks `{words[1]}`"),
         ({words[0]: 0.0, words[1]: 0.5, "dim": 1.0}, "`dim` is no value"),
     )
     for values, message in wrong:
@@ -193,6 +195,28 @@ def test_a_word_drives_by_its_own_control(c_type: str, members: tuple[str, ...],
         assert message in page.faults.pop().message
     binder.sensors(buffer, {"base.lamp": {"sensor": "pin", **({} if members else {"under": 0.5})}})
     assert bool(page.faults) == bool(members)
+
+
+def test_a_reading_means_the_nearest_of_the_members(dock: Path) -> None:
+    model = model_of(dock).model
+    lit = leaf("uint8_t", ("dark", "dim", "lit"))
+    buffer = Buffer("a.lamp", "base.lamp", ("base", "lamp"), (lit,), "a.lamp", gives=True, path=())
+    page = plant_page(description(dock / "system.toml"))
+    binder = Binder(page, ("plant", "mujoco"), model)
+    [binding] = binder.sensors(
+        buffer, {"base.lamp": {"sensor": "pin", "values": {"dark": 0, "lit": 2, "dim": 1}}}
+    )
+    edges = {-5.0: 0, 0.4: 0, 0.6: 1, 1.4: 1, 1.6: 2, 9.0: 2}
+    assert {reading: binding.read([reading] * 9) for reading in edges} == edges
+    binder.sensors(buffer, {"base.lamp": {"sensor": "pin", "values": {"dark": 0, "dim": 1}}})
+    assert page.faults.pop().message == "`values` lacks `lit`"
+
+
+def test_a_servo_at_a_tendon_is_in_metres() -> None:
+    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><body><joint name="j" type="slide"/><geom size="0.1"/></body>
+      </worldbody><tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>
+      <actuator><position tendon="t"/><velocity tendon="t"/><motor tendon="t"/></actuator></mujoco>""")
+    assert [driven_in(model, at) for at in range(3)] == ["m", "m/s", None]
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Plants in Python: what fits is bound and moves the docking robot, and everything that does not fit is told before anything moves."""
 
+import copy
 import math
 import shutil
 from collections.abc import Callable, Mapping
@@ -236,7 +237,7 @@ def test_members_must_be_the_variables(dock: Path) -> None:
     )
     with pytest.raises(BadPlant) as caught:
         load_of_fleet(dock)
-    assert "the variable has no member `dok`" in str(caught.value)
+    assert "may be `dok`, which the variable has not" in str(caught.value)
     assert caught.value.diagnostics[0].help == ("did you mean `dock`?",)
     (dock / "fleet.py").write_text(
         RECORDS.replace(', "drive_fault"', "").replace("inc_command_echo: int", "inc_comand_echo: int"),
@@ -245,7 +246,7 @@ def test_members_must_be_the_variables(dock: Path) -> None:
     with pytest.raises(BadPlant) as caught:
         load_of_fleet(dock)
     messages = str(caught.value)
-    assert "it has no member `drive_fault`" in messages
+    assert "has no `drive_fault`, which the variable may be" in messages
     assert "`report.inc_command_echo` of `Fleet`" in messages
     assert "is missing in class `Report`" in messages
 
@@ -341,6 +342,38 @@ def test_a_plant_that_fails_names_the_field_and_the_cycle(line: str, message: st
     with pytest.raises(PlantFailed) as caught:
         bound(dock).step(2, nothing)
     assert message in str(caught.value)
+
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg"/>'
+
+
+@pytest.mark.parametrize(
+    ("method", "message"),
+    [
+        ("picture(self): raise ValueError('no pen')", "the plant's `picture` failed: ValueError: no pen (base.py, line"),
+        ("picture(self): return 5", "it gave a int, which is no text"),
+        ("picture(self): return '<p>here</p>'", "it gave a document of `p`, which is no SVG"),
+        ("picture(self): return '<svg>'", "the plant's `picture` failed: Malformed"),
+        ("__deepcopy__(self, memo): raise ValueError('one of a kind')", "the plant cannot be copied: ValueError: one of a kind"),
+        ("over(self): return 1 / 0", "the plant's `over` failed: ZeroDivisionError"),
+    ],
+)  # fmt: skip
+def test_whatever_a_plant_raises_is_told_as_the_plant_s(method: str, message: str, dock: Path) -> None:
+    text = (dock / "base.py").read_text(encoding="utf-8")
+    wrapped = "    @property\n" * method.startswith("over")
+    (dock / "base.py").write_text(f"{text}\n{wrapped}    def {method}\n", encoding="utf-8")
+    plant = bound(dock)
+    plant.step(1, nothing)
+    with pytest.raises(PlantFailed) as caught:
+        copy.deepcopy(plant).over or plant.pictures["plant"]()  # what they raise
+    assert message in str(caught.value)
+
+
+def test_a_plant_s_picture_is_shown_as_it_is(dock: Path) -> None:
+    text = (dock / "base.py").read_text(encoding="utf-8")
+    assert bound(dock).pictures == {}
+    (dock / "base.py").write_text(f"{text}\n    def picture(self): return {SVG!r}\n", encoding="utf-8")
+    assert bound(dock).pictures["plant"]() == SVG
 
 
 def test_a_number_that_the_variable_does_not_hold_is_refused_where_nothing_clamps() -> None:

@@ -7,13 +7,15 @@ import ast
 import copy
 import inspect
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rcsc.diagnostics.codes import Code
 from rcsc.host.described import BadFile, Document, KeyPath, nearest
+from rcsc.host.files.read import xml_of
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description, Wire
 from rcsc.run.levels import StateTableError
@@ -78,13 +80,43 @@ class BoundPlant:
     seconds: float
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "BoundPlant":
-        """The plant as it is now; what it is bound to never changes."""
-        return BoundPlant(copy.deepcopy(self.plant, memo), self.takes, self.gives, self.seconds)
+        """The plant as it is now; what it is bound to never changes.
+
+        Raises:
+            PlantFailed: It cannot be copied.
+        """
+        with _told("the plant cannot be copied"):
+            return BoundPlant(copy.deepcopy(self.plant, memo), self.takes, self.gives, self.seconds)
 
     @property
     def over(self) -> bool:
-        """Whether the plant says that the run is at its end."""
-        return bool(getattr(self.plant, "over", False))
+        """Whether the plant says that the run is at its end.
+
+        Raises:
+            PlantFailed: It raised.
+        """
+        with _told("the plant's `over` failed"):
+            return bool(getattr(self.plant, "over", False))
+
+    @property
+    def pictures(self) -> dict[str, Callable[[], str]]:
+        """How it looks, by kind of picture; empty where its class has no `picture`."""
+        return {"plant": self._drawn} if callable(getattr(self.plant, "picture", None)) else {}
+
+    def _drawn(self) -> str:
+        """An SVG document.
+
+        Raises:
+            PlantFailed: `picture` raised, or gave something else.
+        """
+        with _told("the plant's `picture` failed"):
+            text = self.plant.picture()
+            if not isinstance(text, str):
+                raise TypeError(f"it gave a {type(text).__name__}, which is no text")
+            root = str(xml_of(text).tag)
+            if root.rpartition("}")[2] != "svg":
+                raise ValueError(f"it gave a document of `{root}`, which is no SVG")
+            return text
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -139,10 +171,8 @@ class BoundPlant:
             values = latest(buffer.name)
             if values is not None:
                 self._put(buffer.field, to_field.taken(iter(values)))
-        try:
+        with _told(f"the plant failed in cycle {tick + 1}"):
             self.plant.step(self.seconds)
-        except Exception as error:
-            raise PlantFailed(f"the plant failed in cycle {tick + 1}: {raised(error)}") from error
         return {buffer.name: self._given(tick, buffer, to_leaves) for buffer, to_leaves in self.gives}
 
     def _put(self, field: FieldPath, value: object) -> None:
@@ -161,6 +191,19 @@ class BoundPlant:
             where, what = error.args if isinstance(error, BadValue) else ("", f"is missing: {error}")
             field = f"{'.'.join(buffer.field)}{where}"
             raise PlantFailed(f"the plant's `{field}` {what}, in cycle {tick + 1}") from error
+
+
+@contextmanager
+def _told(what: str) -> Iterator[None]:
+    """Whatever a user's code raises, told as what the plant did.
+
+    Raises:
+        PlantFailed: It raised.
+    """
+    try:
+        yield
+    except Exception as error:
+        raise PlantFailed(f"{what}: {raised(error)}") from error
 
 
 def raised(error: BaseException) -> str:

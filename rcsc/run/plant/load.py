@@ -153,8 +153,7 @@ def load(
         stage: StageFunction = factory
         return stage(Setup(system, signs, spec, seed, script, database, answers_only))
     bound = bind(system, signs, spec, factory, seed)
-    drawing = getattr(bound.plant, "picture", None)
-    return Staged((bound,), _queries(system, bound), pictures={"plant": drawing} if callable(drawing) else {})
+    return Staged((bound,), _queries(system, bound), pictures=bound.pictures)
 
 
 def _queries(system: Description, bound: BoundPlant) -> dict[str, Query]:

@@ -315,10 +315,13 @@ def _members_misfit(leaf: Leaf, of: fields.FieldType, *, gives: bool) -> tuple[s
     missing = [name for name in ours if name not in theirs]
     if not missing:
         return None
-    what = "the variable has no member" if gives else "it has no member"
-    return f"{what} {', '.join(f'`{name}`' for name in missing)}", nearest(missing[0], theirs) or (
-        f"the members are {', '.join(theirs)}",
+    names = ", ".join(f"`{name}`" for name in missing)
+    what = (
+        f"may be {names}, which the variable has not"
+        if gives
+        else f"has no {names}, which the variable may be"
     )
+    return what, nearest(missing[0], theirs) or (f"the members are {', '.join(theirs)}",)
 
 
 def _range_misfit(leaf: Leaf, of: fields.Number, *, gives: bool) -> tuple[str, tuple[str, ...]] | None:

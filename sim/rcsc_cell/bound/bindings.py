@@ -32,6 +32,7 @@ class SensorBinding:
         at: Where the reading stands in `sensordata`; -1 for `value`, which stands still.
         link: To the leaf; None for a bool that is true beyond a threshold.
         over: A bool is true above it; `under` below it.
+        values: The reading that stands for each member of an enumeration; the nearest is taken.
     """
 
     end: str
@@ -40,6 +41,7 @@ class SensorBinding:
     over: float | None = None
     under: float | None = None
     value: Value = 0
+    values: tuple[float, ...] = ()
 
     def read(self, readings: Sequence[float]) -> Value:
         """The leaf's value.
@@ -50,6 +52,8 @@ class SensorBinding:
         if self.at < 0:
             return self.value
         reading = float(readings[self.at])
+        if self.values:
+            return min(range(len(self.values)), key=lambda member: abs(self.values[member] - reading))
         if self.link is None:
             return reading > self.over if self.over is not None else reading < (self.under or 0.0)
         [value] = self.link.given(reading)
@@ -196,12 +200,16 @@ class Binder:
         if leaf.c_type == "bool":
             return self._threshold(end, at, entry, where)
         if leaf.members:
-            self.page.wrong(
-                where,
-                f"a sensor gives numbers, and `{leaf.name}` is one of {', '.join(leaf.members)}",
-                BY_HAND,
-            )
-            return None
+            if "values" not in entry:
+                self.page.wrong(
+                    where,
+                    f"a sensor gives numbers, and `{leaf.name}` is one of {', '.join(leaf.members)}",
+                    f"`values = {{ {leaf.members[0]} = 0.0, ... }}` says which reading is which",
+                    BY_HAND,
+                )
+                return None
+            values = self._values(leaf.members, entry, where)
+            return None if values is None else SensorBinding(end, at, values=values)
         by = self._factor(leaf, entry, sensed_in(self.model, sensor), "sensor", where)
         return None if by is None else SensorBinding(end, at, NumberLink(leaf, False, by))
 
@@ -250,13 +258,13 @@ class Binder:
             by = self._factor(leaf, entry, driven_in(self.model, actuator), "actuator", where)
             binding = None if by is None else ActuatorBinding(actuator, place, NumberLink(leaf, False, by))
         if binding is not None:
-            self._check_control(binding, leaf, str(entry["actuator"]), where)
+            self._check_control(binding, leaf, entry, where)
         return binding
 
     def _values(
         self, words: Sequence[str], entry: Mapping[str, Any], where: KeyPath
     ) -> tuple[float, ...] | None:
-        """The control of each member."""
+        """The control, or the reading, of each member."""
         values = entry.get("values", {})
         for word in values:
             if word not in words:
@@ -269,21 +277,28 @@ class Binder:
         if missing:
             self.page.wrong(
                 where,
-                f"`values` lacks a control for {', '.join(f'`{word}`' for word in missing)}",
+                f"`values` lacks {', '.join(f'`{word}`' for word in missing)}",
                 f"write `values = {{ {missing[0]} = 0.0, ... }}`",
             )
         return None if missing else tuple(float(values[word]) for word in words)
 
-    def _check_control(self, binding: ActuatorBinding, leaf: Leaf, name: str, where: KeyPath) -> None:
+    def _check_control(
+        self, binding: ActuatorBinding, leaf: Leaf, entry: Mapping[str, Any], where: KeyPath
+    ) -> None:
         """The model would cut a control beyond its range without a word."""
         if not self.model.actuator_ctrllimited[binding.at]:
             return
         edges = binding.values or tuple(binding.control(edge) for edge in (leaf.low or 0, leaf.high or 0))
         low, high = (float(bound) for bound in self.model.actuator_ctrlrange[binding.at])
         if min(edges) < low - 1e-9 or max(edges) > high + 1e-9:
+            as_it_is = leaf.unit and not {"unit", "scale", "values"} & entry.keys()
+            drives = (
+                f"`{leaf.name}` drives actuator `{entry['actuator']}` from {min(edges):g} to {max(edges):g}"
+            )
             self.page.wrong(
                 where,
-                f"`{leaf.name}` drives actuator `{name}` from {min(edges):g} to {max(edges):g}, which takes {low:g} to {high:g}",
+                f"{drives}, which takes {low:g} to {high:g}",
+                *([f'say what the control is in, if not `{leaf.unit}`: `unit = "..."`'] if as_it_is else []),
                 "widen the model's `ctrlrange`, or narrow the variable's range",
             )
 

@@ -48,10 +48,12 @@ def sensed_in(model: Any, sensor: int) -> str | None:
 
 
 def driven_in(model: Any, actuator: int) -> str | None:
-    """The unit of the control of a position or velocity servo at a joint; None of any other actuator."""
-    if int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_JOINT):
+    """The unit of the control of a position or velocity servo at a joint or a tendon; None of any other actuator."""
+    attached = int(model.actuator_trntype[actuator])
+    if attached not in {int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_TENDON)}:
         return None
-    turns = _turns(model, int(model.actuator_trnid[actuator][0]))
+    at_joint = attached == int(mujoco.mjtTrn.mjTRN_JOINT)
+    turns = at_joint and _turns(model, int(model.actuator_trnid[actuator][0]))
     constant, position, velocity = (float(value) for value in model.actuator_biasprm[actuator][:3])
     affine = int(model.actuator_biastype[actuator]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
     if not affine or constant:

@@ -77,6 +77,7 @@ class Story:
         placements: Of the parts.
         margins_deg: The least distance of each joint from its limits.
         tick_ms: Of the system.
+        ticks: How many there were, those before the first row and after the last too.
     """
 
     title: str
@@ -88,6 +89,7 @@ class Story:
     placements: Sequence[Placement] = ()
     margins_deg: Sequence[float] = ()
     tick_ms: int = 40
+    ticks: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -117,6 +117,7 @@ class RunWitness:
         """
         system = self.run.system
         cycle_s = 0.001 * system.description.tick_ms
+        ticks = system.tick - self.run.first_tick
         results = () if self.run.operator is None else self.run.operator.results
         return Story(
             title,
@@ -125,13 +126,14 @@ class RunWitness:
             self.series,
             [Matched(*line, self.matched[line]) for line in _lines(system, self.matched)],
             [
-                Figure("cycles", float(system.tick), ""),
-                Figure("control time", system.tick * cycle_s, "s"),
+                Figure("cycles", float(ticks), ""),
+                Figure("control time", ticks * cycle_s, "s"),
                 Figure("computing", seconds, "s"),
-                Figure("times as fast as the clock", system.tick * cycle_s / max(seconds, 1e-9), ""),
+                Figure("times as fast as the clock", ticks * cycle_s / max(seconds, 1e-9), ""),
                 Figure("of it pictures and figures", self.seconds, "s"),
             ],
             tick_ms=system.description.tick_ms,
+            ticks=ticks,
         )
 
     def closing(self) -> Iterator[str]:
