@@ -207,6 +207,9 @@ static void emove_do_flood_flash(emove_t *s)
 static void emove_do_line_flash(emove_t *s)
 {
     emove_do_pause(s);
+    s->to_vision.expected_normal.x = s->object_data.normal.x + 0.0;
+    s->to_vision.expected_normal.y = s->object_data.normal.y + 0.0;
+    s->to_vision.expected_normal.z = s->object_data.normal.z + 0.0;
     s->to_vision.input_command = (uint8_t)INT64_C(2);
 }
 
@@ -446,7 +449,7 @@ static void emove_admit(emove_t *s)
             s->fault_at = 18;
         }
     }
-    if (((int64_t)s->from_primitive.failure > INT64_C(15))) {
+    if (((int64_t)s->from_primitive.failure > INT64_C(16))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 19;
@@ -464,7 +467,7 @@ static void emove_admit(emove_t *s)
             s->fault_at = 46;
         }
     }
-    if (((int64_t)s->from_vision.failure > INT64_C(15))) {
+    if (((int64_t)s->from_vision.failure > INT64_C(16))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 47;
@@ -513,49 +516,49 @@ static void emove_admit(emove_t *s)
     if (((int64_t)s->path.depart_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 64;
+            s->fault_at = 67;
         }
     }
     if (((int64_t)s->path.depart_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 65;
+            s->fault_at = 68;
         }
     }
     if (((int64_t)s->path.approach_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 66;
+            s->fault_at = 69;
         }
     }
     if (((int64_t)s->path.approach_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 67;
+            s->fault_at = 70;
         }
     }
     if (((int64_t)s->target.hover_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 69;
+            s->fault_at = 72;
         }
     }
     if (((int64_t)s->target.grasp_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 70;
+            s->fault_at = 73;
         }
     }
     if (((int64_t)s->target.view_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 71;
+            s->fault_at = 74;
         }
     }
     if (!((s->object_data.expected_range_mm >= 0.0) && (s->object_data.expected_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 73;
+            s->fault_at = 76;
         }
     } else {
         s->object_data.expected_range_mm = s->object_data.expected_range_mm + 0.0;
@@ -563,7 +566,7 @@ static void emove_admit(emove_t *s)
     if (!((s->object_data.grip_range_mm >= 0.0) && (s->object_data.grip_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 74;
+            s->fault_at = 77;
         }
     } else {
         s->object_data.grip_range_mm = s->object_data.grip_range_mm + 0.0;
@@ -571,15 +574,39 @@ static void emove_admit(emove_t *s)
     if (!((s->object_data.lift_mm >= (-500.0)) && (s->object_data.lift_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 75;
+            s->fault_at = 78;
         }
     } else {
         s->object_data.lift_mm = s->object_data.lift_mm + 0.0;
     }
+    if (!((s->object_data.normal.x >= (-1.0)) && (s->object_data.normal.x <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 79;
+        }
+    } else {
+        s->object_data.normal.x = s->object_data.normal.x + 0.0;
+    }
+    if (!((s->object_data.normal.y >= (-1.0)) && (s->object_data.normal.y <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 80;
+        }
+    } else {
+        s->object_data.normal.y = s->object_data.normal.y + 0.0;
+    }
+    if (!((s->object_data.normal.z >= (-1.0)) && (s->object_data.normal.z <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 81;
+        }
+    } else {
+        s->object_data.normal.z = s->object_data.normal.z + 0.0;
+    }
     if (!((s->held_data.expected_range_mm >= 0.0) && (s->held_data.expected_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 77;
+            s->fault_at = 83;
         }
     } else {
         s->held_data.expected_range_mm = s->held_data.expected_range_mm + 0.0;
@@ -587,7 +614,7 @@ static void emove_admit(emove_t *s)
     if (!((s->held_data.grip_range_mm >= 0.0) && (s->held_data.grip_range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 78;
+            s->fault_at = 84;
         }
     } else {
         s->held_data.grip_range_mm = s->held_data.grip_range_mm + 0.0;
@@ -595,10 +622,34 @@ static void emove_admit(emove_t *s)
     if (!((s->held_data.lift_mm >= (-500.0)) && (s->held_data.lift_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 79;
+            s->fault_at = 85;
         }
     } else {
         s->held_data.lift_mm = s->held_data.lift_mm + 0.0;
+    }
+    if (!((s->held_data.normal.x >= (-1.0)) && (s->held_data.normal.x <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 86;
+        }
+    } else {
+        s->held_data.normal.x = s->held_data.normal.x + 0.0;
+    }
+    if (!((s->held_data.normal.y >= (-1.0)) && (s->held_data.normal.y <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 87;
+        }
+    } else {
+        s->held_data.normal.y = s->held_data.normal.y + 0.0;
+    }
+    if (!((s->held_data.normal.z >= (-1.0)) && (s->held_data.normal.z <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 88;
+        }
+    } else {
+        s->held_data.normal.z = s->held_data.normal.z + 0.0;
     }
     if (s->fault != 0) {
         before.line = -1;
@@ -1126,6 +1177,9 @@ void emove_init(emove_t *s)
     s->to_vision.input_command = (uint8_t)INT64_C(0);
     s->to_vision.obj_ptr = (uint8_t)INT64_C(0);
     s->to_vision.expected_range_mm = 0.0;
+    s->to_vision.expected_normal.x = (-1.0);
+    s->to_vision.expected_normal.y = (-1.0);
+    s->to_vision.expected_normal.z = (-1.0);
     s->vision.command = (uint8_t)INT64_C(0);
     s->vision.status = (uint8_t)INT64_C(0);
     s->vision.resting = false;
@@ -1145,10 +1199,16 @@ void emove_init(emove_t *s)
     s->object_data.expected_range_mm = 0.0;
     s->object_data.grip_range_mm = 0.0;
     s->object_data.lift_mm = (-500.0);
+    s->object_data.normal.x = (-1.0);
+    s->object_data.normal.y = (-1.0);
+    s->object_data.normal.z = (-1.0);
     s->held_data.known = false;
     s->held_data.expected_range_mm = 0.0;
     s->held_data.grip_range_mm = 0.0;
     s->held_data.lift_mm = (-500.0);
+    s->held_data.normal.x = (-1.0);
+    s->held_data.normal.y = (-1.0);
+    s->held_data.normal.z = (-1.0);
     s->idle = true;
     s->cur_state = (uint8_t)INT64_C(0);
     s->cur_state_next = (uint8_t)INT64_C(0);
@@ -1186,7 +1246,7 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && (((int64_t)s->to_task.status_report > INT64_C(2)))) {
         at = 10;
     }
-    if ((at < 0) && (((int64_t)s->to_task.failure > INT64_C(15)))) {
+    if ((at < 0) && (((int64_t)s->to_task.failure > INT64_C(16)))) {
         at = 11;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
@@ -1237,7 +1297,7 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && ((*(const uint8_t *)&s->primitive.resting) > 1u)) {
         at = 33;
     }
-    if ((at < 0) && (((int64_t)s->primitive.failure > INT64_C(15)))) {
+    if ((at < 0) && (((int64_t)s->primitive.failure > INT64_C(16)))) {
         at = 34;
     }
     if ((at < 0) && (((int64_t)s->last_primitive.input_command > INT64_C(5)))) {
@@ -1276,92 +1336,101 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && (!((s->to_vision.expected_range_mm >= 0.0) && (s->to_vision.expected_range_mm <= 2000.0)))) {
         at = 56;
     }
-    if ((at < 0) && (((int64_t)s->vision.command > INT64_C(2)))) {
+    if ((at < 0) && (!((s->to_vision.expected_normal.x >= (-1.0)) && (s->to_vision.expected_normal.x <= 1.0)))) {
         at = 57;
     }
-    if ((at < 0) && (((int64_t)s->vision.status > INT64_C(2)))) {
+    if ((at < 0) && (!((s->to_vision.expected_normal.y >= (-1.0)) && (s->to_vision.expected_normal.y <= 1.0)))) {
         at = 58;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->vision.resting) > 1u)) {
+    if ((at < 0) && (!((s->to_vision.expected_normal.z >= (-1.0)) && (s->to_vision.expected_normal.z <= 1.0)))) {
         at = 59;
     }
-    if ((at < 0) && (((int64_t)s->vision.failure > INT64_C(15)))) {
+    if ((at < 0) && (((int64_t)s->vision.command > INT64_C(2)))) {
         at = 60;
     }
-    if ((at < 0) && (((int64_t)s->last_vision.input_command > INT64_C(2)))) {
+    if ((at < 0) && (((int64_t)s->vision.status > INT64_C(2)))) {
         at = 61;
     }
-    if ((at < 0) && (((int64_t)s->last_vision.obj_ptr > INT64_C(7)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->vision.resting) > 1u)) {
         at = 62;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->path.known) > 1u)) {
+    if ((at < 0) && (((int64_t)s->vision.failure > INT64_C(16)))) {
         at = 63;
     }
+    if ((at < 0) && (((int64_t)s->last_vision.input_command > INT64_C(2)))) {
+        at = 64;
+    }
+    if ((at < 0) && (((int64_t)s->last_vision.obj_ptr > INT64_C(7)))) {
+        at = 65;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->path.known) > 1u)) {
+        at = 66;
+    }
     if ((at < 0) && ((*(const uint8_t *)&s->target.known) > 1u)) {
-        at = 68;
+        at = 71;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->object_data.known) > 1u)) {
-        at = 72;
+        at = 75;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->held_data.known) > 1u)) {
-        at = 76;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
-        at = 80;
-    }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(13)))) {
-        at = 81;
-    }
-    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(13)))) {
         at = 82;
     }
-    if ((at < 0) && (((int64_t)s->path_at > INT64_C(62)))) {
-        at = 83;
-    }
-    if ((at < 0) && (((int64_t)s->path_at_next > INT64_C(62)))) {
-        at = 84;
-    }
-    if ((at < 0) && (((int64_t)s->here_sector > INT64_C(99)))) {
-        at = 87;
-    }
-    if ((at < 0) && (((int64_t)s->here_sector_asked > INT64_C(99)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
         at = 89;
     }
-    if ((at < 0) && (((int64_t)s->depart_first > INT64_C(9999)))) {
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(13)))) {
         at = 90;
     }
-    if ((at < 0) && (((int64_t)s->depart_count > INT64_C(31)))) {
+    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(13)))) {
         at = 91;
     }
-    if ((at < 0) && (((int64_t)s->approach_first > INT64_C(9999)))) {
+    if ((at < 0) && (((int64_t)s->path_at > INT64_C(62)))) {
         at = 92;
     }
-    if ((at < 0) && (((int64_t)s->path_length > INT64_C(62)))) {
+    if ((at < 0) && (((int64_t)s->path_at_next > INT64_C(62)))) {
         at = 93;
     }
-    if ((at < 0) && (!((s->displaced_here.x >= (-500.0)) && (s->displaced_here.x <= 500.0)))) {
-        at = 94;
-    }
-    if ((at < 0) && (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0)))) {
-        at = 95;
-    }
-    if ((at < 0) && (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0)))) {
+    if ((at < 0) && (((int64_t)s->here_sector > INT64_C(99)))) {
         at = 96;
     }
-    if ((at < 0) && (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0)))) {
-        at = 97;
-    }
-    if ((at < 0) && (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0)))) {
+    if ((at < 0) && (((int64_t)s->here_sector_asked > INT64_C(99)))) {
         at = 98;
     }
-    if ((at < 0) && (!((s->lift_mm >= (-500.0)) && (s->lift_mm <= 500.0)))) {
+    if ((at < 0) && (((int64_t)s->depart_first > INT64_C(9999)))) {
         at = 99;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->lost) > 1u)) {
+    if ((at < 0) && (((int64_t)s->depart_count > INT64_C(31)))) {
         at = 100;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+    if ((at < 0) && (((int64_t)s->approach_first > INT64_C(9999)))) {
         at = 101;
+    }
+    if ((at < 0) && (((int64_t)s->path_length > INT64_C(62)))) {
+        at = 102;
+    }
+    if ((at < 0) && (!((s->displaced_here.x >= (-500.0)) && (s->displaced_here.x <= 500.0)))) {
+        at = 103;
+    }
+    if ((at < 0) && (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0)))) {
+        at = 104;
+    }
+    if ((at < 0) && (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0)))) {
+        at = 105;
+    }
+    if ((at < 0) && (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0)))) {
+        at = 106;
+    }
+    if ((at < 0) && (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0)))) {
+        at = 107;
+    }
+    if ((at < 0) && (!((s->lift_mm >= (-500.0)) && (s->lift_mm <= 500.0)))) {
+        at = 108;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->lost) > 1u)) {
+        at = 109;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+        at = 110;
     }
     return at;
 }

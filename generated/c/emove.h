@@ -134,31 +134,31 @@ typedef struct {
     emove_common_primitive_held_t primitive; /* 31 to 34: state; What primitive says of the last orders, held until they are echoed. */
     emove_common_primitive_last_t last_primitive; /* 35 to 43: state; The order to primitive that was numbered last. */
     vocabulary_vision_report_t from_vision; /* 44 to 52: input; Reports of vision, as they come. */
-    vocabulary_vision_order_t to_vision; /* 53 to 56: output; Orders to vision. */
-    emove_common_vision_held_t vision; /* 57 to 60: state; What vision says of the last orders, held until they are echoed. */
-    emove_common_vision_last_t last_vision; /* 61 to 62: state; The order to vision that was numbered last. */
-    emove_common_path_t path; /* 63 to 67: input; From the database: the way from where the robot is to the location of the task. */
-    emove_common_spot_t target; /* 68 to 71: input; From the database: the location of the task. */
-    emove_common_part_t object_data; /* 72 to 75: input; From the database: the part of the task. */
-    emove_common_part_t held_data; /* 76 to 79: input; From the database: the part in the gripper. */
-    bool idle; /* 80: state; Both levels below rest, and what they say answers this level's last orders. */
-    emove_common_emove_state_t cur_state; /* 81: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
-    emove_common_emove_state_t cur_state_next; /* 82: state; the deferred next value of cur_state */
-    uint8_t path_at; /* 83: state; 0 .. 62; Which point of the path is under way. */
-    uint8_t path_at_next; /* 84: state; the deferred next value of path_at */
-    uint8_t here; /* 85: state; 0 .. 255; Where the robot is; 0 while it moves. */
-    uint8_t here_next; /* 86: state; the deferred next value of here */
-    uint8_t here_sector; /* 87: state; 0 .. 99 */
-    uint8_t here_asked; /* 88: state; 0 .. 255; What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before. */
-    uint8_t here_sector_asked; /* 89: state; 0 .. 99 */
-    uint16_t depart_first; /* 90: state; 0 .. 9999; The path under way, kept because `here` is forgotten as soon as the robot moves. */
-    uint8_t depart_count; /* 91: state; 0 .. 31 */
-    uint16_t approach_first; /* 92: state; 0 .. 9999 */
-    uint8_t path_length; /* 93: state; 0 .. 62; How many points the path has. */
-    vocabulary_shift_t displaced_here; /* 94 to 98: state; How far the part that was located here was displaced: the departure is displaced as far. */
-    double lift_mm; /* 99: state; -500.0 .. 500.0 mm; How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height. */
-    bool lost; /* 100: state; A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed. */
-    bool echoed; /* 101: state; Every last order is echoed, or too late. */
+    vocabulary_vision_order_t to_vision; /* 53 to 59: output; Orders to vision. */
+    emove_common_vision_held_t vision; /* 60 to 63: state; What vision says of the last orders, held until they are echoed. */
+    emove_common_vision_last_t last_vision; /* 64 to 65: state; The order to vision that was numbered last. */
+    emove_common_path_t path; /* 66 to 70: input; From the database: the way from where the robot is to the location of the task. */
+    emove_common_spot_t target; /* 71 to 74: input; From the database: the location of the task. */
+    emove_common_part_t object_data; /* 75 to 81: input; From the database: the part of the task. */
+    emove_common_part_t held_data; /* 82 to 88: input; From the database: the part in the gripper. */
+    bool idle; /* 89: state; Both levels below rest, and what they say answers this level's last orders. */
+    emove_common_emove_state_t cur_state; /* 90: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
+    emove_common_emove_state_t cur_state_next; /* 91: state; the deferred next value of cur_state */
+    uint8_t path_at; /* 92: state; 0 .. 62; Which point of the path is under way. */
+    uint8_t path_at_next; /* 93: state; the deferred next value of path_at */
+    uint8_t here; /* 94: state; 0 .. 255; Where the robot is; 0 while it moves. */
+    uint8_t here_next; /* 95: state; the deferred next value of here */
+    uint8_t here_sector; /* 96: state; 0 .. 99 */
+    uint8_t here_asked; /* 97: state; 0 .. 255; What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before. */
+    uint8_t here_sector_asked; /* 98: state; 0 .. 99 */
+    uint16_t depart_first; /* 99: state; 0 .. 9999; The path under way, kept because `here` is forgotten as soon as the robot moves. */
+    uint8_t depart_count; /* 100: state; 0 .. 31 */
+    uint16_t approach_first; /* 101: state; 0 .. 9999 */
+    uint8_t path_length; /* 102: state; 0 .. 62; How many points the path has. */
+    vocabulary_shift_t displaced_here; /* 103 to 107: state; How far the part that was located here was displaced: the departure is displaced as far. */
+    double lift_mm; /* 108: state; -500.0 .. 500.0 mm; How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height. */
+    bool lost; /* 109: state; A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed. */
+    bool echoed; /* 110: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */

@@ -46,6 +46,7 @@ typedef struct {
     double expected_range_mm; /* 0.0 .. 2000.0 mm */
     double grip_range_mm; /* 0.0 .. 2000.0 mm */
     double lift_mm; /* -500.0 .. 500.0 mm */
+    vocabulary_direction_t normal;
 } emove_common_part_t;
 
 typedef struct {

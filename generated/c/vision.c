@@ -78,6 +78,7 @@ static void vision_do_measure(vision_t *s)
     }
     s->arrived = ((int64_t)s->camera.number == (int64_t)s->to_camera.number);
     s->fits = (vision_abs_f64((s->camera.range_mm - s->emove.expected_range_mm)) <= 4.0);
+    s->faces = ((((s->camera.normal.x * s->emove.expected_normal.x) + (s->camera.normal.y * s->emove.expected_normal.y)) + (s->camera.normal.z * s->emove.expected_normal.z)) >= 0.9848);
 }
 
 /* Fires a flash; the picture that answers has the next number. */
@@ -116,10 +117,16 @@ static void vision_do_no_match(vision_t *s)
     s->to_emove.failure = (uint8_t)INT64_C(13);
 }
 
-/* Procedure line_flash_failure. */
-static void vision_do_line_flash_failure(vision_t *s)
+/* Procedure range_failure. */
+static void vision_do_range_failure(vision_t *s)
 {
     s->to_emove.failure = (uint8_t)INT64_C(14);
+}
+
+/* Procedure surface_failure. */
+static void vision_do_surface_failure(vision_t *s)
+{
+    s->to_emove.failure = (uint8_t)INT64_C(16);
 }
 
 /* Procedure state. */
@@ -212,10 +219,34 @@ static void vision_admit(vision_t *s)
     } else {
         s->emove.expected_range_mm = s->emove.expected_range_mm + 0.0;
     }
+    if (!((s->emove.expected_normal.x >= (-1.0)) && (s->emove.expected_normal.x <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 4;
+        }
+    } else {
+        s->emove.expected_normal.x = s->emove.expected_normal.x + 0.0;
+    }
+    if (!((s->emove.expected_normal.y >= (-1.0)) && (s->emove.expected_normal.y <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 5;
+        }
+    } else {
+        s->emove.expected_normal.y = s->emove.expected_normal.y + 0.0;
+    }
+    if (!((s->emove.expected_normal.z >= (-1.0)) && (s->emove.expected_normal.z <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 6;
+        }
+    } else {
+        s->emove.expected_normal.z = s->emove.expected_normal.z + 0.0;
+    }
     if (!((s->camera.x_mm >= (-500.0)) && (s->camera.x_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 19;
+            s->fault_at = 22;
         }
     } else {
         s->camera.x_mm = s->camera.x_mm + 0.0;
@@ -223,7 +254,7 @@ static void vision_admit(vision_t *s)
     if (!((s->camera.y_mm >= (-500.0)) && (s->camera.y_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 20;
+            s->fault_at = 23;
         }
     } else {
         s->camera.y_mm = s->camera.y_mm + 0.0;
@@ -231,7 +262,7 @@ static void vision_admit(vision_t *s)
     if (!((s->camera.c >= (-1.0)) && (s->camera.c <= 1.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 21;
+            s->fault_at = 24;
         }
     } else {
         s->camera.c = s->camera.c + 0.0;
@@ -239,7 +270,7 @@ static void vision_admit(vision_t *s)
     if (!((s->camera.s >= (-1.0)) && (s->camera.s <= 1.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 22;
+            s->fault_at = 25;
         }
     } else {
         s->camera.s = s->camera.s + 0.0;
@@ -247,10 +278,34 @@ static void vision_admit(vision_t *s)
     if (!((s->camera.range_mm >= 0.0) && (s->camera.range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 23;
+            s->fault_at = 26;
         }
     } else {
         s->camera.range_mm = s->camera.range_mm + 0.0;
+    }
+    if (!((s->camera.normal.x >= (-1.0)) && (s->camera.normal.x <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 27;
+        }
+    } else {
+        s->camera.normal.x = s->camera.normal.x + 0.0;
+    }
+    if (!((s->camera.normal.y >= (-1.0)) && (s->camera.normal.y <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 28;
+        }
+    } else {
+        s->camera.normal.y = s->camera.normal.y + 0.0;
+    }
+    if (!((s->camera.normal.z >= (-1.0)) && (s->camera.normal.z <= 1.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 29;
+        }
+    } else {
+        s->camera.normal.z = s->camera.normal.z + 0.0;
     }
     if (s->fault != 0) {
         before.line = -1;
@@ -332,7 +387,7 @@ static void vision_run_line_flash(vision_t *s)
         vision_do_executing(s);
         break;
     case 2: /* vision/vision.rcs line 3 */
-        vision_do_line_flash_failure(s);
+        vision_do_range_failure(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
         vision_do_failed(s);
@@ -344,13 +399,13 @@ static void vision_run_line_flash(vision_t *s)
         vision_do_done(s);
         break;
     case 4: /* vision/vision.rcs line 5a */
-        vision_do_line_flash_failure(s);
+        vision_do_range_failure(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
         vision_do_failed(s);
         break;
     case 5: /* vision/vision.rcs line 5b */
-        vision_do_line_flash_failure(s);
+        vision_do_surface_failure(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
         vision_do_failed(s);
@@ -404,6 +459,9 @@ void vision_init(vision_t *s)
     s->emove.input_command = (uint8_t)INT64_C(0);
     s->emove.obj_ptr = (uint8_t)INT64_C(0);
     s->emove.expected_range_mm = 0.0;
+    s->emove.expected_normal.x = (-1.0);
+    s->emove.expected_normal.y = (-1.0);
+    s->emove.expected_normal.z = (-1.0);
     s->to_emove.inc_command_echo = (uint16_t)INT64_C(0);
     s->to_emove.ref_command_echo = (uint8_t)INT64_C(0);
     s->to_emove.status_report = (uint8_t)INT64_C(0);
@@ -424,10 +482,13 @@ void vision_init(vision_t *s)
     s->camera.c = (-1.0);
     s->camera.s = (-1.0);
     s->camera.range_mm = 0.0;
-    s->camera.flat = false;
+    s->camera.normal.x = (-1.0);
+    s->camera.normal.y = (-1.0);
+    s->camera.normal.z = (-1.0);
     s->cur_state = (uint8_t)INT64_C(0);
     s->arrived = false;
     s->fits = false;
+    s->faces = false;
     s->waited = (uint8_t)INT64_C(0);
     s->to_camera.number = (uint16_t)INT64_C(0);
     s->to_camera.fire = (uint8_t)INT64_C(0);
@@ -439,61 +500,61 @@ int32_t vision_check(const vision_t *s)
 {
     int32_t at = -1;
     if ((at < 0) && (((int64_t)s->to_emove.ref_command_echo > INT64_C(2)))) {
-        at = 5;
-    }
-    if ((at < 0) && (((int64_t)s->to_emove.status_report > INT64_C(2)))) {
-        at = 6;
-    }
-    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(15)))) {
-        at = 7;
-    }
-    if ((at < 0) && (!((s->to_emove.x_mm >= (-500.0)) && (s->to_emove.x_mm <= 500.0)))) {
         at = 8;
     }
-    if ((at < 0) && (!((s->to_emove.y_mm >= (-500.0)) && (s->to_emove.y_mm <= 500.0)))) {
+    if ((at < 0) && (((int64_t)s->to_emove.status_report > INT64_C(2)))) {
         at = 9;
     }
-    if ((at < 0) && (!((s->to_emove.c >= (-1.0)) && (s->to_emove.c <= 1.0)))) {
+    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(16)))) {
         at = 10;
     }
-    if ((at < 0) && (!((s->to_emove.s >= (-1.0)) && (s->to_emove.s <= 1.0)))) {
+    if ((at < 0) && (!((s->to_emove.x_mm >= (-500.0)) && (s->to_emove.x_mm <= 500.0)))) {
         at = 11;
     }
-    if ((at < 0) && (!((s->to_emove.range_mm >= 0.0) && (s->to_emove.range_mm <= 2000.0)))) {
+    if ((at < 0) && (!((s->to_emove.y_mm >= (-500.0)) && (s->to_emove.y_mm <= 500.0)))) {
         at = 12;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+    if ((at < 0) && (!((s->to_emove.c >= (-1.0)) && (s->to_emove.c <= 1.0)))) {
         at = 13;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+    if ((at < 0) && (!((s->to_emove.s >= (-1.0)) && (s->to_emove.s <= 1.0)))) {
         at = 14;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+    if ((at < 0) && (!((s->to_emove.range_mm >= 0.0) && (s->to_emove.range_mm <= 2000.0)))) {
         at = 15;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->camera.matched) > 1u)) {
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+        at = 16;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+        at = 17;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
         at = 18;
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->camera.flat) > 1u)) {
-        at = 24;
+    if ((at < 0) && ((*(const uint8_t *)&s->camera.matched) > 1u)) {
+        at = 21;
     }
     if ((at < 0) && (((int64_t)s->cur_state > INT64_C(2)))) {
-        at = 25;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->arrived) > 1u)) {
-        at = 26;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
-        at = 27;
-    }
-    if ((at < 0) && (((int64_t)s->waited > INT64_C(100)))) {
-        at = 28;
-    }
-    if ((at < 0) && (((int64_t)s->to_camera.fire > INT64_C(2)))) {
         at = 30;
     }
-    if ((at < 0) && (((int64_t)s->to_camera.obj_ptr > INT64_C(7)))) {
+    if ((at < 0) && ((*(const uint8_t *)&s->arrived) > 1u)) {
         at = 31;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
+        at = 32;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->faces) > 1u)) {
+        at = 33;
+    }
+    if ((at < 0) && (((int64_t)s->waited > INT64_C(100)))) {
+        at = 34;
+    }
+    if ((at < 0) && (((int64_t)s->to_camera.fire > INT64_C(2)))) {
+        at = 36;
+    }
+    if ((at < 0) && (((int64_t)s->to_camera.obj_ptr > INT64_C(7)))) {
+        at = 37;
     }
     return at;
 }
@@ -556,17 +617,14 @@ int32_t vision_line_flash_line(const vision_t *s)
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
         uint16_t t0[2];
-        uint16_t t1[2];
-        uint16_t t2[3];
+        uint16_t t1[3];
+        uint16_t t2[2];
         uint16_t t3[2];
         uint16_t t4[2];
         uint16_t t5[101];
     } t = {
         {
             0xfeu, 0x1u
-        },
-        {
-            0xf7u, 0xdfu
         },
         {
             0x41u, 0x81u, 0x3fu
@@ -576,6 +634,9 @@ int32_t vision_line_flash_line(const vision_t *s)
         },
         {
             0xd7u, 0xefu
+        },
+        {
+            0xf7u, 0xdfu
         },
         {
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
@@ -589,7 +650,7 @@ int32_t vision_line_flash_line(const vision_t *s)
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfdu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[(s->camera.flat ? 1u : 0u)] & (uint32_t)t.t2[s->cur_state] & (uint32_t)t.t3[(s->arrived ? 1u : 0u)] & (uint32_t)t.t4[(s->fits ? 1u : 0u)] & (uint32_t)t.t5[s->waited];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] & (uint32_t)t.t2[(s->arrived ? 1u : 0u)] & (uint32_t)t.t3[(s->fits ? 1u : 0u)] & (uint32_t)t.t4[(s->faces ? 1u : 0u)] & (uint32_t)t.t5[s->waited];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = vision_bit32(m | 0x100u);
     line = (m == 0x0u) ? (-1) : line;

@@ -54,18 +54,19 @@ enum {
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
 typedef struct {
-    vocabulary_vision_order_t emove; /* 0 to 3: input; Orders of emove. */
-    vocabulary_vision_report_t to_emove; /* 4 to 12: output; Reports to emove. */
-    bool new_command; /* 13: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
-    bool answered; /* 14: state; A line has answered the new command. */
-    bool settling; /* 15: state; The line of this cycle lets the levels below rest first, and answers nothing. */
-    uint16_t inc_command_seen; /* 16: state; 0 .. 65535; Number of the order that was taken last. */
-    vision_picture_t camera; /* 17 to 24: input; From the image processing. */
-    vision_vision_state_t cur_state; /* 25: state */
-    bool arrived; /* 26: state; The picture that was asked for is there. */
-    bool fits; /* 27: state; Its range is the expected one. */
-    uint8_t waited; /* 28: state; 0 .. 100 */
-    vision_camera_order_t to_camera; /* 29 to 31: output; To the camera. */
+    vocabulary_vision_order_t emove; /* 0 to 6: input; Orders of emove. */
+    vocabulary_vision_report_t to_emove; /* 7 to 15: output; Reports to emove. */
+    bool new_command; /* 16: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool answered; /* 17: state; A line has answered the new command. */
+    bool settling; /* 18: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    uint16_t inc_command_seen; /* 19: state; 0 .. 65535; Number of the order that was taken last. */
+    vision_picture_t camera; /* 20 to 29: input; From the image processing. */
+    vision_vision_state_t cur_state; /* 30: state */
+    bool arrived; /* 31: state; The picture that was asked for is there. */
+    bool fits; /* 32: state; Its range is the expected one; its surface faces as expected. */
+    bool faces; /* 33: state */
+    uint8_t waited; /* 34: state; 0 .. 100 */
+    vision_camera_order_t to_camera; /* 35 to 37: output; To the camera. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */

@@ -31,7 +31,7 @@ typedef struct {
     double c; /* -1.0 .. 1.0 */
     double s; /* -1.0 .. 1.0 */
     double range_mm; /* 0.0 .. 2000.0 mm */
-    bool flat;
+    vocabulary_direction_t normal;
 } vision_picture_t;
 
 typedef struct {

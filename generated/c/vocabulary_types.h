@@ -100,7 +100,8 @@ enum {
     VOCABULARY_REASON_WRONG_SIZE = 12,
     VOCABULARY_REASON_NO_MATCH = 13,
     VOCABULARY_REASON_WRONG_RANGE = 14,
-    VOCABULARY_REASON_RESTART = 15
+    VOCABULARY_REASON_RESTART = 15,
+    VOCABULARY_REASON_WRONG_SURFACE = 16
 };
 
 typedef struct {
@@ -167,10 +168,17 @@ typedef struct {
 } vocabulary_primitive_report_t;
 
 typedef struct {
+    double x; /* -1.0 .. 1.0 */
+    double y; /* -1.0 .. 1.0 */
+    double z; /* -1.0 .. 1.0 */
+} vocabulary_direction_t;
+
+typedef struct {
     uint16_t inc_command; /* 0 .. 65535 */
     vocabulary_vision_command_t input_command;
     vocabulary_object_t obj_ptr;
     double expected_range_mm; /* 0.0 .. 2000.0 mm */
+    vocabulary_direction_t expected_normal;
 } vocabulary_vision_order_t;
 
 typedef struct {

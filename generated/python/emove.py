@@ -105,6 +105,7 @@ class reason(IntEnum):
     no_match = 13
     wrong_range = 14
     restart = 15
+    wrong_surface = 16
 
 
 class emove_state(IntEnum):
@@ -207,6 +208,9 @@ class State:
         "to_vision_input_command",
         "to_vision_obj_ptr",
         "to_vision_expected_range_mm",
+        "to_vision_expected_normal_x",
+        "to_vision_expected_normal_y",
+        "to_vision_expected_normal_z",
         "vision_command",
         "vision_status",
         "vision_resting",
@@ -226,10 +230,16 @@ class State:
         "object_data_expected_range_mm",
         "object_data_grip_range_mm",
         "object_data_lift_mm",
+        "object_data_normal_x",
+        "object_data_normal_y",
+        "object_data_normal_z",
         "held_data_known",
         "held_data_expected_range_mm",
         "held_data_grip_range_mm",
         "held_data_lift_mm",
+        "held_data_normal_x",
+        "held_data_normal_y",
+        "held_data_normal_z",
         "idle",
         "cur_state",
         "cur_state_next",
@@ -316,6 +326,9 @@ class State:
         self.to_vision_input_command = 0  # Orders to vision.
         self.to_vision_obj_ptr = 0  # Orders to vision.
         self.to_vision_expected_range_mm = 0.0  # Orders to vision.
+        self.to_vision_expected_normal_x = -1.0  # Orders to vision.
+        self.to_vision_expected_normal_y = -1.0  # Orders to vision.
+        self.to_vision_expected_normal_z = -1.0  # Orders to vision.
         self.vision_command = 0  # What vision says of the last orders, held until they are echoed.
         self.vision_status = 0  # What vision says of the last orders, held until they are echoed.
         self.vision_resting = False  # What vision says of the last orders, held until they are echoed.
@@ -335,10 +348,16 @@ class State:
         self.object_data_expected_range_mm = 0.0  # From the database: the part of the task.
         self.object_data_grip_range_mm = 0.0  # From the database: the part of the task.
         self.object_data_lift_mm = -500.0  # From the database: the part of the task.
+        self.object_data_normal_x = -1.0  # From the database: the part of the task.
+        self.object_data_normal_y = -1.0  # From the database: the part of the task.
+        self.object_data_normal_z = -1.0  # From the database: the part of the task.
         self.held_data_known = False  # From the database: the part in the gripper.
         self.held_data_expected_range_mm = 0.0  # From the database: the part in the gripper.
         self.held_data_grip_range_mm = 0.0  # From the database: the part in the gripper.
         self.held_data_lift_mm = -500.0  # From the database: the part in the gripper.
+        self.held_data_normal_x = -1.0  # From the database: the part in the gripper.
+        self.held_data_normal_y = -1.0  # From the database: the part in the gripper.
+        self.held_data_normal_z = -1.0  # From the database: the part in the gripper.
         self.idle = True  # Both levels below rest, and what they say answers this level's last orders.
         self.cur_state = 0  # Where the table is in its sequence; both echoes must match before it moves on (section 9).
         self.cur_state_next = 0  # Where the table is in its sequence; both echoes must match before it moves on (section 9).
@@ -947,6 +966,9 @@ def _do_flood_flash(s):
 def _do_line_flash(s):
     """Procedure line_flash."""
     _do_pause(s)
+    s.to_vision_expected_normal_x = s.object_data_normal_x + 0.0
+    s.to_vision_expected_normal_y = s.object_data_normal_y + 0.0
+    s.to_vision_expected_normal_z = s.object_data_normal_z + 0.0
     s.to_vision_input_command = 2
 
 
@@ -1119,7 +1141,7 @@ def check(s):
         return 9
     if not (isinstance(s.to_task_status_report, int) and 0 <= s.to_task_status_report <= 2):
         return 10
-    if not (isinstance(s.to_task_failure, int) and 0 <= s.to_task_failure <= 15):
+    if not (isinstance(s.to_task_failure, int) and 0 <= s.to_task_failure <= 16):
         return 11
     if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
         return 12
@@ -1157,7 +1179,7 @@ def check(s):
         return 32
     if not (isinstance(s.primitive_resting, int) and 0 <= s.primitive_resting <= 1):
         return 33
-    if not (isinstance(s.primitive_failure, int) and 0 <= s.primitive_failure <= 15):
+    if not (isinstance(s.primitive_failure, int) and 0 <= s.primitive_failure <= 16):
         return 34
     if not (isinstance(s.last_primitive_input_command, int) and 0 <= s.last_primitive_input_command <= 5):
         return 35
@@ -1185,70 +1207,76 @@ def check(s):
         return 55
     if not (isinstance(s.to_vision_expected_range_mm, (int, float)) and 0.0 <= s.to_vision_expected_range_mm <= 2000.0):
         return 56
-    if not (isinstance(s.vision_command, int) and 0 <= s.vision_command <= 2):
+    if not (isinstance(s.to_vision_expected_normal_x, (int, float)) and -1.0 <= s.to_vision_expected_normal_x <= 1.0):
         return 57
-    if not (isinstance(s.vision_status, int) and 0 <= s.vision_status <= 2):
+    if not (isinstance(s.to_vision_expected_normal_y, (int, float)) and -1.0 <= s.to_vision_expected_normal_y <= 1.0):
         return 58
-    if not (isinstance(s.vision_resting, int) and 0 <= s.vision_resting <= 1):
+    if not (isinstance(s.to_vision_expected_normal_z, (int, float)) and -1.0 <= s.to_vision_expected_normal_z <= 1.0):
         return 59
-    if not (isinstance(s.vision_failure, int) and 0 <= s.vision_failure <= 15):
+    if not (isinstance(s.vision_command, int) and 0 <= s.vision_command <= 2):
         return 60
-    if not (isinstance(s.last_vision_input_command, int) and 0 <= s.last_vision_input_command <= 2):
+    if not (isinstance(s.vision_status, int) and 0 <= s.vision_status <= 2):
         return 61
-    if not (isinstance(s.last_vision_obj_ptr, int) and 0 <= s.last_vision_obj_ptr <= 7):
+    if not (isinstance(s.vision_resting, int) and 0 <= s.vision_resting <= 1):
         return 62
-    if not (isinstance(s.path_known, int) and 0 <= s.path_known <= 1):
+    if not (isinstance(s.vision_failure, int) and 0 <= s.vision_failure <= 16):
         return 63
+    if not (isinstance(s.last_vision_input_command, int) and 0 <= s.last_vision_input_command <= 2):
+        return 64
+    if not (isinstance(s.last_vision_obj_ptr, int) and 0 <= s.last_vision_obj_ptr <= 7):
+        return 65
+    if not (isinstance(s.path_known, int) and 0 <= s.path_known <= 1):
+        return 66
     if not (isinstance(s.target_known, int) and 0 <= s.target_known <= 1):
-        return 68
+        return 71
     if not (isinstance(s.object_data_known, int) and 0 <= s.object_data_known <= 1):
-        return 72
+        return 75
     if not (isinstance(s.held_data_known, int) and 0 <= s.held_data_known <= 1):
-        return 76
-    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
-        return 80
-    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 13):
-        return 81
-    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 13):
         return 82
-    if not (isinstance(s.path_at, int) and 0 <= s.path_at <= 62):
-        return 83
-    if not (isinstance(s.path_at_next, int) and 0 <= s.path_at_next <= 62):
-        return 84
-    if not (isinstance(s.here, int) and 0 <= s.here <= 255):
-        return 85
-    if not (isinstance(s.here_next, int) and 0 <= s.here_next <= 255):
-        return 86
-    if not (isinstance(s.here_sector, int) and 0 <= s.here_sector <= 99):
-        return 87
-    if not (isinstance(s.here_asked, int) and 0 <= s.here_asked <= 255):
-        return 88
-    if not (isinstance(s.here_sector_asked, int) and 0 <= s.here_sector_asked <= 99):
+    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
         return 89
-    if not (isinstance(s.depart_first, int) and 0 <= s.depart_first <= 9999):
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 13):
         return 90
-    if not (isinstance(s.depart_count, int) and 0 <= s.depart_count <= 31):
+    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 13):
         return 91
-    if not (isinstance(s.approach_first, int) and 0 <= s.approach_first <= 9999):
+    if not (isinstance(s.path_at, int) and 0 <= s.path_at <= 62):
         return 92
-    if not (isinstance(s.path_length, int) and 0 <= s.path_length <= 62):
+    if not (isinstance(s.path_at_next, int) and 0 <= s.path_at_next <= 62):
         return 93
-    if not (isinstance(s.displaced_here_x, (int, float)) and -500.0 <= s.displaced_here_x <= 500.0):
+    if not (isinstance(s.here, int) and 0 <= s.here <= 255):
         return 94
-    if not (isinstance(s.displaced_here_y, (int, float)) and -500.0 <= s.displaced_here_y <= 500.0):
+    if not (isinstance(s.here_next, int) and 0 <= s.here_next <= 255):
         return 95
-    if not (isinstance(s.displaced_here_z, (int, float)) and -500.0 <= s.displaced_here_z <= 500.0):
+    if not (isinstance(s.here_sector, int) and 0 <= s.here_sector <= 99):
         return 96
-    if not (isinstance(s.displaced_here_c, (int, float)) and -1.0 <= s.displaced_here_c <= 1.0):
+    if not (isinstance(s.here_asked, int) and 0 <= s.here_asked <= 255):
         return 97
-    if not (isinstance(s.displaced_here_s, (int, float)) and -1.0 <= s.displaced_here_s <= 1.0):
+    if not (isinstance(s.here_sector_asked, int) and 0 <= s.here_sector_asked <= 99):
         return 98
-    if not (isinstance(s.lift_mm, (int, float)) and -500.0 <= s.lift_mm <= 500.0):
+    if not (isinstance(s.depart_first, int) and 0 <= s.depart_first <= 9999):
         return 99
-    if not (isinstance(s.lost, int) and 0 <= s.lost <= 1):
+    if not (isinstance(s.depart_count, int) and 0 <= s.depart_count <= 31):
         return 100
-    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+    if not (isinstance(s.approach_first, int) and 0 <= s.approach_first <= 9999):
         return 101
+    if not (isinstance(s.path_length, int) and 0 <= s.path_length <= 62):
+        return 102
+    if not (isinstance(s.displaced_here_x, (int, float)) and -500.0 <= s.displaced_here_x <= 500.0):
+        return 103
+    if not (isinstance(s.displaced_here_y, (int, float)) and -500.0 <= s.displaced_here_y <= 500.0):
+        return 104
+    if not (isinstance(s.displaced_here_z, (int, float)) and -500.0 <= s.displaced_here_z <= 500.0):
+        return 105
+    if not (isinstance(s.displaced_here_c, (int, float)) and -1.0 <= s.displaced_here_c <= 1.0):
+        return 106
+    if not (isinstance(s.displaced_here_s, (int, float)) and -1.0 <= s.displaced_here_s <= 1.0):
+        return 107
+    if not (isinstance(s.lift_mm, (int, float)) and -500.0 <= s.lift_mm <= 500.0):
+        return 108
+    if not (isinstance(s.lost, int) and 0 <= s.lost <= 1):
+        return 109
+    if not (isinstance(s.echoed, int) and 0 <= s.echoed <= 1):
+        return 110
     return -1
 
 
@@ -1291,7 +1319,7 @@ def _admit(s):
     if not 0 <= i10 <= 2:
         return _refused(s, 18)
     i11 = _whole(s.from_primitive_failure)
-    if not 0 <= i11 <= 15:
+    if not 0 <= i11 <= 16:
         return _refused(s, 19)
     i12 = _whole(s.from_primitive_holds)
     if not 0 <= i12 <= 1:
@@ -1306,7 +1334,7 @@ def _admit(s):
     if not 0 <= i15 <= 2:
         return _refused(s, 46)
     i16 = _whole(s.from_vision_failure)
-    if not 0 <= i16 <= 15:
+    if not 0 <= i16 <= 16:
         return _refused(s, 47)
     i17 = _real(s.from_vision_x_mm)
     if not -500.0 <= i17 <= 500.0:
@@ -1330,61 +1358,85 @@ def _admit(s):
     i21 = i21 + 0.0
     i22 = _whole(s.path_known)
     if not 0 <= i22 <= 1:
-        return _refused(s, 63)
+        return _refused(s, 66)
     i23 = _whole(s.path_depart_first)
     if not 0 <= i23 <= 9999:
-        return _refused(s, 64)
+        return _refused(s, 67)
     i24 = _whole(s.path_depart_count)
     if not 0 <= i24 <= 31:
-        return _refused(s, 65)
+        return _refused(s, 68)
     i25 = _whole(s.path_approach_first)
     if not 0 <= i25 <= 9999:
-        return _refused(s, 66)
+        return _refused(s, 69)
     i26 = _whole(s.path_approach_count)
     if not 0 <= i26 <= 31:
-        return _refused(s, 67)
+        return _refused(s, 70)
     i27 = _whole(s.target_known)
     if not 0 <= i27 <= 1:
-        return _refused(s, 68)
+        return _refused(s, 71)
     i28 = _whole(s.target_hover_point)
     if not 0 <= i28 <= 9999:
-        return _refused(s, 69)
+        return _refused(s, 72)
     i29 = _whole(s.target_grasp_point)
     if not 0 <= i29 <= 9999:
-        return _refused(s, 70)
+        return _refused(s, 73)
     i30 = _whole(s.target_view_point)
     if not 0 <= i30 <= 9999:
-        return _refused(s, 71)
+        return _refused(s, 74)
     i31 = _whole(s.object_data_known)
     if not 0 <= i31 <= 1:
-        return _refused(s, 72)
+        return _refused(s, 75)
     i32 = _real(s.object_data_expected_range_mm)
     if not 0.0 <= i32 <= 2000.0:
-        return _refused(s, 73)
+        return _refused(s, 76)
     i32 = i32 + 0.0
     i33 = _real(s.object_data_grip_range_mm)
     if not 0.0 <= i33 <= 2000.0:
-        return _refused(s, 74)
+        return _refused(s, 77)
     i33 = i33 + 0.0
     i34 = _real(s.object_data_lift_mm)
     if not -500.0 <= i34 <= 500.0:
-        return _refused(s, 75)
-    i34 = i34 + 0.0
-    i35 = _whole(s.held_data_known)
-    if not 0 <= i35 <= 1:
-        return _refused(s, 76)
-    i36 = _real(s.held_data_expected_range_mm)
-    if not 0.0 <= i36 <= 2000.0:
-        return _refused(s, 77)
-    i36 = i36 + 0.0
-    i37 = _real(s.held_data_grip_range_mm)
-    if not 0.0 <= i37 <= 2000.0:
         return _refused(s, 78)
-    i37 = i37 + 0.0
-    i38 = _real(s.held_data_lift_mm)
-    if not -500.0 <= i38 <= 500.0:
+    i34 = i34 + 0.0
+    i35 = _real(s.object_data_normal_x)
+    if not -1.0 <= i35 <= 1.0:
         return _refused(s, 79)
-    i38 = i38 + 0.0
+    i35 = i35 + 0.0
+    i36 = _real(s.object_data_normal_y)
+    if not -1.0 <= i36 <= 1.0:
+        return _refused(s, 80)
+    i36 = i36 + 0.0
+    i37 = _real(s.object_data_normal_z)
+    if not -1.0 <= i37 <= 1.0:
+        return _refused(s, 81)
+    i37 = i37 + 0.0
+    i38 = _whole(s.held_data_known)
+    if not 0 <= i38 <= 1:
+        return _refused(s, 82)
+    i39 = _real(s.held_data_expected_range_mm)
+    if not 0.0 <= i39 <= 2000.0:
+        return _refused(s, 83)
+    i39 = i39 + 0.0
+    i40 = _real(s.held_data_grip_range_mm)
+    if not 0.0 <= i40 <= 2000.0:
+        return _refused(s, 84)
+    i40 = i40 + 0.0
+    i41 = _real(s.held_data_lift_mm)
+    if not -500.0 <= i41 <= 500.0:
+        return _refused(s, 85)
+    i41 = i41 + 0.0
+    i42 = _real(s.held_data_normal_x)
+    if not -1.0 <= i42 <= 1.0:
+        return _refused(s, 86)
+    i42 = i42 + 0.0
+    i43 = _real(s.held_data_normal_y)
+    if not -1.0 <= i43 <= 1.0:
+        return _refused(s, 87)
+    i43 = i43 + 0.0
+    i44 = _real(s.held_data_normal_z)
+    if not -1.0 <= i44 <= 1.0:
+        return _refused(s, 88)
+    i44 = i44 + 0.0
     s.task_inc_command = i0
     s.task_input_command = i1
     s.task_obj_ptr = i2
@@ -1420,10 +1472,16 @@ def _admit(s):
     s.object_data_expected_range_mm = i32
     s.object_data_grip_range_mm = i33
     s.object_data_lift_mm = i34
-    s.held_data_known = i35
-    s.held_data_expected_range_mm = i36
-    s.held_data_grip_range_mm = i37
-    s.held_data_lift_mm = i38
+    s.object_data_normal_x = i35
+    s.object_data_normal_y = i36
+    s.object_data_normal_z = i37
+    s.held_data_known = i38
+    s.held_data_expected_range_mm = i39
+    s.held_data_grip_range_mm = i40
+    s.held_data_lift_mm = i41
+    s.held_data_normal_x = i42
+    s.held_data_normal_y = i43
+    s.held_data_normal_z = i44
     return 0
 
 

@@ -105,6 +105,7 @@ class reason(IntEnum):
     no_match = 13
     wrong_range = 14
     restart = 15
+    wrong_surface = 16
 
 
 class gripper_state(IntEnum):
@@ -700,7 +701,7 @@ def check(s):
         return 6
     if not (isinstance(s.to_primitive_status_report, int) and 0 <= s.to_primitive_status_report <= 2):
         return 7
-    if not (isinstance(s.to_primitive_failure, int) and 0 <= s.to_primitive_failure <= 15):
+    if not (isinstance(s.to_primitive_failure, int) and 0 <= s.to_primitive_failure <= 16):
         return 8
     if not (isinstance(s.to_primitive_opening_mm, (int, float)) and 0.0 <= s.to_primitive_opening_mm <= 200.0):
         return 9

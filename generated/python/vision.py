@@ -105,6 +105,7 @@ class reason(IntEnum):
     no_match = 13
     wrong_range = 14
     restart = 15
+    wrong_surface = 16
 
 
 class vision_state(IntEnum):
@@ -144,6 +145,9 @@ class State:
         "emove_input_command",
         "emove_obj_ptr",
         "emove_expected_range_mm",
+        "emove_expected_normal_x",
+        "emove_expected_normal_y",
+        "emove_expected_normal_z",
         "to_emove_inc_command_echo",
         "to_emove_ref_command_echo",
         "to_emove_status_report",
@@ -164,10 +168,13 @@ class State:
         "camera_c",
         "camera_s",
         "camera_range_mm",
-        "camera_flat",
+        "camera_normal_x",
+        "camera_normal_y",
+        "camera_normal_z",
         "cur_state",
         "arrived",
         "fits",
+        "faces",
         "waited",
         "to_camera_number",
         "to_camera_fire",
@@ -183,6 +190,9 @@ class State:
         self.emove_input_command = 0  # Orders of emove.
         self.emove_obj_ptr = 0  # Orders of emove.
         self.emove_expected_range_mm = 0.0  # Orders of emove.
+        self.emove_expected_normal_x = -1.0  # Orders of emove.
+        self.emove_expected_normal_y = -1.0  # Orders of emove.
+        self.emove_expected_normal_z = -1.0  # Orders of emove.
         self.to_emove_inc_command_echo = 0  # Reports to emove.
         self.to_emove_ref_command_echo = 0  # Reports to emove.
         self.to_emove_status_report = 0  # Reports to emove.
@@ -203,10 +213,13 @@ class State:
         self.camera_c = -1.0  # From the image processing.
         self.camera_s = -1.0  # From the image processing.
         self.camera_range_mm = 0.0  # From the image processing.
-        self.camera_flat = False  # From the image processing.
+        self.camera_normal_x = -1.0  # From the image processing.
+        self.camera_normal_y = -1.0  # From the image processing.
+        self.camera_normal_z = -1.0  # From the image processing.
         self.cur_state = 0
         self.arrived = False  # The picture that was asked for is there.
-        self.fits = False  # Its range is the expected one.
+        self.fits = False  # Its range is the expected one; its surface faces as expected.
+        self.faces = False
         self.waited = 0
         self.to_camera_number = 0  # To the camera.
         self.to_camera_fire = 0  # To the camera.
@@ -411,21 +424,21 @@ _LINE_FLASH_0 = (
     0x1,
 )
 _LINE_FLASH_1 = (
-    0xf7,
-    0xdf,
-)
-_LINE_FLASH_2 = (
     0x41,
     0x81,
     0x3f,
 )
-_LINE_FLASH_3 = (
+_LINE_FLASH_2 = (
     0xc7,
     0xf9,
 )
-_LINE_FLASH_4 = (
+_LINE_FLASH_3 = (
     0xd7,
     0xef,
+)
+_LINE_FLASH_4 = (
+    0xf7,
+    0xdf,
 )
 _LINE_FLASH_5 = (
     0xfb,
@@ -531,7 +544,7 @@ _LINE_FLASH_5 = (
     0xfd,
 )
 _LINE_FLASH_LINE = (
-    *_lines_of(_joined(_LINE_FLASH_5, _LINE_FLASH_2, _LINE_FLASH_0, _LINE_FLASH_1, _LINE_FLASH_3, _LINE_FLASH_4), 8, False),
+    *_lines_of(_joined(_LINE_FLASH_5, _LINE_FLASH_1, _LINE_FLASH_0, _LINE_FLASH_2, _LINE_FLASH_3, _LINE_FLASH_4), 8, False),
 )
 _PAUSE_VISION_ONE = (
     _one_of(1, False),
@@ -544,6 +557,7 @@ def _do_measure(s):
         s.waited = 0
     s.arrived = (s.camera_number == s.to_camera_number)
     s.fits = (abs((s.camera_range_mm - s.emove_expected_range_mm)) <= 4.0)
+    s.faces = ((((s.camera_normal_x * s.emove_expected_normal_x) + (s.camera_normal_y * s.emove_expected_normal_y)) + (s.camera_normal_z * s.emove_expected_normal_z)) >= 0.9848)
 
 
 def _do_shoot(s, v_which):
@@ -577,9 +591,14 @@ def _do_no_match(s):
     s.to_emove_failure = 13
 
 
-def _do_line_flash_failure(s):
-    """Procedure line_flash_failure."""
+def _do_range_failure(s):
+    """Procedure range_failure."""
     s.to_emove_failure = 14
+
+
+def _do_surface_failure(s):
+    """Procedure surface_failure."""
+    s.to_emove_failure = 16
 
 
 def _do_state(s, v_value):
@@ -633,49 +652,49 @@ def _do_failed(s):
 def check(s):
     """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
     if not (isinstance(s.to_emove_inc_command_echo, int) and 0 <= s.to_emove_inc_command_echo <= 65535):
-        return 4
-    if not (isinstance(s.to_emove_ref_command_echo, int) and 0 <= s.to_emove_ref_command_echo <= 2):
-        return 5
-    if not (isinstance(s.to_emove_status_report, int) and 0 <= s.to_emove_status_report <= 2):
-        return 6
-    if not (isinstance(s.to_emove_failure, int) and 0 <= s.to_emove_failure <= 15):
         return 7
-    if not (isinstance(s.to_emove_x_mm, (int, float)) and -500.0 <= s.to_emove_x_mm <= 500.0):
+    if not (isinstance(s.to_emove_ref_command_echo, int) and 0 <= s.to_emove_ref_command_echo <= 2):
         return 8
-    if not (isinstance(s.to_emove_y_mm, (int, float)) and -500.0 <= s.to_emove_y_mm <= 500.0):
+    if not (isinstance(s.to_emove_status_report, int) and 0 <= s.to_emove_status_report <= 2):
         return 9
-    if not (isinstance(s.to_emove_c, (int, float)) and -1.0 <= s.to_emove_c <= 1.0):
+    if not (isinstance(s.to_emove_failure, int) and 0 <= s.to_emove_failure <= 16):
         return 10
-    if not (isinstance(s.to_emove_s, (int, float)) and -1.0 <= s.to_emove_s <= 1.0):
+    if not (isinstance(s.to_emove_x_mm, (int, float)) and -500.0 <= s.to_emove_x_mm <= 500.0):
         return 11
-    if not (isinstance(s.to_emove_range_mm, (int, float)) and 0.0 <= s.to_emove_range_mm <= 2000.0):
+    if not (isinstance(s.to_emove_y_mm, (int, float)) and -500.0 <= s.to_emove_y_mm <= 500.0):
         return 12
-    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
+    if not (isinstance(s.to_emove_c, (int, float)) and -1.0 <= s.to_emove_c <= 1.0):
         return 13
-    if not (isinstance(s.answered, int) and 0 <= s.answered <= 1):
+    if not (isinstance(s.to_emove_s, (int, float)) and -1.0 <= s.to_emove_s <= 1.0):
         return 14
-    if not (isinstance(s.settling, int) and 0 <= s.settling <= 1):
+    if not (isinstance(s.to_emove_range_mm, (int, float)) and 0.0 <= s.to_emove_range_mm <= 2000.0):
         return 15
-    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
         return 16
-    if not (isinstance(s.camera_matched, int) and 0 <= s.camera_matched <= 1):
+    if not (isinstance(s.answered, int) and 0 <= s.answered <= 1):
+        return 17
+    if not (isinstance(s.settling, int) and 0 <= s.settling <= 1):
         return 18
-    if not (isinstance(s.camera_flat, int) and 0 <= s.camera_flat <= 1):
-        return 24
+    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+        return 19
+    if not (isinstance(s.camera_matched, int) and 0 <= s.camera_matched <= 1):
+        return 21
     if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 2):
-        return 25
-    if not (isinstance(s.arrived, int) and 0 <= s.arrived <= 1):
-        return 26
-    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
-        return 27
-    if not (isinstance(s.waited, int) and 0 <= s.waited <= 100):
-        return 28
-    if not (isinstance(s.to_camera_number, int) and 0 <= s.to_camera_number <= 65535):
-        return 29
-    if not (isinstance(s.to_camera_fire, int) and 0 <= s.to_camera_fire <= 2):
         return 30
-    if not (isinstance(s.to_camera_obj_ptr, int) and 0 <= s.to_camera_obj_ptr <= 7):
+    if not (isinstance(s.arrived, int) and 0 <= s.arrived <= 1):
         return 31
+    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
+        return 32
+    if not (isinstance(s.faces, int) and 0 <= s.faces <= 1):
+        return 33
+    if not (isinstance(s.waited, int) and 0 <= s.waited <= 100):
+        return 34
+    if not (isinstance(s.to_camera_number, int) and 0 <= s.to_camera_number <= 65535):
+        return 35
+    if not (isinstance(s.to_camera_fire, int) and 0 <= s.to_camera_fire <= 2):
+        return 36
+    if not (isinstance(s.to_camera_obj_ptr, int) and 0 <= s.to_camera_obj_ptr <= 7):
+        return 37
     return -1
 
 
@@ -697,47 +716,73 @@ def _admit(s):
     if not 0.0 <= i3 <= 2000.0:
         return _refused(s, 3)
     i3 = i3 + 0.0
-    i4 = _whole(s.camera_number)
-    if not 0 <= i4 <= 65535:
-        return _refused(s, 17)
-    i5 = _whole(s.camera_matched)
-    if not 0 <= i5 <= 1:
-        return _refused(s, 18)
-    i6 = _real(s.camera_x_mm)
-    if not -500.0 <= i6 <= 500.0:
-        return _refused(s, 19)
+    i4 = _real(s.emove_expected_normal_x)
+    if not -1.0 <= i4 <= 1.0:
+        return _refused(s, 4)
+    i4 = i4 + 0.0
+    i5 = _real(s.emove_expected_normal_y)
+    if not -1.0 <= i5 <= 1.0:
+        return _refused(s, 5)
+    i5 = i5 + 0.0
+    i6 = _real(s.emove_expected_normal_z)
+    if not -1.0 <= i6 <= 1.0:
+        return _refused(s, 6)
     i6 = i6 + 0.0
-    i7 = _real(s.camera_y_mm)
-    if not -500.0 <= i7 <= 500.0:
+    i7 = _whole(s.camera_number)
+    if not 0 <= i7 <= 65535:
         return _refused(s, 20)
-    i7 = i7 + 0.0
-    i8 = _real(s.camera_c)
-    if not -1.0 <= i8 <= 1.0:
+    i8 = _whole(s.camera_matched)
+    if not 0 <= i8 <= 1:
         return _refused(s, 21)
-    i8 = i8 + 0.0
-    i9 = _real(s.camera_s)
-    if not -1.0 <= i9 <= 1.0:
+    i9 = _real(s.camera_x_mm)
+    if not -500.0 <= i9 <= 500.0:
         return _refused(s, 22)
     i9 = i9 + 0.0
-    i10 = _real(s.camera_range_mm)
-    if not 0.0 <= i10 <= 2000.0:
+    i10 = _real(s.camera_y_mm)
+    if not -500.0 <= i10 <= 500.0:
         return _refused(s, 23)
     i10 = i10 + 0.0
-    i11 = _whole(s.camera_flat)
-    if not 0 <= i11 <= 1:
+    i11 = _real(s.camera_c)
+    if not -1.0 <= i11 <= 1.0:
         return _refused(s, 24)
+    i11 = i11 + 0.0
+    i12 = _real(s.camera_s)
+    if not -1.0 <= i12 <= 1.0:
+        return _refused(s, 25)
+    i12 = i12 + 0.0
+    i13 = _real(s.camera_range_mm)
+    if not 0.0 <= i13 <= 2000.0:
+        return _refused(s, 26)
+    i13 = i13 + 0.0
+    i14 = _real(s.camera_normal_x)
+    if not -1.0 <= i14 <= 1.0:
+        return _refused(s, 27)
+    i14 = i14 + 0.0
+    i15 = _real(s.camera_normal_y)
+    if not -1.0 <= i15 <= 1.0:
+        return _refused(s, 28)
+    i15 = i15 + 0.0
+    i16 = _real(s.camera_normal_z)
+    if not -1.0 <= i16 <= 1.0:
+        return _refused(s, 29)
+    i16 = i16 + 0.0
     s.emove_inc_command = i0
     s.emove_input_command = i1
     s.emove_obj_ptr = i2
     s.emove_expected_range_mm = i3
-    s.camera_number = i4
-    s.camera_matched = i5
-    s.camera_x_mm = i6
-    s.camera_y_mm = i7
-    s.camera_c = i8
-    s.camera_s = i9
-    s.camera_range_mm = i10
-    s.camera_flat = i11
+    s.emove_expected_normal_x = i4
+    s.emove_expected_normal_y = i5
+    s.emove_expected_normal_z = i6
+    s.camera_number = i7
+    s.camera_matched = i8
+    s.camera_x_mm = i9
+    s.camera_y_mm = i10
+    s.camera_c = i11
+    s.camera_s = i12
+    s.camera_range_mm = i13
+    s.camera_normal_x = i14
+    s.camera_normal_y = i15
+    s.camera_normal_z = i16
     return 0
 
 
@@ -829,7 +874,7 @@ def flood_flash_step(s):
 
 def line_flash_line(s):
     """The line of table line_flash that matches admitted inputs: its position; -1 none, -2 several."""
-    return _LINE_FLASH_LINE[s.waited * 48 + s.cur_state * 16 + s.new_command * 8 + s.camera_flat * 4 + s.arrived * 2 + s.fits]
+    return _LINE_FLASH_LINE[s.waited * 48 + s.cur_state * 16 + s.new_command * 8 + s.arrived * 4 + s.fits * 2 + s.faces]
 
 
 def line_flash_lines(states):
@@ -862,7 +907,7 @@ def _line_flash_1(s):
 
 def _line_flash_2(s):
     """vision/vision.rcs line 3"""
-    _do_line_flash_failure(s)
+    _do_range_failure(s)
     _do_state(s, 1)
     _do_rest(s)
     _do_failed(s)
@@ -878,7 +923,7 @@ def _line_flash_3(s):
 
 def _line_flash_4(s):
     """vision/vision.rcs line 5a"""
-    _do_line_flash_failure(s)
+    _do_range_failure(s)
     _do_state(s, 1)
     _do_rest(s)
     _do_failed(s)
@@ -886,7 +931,7 @@ def _line_flash_4(s):
 
 def _line_flash_5(s):
     """vision/vision.rcs line 5b"""
-    _do_line_flash_failure(s)
+    _do_surface_failure(s)
     _do_state(s, 1)
     _do_rest(s)
     _do_failed(s)

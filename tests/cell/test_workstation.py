@@ -57,6 +57,11 @@ WRONG_DATA = {
     "too many in stock": ("stock = 10", "stock = 200", "from 0 to 99, not `200`"),
     "vision without a view": ('vupos = "BUFFER-VUPOS"\n', "", "`vupos`"),
     "a missing value": ("breakpoint_mm = 30.0\n", "", "breakpoint_mm"),
+    "a normal that is no direction": (
+        "[object.tbox]\n",
+        "[object.tbox]\nnormal = [0.0, 1.0, 1.0]\n",
+        "object `tbox`, normal: is 1.4142 long, not 1",
+    ),
     "a path to nowhere": ('to = "STATION"', 'to = "STATON"', "no location is called `STATON`"),
     "a path that says nothing": (
         'to = "STATION"\napproach = [200.0]\n',

@@ -270,7 +270,7 @@ PLATE = {f"to_robot.plate[{i}]" for i in range(9)}
 NOT_NUMBERED = {
     # said beside an order, not compared with the last one: nobody may rely on them
     "task": {"to_emove.apoint_pos_flag", "to_emove.gripped_obj_ptr"},
-    "emove": {"to_vision.expected_range_mm"},
+    "emove": {"to_vision.expected_range_mm", *(f"to_vision.expected_normal.{axis}" for axis in "xyz")},
     "primitive": PLATE,  # poses follow one another under the number of FOLLOW
 }
 

@@ -64,7 +64,7 @@ def queries() -> dict[str, Query]:
         return (True, 5, 6, 7)
 
     def part(_: int) -> Values:
-        return (True, 40.0, 30.0, 0.0)
+        return (True, 40.0, 30.0, 0.0, 0.0, 0.0, 1.0)
 
     def point(number: int) -> Values:
         return (True, *(float(number + at) for at in range(9)), 100.0, 1000.0, 1000.0, 5.0)

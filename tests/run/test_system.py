@@ -226,6 +226,7 @@ def test_an_empty_buffer_fails_and_stays_failed() -> None:
         ("robot_stuck", "move", {"dest": "FIX-SAFE"}, ("move", "robot")),
         ("hand_stuck", "acquire", {"obj": "tbox", "grasp": 2, "source": "FIX-MAC5"}, ("move", "grip")),
         ("blind", "acquire", {"obj": "tbox", "grasp": 2, "source": "BUFFER"}, ("loc", "no_match")),
+        ("tilted", "acquire", {"obj": "tbox", "grasp": 2, "source": "BUFFER"}, ("loc", "wrong_surface")),
     ],
 )
 def test_a_fault_below_is_reported_upward(
@@ -262,6 +263,20 @@ def test_a_station_moves_in_the_data_and_nothing_is_compiled_again(tmp_path: Pat
     made = run.system.outside[1]
     assert isinstance(made, Plant)
     assert made.plate[:3] == pytest.approx((530.0, 40.0, 715.0))
+
+
+@pytest.mark.parametrize(("leans", "reason"), [(False, "loc: wrong_surface"), (True, "")])
+def test_vision_is_told_the_surface_normal_to_expect(leans: bool, reason: str, tmp_path: Path) -> None:
+    """Section 5.2: LINE-FLASH fails where the measured orientation is not the expected one."""
+    data = DATA.replace(
+        "[object.tbox]\n", "[object.tbox]\nnormal = [0.342, 0.0, 0.9397]\n", 1
+    )  # 20 degrees to the right
+    run = with_data(data, tmp_path, "ACQUIRE,BOXT (2),BUFFER,,")
+    [_, made] = run.system.outside
+    assert isinstance(made, Plant)
+    made.faults.tilted = leans
+    [result] = run.steps()
+    assert result.reason == reason
 
 
 def test_the_way_to_a_place_depends_on_where_the_robot_comes_from(tmp_path: Path) -> None:

@@ -32,13 +32,14 @@ PICTURE_TICKS = 3
 """From the flash to what the image processing says."""
 DARK, FLOOD, LINE = 0, 1, 2
 WIDE_MM = 120.0
-FLAT_COS = cos(10.0 * pi / 180.0)
-"""A surface that leans by more does not lie flat."""
+TILT_RAD = 20.0 * pi / 180.0
+"""By how much a surface that is tilted by a fault leans."""
 RANGE_MM, ASIDE_MM = 2000.0, 500.0
 """The declared ranges of what vision says, in tables/vocabulary.rcs."""
 WEAK_MM = 6.0
 """How far from what it closes on a weak jaw stops."""
-NO_PICTURE: tuple[Value, ...] = (False, 0.0, 0.0, 1.0, 0.0, 0.0, False)
+NO_NORMAL = (0.0, 0.0, 0.0)
+NO_PICTURE: tuple[Value, ...] = (False, 0.0, 0.0, 1.0, 0.0, 0.0, *NO_NORMAL)
 
 CONTROLLERS = ("robot", "vise", "machine", "_grip", "_asked", "_picture", "_developing")
 """What a plant remembers from one cycle to the next, beside its mechanism."""
@@ -251,18 +252,28 @@ class Plant:
             self._picture = self._developing
 
     def _shot(self, fire: int, wanted: int) -> tuple[Value, ...]:
-        """matched, x, y, cosine and sine of the turn, range, flat."""
+        """matched, x, y, cosine and sine of the turn, range, the surface's normal in camera axes."""
         expected_mm = float(self.database.part(wanted)[1])
         if self.faults.blind or fire == DARK or expected_mm <= 0.0:
             return NO_PICTURE
         if fire == FLOOD:
             part = self._find(wanted, expected_mm)
-            return NO_PICTURE if part is None else (True, *self._in_hand(part), False)
+            return NO_PICTURE if part is None else (True, *self._in_hand(part), *NO_NORMAL)
         surface = self.mechanism.lines(expected_mm)
         if surface is None:
             return NO_PICTURE
-        flat = surface.normal[2] >= FLAT_COS and not self.faults.tilted
-        return (True, 0.0, 0.0, 1.0, 0.0, min(RANGE_MM, surface.range_mm), flat)
+        x, y, z = surface.normal
+        if self.faults.tilted:
+            x, z = x * cos(TILT_RAD) + z * sin(TILT_RAD), z * cos(TILT_RAD) - x * sin(TILT_RAD)
+        return (
+            True,
+            0.0,
+            0.0,
+            1.0,
+            0.0,
+            min(RANGE_MM, surface.range_mm),
+            *(max(-1.0, min(1.0, n)) for n in (x, y, z)),
+        )
 
     def _find(self, wanted: int, expected_mm: float) -> FoundPart | None:
         """Return where the camera sees the part; None where it sees none, or cannot look."""

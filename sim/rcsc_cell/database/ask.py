@@ -23,7 +23,7 @@ from rcsc_cell.database.pose import Pose, Vector, about_z, pose_of
 
 NO_PLACE: Values = (False, False, False, 0, 0)
 NO_ROUTE: Values = (False, 0, 0, 0, 0, 0, 0, 0)
-NO_PART: Values = (False, 0.0, 0.0, 0.0)
+NO_PART: Values = (False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 NO_POINT: Values = (False, *(0.0,) * 9, 1.0, 10.0, 10.0, 0.0)
 NO_FINGERS: Values = (False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -148,9 +148,9 @@ class Database:
         return one == other or not self._is_pallet(location)
 
     def part(self, number: int) -> Values:
-        """known, ranges in mm from the camera to its top as it lies, and at which its top is where the pads take it; lift in mm.
+        """known, ranges in mm from the camera to its top as it lies, and at which its top is where the pads take it; lift in mm; normal.
 
-        The lift: how much higher than at the locations of the data the pads hold it.
+        The lift: how much higher than at the locations of the data the pads hold it. The normal: of its top, in the camera's axes.
         """
         return self._parts.get(number, NO_PART)
 

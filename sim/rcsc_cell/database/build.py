@@ -38,7 +38,8 @@ SCHEMA = """
 create table meta (digest text not null);
 create table objects (number integer primary key, name text unique not null, length_mm size real not null, width_mm size real not null,
   height_mm size real not null, stock integer not null,
-  expected_range_mm size real not null, grip_range_mm size real not null, lift_mm real not null);
+  expected_range_mm size real not null, grip_range_mm size real not null, lift_mm real not null,
+  normal_x real not null, normal_y real not null, normal_z real not null);
 create table grasps (object integer not null references objects, grasp integer not null, approach_mm size real not null,
   departure_mm size real not null, grip_mm size real not null, tolerance_mm size real not null,
   force_n force real not null, speed_mm_s room real not null,
@@ -74,6 +75,10 @@ create table parts (object integer not null references objects, x_mm real not nu
   yaw_deg real not null);
 """
 """Each type's last word is SQLite's, all of it a key of `COLUMNS`."""
+UP = (0.0, 0.0, 1.0)
+"""The normal of a top that faces the camera."""
+UNIT = 1e-3
+"""A normal is as long as 1 within this."""
 HOVER_MM = 100.0
 """How far above a part the robot turns its hand before it goes down."""
 DEPTH_MM, CLEARANCE_MM = 12.0, 4.0
@@ -129,7 +134,12 @@ ROBOT = Record(
     }
 )
 OBJECT = Record(
-    {"size_mm": Listing(SIZE, 3, 3)}, {"stock": Number(0, 99, whole=True), "grasp": Entries(Record(GRASP))}
+    {"size_mm": Listing(SIZE, 3, 3)},
+    {
+        "stock": Number(0, 99, whole=True),
+        "normal": Listing(Number(-1, 1), 3, 3),
+        "grasp": Entries(Record(GRASP)),
+    },
 )
 STATION = Record(
     {"at": POSE, "size_mm": Listing(ROOM, 2, 2)}, {"vise": Record(VISE), "vblock": Record(VBLOCK)}
@@ -363,8 +373,14 @@ class _Rows:
             depth = depth_mm(height, float(self.toml["robot"]["pad_mm"]))
             grip = max(0.0, camera_mm - pads_mm - depth)
             lift = height - depth - float(self.toml["robot"]["hold_mm"]) if height > 0 else 0.0
-            self._within("part", (expected, grip, lift), where)
-            yield self._object(name, where), name, length, width, height, stock, expected, grip, lift
+            normal = [float(value) for value in part.get("normal", UP)]
+            if abs(hypot(*normal) - 1.0) > UNIT:
+                self.wrong(
+                    At(f"{where}, normal", (*where.path, "normal")), f"is {hypot(*normal):.4f} long, not 1"
+                )
+            answer = (expected, grip, lift, *normal)
+            self._within("part", answer, where)
+            yield self._object(name, where), name, length, width, height, stock, *answer
 
     def _view(self) -> tuple[float, float]:
         """Return the heights over the station of the camera where vision looks, and of the pads where they take the part."""

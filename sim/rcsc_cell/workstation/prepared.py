@@ -140,7 +140,8 @@ BUFFERS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
     "hand.report": ("gripper", "hand", ("opening_mm", "force_n")),
     "vision.to_camera": ("vision", "to_camera", ("number", "fire", "obj_ptr")),
     "camera.picture": ("vision", "camera", (
-        "number", "matched", "x_mm", "y_mm", "c", "s", "range_mm", "flat",
+        "number", "matched", "x_mm", "y_mm", "c", "s", "range_mm", "normal.x", "normal.y",
+        "normal.z",
     )),
 }  # fmt: skip
 """What workstation, robot, hand and camera write and read: of each buffer the level, its variable, and the fields in order."""
