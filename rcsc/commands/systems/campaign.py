@@ -272,11 +272,12 @@ def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool:
         if choice not in wanted:
             place = folder / choice.name(seed)
             click.echo(f"saved before: {place}: {asked.again} {shlex.quote(str(place))}")
-    shown: dict[tuple[str, EpisodeValue], Path] = {}
+    shown: dict[tuple[str, EpisodeValue | tuple[str, ...]], Path] = {}
     for choice, counterexample in counterexamples(rig, seed, wanted, pool):
         with writing(folder / choice.name(seed)):
             place = save(folder, rig, seed, choice, counterexample)
-        first = shown.setdefault((choice.property, counterexample.episode), place)
+        what = rig.kind.told(counterexample.episode) or counterexample.episode
+        first = shown.setdefault((choice.property, what), place)
         if first != place:
             click.echo(
                 f"episode {choice.index} comes to the same: {asked.again} {shlex.quote(str(first))}", err=True
