@@ -14,7 +14,8 @@ True
 >>> buffers.latest("task.to_emove")
 {'inc_command': 2}
 
-The compiler is not needed here: a program is known by the symbol file beside its executor (`signature`). C and Python
+The compiler is not needed here: a program is known by the symbol file beside its executor (`signature`); whom it serves and commands
+is read in its tables, unless all buffers are written. C and Python
 executors are behind one interface and leave the same bytes. Trusted: `system.toml`, the plant that it names, the generated folder and what
 extern procedures do; logs and symbol files may come from anybody and are read within bounds. A tick copies each
 level's state; it does not depend on the number of lines.

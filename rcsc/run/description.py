@@ -30,7 +30,7 @@ from rcsc.host.described import (
 )
 from rcsc.host.files.names import BadName, is_member, member, within
 from rcsc.host.files.read import CheckedFields
-from rcsc.lang.project import project_root
+from rcsc.lang.project import Neighbours, neighbours, project_root
 from rcsc.run.declared_plant import PlantSpec, plants
 
 
@@ -49,9 +49,9 @@ SYSTEM = Record(
         "generated": Text(),
         "tick_ms": Number(1, LONGEST_MS, whole=True),
         "level": Listing(LEVEL, least=1),
-        "buffers": Entries(Member()),
     },
     {
+        "buffers": Entries(Member()),
         "data": Text(),
         "displays": Entries(Listing(Member())),
         "outside": Listing(Word()),
@@ -60,7 +60,9 @@ SYSTEM = Record(
         "campaign": Record({}, {"within": Number(1, MOST_WITHIN, whole=True)}),
     },
 )
-PARTIES = Record({key: SYSTEM.needed[key] for key in ("level", "buffers")}, {"outside": Listing(Word())})
+PARTIES = Record(
+    {"level": SYSTEM.needed["level"]}, {key: SYSTEM.others[key] for key in ("buffers", "outside")}
+)
 """What a description may say; `outside` are the parties of its buffers that are no levels."""
 
 
@@ -149,6 +151,10 @@ def description(path: Path) -> Description:
     document = read_document(path, Code.BAD_SYSTEM, BadDescription)
     document.check(SYSTEM)
     if document.holds(PARTIES):
+        roots = {level["name"]: _root(path, level) for level in document.value["level"]}
+        roles = {name: neighbours(root) for name, root in roots.items() if root is not None}
+        buffers = _Rows(document, roles).all()
+        document = replace(document, value={**document.value, "buffers": buffers})
         _check_parties(document)
     generated, data = (_place(path, document, key) for key in ("generated", "data"))
     script = _place(path, document, "script") if isinstance(document.value.get("script"), str) else None
@@ -156,6 +162,12 @@ def description(path: Path) -> Description:
     if document.faults:
         raise document.bad(BadDescription)
     return replace(_described(path, document, generated, data), plants=declared, script=script)
+
+
+def _root(path: Path, level: Mapping[str, Any]) -> Path | None:
+    """The root file of a level's program; None where there is none, which is told where it is read."""
+    found = places(path, str(level.get("program", level["name"])))
+    return next((file for file in found if file.is_file()), None)
 
 
 def _place(path: Path, document: Document, key: str) -> Path:
@@ -267,3 +279,130 @@ def _alike(party: str, levels: list[str], parties: list[str]) -> str:
 def places(path: Path, program: str) -> tuple[Path, Path]:
     """Return where the program of a level is looked for, in order."""
     return path.parent / program / f"{program}.rcs", path.parent / f"{program}.rcs"
+
+
+# --- buffers that nobody writes ---
+
+
+@dataclass(slots=True)
+class _Rows:
+    """Makes the buffers that follow from whom levels serve and command, over which link.
+
+        level a: `commands b : L`, level b: `serves a : L`      "a.to_b" = "b.a",       "b.to_a" = "a.from_b"
+        level a: `serves fleet : L`, and no level is `fleet`    "fleet.order" = "a.fleet", "a.to_fleet" = "fleet.report"
+        level a: `commands arm : L`, and no level is `arm`      "a.to_arm" = "arm.order",  "arm.report" = "a.from_arm"
+
+    A row that is written stands: a party outside may have other names for its ends, and two levels may speak by way of one. Every buffer
+    is held against the programs later, whoever named it (`system.check_fit`, `compose`).
+
+    Attributes:
+        document: The description's page, where what contradicts them is noted.
+        roles: Of each level whose program is there.
+    """
+
+    document: Document
+    roles: dict[str, Neighbours]
+    rows: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def written(self) -> dict[str, str]:
+        """The rows of the description."""
+        rows: dict[str, str] = self.document.value.get("buffers", {})
+        return rows
+
+    def all(self) -> dict[str, str]:
+        """Those that follow, then those that are written."""
+        levels = [str(level["name"]) for level in self.document.value["level"]]
+        for at, level in enumerate(levels):
+            roles = self.roles.get(level, Neighbours())
+            for superior in roles.serves:
+                if superior not in levels:
+                    self._outside(at, (f"{superior}.order", f"{level}.{superior}"), levels)
+                    self._outside(at, (f"{level}.to_{superior}", f"{superior}.report"), levels)
+                elif level not in self.roles.get(superior, Neighbours()).commands:
+                    self._one_sided(
+                        at, f"`{level}` serves `{superior}`", superior, "commands", f"{level}.{superior}"
+                    )
+            for subordinate in roles.commands:
+                if subordinate not in levels:
+                    self._outside(at, (f"{level}.to_{subordinate}", f"{subordinate}.order"), levels)
+                    self._outside(at, (f"{subordinate}.report", f"{level}.from_{subordinate}"), levels)
+                else:
+                    self._between(at, level, subordinate)
+        return {
+            **self.rows,
+            **{source: target for source, target in self.written.items() if source not in self.rows},
+        }
+
+    def _between(self, at: int, upper: str, lower: str) -> None:
+        """The two rows between levels."""
+        above, below = (
+            self.roles[upper].commands[lower],
+            self.roles.get(lower, Neighbours()).serves.get(upper),
+        )
+        if below is None:
+            self._one_sided(at, f"`{upper}` commands `{lower}`", lower, "serves", f"{upper}.to_{lower}")
+            return
+        rows = (f"{upper}.to_{lower}", f"{lower}.{upper}"), (f"{lower}.to_{upper}", f"{upper}.from_{lower}")
+        missing = [row for row in rows if self._wanted(*row)]
+        if missing and above != below:
+            self.document.wrong(
+                ("level", at, "name"),
+                f"`{upper}` commands `{lower}` over link `{above}`, and `{lower}` serves it over link `{below}`",
+                "declare both over one link, or connect them in `[buffers]`",
+            )
+            return
+        self.rows.update(missing)
+
+    def _wanted(self, source: str, target: str) -> bool:
+        """Whether a row between levels is not written; one that is half written contradicts what is declared."""
+        by_target = {to: came for came, to in self.written.items()}
+        if source not in self.written and target not in by_target:
+            return True
+        if (source in self.written) != (target in by_target):
+            came, to = (
+                (source, self.written[source]) if source in self.written else (by_target[target], target)
+            )
+            self.document.wrong(
+                ("buffers", came),
+                f"`{came}` = `{to}` contradicts what the levels declare: `{source}` goes to `{target}`",
+                "leave the row out: who serves and commands whom says enough",
+            )
+        return False
+
+    def _one_sided(self, at: int, says: str, other: str, word: str, end: str) -> None:
+        """Note that the other level does not say so, where no row connects them either."""
+        if end in self.written or end in self.written.values():
+            return
+        theirs = getattr(self.roles.get(other, Neighbours()), word)
+        does = f"{word} {', '.join(f'`{name}`' for name in theirs)}" if theirs else f"{word} nobody"
+        wanted = says.split("`")[1]
+        self.document.wrong(
+            ("level", at, "name"),
+            f"{says}, and `{other}` {does}",
+            f"write `{word} {wanted} : LINK` in the tables of `{other}`, or connect the two in `[buffers]`",
+        )
+
+    def _outside(self, at: int, row: tuple[str, str], levels: list[str]) -> None:
+        """A row to or from a party outside, unless the level's end is written."""
+        source, target = row
+        inner, outer = (source, target) if source.partition(".")[0] in levels else (target, source)
+        by_target = {to: came for came, to in self.written.items()}
+        if inner in self.written or inner in by_target:
+            return
+        party = outer.partition(".")[0]
+        taken = {**self.written, **self.rows}
+        known = self.document.value.get("outside")
+        if known is not None and party not in known:
+            self.document.wrong(
+                ("outside",), f"`{party}`, with whom `{levels[at]}` exchanges orders and reports, is neither a level nor in `outside`",
+                *nearest(party, [*levels, *known]),
+            )  # fmt: skip
+        elif outer in taken or outer in taken.values():
+            self.document.wrong(
+                ("level", at, "name"),
+                f"`{outer}` would be an end of two buffers, one of them with `{inner}`",
+                f"write what is at the other end of `{inner}` in `[buffers]`",
+            )
+        else:
+            self.rows[source] = target
