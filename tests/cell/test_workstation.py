@@ -1,5 +1,6 @@
 """The database, the scripts, the interlocks, and the commands that use them: what is wrong is said before anything moves."""
 
+import csv
 import json
 import shutil
 import sqlite3
@@ -333,6 +334,43 @@ def test_scripts_that_cannot_be_run_are_coded_errors(
         assert "error[RCS723]" in capfd.readouterr().err, script
     assert run(["run", "make_box", *QUICK]) == 2
     assert "there is no script `make_box`; did you mean `make_boxt`?" in capfd.readouterr().err
+
+
+FIG_7 = """
+VISE-OPEN RIGHT, CLOSE LEFT | | | |
+MOVE | BOXT (2) | BUFFER | FIX-MAC1 |
+VISE-CLOSE RIGHT | | | |
+RELEASE | | | | FIX-MAC2
+MOVE | | | FIX-MAC3 |
+VISE-OPEN RIGHT | | | |
+MOVE | | | FIX-MAC4 |
+VISE-CLOSE RIGHT | | | |
+MOVE | | | FIX-SAFE |
+ENGRAVE PART | | | |
+ACQUIRE | BOXT (2) | FIX-MAC5 | |
+VISE-OPEN RIGHT, OPEN LEFT | | | |
+TRANSFER | BOXT (2) | | V-BLK1 | V-BLK2
+TRANSFER | BOXT (3) | V-BLK3 | V-BLK4 | V-BLK2
+VISE-CLOSE LEFT | | | |
+MOVE | BOXT (2) | V-BLK5 | FIX-MAC1 |
+VISE-CLOSE RIGHT | | | |
+RELEASE | | | | FIX-MAC2
+MOVE | CLOSE-GRIP | | FIX-MAC3 |
+VISE-OPEN RIGHT | | | |
+MOVE | | | FIX-SAFE |
+MACHINE DOVETAIL | | | |
+ACQUIRE | BOXT (2) | FIX-MAC5 | |
+VISE-OPEN RIGHT, OPEN LEFT | | | |
+TRANSFER | BOXT (2) | | STATION(3) | WS-SAFE
+"""
+"""Commands as printed, but for STATION-x(y), which stands for a place on a pallet. Source: Haynes et al. (1984), Fig. 7."""
+
+
+def test_a_script_names_commands_parts_and_places_as_fig_7_does() -> None:
+    with (SYSTEM.parent / "scripts/make_boxt_printed.csv").open(encoding="utf-8", newline="") as file:
+        shipped = [tuple(row) for row in csv.reader(file)]
+    printed = [tuple(cell.strip() for cell in row.split("|")) for row in FIG_7.strip().splitlines()]
+    assert shipped == [("command", "part", "source", "dest", "end_at"), *printed]
 
 
 def test_the_scripts_are_fig_7() -> None:

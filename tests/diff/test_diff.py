@@ -221,7 +221,7 @@ def test_a_constant_in_a_procedure_changes_every_line_that_calls_it(task: Callab
 
 
 def test_independent_assignments_in_another_order_mean_the_same(task: Callable[..., Program]) -> None:
-    one, two = "  to_emove.sector := workstation.sector\n", "  to_emove.locpt_ptr := source.vupos\n"
+    one, two = "  to_emove.sector := source_sector\n", "  to_emove.locpt_ptr := source_vupos\n"
     found = acquire(task, (one + two, two + one), file="common.rcs")
     assert not found.changed
     assert part(found, "vupos_setup", "procedure").basis is Basis.SOLVER
