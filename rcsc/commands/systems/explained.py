@@ -1,6 +1,7 @@
 """What is not proved, as text and as JSON: the claim, its run as a time line, what follows it, and what would help."""
 
 import io
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -13,11 +14,13 @@ from rich.table import Table
 from rcsc.compose.contract.claims import SAFE
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.counterexample.consequence import MOST, Consequence, spelled_leaves, told
+from rcsc.compose.counterexample.consequence import MOST, Consequence, How, spelled_leaves, told
 from rcsc.compose.counterexample.explain import Explanation
 from rcsc.compose.counterexample.finding import Finding, TimeLineRow, beginnings, rows
 from rcsc.diagnostics.codes import Code
 
+ALIKE = 2
+"""Consequences of one kind that are shown with their runs; others differ in a reason only, and are told in a line."""
 _WIDTH = 118
 """Columns of a time line."""
 _LONG = 33
@@ -142,12 +145,15 @@ def _say_consequences(
 ) -> None:
     """Print what follows, each with its run: only what comes after the finding's own where it begins as that does."""
     ts = systems[explanation.level]
+    alike: Counter[tuple[object, ...]] = Counter()
     for number, then in enumerate(explanation.follows or (), 1):
-        click.echo(
-            f"  = then {number}: {told(systems[then.level], then)}{'' if then.shared else '; its run'}",
-            err=True,
-        )
-        _say_time_line(_further_rows(systems, then))
+        kind = (then.how, then.level, then.report[:1], then.before[:1])  # the status; a reason beside it may be any
+        alike[kind] += 1
+        shown = alike[kind] <= ALIKE or then.how is How.STOPS
+        run = "" if then.shared or not shown else "; its run"
+        click.echo(f"  = then {number}: {told(systems[then.level], then)}{run}", err=True)
+        if shown:
+            _say_time_line(_further_rows(systems, then))
     if explanation.follows is not None and len(explanation.follows) == MOST:
         click.echo(f"  = note: no more than {MOST} such runs are looked for", err=True)
     if explanation.follows == () and ts.links.above is not None:

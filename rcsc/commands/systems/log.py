@@ -12,7 +12,7 @@ from rcsc.commands.shared.stopped import stopped
 from rcsc.commands.shared.systems import NoSystem, system_path
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files import write_atomically
-from rcsc.run.description import BadDescription, description
+from rcsc.run.description import NO_DATA, BadDescription, description
 from rcsc.run.log import export
 from rcsc.run.log.export import coverage
 from rcsc.run.log.plot import plot as draw
@@ -172,7 +172,10 @@ def _cell_of(log: Log, given: Path | None) -> tuple[DrawnCell | None, str]:
         given: The description that was named; what is wrong with it stops the command.
     """
     try:
-        return _cell(log, system_path(given)), ""
+        path = system_path(given)
+        if description(path).database.name == NO_DATA:
+            return None, "the system has no data of which the paper's cell is made."
+        return _cell(log, path), ""
     except NoSystem as error:
         return None, f"{error}; `--system` names one."
     except (BadData, BadDescription) as error:
