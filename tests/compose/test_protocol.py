@@ -1,6 +1,7 @@
 """A system whose levels declare whom they serve and command: proved with no line of the protocol by hand, refuted where it is wrong."""
 
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -232,3 +233,46 @@ def test_a_proof_stops_only_within_the_invariant(level: str, dock: Path) -> None
     every = [obligation for obligation, _ in proof.verdicts]
     assert not [each for each in every if stopping(ts, each, proof.predicates, proof.clauses)]
     assert [each for each in every if stopping(ts, each, proof.predicates, ())]
+
+
+# --- two subordinates ---
+
+
+@pytest.mark.parametrize("keeps", [True, False])
+def test_a_level_of_two_subordinates_keeps_its_decision_until_both_have_echoed(
+    keeps: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The manual's example; without its column `answered` a late echo turns a decision, and it is shown where."""
+    manual = (Path(__file__).parents[2] / "grammar" / "manual.md").read_text(encoding="utf-8")
+    [text] = [
+        case
+        for case in re.findall(r"^```rcs\n(.*?)^```$", manual, re.MULTILINE | re.DOTALL)
+        if "commands b : feeding" in case
+    ]
+    if not keeps:
+        text = re.sub(r"^  \| wait .*\n", "", text, flags=re.MULTILINE)
+        before, _, rest = text.partition("table sort {\n")
+        rows, _, after = rest.partition("\n}\n")
+        kept = ("|".join(cells[:3] + cells[4:]) for row in rows.splitlines() for cells in [row.split("|")])
+        text = before + "table sort {\n" + "\n".join(kept) + "\n}\n" + after
+    (tmp_path / "cell.rcs").write_text(text, encoding="utf-8")
+    (tmp_path / "system.toml").write_text(TWO, encoding="utf-8")
+    assert run(["prove", str(tmp_path), "--no-cache"]) == (0 if keeps else 1)
+    said = capsys.readouterr().err
+    assert ("no other command replaces an order before its echo" in said) is not keeps
+    assert ("sort: go" in said) is not keeps
+
+
+TWO = """name = "two"
+generated = "generated"
+tick_ms = 40
+[[level]]
+name = "cell"
+[buffers]
+"operator.order" = "cell.operator"
+"cell.to_operator" = "operator.report"
+"cell.to_a" = "a.order"
+"a.report" = "cell.from_a"
+"cell.to_b" = "b.order"
+"b.report" = "cell.from_b"
+"""

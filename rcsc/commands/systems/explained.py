@@ -147,7 +147,12 @@ def _say_consequences(
     ts = systems[explanation.level]
     alike: Counter[tuple[object, ...]] = Counter()
     for number, then in enumerate(explanation.follows or (), 1):
-        kind = (then.how, then.level, then.report[:1], then.before[:1])  # the status; a reason beside it may be any
+        kind = (
+            then.how,
+            then.level,
+            then.report[:1],
+            then.before[:1],
+        )  # the status; a reason beside it may be any
         alike[kind] += 1
         shown = alike[kind] <= ALIKE or then.how is How.STOPS
         run = "" if then.shared or not shown else "; its run"
