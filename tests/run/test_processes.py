@@ -448,7 +448,7 @@ def test_a_level_with_a_lost_state_starts_safely(repo: Path, tmp_path: Path) -> 
     region = system.buffers.layout.regions["task"]
 
     def report() -> Values:
-        return system.buffers.latest("task.to_workstation") or (0,) * 5
+        return system.buffers.latest("task.to_workstation") or (0,) * 6
 
     with system:
         system.buffers.publish("workstation.order", (41, *ROUND[0]))
@@ -460,7 +460,7 @@ def test_a_level_with_a_lost_state_starts_safely(repo: Path, tmp_path: Path) -> 
         system.start("task")
         until(lambda: report()[2] != DONE, "nothing is said of the restart")
         restart = sign.leaves[sign.index["to_workstation.failure"]].members.index("restart")
-        assert report() == (41, ACQUIRE, 2, 0, restart)
+        assert report() == (41, ACQUIRE, 2, 0, restart, 0)
         until(lambda: len(lines(tmp_path / "below")) > len(before), "no PAUSE goes down")
         assert lines(tmp_path / "below") == [*before, ((before[-1][0] + 1) % NUMBERS, PAUSE)]
         system.buffers.publish("workstation.order", (42, *ROUND[0]))
