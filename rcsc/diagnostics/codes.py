@@ -1091,7 +1091,8 @@ class Code(StrEnum):
 
     A note, not an error. A property is about what a level does cycle after cycle in its environment, which a table proved alone does
     not show: `rcsc check` and `rcsc compile` make sure that it can be read, no more. `rcsc prove` proves it, or shows the shortest run
-    that breaks it; as long as nothing changes after that, the note of `rcsc check` says that it is proved.
+    that breaks it; as long as nothing changes after that, the note of `rcsc check` says that it is proved. Properties that come with
+    `serves` are proved in the same way, and no note repeats it.
 
         state n : int 0 .. 9
         property some : n < 9

@@ -520,6 +520,7 @@ class Property:
         condition: About a cycle: leaves as it leaves them, inputs as it took them; and, under the names that `earlier`
             gives, leaves as the cycle before left them (before the first: as the level begins).
         text: As it was written, after the colon.
+        standard: Whether it comes with the protocol, and nobody wrote it.
     """
 
     name: str
@@ -527,6 +528,7 @@ class Property:
     text: str
     doc: str = ""
     span: Span = at()
+    standard: bool = field(default=False, compare=False)
 
 
 # --- tables --------------------------------------------------------------------------

@@ -43,9 +43,13 @@ def at_first(program: Program) -> Iterator[Diagnostic]:
 
 
 def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
-    """Note, for each file that declares some, that a program alone proves no properties."""
+    """Note, for each file that declares some, that a program alone proves no properties.
+
+    Those that come with the protocol are left out: nobody wrote them, and every check would repeat it. That one is not kept is
+    said of its level once it was looked at (`driver.together`).
+    """
     files: dict[str, list[Property]] = {}
-    for claim in program.properties:
+    for claim in (each for each in program.properties if not each.standard):
         files.setdefault(claim.span.file, []).append(claim)
     for declared in files.values():
         names = ", ".join(f"`{claim.name}`" for claim in declared)

@@ -213,7 +213,7 @@ def test_where_no_run_is_found_the_cycle_is_shown_at_which_the_proof_stops(
     said = capsys.readouterr().err
     assert "no run of 8 cycles or fewer shows it" in said
     assert "whether that is ever reached is not known" in said
-    assert run([*asked, "--trace", "0"]) == 1
+    assert run([*asked, "--trace", "0", "--level", "drive"]) == 1
     assert "proof stops" not in capsys.readouterr().err, "nothing was looked for"
 
 
@@ -233,6 +233,24 @@ def test_a_proof_stops_only_within_the_invariant(level: str, dock: Path) -> None
     every = [obligation for obligation, _ in proof.verdicts]
     assert not [each for each in every if stopping(ts, each, proof.predicates, proof.clauses)]
     assert [each for each in every if stopping(ts, each, proof.predicates, ())]
+
+
+def test_check_repeats_no_property_that_nobody_wrote_until_one_is_not_proved(
+    dock: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`failed_stays` is broken: a drive that ran into something says so, and goes on."""
+    drive = dock.parent / "drive.rcs"
+    (dock.parent / "rcsc.toml").write_text("", encoding="utf-8")
+    edit_file(drive, ("table goto", "property slow : speed <= 400\ntable goto"))
+    assert run(["check", str(drive)]) == 0
+    said = capsys.readouterr().out
+    assert "property `slow` is not proved here" in said
+    assert "failed_stays" not in said
+    edit_file(drive, ("|| blocked; stage(bad)", "|| blocked            "))
+    assert run(["prove", str(dock), "--trace", "0", "--level", "drive"]) == 1
+    capsys.readouterr()
+    run(["check", str(drive)])
+    assert "not proved: property `failed_stays`" in capsys.readouterr().out
 
 
 # --- two subordinates ---

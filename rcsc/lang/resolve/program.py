@@ -3,6 +3,7 @@
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
@@ -93,6 +94,7 @@ class _Resolver:
         if scope.diagnostics:  # what would be made of it would only repeat this
             return tuple(sorted(set(scope.diagnostics), key=sort_key))
         deferred = [d.name.text for d in all_ if isinstance(d, tree.VariableDecl) and d.deferred]
+        claimed = {d.name.text for d in all_ if isinstance(d, tree.PropertyDecl)}
         all_ = expanded(parties, all_)
         enums = Names(scope, all_).declare()
         written = [d for d in all_ if isinstance(d, tree.ProcedureDecl) and scope.claim(d.name, "call")]
@@ -103,7 +105,9 @@ class _Resolver:
         )
         assumptions = self._assumptions(all_)
         invariants = self._invariants(all_)
-        properties = self._properties(all_)
+        properties = tuple(
+            replace(each, standard=each.name not in claimed) for each in self._properties(all_)
+        )
         tables = self._tables(all_, {a.name for a in assumptions})
         if not scope.diagnostics:
             more, tables = offered(scope, parties, deferred, tables, procedures)
