@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from rcsc.diagnostics.codes import Code
 from rcsc.run.faults import UnknownFault, faults_of, switch
 from rcsc.run.levels import RunningLevel
+from rcsc.run.orders.roles import COMMAND, served
 from rcsc.shell import typed_names
 from rcsc.shell.part_runs import call_of, part_names
 from rcsc.shell.queries import StateQuery, asked
@@ -43,6 +44,8 @@ run to [LEVEL.]TABLE.LINE
 run to cycle N          until N cycles are done
 break CONDITION         stop `run` where it comes to hold; a line, too: break task.acquire.5
 breaks, delete N        the breakpoints; one less
+order [LEVEL] COMMAND [FIELD=VALUE ...]
+                        order a level from outside, with the next number; other fields are as at first
 faults                  the plant's faults
 fault NAME [off]        switch one on, or off
 undo [N]                go back to before the last cycle, or the last N
@@ -91,7 +94,7 @@ class Commands:
             "break": self._break, "breaks": self._breaks, "buffers": self._buffers, "delete": self._delete,
             "diff": self._diff,
             "expect": self._expect, "fault": self._fault, "faults": self._faults,
-            "help": self._help, "level": self._level, "levels": self._levels,
+            "help": self._help, "level": self._level, "levels": self._levels, "order": self._order,
             "lines": self._lines, "quit": self._quit, "reload": self._reload, "run": self._run, "show": self._show,
             "step": self._step, "undo": self._undo,
         }  # fmt: skip
@@ -120,6 +123,22 @@ class Commands:
         except UnknownFault as error:
             raise Refused(Code.SHELL_COMMAND, str(error), *error.helps) from error
         return [f"{name} is {'on' if on else 'off'}"]
+
+    def _order(self, rest: str) -> Output:
+        system = self.session.system.description
+        levels = served(system, {level.name: level.sign for level in self.session.levels})
+        words = rest.split()
+        to = next((level for level in levels if words and level.level == words[0]), None)
+        if to is not None:
+            words = words[1:]
+        if not levels:
+            raise Refused(Code.SHELL_COMMAND, "no level is ordered from outside")
+        to = to or levels[0]
+        if not words or not all("=" in word for word in words[1:]):
+            raise Refused(Code.SHELL_COMMAND, "write `order COMMAND`, and perhaps `FIELD=VALUE` after it")
+        given = {COMMAND: words[0], **dict(word.split("=", 1) for word in words[1:])}
+        number = self.session.order(to, given)
+        return [f"{to.level} is ordered {rest}: number {number}"]
 
     # --- by name ---
 

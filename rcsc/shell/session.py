@@ -10,10 +10,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.codes import Code
+from rcsc.host.described import nearest
 from rcsc.lang.model import Program
 from rcsc.run.description import BadDescription, Description, LevelSpec
 from rcsc.run.levels import Fill, Query, RunningLevel
 from rcsc.run.log.schema import fingerprints
+from rcsc.run.orders.roles import COMMAND, Served, field_of
 from rcsc.run.signature import Signature, Value, Values
 from rcsc.run.system import StateTableError, System
 from rcsc.shell import history, typed_names
@@ -218,6 +220,33 @@ class Session:
                 self.memory.publish(buffer, record)
         self._answer(level, at)
         return typed_names.shown(level, at)
+
+    def order(self, to: Served, given: Mapping[str, str]) -> int:
+        """Orders a level from outside, with the next number; fields that are not given are as at first.
+
+        Raises:
+            Refused: The order has no such field, or a text is no value of one; nothing was set.
+        """
+        fields = [COMMAND if at == to.command else field_of(leaf) for at, leaf in enumerate(to.order_leaves)]
+        known = [name for at, name in enumerate(fields) if at != to.number]
+        for name in given:
+            if name not in known:
+                helps = nearest(name, known)
+                raise Refused(Code.SHELL_NAME, f"an order of `{to.level}` has no field `{name}`", *helps)
+        standing = self.memory.latest(to.order)
+        level = next(level for level in self.levels if level.name == to.level)
+        last = level.value(to.order_leaves[to.number].name) if standing is None else standing[to.number]
+        number = (int(last) + 1) % (int(to.order_leaves[to.number].high or 0) + 1)
+        texts = [
+            given.get(name, leaf.shown(leaf.initial))
+            for name, leaf in zip(fields, to.order_leaves, strict=True)
+        ]
+        texts[to.number] = str(number)
+        for leaf, text in zip(to.order_leaves, texts, strict=True):
+            typed_names.value_of(leaf, text)
+        for leaf, text in zip(to.order_leaves, texts, strict=True):
+            self.set(f"{to.level}.{leaf.name}", text)
+        return number
 
     def _answer(self, level: RunningLevel, at: int) -> None:
         """Keep a value set by hand as the database's answer to the same question from now on."""

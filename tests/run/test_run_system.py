@@ -276,6 +276,27 @@ def _ticks(log: Path, capsys: pytest.CaptureFixture[str]) -> list[dict[str, dict
     return [{"drive": {"travelled_mm": int(row["drive.travelled_mm"])}} for row in rows]
 
 
+def test_the_shell_gives_orders_with_the_next_number(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    commands = (
+        "step", "order dock", "expect command.inc_command = 1 and command.input_command = dock", "run until now = aligning",
+        "order supervisor undock", "expect command.inc_command = 2", "run 100", "expect report.status_report = done",
+    )  # fmt: skip
+    asked = ["shell", "dock", "--executor", "python", "--script", str(here / "steps.txt")]
+    (here / "steps.txt").write_text("\n".join(commands), encoding="utf-8")
+    assert run(asked) == 0, capsys.readouterr()
+    assert "supervisor is ordered dock: number 1" in capsys.readouterr().out
+    for command, message in {
+        "order dok": "near it: dock",
+        "order": "write `order COMMAND`",
+        "order dock now": "write `order COMMAND`",
+        "order dock target=5": "an order of `supervisor` has no field `target`",
+        "order dock inc_command=5": "an order of `supervisor` has no field `inc_command`",
+    }.items():
+        (here / "steps.txt").write_text(command, encoding="utf-8")
+        assert run(asked) == 1
+        assert message in " ".join(stopped(capsys).split())
+
+
 def test_the_shell_switches_faults(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     commands = (
         "faults", "fault wheel_slips", "step", "command.inc_command = 1", "command.input_command = dock", "run 20",
