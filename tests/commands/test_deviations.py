@@ -59,7 +59,8 @@ def spoken() -> set[str]:
     paths = [path for kind in ("rcs", "toml", "csv") for path in TABLES.rglob(f"*.{kind}")]
     texts = [path.read_text(encoding="utf-8") for path in paths]
     names = [path.stem for path in paths] + [path.name for path in (REPO / "generated").rglob("*.h")]
-    return set(names) | set(re.findall(r"[\w.]+", "\n".join(texts)))
+    words = [re.findall(word, "\n".join(texts)) for word in (r"[\w.]+", r"[A-Z-]+")]
+    return set(names).union(*words)
 
 
 def test_each_deviation_has_a_place_in_the_paper_and_a_reason(page: str) -> None:
