@@ -4,14 +4,13 @@ In: orders, and what goes wrong from which tick to which. Out: the same as JSON 
 An episode has the same outcome in every process, and with both kinds of executors.
 """
 
-import csv
-import io
 import json
 from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, fields
 from itertools import chain
 from typing import ClassVar, Literal, TypeAlias, get_args
 
+from rcsc.host.files import csv_text
 from rcsc.host.files.names import shown
 from rcsc.host.files.plain import plain, read
 from rcsc.host.files.read import json_of
@@ -196,18 +195,16 @@ class Episode:
         """Return its orders as a script that `rcsc run --script` reads, one after the other."""
         columns = list(dict.fromkeys(field.name for order in self.orders for field in order.fields))
         several = len({order.level for order in self.orders}) > 1
-        file = io.StringIO()
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["command", *(["level"] if several else []), *columns, "cycles"])
+        rows: list[list[Setting]] = [["command", *(["level"] if several else []), *columns, "cycles"]]
         for at, order in enumerate(self.orders):
             after = self.orders[at + 1] if at + 1 < len(self.orders) else None
-            given = {field.name: _cell(field.value) for field in order.fields}
+            given = {field.name: _in_file(field.value) for field in order.fields}
             if order.wait and not order.interrupts:
-                writer.writerow(["", *([""] if several else []), *("" for _ in columns), str(order.wait)])
+                rows.append(["", *([""] if several else []), *("" for _ in columns), str(order.wait)])
             cycles = str(max(after.wait, 1)) if after is not None and after.interrupts else ""
             level = [order.level] if several else []
-            writer.writerow([order.command, *level, *(given.get(name, "") for name in columns), cycles])
-        return file.getvalue()
+            rows.append([order.command, *level, *(given.get(name, "") for name in columns), cycles])
+        return csv_text(rows)
 
 
 _ELEMENTS: dict[str, type] = {
@@ -249,6 +246,11 @@ def _order_told(order: OrderSpec, *, first: bool) -> str:
         else "the end of the one before"
     )
     return f"`{order.level}` is ordered `{order.command}`{fields}, {order.wait} ticks after {after}"
+
+
+def _in_file(value: Setting) -> Setting:
+    """A value as a file's writer takes it: numbers as they are, for a text that begins with a sign would be a formula."""
+    return _cell(value) if isinstance(value, bool | str) else value
 
 
 def _cell(value: Setting) -> str:
