@@ -229,7 +229,9 @@ def _by_alarm(seconds: float) -> Iterator[None]:
         raise _OutOfTime
 
     before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(
+        signal.ITIMER_REAL, seconds, seconds
+    )  # again, for who swallows what is raised: a finalizer does
     try:
         yield
     finally:
