@@ -229,9 +229,8 @@ def _by_alarm(seconds: float) -> Iterator[None]:
         raise _OutOfTime
 
     before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(
-        signal.ITIMER_REAL, seconds, seconds
-    )  # again, for who swallows what is raised: a finalizer does
+    # and again after as long: what is raised in a finalizer goes nowhere
+    signal.setitimer(signal.ITIMER_REAL, seconds, seconds)
     try:
         yield
     finally:

@@ -1,6 +1,7 @@
 """Campaigns of a system that rcsc knows nothing of but its files: the docking robot, with plants that break, die, hang and raise."""
 
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from rcsc.campaign.journal import Journal, header
 from rcsc.campaign.rig import EpisodeKind, Rig, digest
 from rcsc.campaign.runner import campaign
 from rcsc.campaign.shrink import shrink
-from rcsc.campaign.work import NotDrawn, play
+from rcsc.campaign.work import NotDrawn, _OutOfTime, play, within
 from rcsc.campaign.worker_pool import processes
 from rcsc.episodes.episode import Episode, FieldValue, OrderSpec, Switch
 from rcsc.run.plant.bind import BadPlant
@@ -286,3 +287,15 @@ def test_what_is_within_an_order_shrinks_too() -> None:
     [field] = order.fields
     assert (order.command, order.wait, field.name) == ("goto", 0, "target_mm")
     assert 100 < int(field.value) <= 225
+
+
+def test_the_end_of_the_limit_comes_again_for_who_swallowed_it() -> None:
+    """As a finalizer does, in which the alarm may ring."""
+    swallowed = False
+    with pytest.raises(_OutOfTime), within(0.05):
+        try:
+            time.sleep(900)
+        except _OutOfTime:
+            swallowed = True
+        time.sleep(900)
+    assert swallowed
