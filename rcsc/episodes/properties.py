@@ -179,7 +179,7 @@ class NumbersOrders:
             yield Broken(f"{self.link.party}: numbers each order", text, self.link.party)
 
 
-def _numbered(stand: Stand, link: Served) -> tuple[int, ...]:
+def numbered(stand: Stand, link: Served) -> tuple[int, ...]:
     """Places of an order's fields that change with its number only: those that its giver does not declare as streams."""
     roles, record = stand.programs[link.party].roles, link.order.partition(".")[2]
     named = None
@@ -297,7 +297,7 @@ def properties(stand: Stand, within: int) -> list[Property]:
         echo = int(link.report_leaves[link.echo].initial)
         watching.append(TakesInTurn(link, at, {first: 0, echo: 0}))
         if link.party in stand.programs:
-            watching.append(NumbersOrders(link, _numbered(stand, link)))
+            watching.append(NumbersOrders(link, numbered(stand, link)))
         if stand.programs[link.level].roles is None:  # else its standard properties say it
             watching.append(AnswerStays(link, at, sign.index[link.order_leaves[0].name]))
     return [*watching, Ends(within), PlantHolds()]

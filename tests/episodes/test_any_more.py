@@ -8,8 +8,10 @@ import pytest
 from rcsc.commands import run as rcsc
 from rcsc.episodes.episode import Episode, FieldValue, OrderSpec, Reading, Switch
 from rcsc.episodes.loop import run
+from rcsc.episodes.properties import numbered
 from rcsc.episodes.sampling import draw, fault_names
 from rcsc.episodes.stand import stand
+from rcsc.run.orders.roles import field_of
 from tests.support.programs.texts import edit_file
 
 LAMP = """
@@ -173,3 +175,10 @@ class TestThePapersCell:
             assert not run(replace(draw(seed, path, "kinematic"), orders=orders), path).findings
         in_python = run(Episode("kinematic", "python", orders=orders), path)
         assert in_python == outcome
+
+    def test_has_streams_that_change_without_a_number(self, repo: Path) -> None:
+        its = stand(repo / "tables" / "system.toml")
+        link = next(link for link in its.links if link.level == "emove")
+        fixed = {field_of(link.order_leaves[at]) for at in numbered(its, link)}
+        every = {field_of(leaf) for leaf in link.order_leaves}
+        assert every - fixed == {"inc_command", "apoint_pos_flag", "gripped_obj_ptr"}
