@@ -449,7 +449,7 @@ static void emove_admit(emove_t *s)
             s->fault_at = 18;
         }
     }
-    if (((int64_t)s->from_primitive.failure > INT64_C(16))) {
+    if (((int64_t)s->from_primitive.failure > INT64_C(17))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 19;
@@ -467,7 +467,7 @@ static void emove_admit(emove_t *s)
             s->fault_at = 46;
         }
     }
-    if (((int64_t)s->from_vision.failure > INT64_C(16))) {
+    if (((int64_t)s->from_vision.failure > INT64_C(17))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 47;
@@ -1246,7 +1246,7 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && (((int64_t)s->to_task.status_report > INT64_C(2)))) {
         at = 10;
     }
-    if ((at < 0) && (((int64_t)s->to_task.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->to_task.failure > INT64_C(17)))) {
         at = 11;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
@@ -1297,7 +1297,7 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && ((*(const uint8_t *)&s->primitive.resting) > 1u)) {
         at = 33;
     }
-    if ((at < 0) && (((int64_t)s->primitive.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->primitive.failure > INT64_C(17)))) {
         at = 34;
     }
     if ((at < 0) && (((int64_t)s->last_primitive.input_command > INT64_C(5)))) {
@@ -1354,7 +1354,7 @@ int32_t emove_check(const emove_t *s)
     if ((at < 0) && ((*(const uint8_t *)&s->vision.resting) > 1u)) {
         at = 62;
     }
-    if ((at < 0) && (((int64_t)s->vision.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->vision.failure > INT64_C(17)))) {
         at = 63;
     }
     if ((at < 0) && (((int64_t)s->last_vision.input_command > INT64_C(2)))) {

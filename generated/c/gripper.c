@@ -405,7 +405,7 @@ int32_t gripper_check(const gripper_t *s)
     if ((at < 0) && (((int64_t)s->to_primitive.status_report > INT64_C(2)))) {
         at = 7;
     }
-    if ((at < 0) && (((int64_t)s->to_primitive.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->to_primitive.failure > INT64_C(17)))) {
         at = 8;
     }
     if ((at < 0) && (!((s->to_primitive.opening_mm >= 0.0) && (s->to_primitive.opening_mm <= 200.0)))) {

@@ -460,7 +460,7 @@ static void primitive_admit(primitive_t *s)
             s->fault_at = 21;
         }
     }
-    if (((int64_t)s->from_robot.failure > INT64_C(16))) {
+    if (((int64_t)s->from_robot.failure > INT64_C(17))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 22;
@@ -550,7 +550,7 @@ static void primitive_admit(primitive_t *s)
             s->fault_at = 50;
         }
     }
-    if (((int64_t)s->from_gripper.failure > INT64_C(16))) {
+    if (((int64_t)s->from_gripper.failure > INT64_C(17))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 51;
@@ -1213,7 +1213,7 @@ int32_t primitive_check(const primitive_t *s)
     if ((at < 0) && (((int64_t)s->to_emove.status_report > INT64_C(2)))) {
         at = 12;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(17)))) {
         at = 13;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->to_emove.holds) > 1u)) {
@@ -1267,7 +1267,7 @@ int32_t primitive_check(const primitive_t *s)
     if ((at < 0) && ((*(const uint8_t *)&s->robot.resting) > 1u)) {
         at = 45;
     }
-    if ((at < 0) && (((int64_t)s->robot.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->robot.failure > INT64_C(17)))) {
         at = 46;
     }
     if ((at < 0) && (((int64_t)s->last_robot.input_command > INT64_C(1)))) {
@@ -1294,7 +1294,7 @@ int32_t primitive_check(const primitive_t *s)
     if ((at < 0) && ((*(const uint8_t *)&s->gripper.resting) > 1u)) {
         at = 60;
     }
-    if ((at < 0) && (((int64_t)s->gripper.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->gripper.failure > INT64_C(17)))) {
         at = 61;
     }
     if ((at < 0) && (((int64_t)s->last_gripper.input_command > INT64_C(2)))) {

@@ -476,7 +476,7 @@ static void task_admit(task_t *s)
             s->fault_at = 20;
         }
     }
-    if (((int64_t)s->from_emove.failure > INT64_C(16))) {
+    if (((int64_t)s->from_emove.failure > INT64_C(17))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 21;
@@ -1202,10 +1202,10 @@ int32_t task_check(const task_t *s)
     if ((at < 0) && (((int64_t)s->to_workstation.status_parameter > INT64_C(7)))) {
         at = 11;
     }
-    if ((at < 0) && (((int64_t)s->to_workstation.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->to_workstation.failure > INT64_C(17)))) {
         at = 12;
     }
-    if ((at < 0) && (((int64_t)s->to_workstation.cause > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->to_workstation.cause > INT64_C(17)))) {
         at = 13;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
@@ -1244,7 +1244,7 @@ int32_t task_check(const task_t *s)
     if ((at < 0) && ((*(const uint8_t *)&s->emove.resting) > 1u)) {
         at = 32;
     }
-    if ((at < 0) && (((int64_t)s->emove.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->emove.failure > INT64_C(17)))) {
         at = 33;
     }
     if ((at < 0) && (((int64_t)s->last_emove.input_command > INT64_C(5)))) {

@@ -111,6 +111,12 @@ static void vision_do_measured(vision_t *s)
     s->to_emove.range_mm = s->camera.range_mm + 0.0;
 }
 
+/* Procedure no_picture. */
+static void vision_do_no_picture(vision_t *s)
+{
+    s->to_emove.failure = (uint8_t)INT64_C(17);
+}
+
 /* Procedure no_match. */
 static void vision_do_no_match(vision_t *s)
 {
@@ -337,7 +343,7 @@ static void vision_run_flood_flash(vision_t *s)
         vision_do_executing(s);
         break;
     case 2: /* vision/vision.rcs line 3 */
-        vision_do_no_match(s);
+        vision_do_no_picture(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
         vision_do_failed(s);
@@ -387,7 +393,7 @@ static void vision_run_line_flash(vision_t *s)
         vision_do_executing(s);
         break;
     case 2: /* vision/vision.rcs line 3 */
-        vision_do_range_failure(s);
+        vision_do_no_picture(s);
         vision_do_state(s, INT64_C(1));
         vision_do_rest(s);
         vision_do_failed(s);
@@ -505,7 +511,7 @@ int32_t vision_check(const vision_t *s)
     if ((at < 0) && (((int64_t)s->to_emove.status_report > INT64_C(2)))) {
         at = 9;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(16)))) {
+    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(17)))) {
         at = 10;
     }
     if ((at < 0) && (!((s->to_emove.x_mm >= (-500.0)) && (s->to_emove.x_mm <= 500.0)))) {

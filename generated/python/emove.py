@@ -106,6 +106,7 @@ class reason(IntEnum):
     wrong_range = 14
     restart = 15
     wrong_surface = 16
+    no_picture = 17
 
 
 class emove_state(IntEnum):
@@ -1141,7 +1142,7 @@ def check(s):
         return 9
     if not (isinstance(s.to_task_status_report, int) and 0 <= s.to_task_status_report <= 2):
         return 10
-    if not (isinstance(s.to_task_failure, int) and 0 <= s.to_task_failure <= 16):
+    if not (isinstance(s.to_task_failure, int) and 0 <= s.to_task_failure <= 17):
         return 11
     if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
         return 12
@@ -1179,7 +1180,7 @@ def check(s):
         return 32
     if not (isinstance(s.primitive_resting, int) and 0 <= s.primitive_resting <= 1):
         return 33
-    if not (isinstance(s.primitive_failure, int) and 0 <= s.primitive_failure <= 16):
+    if not (isinstance(s.primitive_failure, int) and 0 <= s.primitive_failure <= 17):
         return 34
     if not (isinstance(s.last_primitive_input_command, int) and 0 <= s.last_primitive_input_command <= 5):
         return 35
@@ -1219,7 +1220,7 @@ def check(s):
         return 61
     if not (isinstance(s.vision_resting, int) and 0 <= s.vision_resting <= 1):
         return 62
-    if not (isinstance(s.vision_failure, int) and 0 <= s.vision_failure <= 16):
+    if not (isinstance(s.vision_failure, int) and 0 <= s.vision_failure <= 17):
         return 63
     if not (isinstance(s.last_vision_input_command, int) and 0 <= s.last_vision_input_command <= 2):
         return 64
@@ -1319,7 +1320,7 @@ def _admit(s):
     if not 0 <= i10 <= 2:
         return _refused(s, 18)
     i11 = _whole(s.from_primitive_failure)
-    if not 0 <= i11 <= 16:
+    if not 0 <= i11 <= 17:
         return _refused(s, 19)
     i12 = _whole(s.from_primitive_holds)
     if not 0 <= i12 <= 1:
@@ -1334,7 +1335,7 @@ def _admit(s):
     if not 0 <= i15 <= 2:
         return _refused(s, 46)
     i16 = _whole(s.from_vision_failure)
-    if not 0 <= i16 <= 16:
+    if not 0 <= i16 <= 17:
         return _refused(s, 47)
     i17 = _real(s.from_vision_x_mm)
     if not -500.0 <= i17 <= 500.0:

@@ -106,6 +106,7 @@ class reason(IntEnum):
     wrong_range = 14
     restart = 15
     wrong_surface = 16
+    no_picture = 17
 
 
 class gripper_state(IntEnum):
@@ -701,7 +702,7 @@ def check(s):
         return 6
     if not (isinstance(s.to_primitive_status_report, int) and 0 <= s.to_primitive_status_report <= 2):
         return 7
-    if not (isinstance(s.to_primitive_failure, int) and 0 <= s.to_primitive_failure <= 16):
+    if not (isinstance(s.to_primitive_failure, int) and 0 <= s.to_primitive_failure <= 17):
         return 8
     if not (isinstance(s.to_primitive_opening_mm, (int, float)) and 0.0 <= s.to_primitive_opening_mm <= 200.0):
         return 9

@@ -106,6 +106,7 @@ class reason(IntEnum):
     wrong_range = 14
     restart = 15
     wrong_surface = 16
+    no_picture = 17
 
 
 class primitive_state(IntEnum):
@@ -1092,7 +1093,7 @@ def check(s):
         return 11
     if not (isinstance(s.to_emove_status_report, int) and 0 <= s.to_emove_status_report <= 2):
         return 12
-    if not (isinstance(s.to_emove_failure, int) and 0 <= s.to_emove_failure <= 16):
+    if not (isinstance(s.to_emove_failure, int) and 0 <= s.to_emove_failure <= 17):
         return 13
     if not (isinstance(s.to_emove_holds, int) and 0 <= s.to_emove_holds <= 1):
         return 14
@@ -1132,7 +1133,7 @@ def check(s):
         return 44
     if not (isinstance(s.robot_resting, int) and 0 <= s.robot_resting <= 1):
         return 45
-    if not (isinstance(s.robot_failure, int) and 0 <= s.robot_failure <= 16):
+    if not (isinstance(s.robot_failure, int) and 0 <= s.robot_failure <= 17):
         return 46
     if not (isinstance(s.last_robot_input_command, int) and 0 <= s.last_robot_input_command <= 1):
         return 47
@@ -1152,7 +1153,7 @@ def check(s):
         return 59
     if not (isinstance(s.gripper_resting, int) and 0 <= s.gripper_resting <= 1):
         return 60
-    if not (isinstance(s.gripper_failure, int) and 0 <= s.gripper_failure <= 16):
+    if not (isinstance(s.gripper_failure, int) and 0 <= s.gripper_failure <= 17):
         return 61
     if not (isinstance(s.last_gripper_input_command, int) and 0 <= s.last_gripper_input_command <= 2):
         return 62
@@ -1283,7 +1284,7 @@ def _admit(s):
     if not 0 <= i12 <= 2:
         return _refused(s, 21)
     i13 = _whole(s.from_robot_failure)
-    if not 0 <= i13 <= 16:
+    if not 0 <= i13 <= 17:
         return _refused(s, 22)
     i14 = _real(s.from_robot_plate_0)
     if not -4000.0 <= i14 <= 4000.0:
@@ -1331,7 +1332,7 @@ def _admit(s):
     if not 0 <= i25 <= 2:
         return _refused(s, 50)
     i26 = _whole(s.from_gripper_failure)
-    if not 0 <= i26 <= 16:
+    if not 0 <= i26 <= 17:
         return _refused(s, 51)
     i27 = _real(s.from_gripper_opening_mm)
     if not 0.0 <= i27 <= 200.0:

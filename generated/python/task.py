@@ -106,6 +106,7 @@ class reason(IntEnum):
     wrong_range = 14
     restart = 15
     wrong_surface = 16
+    no_picture = 17
 
 
 class task_state(IntEnum):
@@ -1009,9 +1010,9 @@ def check(s):
         return 10
     if not (isinstance(s.to_workstation_status_parameter, int) and 0 <= s.to_workstation_status_parameter <= 7):
         return 11
-    if not (isinstance(s.to_workstation_failure, int) and 0 <= s.to_workstation_failure <= 16):
+    if not (isinstance(s.to_workstation_failure, int) and 0 <= s.to_workstation_failure <= 17):
         return 12
-    if not (isinstance(s.to_workstation_cause, int) and 0 <= s.to_workstation_cause <= 16):
+    if not (isinstance(s.to_workstation_cause, int) and 0 <= s.to_workstation_cause <= 17):
         return 13
     if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
         return 14
@@ -1043,7 +1044,7 @@ def check(s):
         return 31
     if not (isinstance(s.emove_resting, int) and 0 <= s.emove_resting <= 1):
         return 32
-    if not (isinstance(s.emove_failure, int) and 0 <= s.emove_failure <= 16):
+    if not (isinstance(s.emove_failure, int) and 0 <= s.emove_failure <= 17):
         return 33
     if not (isinstance(s.last_emove_input_command, int) and 0 <= s.last_emove_input_command <= 5):
         return 34
@@ -1163,7 +1164,7 @@ def _admit(s):
     if not 0 <= i10 <= 2:
         return _refused(s, 20)
     i11 = _whole(s.from_emove_failure)
-    if not 0 <= i11 <= 16:
+    if not 0 <= i11 <= 17:
         return _refused(s, 21)
     i12 = _whole(s.source_known)
     if not 0 <= i12 <= 1:

@@ -106,6 +106,7 @@ class reason(IntEnum):
     wrong_range = 14
     restart = 15
     wrong_surface = 16
+    no_picture = 17
 
 
 class vision_state(IntEnum):
@@ -586,6 +587,11 @@ def _do_measured(s):
     s.to_emove_range_mm = s.camera_range_mm + 0.0
 
 
+def _do_no_picture(s):
+    """Procedure no_picture."""
+    s.to_emove_failure = 17
+
+
 def _do_no_match(s):
     """Procedure no_match."""
     s.to_emove_failure = 13
@@ -657,7 +663,7 @@ def check(s):
         return 8
     if not (isinstance(s.to_emove_status_report, int) and 0 <= s.to_emove_status_report <= 2):
         return 9
-    if not (isinstance(s.to_emove_failure, int) and 0 <= s.to_emove_failure <= 16):
+    if not (isinstance(s.to_emove_failure, int) and 0 <= s.to_emove_failure <= 17):
         return 10
     if not (isinstance(s.to_emove_x_mm, (int, float)) and -500.0 <= s.to_emove_x_mm <= 500.0):
         return 11
@@ -826,7 +832,7 @@ def _flood_flash_1(s):
 
 def _flood_flash_2(s):
     """vision/vision.rcs line 3"""
-    _do_no_match(s)
+    _do_no_picture(s)
     _do_state(s, 1)
     _do_rest(s)
     _do_failed(s)
@@ -907,7 +913,7 @@ def _line_flash_1(s):
 
 def _line_flash_2(s):
     """vision/vision.rcs line 3"""
-    _do_range_failure(s)
+    _do_no_picture(s)
     _do_state(s, 1)
     _do_rest(s)
     _do_failed(s)

@@ -55,7 +55,7 @@ def page() -> str:
 
 
 def spoken() -> set[str]:
-    """Every word of the tables, the data, the scripts, what they compile to, and the commands' help."""
+    """Every word of the tables, the data, the scripts, and the names of files that they compile to."""
     paths = [path for kind in ("rcs", "toml", "csv") for path in TABLES.rglob(f"*.{kind}")]
     texts = [path.read_text(encoding="utf-8") for path in paths]
     names = [path.stem for path in paths] + [path.name for path in (REPO / "generated").rglob("*.h")]

@@ -226,6 +226,7 @@ def test_an_empty_buffer_fails_and_stays_failed() -> None:
         ("robot_stuck", "move", {"dest": "FIX-SAFE"}, ("move", "robot")),
         ("hand_stuck", "acquire", {"obj": "tbox", "grasp": 2, "source": "FIX-MAC5"}, ("move", "grip")),
         ("blind", "acquire", {"obj": "tbox", "grasp": 2, "source": "BUFFER"}, ("loc", "no_match")),
+        ("dark", "acquire", {"obj": "tbox", "grasp": 2, "source": "BUFFER"}, ("loc", "no_picture")),
         ("tilted", "acquire", {"obj": "tbox", "grasp": 2, "source": "BUFFER"}, ("loc", "wrong_surface")),
     ],
 )
