@@ -102,12 +102,17 @@ def stand(path: Path, generated: Path | None = None) -> Stand:
 
 def _files(path: Path, generated: Path | None) -> tuple[tuple[str, int], ...]:
     """Every file that a stand is made of, with its time: all sources, plants and models beside the description and its levels."""
-    system = description(path)
+    system = _described(path, path.stat().st_mtime_ns if path.is_file() else 0)
     tried = [place for spec in system.levels for place in places(path, spec.program)]
     folders = dict.fromkeys((path.parent, *(place.parent for place in tried)))
     files = [file for folder in folders for end in SOURCES for file in sorted(folder.glob(end))]
     symbols = [generated_files(generated or system.generated, spec.program)[0] for spec in system.levels]
     return tuple((str(file), file.stat().st_mtime_ns) for file in (path, *files, *symbols) if file.is_file())
+
+
+@lru_cache(maxsize=8)
+def _described(path: Path, _time_ns: int) -> Description:
+    return description(path)
 
 
 @lru_cache(maxsize=8)

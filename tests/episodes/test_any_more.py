@@ -84,7 +84,7 @@ def compiled(folder: Path) -> Path:
 class TestALevelWithoutAProtocol:
     def test_is_run_for_a_while_and_keeps_its_property(self, room: Path) -> None:
         path = compiled(room)
-        for seed in range(20):
+        for seed in range(12):
             episode = draw(seed, path)
             outcome = run(episode, path)
             assert not outcome.findings
@@ -171,7 +171,7 @@ class TestThePapersCell:
         outcome = run(Episode("kinematic", orders=orders), path)
         assert [row.state for row in outcome.rows] == ["changed", "changed", "done", "done", "done"]
         assert len(outcome.lines) >= 20
-        for seed in range(8):
+        for seed in range(4):
             assert not run(replace(draw(seed, path, "kinematic"), orders=orders), path).findings
         in_python = run(Episode("kinematic", "python", orders=orders), path)
         assert in_python == outcome

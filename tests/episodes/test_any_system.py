@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 
+from rcsc.campaign.shrink import shrink
 from rcsc.commands import run as rcsc
 from rcsc.episodes.cycle import Broken
 from rcsc.episodes.episode import (
@@ -22,7 +23,7 @@ from rcsc.episodes.explain import Explanations
 from rcsc.episodes.loop import Loop, check, run
 from rcsc.episodes.outcome import EpisodeOutcome
 from rcsc.episodes.sampling import draw, fault_classes, fault_names
-from rcsc.episodes.search import episodes, search
+from rcsc.episodes.search import episodes, found_again, search
 from rcsc.episodes.stand import stand
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Value
@@ -396,10 +397,10 @@ class TestExecutorsThatAreSpoilt:
 
 class TestTheSearch:
     def test_says_what_it_tried(self, robot: Path) -> None:
-        searched = search(stand(robot), 6)
+        searched = search(stand(robot), 3)
         assert searched.falsified is None
-        assert searched.episodes == 6
-        assert searched == search(stand(robot), 6)
+        assert searched.episodes == 3
+        assert searched == search(stand(robot), 3)
 
     def test_finds_a_plant_that_does_not_repeat_itself(self, dock: Path) -> None:
         text = "import random\nfrom typing import Annotated"
@@ -430,23 +431,14 @@ class TestTheSearch:
 
         holds()
 
-    def test_is_part_of_rcsc_test(
-        self, dock: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.chdir(tmp_path)
-        edit_file(dock / "drive.rcs", (" restart bad", ""))
-        quick = ["test", "--examples", "60", "--mutants", "0", "--no-cortex"]
-        assert rcsc([*quick, str(dock)]) == 1
-        said = "".join(capsys.readouterr())
-        assert (
-            "`drive: failed stays failed` does not hold: order 1 of `supervisor.to_drive` was failed, and is done"
-            in said
-        )
-        assert "note: `supervisor` is ordered `dock`, 0 ticks after the beginning" in said
-        assert "before tick 2: level `drive` starts anew" in said
-        [folder] = (tmp_path / "campaign").iterdir()
-        assert f"--again campaign/{folder.name}" in said
-        again = ["campaign", str(dock), "--again", str(folder)]
-        assert rcsc(again) == 1
-        edit_file(dock / "drive.rcs", ("state stage : stage", "state stage : stage restart bad"))
-        assert rcsc(again) == 0
+    def test_leaves_of_what_is_found_one_order_and_one_restart(self, dock: Path) -> None:
+        its = stand(changed(dock, "drive.rcs", (" restart bad", "")))
+        searched = search(its, 60)
+        assert searched.falsified is not None
+        episode, finding = searched.falsified
+        assert finding.property == "drive: failed stays failed"
+        least = shrink(episode, lambda simpler: found_again(simpler, its, finding.property) is not None)
+        assert (len(least.orders), len(least.restarts), fault_classes(least)) == (1, 1, ("restarted",))
+        assert least.told()[1] == f"before tick {least.restarts[0].tick}: level `drive` starts anew"
+        assert found_again(replace(least, restarts=()), its, finding.property) is None
+        assert found_again(replace(least, switches=(Switch("none", 0, 0),)), its, finding.property) is None
