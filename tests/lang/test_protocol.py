@@ -277,6 +277,71 @@ def test_what_a_level_adopts_that_starts_anew_is_declared() -> None:
     }
 
 
+LEVEL_BY = "level cell {{ table by {} {{ rest : work  work : work  stow : work }} }}"
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "code", "help_"),
+    [
+        ("commands arm : jobs", "commands arm : works", "RCS201", "links are `jobs`"),
+        ("within 2 cycles", "within 2", "RCS101", "`within 25 cycles`"),
+        ("within 2 cycles", "within 80 [ms]", "RCS101", "`within 25 cycles`"),
+        ("within 2 cycles", "within 80 [ms] cycles", "RCS302", "write how many cycles"),
+        (" within 2 cycles else silent", " else silent", "RCS101", "`within 25 cycles else REASON`"),
+        (" within 2 cycles else silent", ", hand : jobs", "RCS101", "`commands NAME : LINK`"),
+        ("command : job rest rest", "command : job pause rest", "RCS101", "`command : TYPE rest MEMBER`"),
+        ("done done failed failed executing executing", "done done failed failed", "RCS101", "executing MEMBER"),
+        ("  order { width_mm", "  width_mm", "RCS101", "stands in `order { NAME : TYPE }`"),
+        ("commands hand : jobs\n", "", "RCS201", "`commands hand : LINK`, or `serves hand : LINK`, makes it"),
+        ("  | none  | nothing  || look ", "  | none  | nothing  || work(3) ", "RCS201", "says to whom: `arm := work(FIELD := VALUE)`"),
+        ("to_arm.seen_mm := ", "arm.seen_mm := ", "RCS201", "`arm := COMMAND(seen_mm := VALUE)`"),
+        ("to_arm.seen_mm := ", "arm.status := ", "RCS206", "`arm := COMMAND` orders"),
+        ("to_arm.seen_mm := ", "to_arm.inc_command := ", "RCS206", "numbers the same order anew"),
+        ("to_arm.seen_mm := ", "to_boss.inc_command_echo := ", "RCS206", "follows from the commands"),
+        ("level cell { table work }", LEVEL_BY.format("boss"), "RCS301", "write `boss.input_command`"),
+        ("level cell { table work }", LEVEL_BY.format("boss.command"), "RCS201", "did you mean `input_command`?"),
+        ("| line  | choice   |", "| line  | resting  |", "RCS201", "write `arm.resting`"),
+        ("| line  | choice   |", "| line  | hand.late |", "RCS201", "`commands hand : LINK within 25 cycles` makes it"),
+        ("| status_out |", "| elbow |", "RCS201", "`commands elbow : LINK` declares it"),
+        ("serves boss : jobs", "serves boss : jobs serves chief : jobs", "RCS202", "one superior"),
+    ],
+)  # fmt: skip
+def test_whoever_declares_it_for_the_first_time_is_told_what_to_write(
+    was: str, now: str, code: str, help_: str
+) -> None:
+    text = LEVEL.replace(was, now, 1)
+    assert text != LEVEL
+    diagnostics = compile_text(text)
+    assert isinstance(diagnostics, tuple)
+    told = [" ".join(one.help) for one in diagnostics if one.code.value == code]
+    assert any(help_ in text for text in told), diagnostics
+
+
+@pytest.mark.parametrize("name", ["arm", "boss"])
+def test_a_neighbour_is_declared_once(name: str) -> None:
+    diagnostics = compile_text(LEVEL.replace("commands hand", f"commands {name}"))
+    assert isinstance(diagnostics, tuple)
+    assert [(one.code.value, one.message) for one in diagnostics] == [
+        ("RCS202", f"`{name}` is declared twice")
+    ]
+
+
+def test_what_is_done_has_not_failed() -> None:
+    diagnostics = compile_text(LEVEL.replace("failed failed", "failed done"))
+    assert isinstance(diagnostics, tuple)
+    assert "cannot mean two things" in diagnostics[0].message
+
+
+def test_the_echo_may_be_bounded_after_the_answer() -> None:
+    swapped = LEVEL.replace(
+        "within 2 cycles else silent", "answered within 9 cycles else slow within 2 cycles else silent"
+    )
+    plain = LEVEL.replace(
+        "within 2 cycles else silent", "within 2 cycles else silent answered within 9 cycles else slow"
+    )
+    assert program(swapped).procedures == program(plain).procedures
+
+
 # --- orders with fields ---
 
 ORDERS = (

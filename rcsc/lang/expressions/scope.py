@@ -49,6 +49,9 @@ class Scope:
         depth: How deep the expression that is being resolved nests.
         copied: Statements that copies of records and arrays came to so far.
         orders: Of each subordinate that is commanded, the output with its orders, and the flag that the same order comes once more.
+        commands: Of each subordinate that is commanded, its commands.
+        links: Names of links.
+        numbers: Leaves that only the protocol writes: numbers, echoes, and what a subordinate said.
         no_before: Why `was` cannot stand in the expression that is being resolved; empty where it can.
     """
 
@@ -73,6 +76,9 @@ class Scope:
     depth: int = 0
     copied: int = 0
     orders: dict[str, tuple[str, str]] = field(default_factory=dict)
+    commands: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    links: tuple[str, ...] = ()
+    numbers: frozenset[str] = frozenset()
     no_before: str = "`was` stands in a property only"
 
     def report(
@@ -113,11 +119,45 @@ class Scope:
 
     def unknown(self, kind: str, name: tree.Name, known: list[str], span: Span | None = None) -> None:
         """Reports a name that nothing declares, with the nearest one that exists."""
-        near = get_close_matches(name.text, known, n=1)
+        near = (
+            [_FIELDS[name.text]]
+            if _FIELDS.get(name.text) in known
+            else get_close_matches(name.text, known, n=1)
+        )
         helps = (f"did you mean `{near[0]}`?",) if near else ()
+        made = self._made_by(kind, name.text, near=bool(near))
+        helps = (made,) if made else helps
         if name.text in self.procedures:
             helps = (f"`{name.text}` is a procedure and has no value: {CALL_UNDER}",)
         self.report(Code.UNKNOWN_NAME, f"no {kind} is called `{name.text}`", span or name.span, *helps)
+
+    def _made_by(self, kind: str, name: str, *, near: bool) -> str:
+        """Say what declaration of the protocol would make a name, or who has it; empty where none would."""
+        word, _, peer = name.partition("_")
+        owners = [subordinate for subordinate, commands in self.commands.items() if name in commands]
+        if kind == "procedure":
+            if owners:
+                return f"an order says to whom: `{owners[0]} := {name}(FIELD := VALUE)`"
+            return "`commands SUBORDINATE : LINK` makes it" if name == "settle" and not self.commands else ""
+        if kind == "link" and not near:
+            return (
+                f"links are {', '.join(f'`{link}`' for link in self.links)}"
+                if self.links
+                else "declare it: `link NAME { ... }`"
+            )
+        if not kind.startswith("variable") or not self.links:
+            return ""
+        if name in _HELD and self.commands:
+            return f"write `{next(iter(self.commands))}.{name}`"
+        if name in _SERVING:
+            return "`serves SUPERIOR : LINK` makes it"
+        peers = [other.removeprefix(f"{word}_") for other in self.declared if other.startswith(f"{word}_")]
+        if word in {"to", "from", "last"} and peer and not get_close_matches(peer, peers, n=1):
+            served = f", or `serves {peer} : LINK`," if word == "to" else ""
+            return f"`commands {peer} : LINK`{served} makes it"
+        if not near and (name in self.links or (kind == "variable" and self.cell is not None)):
+            return f"if it is a subordinate: `commands {name} : LINK` declares it"
+        return ""
 
     def unit(self, written: tree.Unit | None) -> Unit:
         """The unit in normal form; () for none."""
@@ -134,6 +174,19 @@ class Scope:
                 )
             powers[factor.name.text] = powers.get(factor.name.text, 0) + factor.power
         return normal(powers)
+
+
+_FIELDS = {
+    "command": "input_command",
+    "number": "inc_command",
+    "status": "status_report",
+    "echo": "inc_command_echo",
+}
+"""Fields that the protocol makes, by what one would call them."""
+_HELD = frozenset({"resting", "late", "status"})
+"""What is known of a subordinate besides its report's fields."""
+_SERVING = frozenset({"new_command", "answered", "inc_command_seen"})
+"""What a level remembers of its superior's order."""
 
 
 def root_of(leaf: str) -> str:

@@ -194,6 +194,19 @@ def _field(scope: Scope, base: Path | None, name: tree.Name) -> Path | None:
     for part in base.type.fields:
         if part.name == name.text:
             return Path(tuple(f"{prefix}.{name.text}" for prefix in base.names), part.type, base.index)
+    told, _ = scope.orders.get(base.names[0], ("", ""))
+    if any(leaf == f"{told}.{name.text}" or leaf.startswith(f"{told}.{name.text}.") for leaf in scope.leaves):
+        helps = (
+            f"it is of the order: `{base.names[0]} := COMMAND({name.text} := VALUE)`, or `{told}.{name.text}`"
+        )
+        scope.report(Code.UNKNOWN_NAME, f"`{base.names[0]}` has no field `{name.text}`", name.span, helps)
+        return None
+    if told and name.text == "late":
+        helps = (
+            f"`commands {base.names[0]} : LINK within 25 cycles` makes it: what is not echoed in time is late"
+        )
+        scope.report(Code.UNKNOWN_NAME, f"`{base.names[0]}` has no field `late`", name.span, helps)
+        return None
     scope.unknown("field", name, [part.name for part in base.type.fields])
     return None
 
@@ -233,7 +246,9 @@ def _path(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
     if path is None:
         return None
     if not isinstance(path.type, Bool | Enum | Int | Real):
-        scope.report(Code.KIND, f"`{path.names[0]}` is a whole record or array", written.span)
+        own = [part.name for part in path.type.fields] if isinstance(path.type, Record) else []
+        helps = [f"write `{path.names[0]}.input_command`"] if "input_command" in own else []
+        scope.report(Code.KIND, f"`{path.names[0]}` is a whole record or array", written.span, *helps)
         return None
     leaves = tuple(VariableName(name) for name in path.names)
     if path.index is None:

@@ -97,6 +97,14 @@ class Parties:
     def __bool__(self) -> bool:
         return self.superior is not None or bool(self.subordinates)
 
+    @property
+    def numbers(self) -> frozenset[str]:
+        """Leaves that only the protocol writes: numbers of orders, what is echoed, and what a subordinate said."""
+        held = (f"{party.name}.{part}" for party in self.subordinates for part in _HELD)
+        above = () if self.superior is None else ("inc_command_echo", "ref_command_echo")
+        own = (f"{self.superior.told}.{part}" for part in above if self.superior is not None)
+        return frozenset((*own, *held, *(f"{party.told}.inc_command" for party in self.subordinates)))
+
     def named(self, name: str) -> Party | None:
         """The subordinate of that name; None if there is none."""
         return next((party for party in self.subordinates if party.name == name), None)
@@ -109,14 +117,14 @@ def declared(scope: Scope, declarations: Sequence[tree.Declaration]) -> Parties:
     links = {link.name.text: link for link in written if _sound(scope, link, types)}
     served = [d for d in declarations if isinstance(d, tree.ServesDecl)]
     for more in served[1:]:
-        scope.report(Code.DUPLICATE_NAME, "a level serves one superior", more.span)
+        helps = "another one orders a level of its own, or through the one superior"
+        scope.report(Code.DUPLICATE_NAME, "a level serves one superior", more.span, helps)
+    commanded = [d for d in declarations if isinstance(d, tree.CommandsDecl)]
+    for peer in [d.peer for d in served[:1]] + [d.peer for d in commanded]:
+        scope.claim(peer, "neighbour")
     superior = _superior(scope, served[0], links, types) if served else None
     again = {name for declaration in declarations for name in _ordered_again(declaration)}
-    below = (
-        _subordinate(scope, d, links, types, again=d.peer.text in again)
-        for d in declarations
-        if isinstance(d, tree.CommandsDecl)
-    )
+    below = (_subordinate(scope, d, links, types, again=d.peer.text in again) for d in commanded)
     return Parties(superior, tuple(party for party in below if party is not None), types.members)
 
 
@@ -191,6 +199,12 @@ class _Types:
             written = self._constants.get(written.name.text, written)
         return int(written.text.replace("_", ""), 0) if isinstance(written, tree.IntLiteral) else None
 
+    def unit(self, written: tree.Expr) -> bool:
+        """Whether a number, or a constant that is one, has a unit."""
+        if isinstance(written, tree.Reference):
+            written = self._constants.get(written.name.text, written)
+        return isinstance(written, tree.IntLiteral | tree.RealLiteral) and written.unit is not None
+
     def none(self, link: tree.LinkDecl) -> str | None:
         """Return the first member of the link's reason; None where it has no reason."""
         kind = next((part.type for part in link.report if part.word == "reason"), None)
@@ -237,6 +251,12 @@ def _bounds(scope: Scope, given: tree.CommandsDecl, types: "_Types") -> None:
     echo, answer = (
         None if bound is None else types.number(bound) for bound in (given.within, given.answered)
     )
+    for bound in (given.within, given.answered):
+        if bound is not None and types.unit(bound):
+            helps = "write how many cycles: at a period of 40 [ms], 25 cycles are a second"
+            scope.report(
+                Code.UNIT, "`within` counts the level's cycles, which have no unit", bound.span, helps
+            )
     for bound, cycles, what in ((given.within, echo, "an echo"), (given.answered, answer, "an answer")):
         if bound is not None and cycles == 0:
             scope.report(Code.KIND, f"{what} takes at least one cycle", bound.span)
@@ -294,6 +314,12 @@ def _sound(scope: Scope, link: tree.LinkDecl, types: "_Types") -> bool:
                 named[0].span,
                 "put it first: a buffer into which nobody has written shows the first member",
             )
+    said: set[str] = set()
+    for member in (link.done, link.failed, link.executing):
+        if member.text in said:
+            message = f"`{member.text}` cannot mean two things: done, failed and executing are three members"
+            scope.report(Code.KIND, message, member.span)
+        said.add(member.text)
     for message, span in _misplaced(link, members):
         scope.report(Code.KIND, message, span)
     return len(scope.diagnostics) == before

@@ -22,6 +22,7 @@ from rcsc.lang.model import (
     VariableName,
     pending,
 )
+from rcsc.lang.protocol.written import AFTER, BEFORE
 from rcsc.lang.resolve.externs import extern
 from rcsc.lang.resolve.statements import MOST_STATEMENTS, Statements, below, cost
 from rcsc.lang.syntax import tree
@@ -63,7 +64,8 @@ def _body(scope: Scope, written: tree.ProcedureDecl) -> _Body:
             scope.report(Code.DUPLICATE_NAME, f"`{param.name.text}` is a parameter twice", param.name.span)
         body.visible[param.name.text] = parameter
         params.append(parameter)
-    return tuple(params), Statements(scope, body).block(written.body)
+    is_protocol = written.name.text in {BEFORE, AFTER} and bool(scope.numbers)
+    return tuple(params), Statements(scope, body, is_protocol=is_protocol).block(written.body)
 
 
 def _call_order(scope: Scope, bodies: dict[str, _Body]) -> list[str]:

@@ -89,8 +89,13 @@ class _Resolver:
     def program(self, all_: list[tree.Declaration], root: tree.File) -> Program | tuple[Diagnostic, ...]:
         """The program, or what is wrong."""
         scope = self.scope
+        scope.links = tuple(d.name.text for d in all_ if isinstance(d, tree.LinkDecl))
         parties = declared(scope, all_)
         scope.orders = {party.name: (party.told, party.once_more) for party in parties.subordinates}
+        scope.commands = {
+            party.name: parties.members[party.link.command.text] for party in parties.subordinates
+        }
+        scope.numbers = parties.numbers
         if scope.diagnostics:  # what would be made of it would only repeat this
             return tuple(sorted(set(scope.diagnostics), key=sort_key))
         deferred = [d.name.text for d in all_ if isinstance(d, tree.VariableDecl) and d.deferred]

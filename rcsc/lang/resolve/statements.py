@@ -49,11 +49,16 @@ MOST_STATEMENTS = 1_000_000
 
 @dataclass(slots=True)
 class Statements:
-    """Resolves the statements of one procedure, or of one action cell."""
+    """Resolves the statements of one procedure, or of one action cell.
+
+    Attributes:
+        is_protocol: Whether they are the protocol's own.
+    """
 
     scope: Scope
     body: Body = field(default_factory=Body)
     loops: set[str] = field(default_factory=set)
+    is_protocol: bool = False
 
     def block(self, written: tuple[tree.Statement, ...]) -> tuple[Statement, ...]:
         """The statements; locals declared inside are forgotten after it."""
@@ -164,6 +169,15 @@ class Statements:
     def _writable(self, target: Path, deferred: bool, span: Span) -> bool:
         root = root_of(target.names[0])
         declared = self.scope.declared[root]
+        if target.names[0] in self.scope.numbers and not self.is_protocol:
+            root = root_of(target.names[0])
+            helps = (
+                f"`{root} := COMMAND` orders; what `{root}` said is read"
+                if root in self.scope.orders
+                else "it follows from the commands that are ordered; `COMMAND(again)` numbers the same order anew"
+            )
+            self.scope.report(Code.NOT_WRITABLE, f"the protocol writes `{target.names[0]}`", span, helps)
+            return False
         if declared.kind is Kind.INPUT:
             self.scope.report(Code.NOT_WRITABLE, f"`{root}` is an input; only the world writes it", span)
             return False

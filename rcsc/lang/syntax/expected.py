@@ -59,6 +59,7 @@ _SYMBOLS = frozenset(
     " EQUAL MINUS".split()
 )
 """Terminals that are no words, whatever they are called."""
+_STATUS = "a link says what its statuses mean: `status : TYPE done MEMBER failed MEMBER executing MEMBER`"
 ELSEWHERE = {
     "===": "=", "!==": "/=", "==": "=", "!=": "/=", "<>": "/=", "&&": "and", "||": "or", "=>": "implies", "->": "implies",
     "=<": "<=", "&": "and", "!": "not", "~": "not", "%": "mod",
@@ -84,6 +85,30 @@ def expected(terminals: Iterable[str]) -> str:
     single = sorted(_WORDS.get(name, f"`{name.lower()}`") for name in names)
     words = (parts + single)[:_MOST]
     return " or ".join(words) if len(words) < 3 else ", ".join(words[:-1]) + " or " + words[-1]
+
+
+_HELPS = {
+    "CYCLES": "a time is a number of the level's own cycles: `within 25 cycles`",
+    "REST": "a link says which command rests: `command : TYPE rest MEMBER`",
+    "DONE": _STATUS,
+    "FAILED": _STATUS,
+    "EXECUTING": _STATUS,
+    "ORDER": "a field of a link stands in `order { NAME : TYPE }` or in `report { NAME : TYPE }`",
+}
+"""What helps where a word of the protocol is missing, by the terminal."""
+_FOR_WITHIN = {
+    ",": "each subordinate has a declaration of its own: `commands NAME : LINK`",
+    "else": "the reason is that of a time: `within 25 cycles else REASON`",
+}
+"""What helps behind `commands NAME : LINK`, by what is found there."""
+
+
+def missing_word(found: str, terminals: Iterable[str]) -> str:
+    """What helps where one of these words is missing, and something else is found; empty where nothing is known."""
+    names = set(terminals)
+    if "WITHIN" in names and found in _FOR_WITHIN:
+        return _FOR_WITHIN[found]
+    return next((text for name, text in _HELPS.items() if name in names), "")
 
 
 def operator_meant(text: str, at: int) -> tuple[int, str] | None:

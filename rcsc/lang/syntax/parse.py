@@ -18,7 +18,7 @@ from rcsc.diagnostics.source import Source, Span
 from rcsc.lang.syntax import screen, tree
 from rcsc.lang.syntax.build import Build
 from rcsc.lang.syntax.comments import Comments, words
-from rcsc.lang.syntax.expected import ELSEWHERE, expected, operator_meant, word_meant
+from rcsc.lang.syntax.expected import ELSEWHERE, expected, missing_word, operator_meant, word_meant
 from rcsc.lang.syntax.lalr import ParseLeaf, ParseNode, Tables
 from rcsc.lang.syntax.rows import (
     ACTION_WORDS,
@@ -154,11 +154,12 @@ def _syntax_error(error: lark.UnexpectedInput, file: str, start: int, end: int, 
         return _error(Code.NON_ASCII_NAME, message, Span(file, position, position + len(word)))
     seen = f"`{screen.shortened(word)}`" if word else "the end of the text"
     near = word_meant(word, wanted)
+    helps = f"did you mean `{near}`?" if near else missing_word(word, wanted)
     return _error(
         Code.SYNTAX,
         f"expected {expected(wanted)}, found {seen}",
         Span(file, position, position + len(word)),
-        *([f"did you mean `{near}`?"] if near else []),
+        *([helps] if helps else []),
     )
 
 
