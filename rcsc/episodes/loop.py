@@ -14,7 +14,7 @@ from rcsc.episodes.explain import Explanations
 from rcsc.episodes.harm import HarmedMemory, Held
 from rcsc.episodes.operator import WAITING, EpisodeOperator, operator, value_of
 from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome, Excused
-from rcsc.episodes.properties import NO_ERROR, properties, was_refused
+from rcsc.episodes.properties import ENDS, NO_ERROR, properties, was_refused
 from rcsc.episodes.stand import Field, Stand, stand
 from rcsc.run.levels import BadState, RunningLevel, StateTableError, running_level
 from rcsc.run.orders.roles import FAILED
@@ -288,10 +288,12 @@ class Loop:
 
     def _find(self, broken: Broken, tick: int) -> None:
         name, message = broken.property, broken.message[:MOST_MESSAGE]
+        if broken.property.endswith(ENDS):
+            self._end = "hang"
+            if not self._stage.outside:
+                return  # nothing outside moves, for which a command may wait
         because = self._explained.because(broken)
         if because:
             self._seen.excused.setdefault(name, Excused(name, tick, message, because))
         else:
             self._seen.findings.setdefault(name, EpisodeFinding(name, tick, message))
-            if name.endswith("every command ends"):
-                self._end = "hang"

@@ -21,6 +21,7 @@ from rcsc.run.signature import FAULTS, STOPPED, Signature, Values
 REFUSED = FAULTS.index("input refused")
 NO_ERROR = "no state-table error"
 REFUSES = "refuses what lies out of range"
+ENDS = "every command ends"
 
 
 class NoStateTableError:
@@ -248,7 +249,7 @@ class Ends:
                 text = (
                     f"`{given.text}` has not ended in {self.most} cycles without a fault: line `{level.line}`"
                 )
-                yield Broken(f"{name}: every command ends", text, name)
+                yield Broken(f"{name}: {ENDS}", text, name)
 
 
 class PlantHolds:

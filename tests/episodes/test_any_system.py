@@ -301,6 +301,17 @@ class TestSeededDefects:
         )
         assert (within.end, names(within)) == ("failed:reason drive_fault", set())
 
+    def test_no_end_of_a_command_where_nothing_outside_moves(self, dock: Path) -> None:
+        path = dock / "system.toml"
+        path.write_text(
+            path.read_text()
+            .partition("[plant]")[0]
+            .replace("tick_ms = 40\n", "tick_ms = 40\ncampaign = { within = 50 }\n")
+        )
+        outcome = run(Episode(orders=(UNDOCK, DOCK)), path)
+        assert (outcome.end, outcome.ticks, names(outcome)) == ("hang", 50, set())
+        assert [row.state for row in outcome.rows] == ["waiting"]
+
     def test_no_time_that_a_fault_takes(self, dock: Path) -> None:
         path = dock / "system.toml"
         edit_file(path, ("tick_ms = 40\n", "tick_ms = 40\ncampaign = { within = 100 }\n"))
