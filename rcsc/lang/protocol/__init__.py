@@ -11,6 +11,7 @@ failed, and what is said of it from then on is no answer; but to rest is never t
 
     serves fleet : fleet_link               what fleet orders is `fleet`, what is reported to it `to_fleet`
     commands drive : drive_link             what is ordered of it is `to_drive`, what it said of the last order `drive`
+    drive := goto(target_mm := 500)         the command and the fields that are named; the others are kept (`resolve.statements`)
 
 In: the declarations of a root. Out: the same with records, buffers, state and two modules in the place of the protocol's; what each
 table may assume. All of it is text of the language, parsed as the rest is: interpreter, proof and executors know nothing of it.
