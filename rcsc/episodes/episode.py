@@ -144,6 +144,10 @@ class Episode:
         for name, number in self._ticks():
             if not 0 <= number <= MOST_TICK:
                 raise ValueError(f"`{name}` is {number}, and lies between 0 and {MOST_TICK}")
+        windows: tuple[BufferFault | Reading | Switch, ...] = (*self.harms, *self.readings, *self.switches)
+        for window in windows:
+            if window.first_tick > window.last_tick:
+                raise ValueError(f"a window from tick {window.first_tick} to {window.last_tick} has no tick")
 
     def _ticks(self) -> Iterator[tuple[str, int]]:
         """Yield every number of ticks in it, by the name of its field."""

@@ -7,7 +7,7 @@ outside that holds a value of its range explains no more than an assumption abou
 itself.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from rcsc.episodes.cycle import Broken
@@ -29,11 +29,12 @@ class Explanations:
     misled: dict[str, str] = field(default_factory=dict)
     forged: dict[str, dict[str, str]] = field(default_factory=dict)
 
-    def note(self, changed: Mapping[str, str]) -> None:
+    def note(self, changed: Mapping[str, str], places: Mapping[str, Collection[int]] | None = None) -> None:
         """A tick is done.
 
         Args:
             changed: Buffers that did not say what was published in time, each with the fault.
+            places: Of such a buffer, the leaves that did not; none where all may not have.
         """
         for level, other in self._neighbours():
             if level in self.misled:
@@ -47,7 +48,10 @@ class Explanations:
                 self.misled.setdefault(level, because)
             else:
                 sign = self.stand.signs[level]
-                names = (sign.leaves[at].name for at in sign.record(variable))
+                false = (places or {}).get(wire.source) or range(len(sign.record(variable)))
+                names = (
+                    sign.leaves[at].name for place, at in enumerate(sign.record(variable)) if place in false
+                )
                 self.forged.setdefault(level, {}).update(dict.fromkeys(names, because))
 
     def _neighbours(self) -> Iterator[tuple[str, str]]:

@@ -29,7 +29,7 @@ class HarmedMemory(CommonMemory):
 
     Attributes:
         said: What was last published in each buffer, whatever became of it.
-        changed: Buffers that a stale value or a held one has changed in this tick.
+        changed: Buffers that a stale value or a held one has changed in this tick: which places, none where it is the whole.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class HarmedMemory(CommonMemory):
         """
         super().__init__()
         self.said: dict[str, Values] = {}
-        self.changed: set[str] = set()
+        self.changed: dict[str, frozenset[int]] = {}
         self._harms, self._readings, self._first = tuple(harms), tuple(held), first
         self._tick = 0
         self._now: dict[str, BufferFault] = {}
@@ -54,6 +54,13 @@ class HarmedMemory(CommonMemory):
         self._seen: dict[str, Values] = {}  # what readers see, but for fields that hold a value
         size = 1 + max((harm.ticks for harm in self._harms), default=0)
         self._past = {harm.buffer: deque[Values](maxlen=size) for harm in self._harms if harm.kind == "stale"}
+
+    def written(self) -> CommonMemory:
+        """Common memory as its writers left it: what is lost or late is so on the way to readers."""
+        memory = CommonMemory()
+        for name, values in self.said.items():
+            memory.publish(name, values)
+        return memory
 
     def begin(self, tick: int) -> None:
         """A tick begins: what is due arrives, and fields take and leave what they hold."""
@@ -70,7 +77,16 @@ class HarmedMemory(CommonMemory):
         for name in before.keys() | self._holding.keys():
             if before.get(name) != self._holding.get(name):
                 self._show(name, self._seen.get(name, self._first.get(name)))
-        self.changed.update(self._holding)
+        for name, by_place in self._holding.items():
+            self._note_forged(name, by_place)
+
+    def _note_forged(self, name: str, held: Mapping[int, Value]) -> None:
+        """A field that holds what it would hold anyway is not false."""
+        seen = self._seen.get(name, self._first.get(name, ()))
+        if places := frozenset(
+            place for place, value in held.items() if place < len(seen) and seen[place] != value
+        ):
+            self.changed[name] = places
 
     def publish(self, name: str, values: Values) -> None:
         """Makes this the latest value, unless something happens to it."""
@@ -96,7 +112,7 @@ class HarmedMemory(CommonMemory):
         past = self._past[name]
         older = past[max(0, len(past) - 1 - ticks)]
         if older != past[-1]:
-            self.changed.add(name)
+            self.changed[name] = frozenset()
         self._show(name, older)
 
     def _arrive(self, name: str, published: int, values: Values) -> None:

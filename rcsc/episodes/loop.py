@@ -140,7 +140,7 @@ class Loop:
             buffer.name: tuple(leaf.initial for leaf in buffer.leaves) for buffer in its.outside
         }
         self._memory = HarmedMemory(episode.harms, (one for _, one in fields), first)
-        self._refused = [(at, one) for at, one in fields if at.refuses(one.value)]
+        self._held, self._refused = fields, [(at, one) for at, one in fields if at.refuses(one.value)]
         by_level = executors(its.system, its.signs, episode.executor)
         levels = tuple(
             running_level(spec, its.system, its.signs[spec.name], by_level[spec.name], self._stage.queries)
@@ -242,7 +242,7 @@ class Loop:
 
     def _restart(self, name: str) -> None:
         try:
-            self.system.restart(name)
+            self.system.restart(name, written=self._memory.written())
         except BadState as error:
             self._find(Broken(f"{name}: {RESTARTS}", str(error), name), self.system.tick + 1)
         level = self.system.level(name)
@@ -268,7 +268,7 @@ class Loop:
                 (level.name, -1 if by < 0 else int(values[by]), int(values[len(level.sign.leaves)]))
             )
         cycle.tick, cycle.ran = system.tick, ran
-        self._explained.note({name: self._why(name) for name in self._memory.changed})
+        self._explained.note({name: self._why(name) for name in self._memory.changed}, self._memory.changed)
         for watcher in self._properties:
             for broken in watcher.watch(cycle):
                 self._find(broken, system.tick)
@@ -282,9 +282,11 @@ class Loop:
         for harm in self.episode.harms:
             if (harm.buffer, harm.kind) == (buffer, "stale") and harm.first_tick <= tick <= harm.last_tick:
                 return f"buffer `{buffer}` is stale in ticks {harm.first_tick} .. {harm.last_tick}"
-        readings = (one for one in self.episode.readings if one.first_tick <= tick <= one.last_tick)
-        held_now = next((one for one in readings if one.field.startswith(buffer)), None)
-        return f"`{held_now.field}` is {held_now.value}" if held_now is not None else f"buffer `{buffer}`"
+        for reading, (at, one) in zip(self.episode.readings, self._held, strict=True):
+            forged = at.buffer == buffer and at.place in self._memory.changed[buffer]
+            if forged and one.first_tick <= tick <= one.last_tick:
+                return f"`{reading.field}` is {reading.value}"
+        return f"buffer `{buffer}`"
 
     def _find(self, broken: Broken, tick: int) -> None:
         name, message = broken.property, broken.message[:MOST_MESSAGE]

@@ -44,8 +44,9 @@ def order_of(served: Served, spec: OrderSpec) -> tuple[Value, ...]:
         ValueError: The order has no such field, or a value is none of the field's.
     """
     given = {one.name: one.value for one in spec.fields}
-    leaves = {field_of(leaf): leaf for leaf in served.order_leaves}
-    if stray := sorted(set(given) - set(leaves)):
+    protocol = {served.command, served.number}
+    leaves = {field_of(leaf) for place, leaf in enumerate(served.order_leaves) if place not in protocol}
+    if stray := sorted(set(given) - leaves):
         raise ValueError(f"an order to `{served.level}` has no field `{stray[0]}`")
     values = []
     for place, leaf in enumerate(served.order_leaves):

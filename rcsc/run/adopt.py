@@ -38,13 +38,16 @@ class Restarted:
     values: Values
 
 
-def restart(level: RunningLevel, buffers: Buffers, checkpoint: Values | None = None) -> Restarted:
+def restart(
+    level: RunningLevel, buffers: Buffers, checkpoint: Values | None = None, written: Buffers | None = None
+) -> Restarted:
     """Put a level where its process would begin again.
 
     Args:
         level: Whatever state it is in.
         buffers: What it takes from and gives to.
         checkpoint: All leaves and the trace after its last cycle; None where they are lost: then it starts anew.
+        written: What it gives to, as it wrote it, where readers may not see that yet; None where they do.
 
     Raises:
         BadState: The checkpoint, or what the level would adopt, lies outside what its tables are proved for.
@@ -52,7 +55,7 @@ def restart(level: RunningLevel, buffers: Buffers, checkpoint: Values | None = N
     if checkpoint is None:
         level.put_back(level.initial)
         level.take(buffers)
-        level.restore(adopt(level.sign, level.executor.values(), standing(level, buffers)))
+        level.restore(adopt(level.sign, level.executor.values(), standing(level, written or buffers)))
     else:
         level.restore(checkpoint)
     begun = Begun.ANEW if checkpoint is None else Begun.CHECKPOINT

@@ -95,17 +95,18 @@ class System:
             raise StateTableError(f"buffer `{name}` cannot hold what was published: {error}") from error
         self.buffers.publish(name, values)
 
-    def restart(self, name: str, checkpoint: Values | None = None) -> None:
+    def restart(self, name: str, checkpoint: Values | None = None, written: Buffers | None = None) -> None:
         """Restart a level before the next tick, as if its process had been killed and started again.
 
         Args:
             name: The level's.
             checkpoint: What it goes on from: all leaves and the trace; None where that is lost, too.
+            written: The buffers as they were written, where readers may see something older; None where they do not.
 
         Raises:
             KeyError: There is none of that name.
         """
-        self.restarts.append(restart(self.level(name), self.buffers, checkpoint))
+        self.restarts.append(restart(self.level(name), self.buffers, checkpoint, written))
 
     def level(self, name: str) -> RunningLevel:
         """A level by its name.

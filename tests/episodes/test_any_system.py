@@ -20,6 +20,7 @@ from rcsc.episodes.episode import (
     Switch,
 )
 from rcsc.episodes.explain import Explanations
+from rcsc.episodes.harm import HarmedMemory, Held
 from rcsc.episodes.loop import Loop, check, run
 from rcsc.episodes.outcome import EpisodeOutcome
 from rcsc.episodes.sampling import draw, fault_classes, fault_names
@@ -96,6 +97,8 @@ class TestAnEpisode:
             ('{"orders": [{"level": "supervisor"}]}', "not the values of a OrderSpec"),
             ('{"ticks": -1}', "`ticks` is -1"),
             ('{"seed": -1}', "the seed"),
+            ('{"readings": [{"field": "x", "value": 1, "first_tick": 9, "last_tick": 8}]}', "has no tick"),
+            ('{"switches": [{"fault": "x", "first_tick": 9, "last_tick": 0}]}', "has no tick"),
         ],
     )  # fmt: skip
     def test_that_is_none_is_refused(self, text: str, why: str) -> None:
@@ -108,6 +111,11 @@ class TestAnEpisode:
             (Episode(orders=(OrderSpec("boss", "dock"),)), "no level `boss` is ordered"),
             (Episode(orders=(OrderSpec("supervisor", "dance"),)), "`dance` is no value of"),
             (Episode(orders=(OrderSpec("supervisor", "dock", (FieldValue("at", 3),)),)), "no field `at`"),
+            (Episode(orders=(OrderSpec("supervisor", "dock", (FieldValue("inc_command", 3),)),)), "no field"),
+            (
+                Episode(orders=(OrderSpec("supervisor", "dock", (FieldValue("input_command", 1),)),)),
+                "no field",
+            ),
             (Episode(harms=(BufferFault("x.y", "lost", 0, 1),)), "no buffer `x.y`"),
             (Episode(readings=(Reading("base.speed", 1, 0, 1),)), "`base.speed` is no field"),
             (Episode(readings=(Reading("base.bumper", 3, 0, 1),)), "`3` is no value"),
@@ -215,6 +223,16 @@ class TestEveryFault:
         outcome = run(Episode(orders=(UNDOCK,), restarts=(Restart(30, "supervisor"),)), robot)
         assert outcome.rows[0].state == "failed"
 
+    @pytest.mark.parametrize("kind", ["lost", "late"])
+    @pytest.mark.parametrize("tick", [2, 3, 7])
+    def test_a_restart_counts_on_from_an_order_that_nobody_has_seen_yet(
+        self, robot: Path, kind: Harm, tick: int
+    ) -> None:
+        harm = BufferFault("supervisor.to_drive", kind, 0, 12, ticks=8)
+        restarts = (Restart(tick, "supervisor"),)
+        outcome = run(Episode(orders=(UNDOCK,), harms=(harm,), restarts=restarts), robot)
+        assert (outcome.findings, outcome.excused) == ((), ())
+
     def test_a_switch_makes_the_plant_misbehave_for_its_window(self, robot: Path) -> None:
         plain = run(Episode(orders=(UNDOCK,)), robot)
         slips = run(Episode(orders=(UNDOCK,), switches=(Switch("wheel_slips", 10, 49),)), robot)
@@ -271,6 +289,25 @@ class TestWhatAFaultExplains:
         assert not explained.because(Broken("a", "", "drive", ("bumper",)))
         assert explained.because(Broken("plant: p", "")) == "it is forged"
         assert explained.because(Broken("a", "", "drive", ("travelled_mm",))) == "it is forged"
+
+    def test_a_reading_of_what_is_so_anyway_explains_nothing(self, dock: Path) -> None:
+        method = "    def stays_near(self) -> Property:\n        return self.travelled < 0.5\n\n    def step("
+        edits = ("    def step(", method), ("import Fault, Range", "import Fault, Property, Range")
+        path = changed(dock, "base.py", *edits)
+        for value, broken in ((0, {"plant: stays_near"}), (1, set[str]())):
+            reading = Reading("base.travelled", value, 1, 1)
+            outcome = run(Episode(orders=(UNDOCK,), readings=(reading,)), path)
+            assert names(outcome) == broken
+            assert bool(outcome.excused) is (not broken)
+
+    def test_a_reading_forges_its_own_field_of_a_record_alone(self, robot: Path) -> None:
+        held = (Held("base.seen", 0, 1, 0, 5), Held("base.seen", 1, 7, 0, 5))
+        memory = HarmedMemory((), held, {"base.seen": (1, 2)})
+        memory.begin(0)
+        assert memory.changed == {"base.seen": {1}}
+        explained = Explanations(stand(robot))
+        explained.note({"base.travelled": "it is forged"}, {"base.travelled": {1}})
+        assert explained.forged == {"drive": {}}
 
 
 class TestSeededDefects:
