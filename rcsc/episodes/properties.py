@@ -200,20 +200,23 @@ class AnswerStays:
 
     Attributes:
         at: Where the level's report begins among its leaves; `order` is where the order does.
+        anew: In which cycle the level started anew last.
     """
 
     link: Served
     at: int
     order: int
     last: tuple[int, str] | None = None
+    anew: int = 0
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
         """What it was, and what it became."""
         link, level = self.link, cycle.levels[self.link.level]
-        if level not in cycle.ran or level.fault:
-            return
         if level.name in cycle.restarted:
             self.last = int(cycle.before[level.name][self.order + link.number]), link.failed
+            self.anew = cycle.tick
+        if level not in cycle.ran or level.fault:
+            return
         echo = int(level.values[self.at + link.echo])
         status = link.report_leaves[link.status].shown(level.values[self.at + link.status])
         was, self.last = self.last, (echo, status)
@@ -222,6 +225,8 @@ class AnswerStays:
             return
         if was[1] in (link.done, link.failed):
             text = f"order {echo} of `{link.order}` was {was[1]}, and is {status}"
+            if self.anew:
+                text += f"; the level started anew in cycle {self.anew}: `state NAME : TYPE restart VALUE` says with what"
             yield Broken(f"{link.level}: {was[1]} stays {was[1]}", text, level.name)
 
 

@@ -315,6 +315,10 @@ class TestSeededDefects:
 
     def test_a_drive_that_forgets_what_it_did_when_it_starts_anew(self, dock: Path) -> None:
         path = changed(dock, "drive.rcs", (" restart bad", ""))
+        outcome = run(Episode(orders=(UNDOCK,), restarts=(Restart(20, "drive"),)), path)
+        [finding] = outcome.findings
+        assert finding.message.startswith("order 1 of `supervisor.to_drive` was failed, and is done; ")
+        assert finding.message.endswith("anew in cycle 21: `state NAME : TYPE restart VALUE` says with what")
         found, seed = first_found(path)
         assert found == {"drive: failed stays failed"}
         assert "restarted" in fault_classes(draw(seed, path))
