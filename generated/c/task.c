@@ -333,15 +333,18 @@ static void task_do_released(task_t *s)
     task_do_none_acquired(s);
 }
 
-/* Where to end: as the command says, else at the safe position of the place where the robot is. */
+/* Where to end: as the command says, else at the safe position of the place where the robot is. It leaves that: the line may match again, and by then MOVE-TO is the last order. */
 static void task_do_set_end(task_t *s)
 {
     if (((int64_t)s->workstation.end_at_locpt != INT64_C(0))) {
         s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->workstation.end_at_locpt;
     } else {
-        s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->here.safe;
+        if (((int64_t)s->last_emove.input_command != INT64_C(1))) {
+            s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->here.safe;
+        }
     }
     s->to_emove.sector = (uint8_t)INT64_C(0);
+    s->current_loc = (uint8_t)INT64_C(0);
 }
 
 /* The robot is at the end position. */

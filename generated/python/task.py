@@ -918,12 +918,14 @@ def _do_released(s):
 
 
 def _do_set_end(s):
-    """Where to end: as the command says, else at the safe position of the place where the robot is."""
+    """Where to end: as the command says, else at the safe position of the place where the robot is. It leaves that: the line may match again, and by then MOVE-TO is the last order."""
     if (s.workstation_end_at_locpt != 0):
         s.to_emove_locpt_ptr = s.workstation_end_at_locpt
     else:
-        s.to_emove_locpt_ptr = s.here_safe
+        if (s.last_emove_input_command != 1):
+            s.to_emove_locpt_ptr = s.here_safe
     s.to_emove_sector = 0
+    s.current_loc = 0
 
 
 def _do_ended(s):

@@ -171,6 +171,25 @@ def test_without_a_source_a_robot_on_its_way_takes_nothing() -> None:
     assert cell.do("move", dest="WS-SAFE") == "done"
 
 
+def test_a_robot_that_left_a_part_and_was_paused_is_nowhere() -> None:
+    """RELEASE leaves the place for the safe one: what comes then does not begin at the place."""
+    cell = Cell()
+    assert cell.do("acquire", obj="tbox", grasp=2, source="BUFFER") == "done"
+    assert cell.do("move", dest="STATION", sector=1) == "done"
+    cell.tell("release")
+    task = cell.system.level("task")
+    while task.shown("cur_state") != "state_8":
+        cell.system.step()
+    assert cell.do("pause") == "done"
+    assert task.value("current_loc") == 0
+    assert cell.do("acquire", obj="tbox", grasp=2) == "failed"
+    assert cell.reason() == "cmd"
+    assert cell.do("acquire", obj="tbox", grasp=2, source="STATION", sector=1) == "done"
+    assert cell.do("release") == "done"
+    assert task.value("current_loc") == cell.database.locations["WS-SAFE"]
+    assert cell.failed == []
+
+
 def test_vision_looks_past_a_hand_that_is_opened_fully() -> None:
     """Section 4.1: before the first picture as wide as it goes, and after the second one as the part wants it."""
     cell = Cell()
