@@ -719,6 +719,11 @@ class Roles:
     superior: Role | None
     subordinates: tuple[Role, ...]
 
+    @property
+    def clocks(self) -> frozenset[str]:
+        """Leaves in which the protocol counts the cycles of an order: no line has an effect on them."""
+        return frozenset(f"{role.peer}_waited" for role in self.subordinates if role.late is not None)
+
     def makes(self, leaf: str) -> bool:
         """Return whether the protocol makes the leaf: a buffer, or what is kept of orders and reports."""
         peers = [role.peer for role in (self.superior, *self.subordinates) if role is not None]

@@ -105,6 +105,9 @@ def endings(dock: Path) -> tuple[dict[str, bool], tuple[str, ...]]:
     systems = transition_systems(dock)
     whole = prove_transition_systems(systems, None, 1, tuple(systems))
     ends = {ending.table: ending.proved for ending in whole.levels[0].endings}
+    context = whole.levels[0].context
+    assert context is not None
+    assert context.repeated == ()  # that a cycle passes is no effect of a line
     lacks = whole.of("supervisor", (Sort.ENDS, "dock", "")).lacks
     return ends, tuple(" ".join(part for part in (level, *key) if part) for level, key in lacks)
 

@@ -202,14 +202,18 @@ def _shown(solver: Solver, changed: dict[str, Term]) -> Iterator[str]:
 
 
 def _of_lines(ts: TransitionSystem) -> list[str]:
-    """List states and outputs, except those that only the preprocess writes: a test variable is no effect of a line."""
+    """List states and outputs, except those that only the preprocess writes: a test variable is no effect of a line.
+
+    Nor is it one of a line that time goes on while an order is not echoed.
+    """
+    clocks = ts.program.roles.clocks if ts.program.roles is not None else frozenset()
     before = {str(leaf) for name in ts.level.preprocess for leaf in ts.procedures[name].writes}
     later = {str(leaf) for name in ts.level.postprocess for leaf in ts.procedures[name].writes}
     lines = of_lines(ts) | later
     return [
         str(v.name)
         for v in ts.program.variables
-        if v.kind is not Kind.INPUT and (v.name in lines or v.name not in before)
+        if v.kind is not Kind.INPUT and (v.name in lines or v.name not in before) and v.name not in clocks
     ]
 
 
