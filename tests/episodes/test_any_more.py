@@ -1,5 +1,6 @@
 """Episodes of systems of other kinds: feeds, extern procedures, no protocol, a model, and the paper's cell by its declarations alone."""
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -132,6 +133,10 @@ class TestRcscTest:
         assert "in Python alone: extern procedures have no C here" in capsys.readouterr().out
         assert rcsc(["run", "--cycles", "3", str(room)]) == 1  # which has no such function either
         assert "the C executors call `asked_of`" in capsys.readouterr().err
+        with monkeypatch.context() as without:
+            without.setitem(sys.modules, "hypothesis", None)
+            assert rcsc([*QUICK, str(room)]) == 0
+        assert "`hypothesis` is not installed: pip install 'rcsc[hypothesis]'" in capsys.readouterr().out
         edit_file(room / "system.toml", ('[plant]\npython = "room.py"\n', ""))
         assert rcsc([*QUICK, str(room)]) == 0
         assert "no episodes: " in capsys.readouterr().out
