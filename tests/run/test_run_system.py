@@ -366,7 +366,7 @@ def test_numbers_go_on_and_wrap(here: Path) -> None:
         ("command,base.beacon\ndock,false\n", "failed", "reason no_beacon"),
         ("command,within\ndock,20\n", "failed", "did not end in 20 cycles"),
         ("command,within\ndock,1\n", "failed", "is not answered in 1 cycles"),
-        ("command,expect\nstop,failed\n", "failed", "reason none, and was to be failed"),
+        ("command,expect\nstop,failed\n", "failed", "done, and was to be failed"),
         ("command,expect\ndock,executing\n", "done", ""),
     ],
 )

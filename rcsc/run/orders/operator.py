@@ -219,7 +219,8 @@ class ScriptOperator:
                 return DONE, f"{status} as expected: {said}" if said else ""
             if status in (row.served.done, row.served.failed):
                 wanted = "" if row.expect == row.served.done else f", and was to be {row.expect}"
-                return FAILED, f"{answer_reason(row.served, report) or status}{wanted}"
+                said = answer_reason(row.served, report) if status == row.served.failed else ""
+                return FAILED, f"{said or status}{wanted}"
         if row.within is not None and ticks >= row.within:
             answered = "did not end" if report is not None else "is not answered"
             return FAILED, f"{answered} in {row.within} cycles"
