@@ -23,6 +23,9 @@ fingers in the cycles after that is missed when it is not where it should be."""
 CHANGED_PICKUP = True
 """PICKUP is booked when it is ordered: TASK then counts one less (Fig. 9). Another command while the fingers close leaves that so,
 whatever they hold by then. Counts are not looked at in the command that came between."""
+CHANGED_RELEASE = True
+"""A part is counted when RELEASE is done. Another command while the fingers open may leave it on the buffer, uncounted: TASK takes it to
+be held until the next command finds that it is not."""
 PUSHED = frozenset({"pushed"})
 """Somebody pushed a part after it was put down, or from the table."""
 ASIDE = frozenset({"pushed", "shifted_mm", "noisy"})
@@ -154,6 +157,7 @@ class CountsTrue:
     place: ClassVar[str] = "section 8.1, item 5: REMOVE-FROM-BUFFER-DB"
     lets_go: ClassVar[frozenset[str]] = LETS_GO
     changed_pickup: ClassVar[bool] = CHANGED_PICKUP
+    changed_release: ClassVar[bool] = CHANGED_RELEASE
 
     def __init__(self, cycle: CycleState) -> None:
         self._tables = _buffers(cycle.database)
@@ -178,7 +182,9 @@ class CountsTrue:
                 cycle.shown("task", "obj_now_in_gripper") != "null_obj"
             )  # a part that a changed PICKUP has counted
             still = same or closing or believed or bool(cycle.held)
-            self._excused = (self._excused and still) or (self.changed_pickup and _picking(cycle))
+            picking = self.changed_pickup and _under_way(cycle, "pickup")
+            letting_go = self.changed_release and _under_way(cycle, "release")
+            self._excused = (self._excused and still) or picking or letting_go
             self._begun, self._was = cycle.command, self._difference(cycle)
         if cycle.command is None or cycle.ended != "done" or self._excused:
             return None
@@ -210,10 +216,10 @@ def _at_rest(cycle: CycleState, before: tuple[float, ...]) -> str | None:
     return f"a joint moved by {moved_rad:.4f} rad" if moved_rad > REST_RAD else None
 
 
-def _picking(cycle: CycleState) -> bool:
-    """Whether PICKUP is under way."""
+def _under_way(cycle: CycleState, command: str) -> bool:
+    """Whether this command of E-MOVE is under way."""
     executing = cycle.shown("task", "to_workstation.status_report") == "executing"
-    return executing and cycle.shown("task", "to_emove.input_command") == "pickup"
+    return executing and cycle.shown("task", "to_emove.input_command") == command
 
 
 def _ends_at(cycle: CycleState, command: Command) -> int:
