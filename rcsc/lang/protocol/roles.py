@@ -241,6 +241,9 @@ def _subordinate(
     for reason in filter(None, (given.late, given.unanswered)):
         if party.reason is None:
             scope.report(Code.KIND, f"the report of link `{link.name.text}` has no `reason`", reason.span)
+        elif reason.text == types.none(link):
+            message = f"`{reason.text}` says that there is no reason: what is late has failed"
+            scope.report(Code.KIND, message, reason.span, "name another member of the reason")
         else:
             _known_reason(scope, link, reason, types.members)
     return party
