@@ -287,7 +287,7 @@ LEVEL_BY = "level cell {{ table by {} {{ rest : work  work : work  stow : work }
         ("within 2 cycles", "within 2", "RCS101", "`within 25 cycles`"),
         ("within 2 cycles", "within 80 [ms]", "RCS101", "`within 25 cycles`"),
         ("within 2 cycles", "within 80 [ms] cycles", "RCS302", "write how many cycles"),
-        ("cycles else silent", "cycles else none", "RCS301", "`none` says that there is no reason"),
+        ("cycles else silent", "cycles else none", "RCS301", "name another member of the reason"),
         (" within 2 cycles else silent", " else silent", "RCS101", "`within 25 cycles else REASON`"),
         (" within 2 cycles else silent", ", hand : jobs", "RCS101", "`commands NAME : LINK`"),
         ("command : job rest rest", "command : job pause rest", "RCS101", "`command : TYPE rest MEMBER`"),
