@@ -44,9 +44,9 @@ def term(heading: tree.Heading, cell: tree.Condition) -> tree.Expr:
         case tree.Comparison(op, value):
             return tree.Binary(op, heading.subject, value)
         case tree.OneOf(members):
-            return tree.InSet(heading.subject, members)
+            return tree.InSet(heading.subject, members, negated=cell.negated)
         case tree.Between(low, high):
-            return tree.InRange(heading.subject, low, high)
+            return tree.InRange(heading.subject, low, high, negated=cell.negated)
 
 
 def guard(terms: list[tree.Expr]) -> str:
@@ -79,9 +79,9 @@ def cell(expr: tree.Expr) -> tuple[tree.Expr, tree.Condition] | None:
         case tree.Binary(op, subject, value) if op in ("=", "/=", "<", "<=", ">", ">="):
             return (subject, tree.Comparison(op, value)) if not _constant(subject) else None
         case tree.InSet(subject, members):
-            return subject, tree.OneOf(members)
+            return subject, tree.OneOf(members, negated=expr.negated)
         case tree.InRange(subject, low, high):
-            return subject, tree.Between(low, high)
+            return subject, tree.Between(low, high, negated=expr.negated)
         case tree.Unary("not", (tree.Reference() | tree.FieldOf() | tree.IndexOf()) as subject):
             return subject, tree.Comparison("=", tree.BoolLiteral(value=False))
         case tree.Reference() | tree.FieldOf() | tree.IndexOf():

@@ -289,7 +289,7 @@ def test_a_line_whose_name_was_forgotten_is_no_longer_line() -> None:
     parsed = parse(Source("case.rcs", "table t {\n | line | x ||\n | a | 1 ||\n | | 2 ||\n}"))
     assert not isinstance(parsed, tree.File)
     [finding] = parsed
-    assert finding.message == "expected an operator, `..` or the end, found `2`"
+    assert finding.message == "expected an operator, `,`, `..`, `not` or the end, found `2`"
     assert PIECES in finding.help
 
 

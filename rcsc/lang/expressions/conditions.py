@@ -8,7 +8,7 @@ from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.scope import Body, Scope
-from rcsc.lang.expressions.typed import among, between, boolean, typed
+from rcsc.lang.expressions.typed import among, between, boolean, other_than, typed
 from rcsc.lang.interval_sets import compared as keys_compared
 from rcsc.lang.interval_sets import complement, joined, meet, scaled
 from rcsc.lang.leaves import read_by
@@ -112,6 +112,8 @@ class Tests:
                 condition = among(scope, body, subject, members, span)
             case tree.Between(low, high, span):
                 condition = between(scope, body, subject, low, high, span)
+        if condition is not None and not isinstance(written, tree.Comparison) and written.negated:
+            condition = other_than(condition)
         return None if condition is None else condition.expr
 
     def _fits(self, column: int, subject: Typed, other: Typed, span: Span) -> bool:

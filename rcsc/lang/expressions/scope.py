@@ -40,6 +40,7 @@ class Scope:
 
     Attributes:
         places: Where each name was declared, by `SPACE NAME`.
+        sets: The members of each set; `set_names` has those, too, that are not resolved yet.
         signatures: The types of each procedure's parameters.
         places_of: The place of each leaf in declared order; made when it is asked for.
         doubles: The first spelling of each double of the text, and where it stands.
@@ -59,6 +60,8 @@ class Scope:
     places: dict[str, Span] = field(default_factory=dict)
     units: set[str] = field(default_factory=lambda: set(BASE_UNITS))
     constants: dict[str, Constant] = field(default_factory=dict)
+    sets: dict[str, tuple[tree.Expr | tree.Range, ...]] = field(default_factory=dict)
+    set_names: set[str] = field(default_factory=set)
     types: dict[str, Type] = field(default_factory=dict)
     members: dict[str, list[Enum]] = field(default_factory=dict)
     declared: dict[str, Declared] = field(default_factory=dict)

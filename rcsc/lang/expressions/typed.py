@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import reduce
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -39,6 +40,8 @@ from rcsc.lang.model import (
     Type,
     Value,
     VariableName,
+    key_bounds,
+    value_of_key,
 )
 from rcsc.lang.operator_table import Op, Operator, is_comparison, is_logic
 from rcsc.lang.syntax import tree
@@ -118,6 +121,9 @@ def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scal
         return Typed(Literal(want.members.index(name.text), want, span))
     if name.text in scope.declared:
         return _path(scope, body, tree.Reference(name, span))
+    if name.text in scope.set_names:
+        scope.report(Code.KIND, f"`{name.text}` is a set, and no value", name.span, f"write `in {name.text}`")
+        return None
     if not scope.demand("value", name):
         return None
     if name.text in scope.constants:
@@ -347,15 +353,31 @@ def _binary(scope: Scope, body: Body, written: tree.Binary) -> Typed | None:
 
 def _in_set(scope: Scope, body: Body, written: tree.InSet) -> Typed | None:
     subject = typed(scope, body, written.subject)
-    return None if subject is None else among(scope, body, subject, written.members, written.span)
+    condition = None if subject is None else among(scope, body, subject, written.members, written.span)
+    return other_than(condition) if condition is not None and written.negated else condition
+
+
+def other_than(condition: Typed) -> Typed:
+    """`not in`."""
+    return Typed(Apply(Op.NOT, (condition.expr,), Bool(), condition.expr.span))
 
 
 def among(
-    scope: Scope, body: Body, subject: Typed, members: tuple[tree.Expr, ...], span: Span
+    scope: Scope, body: Body, subject: Typed, members: tuple[tree.Member, ...], span: Span
 ) -> Typed | None:
-    """`subject in {members}`; members are constants."""
+    """`subject in {members}`; members are constants, ranges and named sets."""
     values: list[Value] = []
-    for member in members:
+    ranges: list[Expr] = []
+    every = _members(scope, body, members)
+    if every is None:
+        return None
+    for member in every:
+        if isinstance(member, tree.Range):
+            inside = between(scope, body, subject, member.low, member.high, member.span)
+            if inside is None:
+                return None
+            ranges.append(inside.expr)
+            continue
         element = typed(scope, body, member, subject.expr.type)
         if element is None:
             return None
@@ -369,12 +391,63 @@ def among(
         ):
             return None
         values.append(value)
-    return Typed(Among(subject.expr, tuple(sorted(set(values))), Bool(), span))
+    among_values = Among(subject.expr, tuple(sorted(set(values))), Bool(), span)
+    parts = [among_values, *ranges] if values else ranges
+    return Typed(reduce(lambda left, right: Apply(Op.OR, (left, right), Bool(), span), parts))
+
+
+def _members(
+    scope: Scope, body: Body, members: tuple[tree.Member, ...]
+) -> list[tree.Expr | tree.Range] | None:
+    """The members, with those of named sets in their place; None after an error."""
+    every: list[tree.Expr | tree.Range] = []
+    for member in members:
+        name = _set_name(scope, body, member)
+        if name is None:
+            assert not isinstance(member, tree.NamedSet)
+            every.append(member)
+        elif (its := named_set(scope, name)) is None:
+            return None
+        else:
+            every += its
+    return every
+
+
+def _set_name(scope: Scope, body: Body, member: tree.Member) -> tree.Name | None:
+    """The name of the set that a member is; None for a value or a range."""
+    match member:
+        case tree.NamedSet(name):
+            return name
+        case tree.Reference(name) if name.text in scope.set_names and name.text not in body.visible:
+            return name
+    return None
+
+
+def named_set(scope: Scope, name: tree.Name) -> tuple[tree.Expr | tree.Range, ...] | None:
+    """The members of a declared set; None after an error."""
+    if name.text not in scope.set_names:
+        scope.unknown("set", name, sorted(scope.set_names))
+        return None
+    if not scope.demand("value", name):
+        return None
+    return scope.sets.get(name.text)
+
+
+def declare_set(scope: Scope, written: tree.SetDecl, kind: Scalar) -> None:
+    """Adds a set, once its members are values of its type."""
+    body = Body()
+    every = _members(scope, body, written.members)
+    any_value = Typed(Literal(value_of_key(kind, key_bounds(kind)[0]), kind, written.name.span))
+    if every is not None and among(scope, body, any_value, written.members, written.name.span) is not None:
+        scope.sets[written.name.text] = tuple(every)
 
 
 def _in_range(scope: Scope, body: Body, written: tree.InRange) -> Typed | None:
     subject = typed(scope, body, written.subject)
-    return None if subject is None else between(scope, body, subject, written.low, written.high, written.span)
+    if subject is None:
+        return None
+    condition = between(scope, body, subject, written.low, written.high, written.span)
+    return other_than(condition) if condition is not None and written.negated else condition
 
 
 def between(

@@ -23,7 +23,7 @@ class Names:
     def __init__(self, scope: Scope, all_: list[tree.Declaration]) -> None:
         self.scope = scope
         self.all = all_
-        self.waiting: dict[str, tree.ConstDecl | tree.TypeDecl | tree.RecordDecl] = {}
+        self.waiting: dict[str, tree.ConstDecl | tree.SetDecl | tree.TypeDecl | tree.RecordDecl] = {}
         self.path: list[str] = []
 
     def declare(self) -> tuple[Enum, ...]:
@@ -36,6 +36,9 @@ class Names:
         for const in self.all:
             match const:
                 case tree.ConstDecl(name=name) if scope.claim(name, "value"):
+                    self.waiting[f"value {name.text}"] = const
+                case tree.SetDecl(name=name) if scope.claim(name, "value"):
+                    scope.set_names.add(name.text)
                     self.waiting[f"value {name.text}"] = const
                 case tree.TypeDecl(name=name) | tree.RecordDecl(name=name) if scope.claim(name, "type"):
                     self.waiting[f"type {name.text}"] = const
@@ -78,6 +81,8 @@ class Names:
         match declaration:
             case tree.ConstDecl():
                 variables.declare_constant(scope, declaration)
+            case tree.SetDecl():
+                variables.declare_set_of(scope, declaration)
             case tree.TypeDecl():
                 variables.declare_type(scope, declaration)
             case tree.RecordDecl():

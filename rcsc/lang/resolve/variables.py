@@ -7,7 +7,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.operators import Typed, common_unit, kind_word, same_kind
 from rcsc.lang.expressions.scope import Body, Constant, Scope
-from rcsc.lang.expressions.typed import boolean
+from rcsc.lang.expressions.typed import boolean, declare_set
 from rcsc.lang.expressions.types import MOST_LEAVES, constant, size, type_of
 from rcsc.lang.model import (
     Admit,
@@ -77,6 +77,16 @@ def declare_constant(scope: Scope, written: tree.ConstDecl) -> None:
     value = constant(scope, written.value)
     if value is not None:
         scope.constants[written.name.text] = Constant(value.literal(), value.bare)
+
+
+def declare_set_of(scope: Scope, written: tree.SetDecl) -> None:
+    """Adds a set of values of a scalar type."""
+    kind = type_of(scope, written.type)
+    if isinstance(kind, Array | Record):
+        message = f"a set has values of a scalar type, `{written.name.text}` none"
+        scope.report(Code.KIND, message, written.name.span)
+        return
+    declare_set(scope, written, kind)
 
 
 def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:

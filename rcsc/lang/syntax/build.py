@@ -75,6 +75,11 @@ class Build:
         head = self._head(node)
         return tree.ConstDecl(self._name(node.children[0]), self.expr(node.children[2]), **head)
 
+    def _set_decl(self, node: ParseNode) -> tree.SetDecl:
+        head = self._head(node)
+        name, kind, _, members = node.children
+        return tree.SetDecl(self._name(name), self.type(kind), self._members(members.children), **head)
+
     def _enum_decl(self, node: ParseNode) -> tree.EnumDecl:
         head = self._head(node)
         name, *members = node.children
@@ -311,10 +316,27 @@ class Build:
         return tree.Was(self.expr(parts[0]), span)
 
     def _in_set(self, parts: list[Any], span: Span) -> tree.Expr:
-        return tree.InSet(self.expr(parts[0]), tuple(self.expr(part) for part in parts[1:]), span)
+        return tree.InSet(self.expr(parts[0]), self._members(parts[-1].children), span, len(parts) > 2)
+
+    def _in_named(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.InSet(self.expr(parts[0]), (self._named_set(parts[-1]),), span, len(parts) > 2)
 
     def _in_range(self, parts: list[Any], span: Span) -> tree.Expr:
-        return tree.InRange(self.expr(parts[0]), self.expr(parts[1]), self.expr(parts[2]), span)
+        low, high = parts[-1].children
+        return tree.InRange(self.expr(parts[0]), self.expr(low), self.expr(high), span, len(parts) > 2)
+
+    def _members(self, parts: list[Any]) -> tuple[tree.Member, ...]:
+        return tuple(self._member(part) for part in parts)
+
+    def _member(self, node: ParseNode) -> tree.Member:
+        if node.data != "range":
+            return self.expr(node)
+        low, high = node.children
+        return tree.Range(self.expr(low), self.expr(high), self._span(node))
+
+    def _named_set(self, token: Any) -> tree.NamedSet:
+        name = self._name(token)
+        return tree.NamedSet(name, name.span)
 
     def _field_of(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.FieldOf(self.expr(parts[0]), self._name(parts[-1]), span)
@@ -373,9 +395,14 @@ class Build:
             case "comparison":
                 return tree.Comparison(str(parts[0]), self.expr(parts[1]), span)
             case "one_of":
-                return tree.OneOf(tuple(self.expr(part) for part in parts), span)
+                return tree.OneOf(self._members(parts[-1].children), span, len(parts) > 1)
+            case "listed":
+                return tree.OneOf(self._members(parts), span)
+            case "of_set":
+                return tree.OneOf((self._named_set(parts[-1]),), span, len(parts) > 1)
             case _:
-                return tree.Between(self.expr(parts[0]), self.expr(parts[1]), span)
+                low, high = parts[-1].children
+                return tree.Between(self.expr(low), self.expr(high), span, len(parts) > 1)
 
     # --- statements ---
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from rcsc.lang.operator_table import SUM
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.layout import WIDTH, table_rows
-from rcsc.lang.syntax.spell import spell_expr, spell_statement, spell_type
+from rcsc.lang.syntax.spell import spell_expr, spell_set, spell_statement, spell_type
 
-_LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
+_LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.SetDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
          tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl, tree.AdoptDecl)  # fmt: skip
 
 
@@ -50,7 +50,7 @@ def _declaration(declaration: tree.Declaration, width: int) -> Iterator[str]:
     match declaration:
         case tree.Use(path):
             yield f"use {path}"
-        case tree.UnitDecl() | tree.ConstDecl() | tree.EnumDecl() | tree.TypeDecl():
+        case tree.UnitDecl() | tree.ConstDecl() | tree.SetDecl() | tree.EnumDecl() | tree.TypeDecl():
             yield _type(declaration)
         case tree.RecordDecl():
             yield from _record(declaration)
@@ -73,12 +73,14 @@ def _declaration(declaration: tree.Declaration, width: int) -> Iterator[str]:
             yield from _level(declaration)
 
 
-def _type(one: tree.UnitDecl | tree.ConstDecl | tree.EnumDecl | tree.TypeDecl) -> str:
+def _type(one: tree.UnitDecl | tree.ConstDecl | tree.SetDecl | tree.EnumDecl | tree.TypeDecl) -> str:
     match one:
         case tree.UnitDecl(name):
             return f"unit {name.text}"
         case tree.ConstDecl(name, value):
             return f"const {name.text} = {spell_expr(value)}"
+        case tree.SetDecl(name, kind, members):
+            return f"set {name.text} : {spell_type(kind)} = {spell_set(members)}"
         case tree.EnumDecl(name, members):
             return f"enum {name.text} {{ {', '.join(member.text for member in members)} }}"
         case tree.TypeDecl(name, kind):

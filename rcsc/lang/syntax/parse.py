@@ -301,7 +301,7 @@ class _Rows:
     def _row(
         self, line: _Line, conditions: tuple[tree.Heading, ...], actions: tuple[tree.Heading, ...]
     ) -> tree.Row:
-        name, *tests = line.cells.conditions
+        name, *tests = (cell.blank() for cell in line.cells.conditions)
         default = bool(tests) and _says_default(tests[0])
         for cell in tests[1:]:
             if default and cell.text:
@@ -318,7 +318,8 @@ class _Rows:
             name.text,
             parsed,
             tuple(
-                self._action(cell, heading) for cell, heading in zip(line.cells.actions, actions, strict=True)
+                self._action(cell.blank(), heading)
+                for cell, heading in zip(line.cells.actions, actions, strict=True)
             ),
             default,
             default and tests[0].text.endswith("unreachable"),

@@ -8,7 +8,7 @@ In: rows and their offsets. Out: `Cells`, or what is wrong with them. A table ha
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from rcsc.diagnostics.source import Span
@@ -72,6 +72,10 @@ class Cell:
                 break
             begin, place = offset, there
         return Span(self.file, place + start - begin, place + max(start, min(end, past)) - begin)
+
+    def blank(self) -> "Cell":
+        """The cell, without the `-` that may stand in an empty one."""
+        return replace(self, text="") if self.text == "-" else self
 
     def with_piece(self, piece: "Cell") -> "Cell":
         """The cell with one piece more; a blank between, but after `_` and `.`.

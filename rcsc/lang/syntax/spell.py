@@ -34,12 +34,10 @@ def _expr(expr: tree.Expr) -> tuple[str, int]:
         case tree.Binary(op, left, right):
             return _binary(op, left, right)
         case tree.InSet(subject, members):
-            return f"{spell_expr(subject, SUM)} in {_set(members)}", RELATION
+            return f"{spell_expr(subject, SUM)} {_in(expr)} {spell_set(members)}", RELATION
         case tree.InRange(subject, low, high):
-            return (
-                f"{spell_expr(subject, SUM)} in {spell_expr(low, SUM)} .. {spell_expr(high, SUM)}",
-                RELATION,
-            )
+            ends = spell_member(tree.Range(low, high))
+            return f"{spell_expr(subject, SUM)} {_in(expr)} {ends}", RELATION
         case tree.Apply() | tree.Order():
             return _with_arguments(expr), POSTFIX
         case _:
@@ -60,8 +58,26 @@ def _binary(op: str, left: tree.Expr, right: tree.Expr) -> tuple[str, int]:
     return f"{first} {op} {spell_expr(right, strength + (strength != IMPLICATION))}", strength
 
 
-def _set(members: tuple[tree.Expr, ...]) -> str:
-    return "{" + ", ".join(spell_expr(member) for member in members) + "}"
+def spell_set(members: tuple[tree.Member, ...]) -> str:
+    """The members of a set in braces, or its name alone."""
+    match members:
+        case [tree.NamedSet(name)]:
+            return name.text
+    return "{" + ", ".join(spell_member(member) for member in members) + "}"
+
+
+def spell_member(member: tree.Member) -> str:
+    """A value, or a range."""
+    match member:
+        case tree.Range(low, high):
+            return f"{spell_expr(low, SUM)} .. {spell_expr(high, SUM)}"
+        case tree.NamedSet(name):
+            return name.text
+    return spell_expr(member)
+
+
+def _in(written: tree.InSet | tree.InRange | tree.OneOf) -> str:
+    return "not in" if written.negated else "in"
 
 
 def spell_unit(unit: tree.Unit) -> str:
@@ -101,9 +117,9 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
                 return spell_expr(value) if _plain(value) else f"({spell_expr(value)})"
             return spell_expr(value, SUM) if op == "=" and _plain(value) else f"{op} {spell_expr(value, SUM)}"
         case tree.OneOf(members):
-            return f"in {_set(members)}"
+            return f"{_in(condition)} {spell_set(members)}"
         case tree.Between(low, high):
-            return f"{spell_expr(low, SUM)} .. {spell_expr(high, SUM)}"
+            return f"{'not in ' if condition.negated else ''}{spell_member(tree.Range(low, high))}"
         case _:
             assert_never(condition)
 

@@ -139,22 +139,41 @@ class Binary:
 
 
 @dataclass(frozen=True, slots=True)
-class InSet:
-    """`subject in {a, b}`."""
+class Range:
+    """`low .. high` among the members of a set, both ends included."""
 
-    subject: "Expr"
-    members: "tuple[Expr, ...]"
+    low: "Expr"
+    high: "Expr"
     span: Span = at()
 
 
 @dataclass(frozen=True, slots=True)
+class NamedSet:
+    """The name of a set, outside braces: `in ended`."""
+
+    name: Name
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class InSet:
+    """`subject in {a, b}`, `subject not in ended`; a `NamedSet` stands alone."""
+
+    subject: "Expr"
+    members: "tuple[Member, ...]"
+    span: Span = at()
+    negated: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class InRange:
-    """`subject in low .. high`, both ends included."""
+    """`subject in low .. high`, both ends included; `subject not in low .. high`."""
 
     subject: "Expr"
     low: "Expr"
     high: "Expr"
     span: Span = at()
+    negated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +218,9 @@ Expr: TypeAlias = (
     | Apply
     | Order
 )
+
+
+Member: TypeAlias = Expr | Range | NamedSet
 
 
 # --- types ---------------------------------------------------------------------------
@@ -335,19 +357,21 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """A condition cell `in {a, b}`."""
+    """A condition cell `in {a, b}`, which may be written `a, b`; `not in ended`."""
 
-    members: tuple[Expr, ...]
+    members: tuple[Member, ...]
     span: Span = at()
+    negated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Between:
-    """A condition cell `low .. high`, both ends included."""
+    """A condition cell `low .. high`, both ends included; `not in low .. high`."""
 
     low: Expr
     high: Expr
     span: Span = at()
+    negated: bool = False
 
 
 Condition: TypeAlias = Comparison | OneOf | Between
@@ -416,6 +440,15 @@ class ConstDecl(Documented):
 
     name: Name
     value: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class SetDecl(Documented):
+    """`set ended : status = {done, failed}`."""
+
+    name: Name
+    type: "TypeExpr"
+    members: "tuple[Member, ...]"
 
 
 @dataclass(frozen=True, slots=True)
@@ -645,6 +678,7 @@ Declaration: TypeAlias = (
     Use
     | UnitDecl
     | ConstDecl
+    | SetDecl
     | EnumDecl
     | TypeDecl
     | RecordDecl

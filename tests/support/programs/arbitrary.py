@@ -52,15 +52,20 @@ BINARY = st.sampled_from(
 )
 
 
+def _members(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tuple[tree.Member, ...]]:
+    """Members of a set in braces, or the name of a set alone."""
+    some = st.lists(inner | st.builds(tree.Range, inner, inner), min_size=1, max_size=3).map(tuple)
+    return some | NAMES.map(lambda name: (tree.NamedSet(name),))
+
+
 def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
-    several = st.lists(inner, min_size=1, max_size=3).map(tuple)
     two = st.tuples(inner, inner)
     return st.one_of(
         st.builds(tree.Unary, st.sampled_from(["not", "-"]), inner),
         st.builds(tree.Was, inner),
         st.builds(tree.Binary, BINARY, inner, inner),
-        st.builds(tree.InSet, inner, several),
-        st.builds(tree.InRange, inner, inner, inner),
+        st.builds(tree.InSet, inner, _members(inner), negated=st.booleans()),
+        st.builds(tree.InRange, inner, inner, inner, negated=st.booleans()),
         st.builds(
             tree.Apply, st.sampled_from(["abs", "int", "real"]).map(Name), inner.map(lambda one: (one,))
         ),
@@ -145,11 +150,10 @@ COMPARISONS = st.sampled_from(["=", "/=", "<", "<=", ">", ">="])
 @cache
 def conditions() -> SearchStrategy[tree.Condition]:
     """A condition cell."""
-    several = st.lists(expressions(), min_size=1, max_size=3).map(tuple)
     return st.one_of(
         st.builds(tree.Comparison, COMPARISONS, expressions()),
-        several.map(tree.OneOf),
-        st.builds(tree.Between, expressions(), expressions()),
+        st.builds(tree.OneOf, _members(expressions()), negated=st.booleans()),
+        st.builds(tree.Between, expressions(), expressions(), negated=st.booleans()),
     )
 
 
@@ -244,6 +248,13 @@ def _names_of_things() -> SearchStrategy[tree.Declaration]:
         st.builds(tree.Use, st.sampled_from(["types", "task/vars"]), comments=WORDS),
         st.builds(tree.UnitDecl, NAMES, **_HEAD),
         st.builds(tree.ConstDecl, NAMES, expressions(), **_HEAD),
+        st.builds(
+            tree.SetDecl,
+            NAMES,
+            types(),
+            _members(expressions()).filter(lambda those: not isinstance(those[0], tree.NamedSet)),
+            **_HEAD,
+        ),
         st.builds(tree.EnumDecl, NAMES, some_names, **_HEAD),
         st.builds(tree.TypeDecl, NAMES, types(), **_HEAD),
         st.builds(tree.RecordDecl, NAMES, fields.map(tuple), **_HEAD),
