@@ -6,6 +6,7 @@ import pytest
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
+from rcsc.lang.interpret import holds
 from rcsc.lang.model import Assign, Call, Int, Program, Real, Select, Test, ToElement, ToLeaf, VariableName
 from rcsc.lang.resolve import compile_text
 from tests.support.programs.stages import program_of, refused
@@ -490,3 +491,67 @@ def calls_to_resolve(count: int) -> int:
         sys.setprofile(before)
     assert len(found.tables[0].lines) == count
     return calls
+
+
+SETS = """\
+enum status { executing, done, failed }
+set bad : status = {failed}
+set ended : status = {done, bad}
+set edges : int 0 .. 20 = {0 .. 2, few, 19 .. 20}
+set few : int 0 .. 20 = {5, 7}
+input s : status
+input x : int 0 .. 20
+state b : bool
+table t {
+  | line | s | x | when ||
+  | a    | CELLS ||
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("cells", "plain"),
+    [
+        ("in ended | - | -", "in {done, failed} | |"),
+        ("not in ended | in edges | -", "executing | | x <= 2 or x = 5 or x = 7 or x >= 19"),
+        ("done, failed | not in edges | -", "/= executing | | not (x <= 2 or x = 5 or x = 7 or x >= 19)"),
+        ("bad, executing | 3 .. 4, 8 | -", "/= done | | x in 3 .. 4 or x = 8"),
+        ("not in {bad} | not in 0 .. 18 | -", "/= failed | >= 19 |"),
+        ("in {ended, executing} | not in {few, 1 .. 4} | -", " | | not (x in {5, 7} or x in 1 .. 4)"),
+        ("- | - | s in ended and x not in few", " | | s /= executing and x /= 5 and x /= 7"),
+        ("- | - | x not in 3 .. 30 or s not in {done, bad}", " | | x < 3 or s = executing"),
+    ],
+)
+def test_sets_mean_what_they_name(cells: str, plain: str) -> None:
+    """Held against the same without sets, for every input."""
+    both = [program_of(SETS.replace("CELLS", text)) for text in (cells, plain)]
+    for s in range(3):
+        for x in range(21):
+            matches = [
+                all(
+                    test is None or holds(test.condition, {"s": s, "x": x, "b": False})
+                    for test in program.tables[0].lines[0].tests
+                )
+                for program in both
+            ]
+            assert matches[0] is matches[1], (s, x)
+
+
+@pytest.mark.parametrize(
+    ("declared", "cell", "code", "message"),
+    [
+        ("", "in ends", "RCS201", "no set is called `ends`"),
+        ("", "= ended", "RCS301", "`ended` is a set, and no value"),
+        ("", "in {ended, edges}", "RCS301", ""),
+        ("set odd : status = {done, 5}", "done", "RCS301", ""),
+        ("set odd : int 0 .. 9 = {8 .. 3}", "done", "RCS303", ""),
+        ("set odd : int 0 .. 9 = {x}", "done", "RCS305", "`x` is a variable"),
+        ("set odd : status = {other}\nset other : status = {odd}", "done", "RCS305", "by means of itself"),
+        ("set ended : status = {done}", "done", "RCS202", "declared twice"),
+        ("record r { a : bool }\nset odd : r = {1}", "done", "RCS301", "a set has values of a scalar type"),
+    ],
+)
+def test_what_is_wrong_with_a_set_is_said(declared: str, cell: str, code: str, message: str) -> None:
+    text = SETS.replace("table t", f"{declared}\ntable t").replace("CELLS", f"{cell} | - | -")
+    diagnostics = refused(text)
+    assert (code, True) in {(each.code.value, message in each.message) for each in diagnostics}
