@@ -31,6 +31,8 @@ NEXT = {
 CACHES = {".rcsc-cache", "__pycache__"}
 GUIDE = ".md"
 """The guides beside the paper's tables speak of the repository."""
+GALLERY = "gallery/"
+"""Other people's tables, which are no part of the paper's system."""
 
 
 @click.command(
@@ -87,7 +89,7 @@ def _files(kind: str) -> Iterator[tuple[str, bytes]]:
         packaged = package / "_data" / "tables"
         beside: Traversable = Path(__file__).parents[2] / "tables"
         for file, content in _below(packaged if packaged.is_dir() else beside):
-            if not file.endswith(GUIDE):
+            if not file.endswith(GUIDE) and not file.startswith(GALLERY):
                 yield f"tables/{file}", content
 
 

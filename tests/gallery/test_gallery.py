@@ -1,0 +1,100 @@
+"""The gallery's pages say what rcsc says: every command, every line shown of its output, every figure; mended tables prove and run."""
+
+import re
+import shlex
+import shutil
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from tests.support.programs.stages import shipped
+
+REPO = Path(__file__).parents[2]
+GALLERY = REPO / "tables" / "gallery"
+PAGES = (GALLERY / "README.md", *sorted(GALLERY.glob("*/README.md")))
+TABLES = sorted(path for path in GALLERY.glob("*/*.rcs") if path.name != "words.rcs")
+MENDED = [path for path in TABLES if "published" not in path.name]
+SHOWN = re.compile(
+    r"^```sh\n(?P<commands>.*?)^```\n(?:\n```text\n(?P<shown>.*?)^```\n)?", re.MULTILINE | re.DOTALL
+)
+ROW = re.compile(
+    r"^\| \[(?P<entry>\w+)\]\(\S+\) ?(?P<table>\w*) \|[^|]*\|[^|]*\| (?P<here>\d+ x \d+) \| (?P<findings>[^|]*?) \|"
+)
+
+Say = Callable[[str], tuple[int, str]]
+
+
+@pytest.fixture
+def say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Say:
+    """Runs a command of `rcsc` beside a copy of the gallery: its status, and what it prints with blanks as one."""
+    shutil.copytree(
+        GALLERY, tmp_path / "tables" / "gallery", ignore=shutil.ignore_patterns(".rcsc-cache", "generated")
+    )
+    shutil.copy(REPO / "tables" / "rcsc.toml", tmp_path / "tables")
+    monkeypatch.chdir(tmp_path)
+
+    def said(command: str) -> tuple[int, str]:
+        name, *words = shlex.split(command, comments=True)
+        assert name == "rcsc"
+        capfd.readouterr()
+        status = run(words)
+        return status, plain("\n".join(capfd.readouterr()))
+
+    return said
+
+
+def plain(text: str) -> str:
+    """The text with blanks, and rules of tables, as one blank."""
+    return " ".join(text.replace("| |", "|").split())
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.parent.name)
+def test_a_page_shows_what_its_commands_print(page: Path, say: Say) -> None:
+    parts = [part.groupdict() for part in SHOWN.finditer(page.read_text(encoding="utf-8"))]
+    assert parts
+    for part in parts:
+        printed = ""
+        for command in part["commands"].splitlines():
+            ends = re.search(r"status (\d)", command)
+            status, text = say(command)
+            assert status == (int(ends[1]) if ends else 0), f"{command}\n{text[-2000:]}"
+            printed += text
+        for line in (part["shown"] or "").splitlines():
+            assert plain(line) in printed, f"{part['commands']}does not show\n{line}"
+
+
+def test_the_figures_of_the_page_are_those_of_the_tables_as_published(say: Say) -> None:
+    text = PAGES[0].read_text(encoding="utf-8")
+    rows = [row.groupdict() for row in map(ROW.match, text.splitlines()) if row]
+    published = {path for path in TABLES if path not in MENDED}
+    for row in rows:
+        name = f"{row['table']}_published.rcs".lstrip("_")
+        path = GALLERY / row["entry"] / name
+        published.remove(path)
+        [table] = shipped(str(path), REPO).tables
+        assert row["here"] == f"{len(table.lines)} x {len(table.columns)}", path
+        _, printed = say(f"rcsc check --color never {path.relative_to(REPO)}")
+        codes = Counter(re.findall(r"error\[(RCS\d+)\]", printed))
+        assert row["findings"] == f"{counted(codes['RCS401'], 'gap')}, {counted(codes['RCS402'], 'overlap')}"
+        assert set(codes) <= {"RCS401", "RCS402"}
+    assert not published
+
+
+def counted(number: int, what: str) -> str:
+    """`1 gap`, `2 gaps`."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def test_what_is_mended_proves_and_does_the_same_in_python_and_c(say: Say) -> None:
+    paths = " ".join(str(path.relative_to(REPO)) for path in MENDED)
+    status, printed = say(f"rcsc test --examples 5 --mutants 0 --no-cortex {paths}")
+    assert status == 0, printed
+    assert f"{len(MENDED)} tables: {len(MENDED)} proved" in printed
+    assert printed.count("interpreter = Python = C") == len(MENDED)
+
+
+def test_the_tables_are_laid_out(say: Say) -> None:
+    assert say("rcsc fmt --check tables/gallery")[0] == 0
