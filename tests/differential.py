@@ -399,6 +399,8 @@ class Maker:
         if depth <= 0 or rng.randrange(4) == 0:
             return self.read(Kind("int", "", -3, 9))
         way = rng.randrange(9)
+        if way == 1:
+            return self.counted(depth - 1)
         if way == 0:
             one = self.real(depth - 1)
             return Expr(one.kind, f"int(min(900.0, max(-900.0, {one.text})))",
@@ -408,6 +410,13 @@ class Maker:
             rng.choice(("+", "-", "*", "/", "/", "mod", "mod", "mod", "min", "max", "abs", "neg")), a, b
         )
         return found or a
+
+    def counted(self, depth: int) -> Expr:
+        """How many of some conditions hold, or one condition as a number."""
+        parts = [self.truth(depth) for _ in range(self.rng.choice((1, 2, 3, 5)))]
+        word = "int" if len(parts) == 1 else "count"
+        return Expr(Kind("int", "", 0, len(parts)), f"{word}({', '.join(part.text for part in parts)})",
+                    lambda s, v: sum(1 if part.of(s, v) else 0 for part in parts), 0, len(parts))  # fmt: skip
 
     def _computed(self, op: str, a: Expr, b: Expr) -> Expr | None:
         """The operator applied; None where something might leave 64 bits."""

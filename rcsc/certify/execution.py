@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias, assert_never
 
-from rcsc.certify.values import INT, REAL, Number, Term, Terms, ends_of, sort_of
+from rcsc.certify.values import BOOL, INT, REAL, Number, Term, Terms, ends_of, sort_of
 from rcsc.diagnostics.source import Span as Written
 from rcsc.lang.model import (
     COMPARISONS,
@@ -232,6 +232,8 @@ class Run:
             nonzero = self.terms.negation(self.terms.make("=", args[1], zero))
             self.owe("the divisor is not zero", nonzero, expr.args[1].span)
         if not whole:
+            if op is Op.TO_INT and args[0].sort == BOOL:
+                return self.terms.choice(args[0], *(self.terms.constant(INT, number) for number in (1, 0)))
             if op is Op.TO_INT:
                 return self._truncated(args[0], kinds, expr.span)
             return self._operation(op, args)

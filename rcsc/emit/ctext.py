@@ -13,6 +13,7 @@ from rcsc.emit.code_tree import (
     Body,
     Branch,
     Cast,
+    Choice,
     Code,
     Constant,
     Frame,
@@ -212,6 +213,8 @@ class CText(Text):
         if is_comparison(op) and (known := _decided(op, args)) is not None:
             return constant(Bool(), known)
         given = [(self.expr(arg), wide_type(arg.type)) for arg in args]
+        if op is Op.TO_INT and isinstance(args[0].type, Bool):
+            return Round(Choice(given[0][0], constant(kind, 1), constant(kind, 0)))
         if op is Op.TO_INT or op is Op.TO_REAL:
             return self.converted(*given[0], wide_type(kind))
         shared = _shared((*(arg.type for arg in args), kind))

@@ -31,7 +31,8 @@ class Op(StrEnum):
     The meanings are those of every stage: folding, bounds and interpreter compute with them, and executors, solvers and reference are
     held against them. Reals are IEEE 754 binary64, rounded to nearest even. Comparisons with a NaN are false, but `/=`, which is
     true. `min` and `max` keep their first operand where it is a NaN, and drop a second one. `abs` and `-` act on the sign, of
-    zeros too. `int` is undefined of a NaN or an infinity, and `/` and `mod` of a divisor that is zero.
+    zeros too. `int` is undefined of a NaN or an infinity, and 0 or 1 of a truth value; `/` and `mod` are undefined of a divisor that is
+    zero.
 
     Attributes:
         strength: How tightly it binds.

@@ -84,6 +84,8 @@ def operation(op: Operator, kind: Scalar, terms: list[Term]) -> Term:
             return smt.choice(smt.below(terms[0], terms[1], kind), terms[1], terms[0])
         case Op.TO_REAL:
             return smt.to_double(terms[0])
+        case Op.TO_INT if isinstance(kind, Bool):
+            return smt.choice(terms[0], *(smt.literal(Int(0, 1), number) for number in (1, 0)))
         case Op.TO_INT:
             return smt.to_integer(terms[0])
         case Op.ADD | Op.SUB | Op.MUL | Op.DIV | Op.MOD:

@@ -18,6 +18,7 @@ from rcsc.lang.model import (
     U64_MAX,
     Among,
     Apply,
+    Bool,
     Expr,
     Int,
     Literal,
@@ -273,6 +274,8 @@ class Evaluation:
         match op:
             case Op.NOT:
                 return values.negation(args[0])
+            case Op.TO_INT if isinstance(args[0].kind, Bool):
+                return values.choice(args[0], values.constant(expr.type, 1), values.constant(expr.type, 0))
             case Op.TO_INT:
                 assert isinstance(expr.type, Int)
                 return self._truncated(expr, args[0], expr.type)

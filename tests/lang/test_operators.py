@@ -141,6 +141,7 @@ def cases() -> Iterator[Case]:
     for kind, op in product((SIGNED, UNSIGNED), (*ON_REALS, Op.MOD)):
         made = Bool() if is_comparison(op) else intervals.apply(op, (kind,) * (1 if op in UNARY else 2), ())
         yield Case(op, kind, made)
+    yield Case(Op.TO_INT, Bool(), Int(0, 1))
     yield from (Case(Op.TO_REAL, kind, REAL) for kind in (SIGNED, UNSIGNED))
     yield Case(None, SIGNED, Bool())
     yield from (Case(op, Bool(), Bool()) for op in (Op.NOT, *sorted(LOGIC), Op.EQ, Op.NE))

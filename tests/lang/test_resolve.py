@@ -1,6 +1,7 @@
 """Names, kinds, units and ranges: every code from a minimal text, on its line and on the smallest span."""
 
 import sys
+from itertools import product
 
 import pytest
 
@@ -555,3 +556,59 @@ def test_what_is_wrong_with_a_set_is_said(declared: str, cell: str, code: str, m
     text = SETS.replace("table t", f"{declared}\ntable t").replace("CELLS", f"{cell} | - | -")
     diagnostics = refused(text)
     assert (code, True) in {(each.code.value, message in each.message) for each in diagnostics}
+
+
+COUNTS = """\
+input a : bool
+input b : bool
+input n : int 0 .. 3
+input lid : int 0 .. 9 [mm]
+state count : int 0 .. 9
+table t {
+  | line | when ||
+  | a    | CELL ||
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("cell", "plain"),
+    [
+        ("count(a, b, n > 1) <= 1", "not (a and b) and not (a and n > 1) and not (b and n > 1)"),
+        ("count(a) = n", "a and n = 1 or not a and n = 0"),
+        ("count(a, a, not b, true) = 3", "a and b"),
+        ("int(a) + int(b) = 1", "a xor b"),
+        ("n = int(true) + int(a and b)", "n = 1 and not (a and b) or n = 2 and a and b"),
+        ("int(a) = int(n = 3)", "a = (n = 3)"),
+    ],
+)
+def test_counts_mean_how_many_hold(cell: str, plain: str) -> None:
+    """Held against the same with `and`, `or` and `xor` alone, for every input."""
+    both = [program_of(COUNTS.replace("CELL", text)).tables[0].lines[0].tests[0] for text in (cell, plain)]
+    assert all(both)
+    for a, b, n in product((False, True), (False, True), range(4)):
+        snapshot = {"a": a, "b": b, "n": n, "lid": 0, "count": 0}
+        matches = [holds(test.condition, snapshot) for test in both if test]
+        assert matches[0] is matches[1], (a, b, n)
+
+
+@pytest.mark.parametrize(
+    ("cell", "code", "message"),
+    [
+        ("count(a, n) = 1", "RCS301", "a condition is a bool, this is int"),
+        ("int(n) = 1", "RCS301", "`int` converts a real number or a bool"),
+        ("count(a, b) = 3.0", "RCS301", ""),
+        ("abs(a) = 1", "RCS301", "arithmetic takes numbers, this is bool"),
+    ],
+)
+def test_what_is_wrong_with_a_count_is_said(cell: str, code: str, message: str) -> None:
+    diagnostics = refused(COUNTS.replace("CELL", cell))
+    assert (code, True) in {(each.code.value, message in each.message) for each in diagnostics}
+
+
+def test_elsewhere_count_is_a_name() -> None:
+    program = program_of(
+        COUNTS.replace("CELL", "count = count(a, b) and lid >= count(a) * 2")
+        + "procedure count_up { count := min(count + 1, 9) }\nprocedure p { count_up }"
+    )
+    assert program.tables[0].variables == ("a", "b", "lid", "count")

@@ -40,6 +40,10 @@ _PARTIAL = frozenset({Op.DIV, Op.MOD, Op.TO_INT})
 """Operations that are not defined for every value; no predicate evaluates them."""
 
 
+def _is_partial(operation: Apply) -> bool:
+    return operation.op in _PARTIAL and not isinstance(operation.args[0].type, Bool)
+
+
 # --- as conditions on a cycle ----------------------------------------------------------------
 
 
@@ -199,7 +203,7 @@ def _predicates_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicat
 def _condition(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
     """Make a predicate of a comparison of numbers that is defined for every value."""
     whole = all(
-        not isinstance(apply, Select) and not (isinstance(apply, Apply) and apply.op in _PARTIAL)
+        not isinstance(apply, Select) and not (isinstance(apply, Apply) and _is_partial(apply))
         for apply in parts(part)
     )
     if whole and not all(listed(kinds[leaf]) for leaf in read_by(part)):

@@ -184,7 +184,7 @@ def converted(scope: Scope, op: Conversion, operand: Typed, span: Span) -> Typed
         converted: Scalar = Real(_nearest(kind.low), _nearest(kind.high), kind.unit)
     else:
         if not isinstance(kind, Real):
-            scope.report(Code.KIND, "`int` converts a real number", span)
+            scope.report(Code.KIND, "`int` converts a real number or a bool", span)
             return None
         wide = not (math.isfinite(kind.low) and math.isfinite(kind.high))
         converted = Int(*((-(2**1024), 2**1024) if wide else (int(kind.low), int(kind.high))), kind.unit)
@@ -194,3 +194,12 @@ def converted(scope: Scope, op: Conversion, operand: Typed, span: Span) -> Typed
         scope.report(Code.TOO_WIDE, "no 64-bit integer holds this constant", span)
         return None
     return Typed(conversion if value is None else Literal(value, converted, span), operand.bare)
+
+
+def counted(condition: Expr, span: Span) -> Typed:
+    """`int(b)` of a truth value: 1 where it holds, else 0; it takes the unit of what it meets, as a number written does."""
+    conversion = Apply(Op.TO_INT, (condition,), Int(0, 1), span)
+    value = fold(conversion)
+    return Typed(
+        conversion if value is None else Literal(value, Int(int(value), int(value)), span), bare=True
+    )

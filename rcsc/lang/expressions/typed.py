@@ -16,6 +16,7 @@ from rcsc.lang.expressions.operators import (
     common_unit,
     compared,
     converted,
+    counted,
     kind_word,
     one_kind,
     scaled,
@@ -477,6 +478,8 @@ def between(
 
 
 def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
+    if written.function.text == "count":
+        return _count(scope, body, written)
     op = Op(written.function.text)
     want = 2 if op in (Op.MIN, Op.MAX) else 1
     if len(written.args) != want:
@@ -486,9 +489,11 @@ def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
         return None
     args = [typed(scope, body, arg) for arg in written.args]
     operands = tuple(arg for arg in args if arg is not None)
-    if len(operands) != want or not all(
-        _number(scope, o, w) for o, w in zip(operands, written.args, strict=True)
-    ):
+    if len(operands) != want:
+        return None
+    if op is Op.TO_INT and isinstance(operands[0].expr.type, Bool):
+        return counted(operands[0].expr, written.span)
+    if not all(_number(scope, o, w) for o, w in zip(operands, written.args, strict=True)):
         return None
     match op:
         case Op.TO_INT | Op.TO_REAL:
@@ -497,3 +502,17 @@ def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
             return alike(scope, op, operands, written.span)
         case _:
             raise ValueError(op)  # the grammar has no such function
+
+
+def _count(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
+    """Resolve `count(a, b, ...)`, how many of these hold, to `int(a) + int(b) + ...`."""
+    conditions = [boolean(scope, body, arg) for arg in written.args]
+    numbers = [counted(condition, written.span) for condition in conditions if condition is not None]
+    if len(numbers) < len(written.args):
+        return None
+    total = numbers[0]
+    for number in numbers[1:]:
+        larger = applied(scope, Op.ADD, (total, number), (), written.span)
+        assert larger is not None  # so few fit in 64 bits
+        total = larger
+    return total

@@ -49,7 +49,7 @@ _CLASSES = {
     "KIND": ("input", "state", "output"),
     "ADMIT": ("clamp", "reject"),
     "STANDING": ("assumed", "monitored", "proved"),
-    "FUNCTION": ("abs", "min", "max"),
+    "FUNCTION": ("abs", "min", "max", "count"),
     "_INT": ("int",),
     "_REAL": ("real",),
 }

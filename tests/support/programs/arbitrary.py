@@ -70,6 +70,7 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
             tree.Apply, st.sampled_from(["abs", "int", "real"]).map(Name), inner.map(lambda one: (one,))
         ),
         st.builds(tree.Apply, st.sampled_from(["min", "max"]).map(Name), two),
+        st.builds(tree.Apply, st.just(Name("count")), st.lists(inner, min_size=1, max_size=3).map(tuple)),
         st.builds(tree.FieldOf, REFERENCES, NAMES),
         st.builds(tree.IndexOf, REFERENCES, inner),
         st.builds(
