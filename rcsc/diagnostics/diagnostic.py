@@ -32,6 +32,10 @@ class MatchedLine:
     span: Span | None = None
 
 
+MOST_SHOWN = 3
+"""Witnesses of one finding in a text."""
+
+
 @dataclass(frozen=True, slots=True)
 class WitnessColumn:
     """A witness as a column of the table, with the lines that match it.
@@ -43,6 +47,7 @@ class WitnessColumn:
         lines: The lines that match the witness; none for a gap.
         region: The maximal region around the witness, one condition a variable in the
             table's words; variables left out are free (`any other`).
+        inputs: How many inputs the region has; None where nobody counted.
     """
 
     table: str
@@ -50,6 +55,7 @@ class WitnessColumn:
     values: tuple[str, ...]
     lines: tuple[MatchedLine, ...] = ()
     region: tuple[str, ...] = ()
+    inputs: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +75,24 @@ class Diagnostic:
     witnesses: tuple[WitnessColumn, ...] = ()
     more: int = 0  # witnesses of the same cause that are not shown
     severity: Severity = Severity.ERROR
+
+    @property
+    def shown(self) -> tuple[WitnessColumn, ...]:
+        """The witnesses that a text shows; the JSON form has all."""
+        return self.witnesses[:MOST_SHOWN]
+
+    @property
+    def left_out(self) -> str:
+        """What a text says of those that it does not show; empty for none."""
+        left = self.witnesses[MOST_SHOWN:]
+        inputs = self.more + sum(witness.inputs or 1 for witness in left)
+        words = f"{inputs} more input{'' if inputs == 1 else 's'}" if inputs else ""
+        if not left:
+            return words
+        regions = f"{len(left)} more region{'' if len(left) == 1 else 's'}"
+        return (
+            f"{words}; --json lists {regions}" if self.more else f"{words} in {regions}, which --json lists"
+        )
 
 
 def sort_key(diagnostic: Diagnostic) -> tuple[str, int, int, str, str]:

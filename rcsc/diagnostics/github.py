@@ -35,13 +35,13 @@ def annotation(diagnostic: Diagnostic, sources: Sources) -> str:
 
 def _body(diagnostic: Diagnostic) -> str:
     lines = [escape(diagnostic.message)]
-    for witness in diagnostic.witnesses:
+    for witness in diagnostic.shown:
         values = zip(witness.variables, witness.values, strict=True)
         lines.append("input: " + escape(", ".join(f"{name} = {value}" for name, value in values)))
         if witness.region:
             lines.append("region: " + escape(region(witness)))
-    if diagnostic.more:
-        lines.append(f"and {diagnostic.more} more")
+    if diagnostic.left_out:
+        lines.append(f"and {diagnostic.left_out}")
     lines += [f"note: {escape(note)}" for note in diagnostic.notes]
     lines += [f"help: {escape(text)}" for text in diagnostic.help]
     return "\n".join(lines)

@@ -104,4 +104,5 @@ def _witness_to_json(witness: WitnessColumn, sources: Sources) -> Json:
             for line in witness.lines
         ],
         "region": list(witness.region),
+        "inputs": witness.inputs,
     }

@@ -57,12 +57,11 @@ def full(diagnostic: Diagnostic, sources: Sources, columns: int = WIDEST_LINE) -
     labels = (diagnostic.primary, *diagnostic.related)
     gutter = max(len(str(_line_number(label, sources))) for label in labels)
     rows += _snippets(diagnostic, sources, gutter, columns, style)
-    for witness in diagnostic.witnesses:
+    for witness in diagnostic.shown:
         whole = diagnostic.severity is not Severity.NOTE or not witness.region
         rows += _witness(witness, gutter) if whole else (_region(witness, gutter),)
-    if diagnostic.more:
-        inputs = "input" if diagnostic.more == 1 else "inputs"
-        rows.append(_attached(gutter, "more", f"and {diagnostic.more} more {inputs}", Style.NOTE))
+    if diagnostic.left_out:
+        rows.append(_attached(gutter, "more", f"and {diagnostic.left_out}", Style.NOTE))
     rows += [_attached(gutter, "note", note, Style.NOTE) for note in diagnostic.notes]
     rows += [_attached(gutter, "help", text, Style.HELP) for text in diagnostic.help]
     return tuple(rows)

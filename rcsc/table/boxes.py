@@ -12,7 +12,8 @@ from rcsc.lang.model import Box, Program, Table, key_bounds, value_of_key
 from rcsc.table.regions.partition import Boxes, BudgetError, Gaps, common
 from rcsc.table.verdict import Gap, Overlap, Region, Witness
 
-MOST_GAPS = 3
+MOST_GAPS, MOST_FALLS = 64, 3
+"""Regions of what no line matches: as many are told, and as many of what falls to DEFAULT, which is no mistake."""
 
 
 def applies(table: Table) -> bool:
@@ -64,8 +65,8 @@ class TableBoxes(Boxes[str]):
         """Leave out variables that may have any key."""
         return {name: box for name, box in region.items() if box != (self.extents[name],)}
 
-    def gap(self, disjoint: bool) -> Gap | None:
-        """Find what no line matches: up to three witnesses with regions, and the count if lines are disjoint.
+    def gap(self, disjoint: bool, most: int = MOST_GAPS) -> Gap | None:
+        """Find what no line matches: up to `most` witnesses with regions, and the count if lines are disjoint.
 
         Raises:
             BudgetError: Whether there is anything was not found out.
@@ -78,7 +79,7 @@ class TableBoxes(Boxes[str]):
         shown: list[dict[str, Box]] = []
         witnesses = []
         try:
-            while len(shown) < MOST_GAPS and (cell := search.least(shown)) is not None:
+            while len(shown) < most and (cell := search.least(shown)) is not None:
                 shown.append(search.grown(cell, shown))
                 witnesses.append(self.witness({name: low for name, (low, _) in cell.items()}))
         except BudgetError:

@@ -49,7 +49,7 @@ def _by_boxes(program: Program, table: Table) -> tuple[TableFinding, ...]:
     findings: list[TableFinding] = [DeadLine(at) for at in decided.dead()]
     findings.extend(decided.both(first, second) for first, second in pairs)
     try:
-        gap = decided.gap(disjoint=not pairs)
+        gap = decided.gap(not pairs, boxes.MOST_GAPS if must_cover(table) else boxes.MOST_FALLS)
     except partition.BudgetError:
         return (*findings, Undecided("whether every input is matched by some line; first mend the overlaps"))
     if gap is not None:

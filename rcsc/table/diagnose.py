@@ -1,13 +1,13 @@
 """What was found of a table, as diagnostics."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import prod
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.lang.interval_sets import size
-from rcsc.lang.model import Program, Scalar, Table, key_bounds, spell
+from rcsc.lang.model import Box, Enum, Program, Scalar, Table, key_bounds, spell
 from rcsc.table import cells as words
 from rcsc.table.certificate import must_cover
 from rcsc.table.regions import partition
@@ -26,6 +26,8 @@ from rcsc.table.verdict import (
 
 MOST_PAIRS = 20
 """Overlapping pairs shown of one table; then how many more."""
+MANY = 3
+"""Regions of a gap from which on it is said, too, how they lie over an enumeration."""
 
 
 def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[str] = ()) -> list[Diagnostic]:
@@ -127,9 +129,10 @@ def _together(program: Program, table: Table, overlaps: Sequence[Overlap]) -> st
 
 def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
     columns = tuple(
-        _column(program, table, witness, (), region)
-        for witness, region in zip(gap.witnesses, gap.regions, strict=True)
+        replace(_column(program, table, witness, (), region), inputs=inputs)
+        for witness, region, inputs in zip(gap.witnesses, gap.regions, _inputs(program, gap), strict=True)
     )
+    notes = _by_member(program, gap)
     share = f"{_share(*gap.count)} of the inputs" if gap.count else "some inputs"
     if must_cover(table) and table.default is None:
         repair = closing_line(program, table, gap)
@@ -138,6 +141,7 @@ def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
             Code.GAP,
             message,
             Label(table.span),
+            notes=notes,
             help=(repair,) if repair else (),
             witnesses=columns,
             more=_more(program, gap),
@@ -146,7 +150,9 @@ def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
     label = Label(table.default.span)
     if table.default.unreachable:
         message = f"the DEFAULT line of table `{table.name}` is declared unreachable, but {share} fall to it"
-        return Diagnostic(Code.DEFAULT_REACHED, message, label, witnesses=columns, more=_more(program, gap))
+        return Diagnostic(
+            Code.DEFAULT_REACHED, message, label, notes=notes, witnesses=columns, more=_more(program, gap)
+        )
     message = f"{share} fall to the DEFAULT line of table `{table.name}`"
     return Diagnostic(
         Code.DEFAULT_COVERS,
@@ -162,12 +168,55 @@ def _more(program: Program, gap: Gap) -> int:
     """Count the gap's inputs outside the regions shown; 0 where nobody counted."""
     if gap.count is None:
         return 0
-    bounds = {str(v.name): key_bounds(v.type) for v in program.variables}
-    shown = 0
-    for witness, region in zip(gap.witnesses, gap.regions, strict=True):
-        sizes = (size((region or {}).get(name, (bounds[name],))) for name in witness)
-        shown += prod(sizes) if region is not None else 1
-    return max(0, gap.count[0] - shown)
+    return max(0, gap.count[0] - sum(inputs or 1 for inputs in _inputs(program, gap)))
+
+
+def _inputs(program: Program, gap: Gap) -> list[int | None]:
+    """Count the inputs of each region; None where there is none."""
+    kinds = {str(v.name): v.type for v in program.variables}
+    return [
+        None if region is None else prod(size(_box(kinds, region, name)) for name in witness)
+        for witness, region in zip(gap.witnesses, gap.regions, strict=True)
+    ]
+
+
+def _box(kinds: Mapping[str, Scalar], region: Region, name: str) -> Box:
+    return region.get(name, (key_bounds(kinds[name]),))
+
+
+def _by_member(program: Program, gap: Gap) -> tuple[str, ...]:
+    """Say how a gap of several regions lies over the members of the enumeration that parts it best."""
+    counts = _inputs(program, gap)
+    if len(counts) < MANY or gap.count is None or _more(program, gap):
+        return ()
+    kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
+    names = [name for name in gap.witnesses[0] if isinstance(kinds[name], Enum)]
+    tables = {name: _shares(kinds, name, gap, counts) for name in names}
+    if not tables:
+        return ()
+    best = max(names, key=lambda name: (sum(not inputs for inputs in tables[name]), max(tables[name])))
+    kind = kinds[best]
+    assert isinstance(kind, Enum)
+    whole = gap.count[1] // len(kind.members)
+    parts = sorted(zip(tables[best], kind.members, strict=True), key=lambda part: -part[0])
+    said = [f"`{member}` {_of(inputs, whole)}" for inputs, member in parts if inputs]
+    return (f"by `{best}`: {', '.join(said)}",)
+
+
+def _shares(kinds: Mapping[str, Scalar], name: str, gap: Gap, counts: Sequence[int | None]) -> list[int]:
+    """Count the inputs of a gap for each member of an enumeration; the regions are disjoint."""
+    low, high = key_bounds(kinds[name])
+    totals = [0] * (high - low + 1)
+    for region, inputs in zip(gap.regions, counts, strict=True):
+        box = _box(kinds, region or {}, name)
+        for key in range(low, high + 1):
+            if any(first <= key <= last for first, last in box):
+                totals[key - low] += (inputs or 0) // size(box)
+    return totals
+
+
+def _of(inputs: int, whole: int) -> str:
+    return "all" if inputs == whole else f"{100 * inputs / whole:.3g} %"
 
 
 def _share(count: int, total: int) -> str:

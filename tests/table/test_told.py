@@ -4,7 +4,10 @@ from typing import Any
 
 import pytest
 
+from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.render import full, plain
+from rcsc.diagnostics.source import Source
 from rcsc.lang.model import Backing
 from rcsc.procedures.discharge import Asker, Discharge
 from rcsc.solvers import smt
@@ -16,7 +19,7 @@ from rcsc.table.decide import prove_table
 from rcsc.table.program import prove_program
 from rcsc.table.regions.splitting import Tree
 from rcsc.table.verdict import Overlap, TableVerdict, Undecided
-from tests.support.programs.stages import program_of
+from tests.support.programs.stages import program_of, reported
 
 FAULTY = """\
 input a : int 0 .. 9
@@ -323,3 +326,43 @@ def test_z3_finds_the_overlap_of_two_lines_of_which_a_third_is_apart() -> None:
     [found] = prove_program(program_of(text), Options(solver="both")).tables
     assert [type(one) for one in found.findings] == [Overlap]
     assert found.backing.confirmed_by_z3
+
+
+MANY = """\
+enum st { a, b, c, d, e, f, g, h }
+input s : st
+input x : int 0 .. 100
+input y : bool
+table t {
+  | line | s         | x      | y     ||
+  |------|-----------|--------|-------||
+  | l1   | a         | < 50   | true  ||
+  | l2   | b         | < 50   |       ||
+  | l3   | c         | > 10   | false ||
+  | l5   | e         |        | true  ||
+  | l6   | g         |        | true  ||
+  | l7   | h         | 4 .. 9 |       ||
+}
+"""
+
+
+def test_every_region_of_a_gap_is_told_and_how_they_lie_over_an_enumeration() -> None:
+    [gap] = reported(MANY, Options())
+    assert gap.message == "no line of table `t` matches 1,162 of 1,616 (71.9 %) of the inputs"
+    assert gap.more == 0
+    assert sum(witness.inputs or 0 for witness in gap.witnesses) == 1162, (
+        "the regions are the gap, and part it"
+    )
+    [note] = gap.notes
+    assert note.startswith("by `s`: `d` all, `f` all, `h` 94.1 %, ")
+    text = plain(full(gap, {"case.rcs": Source("case.rcs", MANY)}))
+    assert text.count("region:") == 3
+    assert "and 551 more inputs in 4 more regions, which --json lists" in text
+
+
+def test_what_falls_to_default_is_told_by_its_first_regions() -> None:
+    """It is no mistake, and every table with a DEFAULT has it."""
+    text = MANY.replace("  | l7   | h ", "  | rest | DEFAULT | | ||\n  | l7   | h ")
+    [falls] = reported(text, Options())
+    assert (falls.code, len(falls.witnesses), falls.notes) == (Code.DEFAULT_COVERS, 3, ())
+    assert falls.more == 1162 - sum(witness.inputs or 0 for witness in falls.witnesses)
