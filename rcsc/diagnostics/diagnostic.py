@@ -75,16 +75,17 @@ class Diagnostic:
     witnesses: tuple[WitnessColumn, ...] = ()
     more: int = 0  # witnesses of the same cause that are not shown
     severity: Severity = Severity.ERROR
+    only_listed: bool = False  # witnesses stand in the JSON form alone
 
     @property
     def shown(self) -> tuple[WitnessColumn, ...]:
         """The witnesses that a text shows; the JSON form has all."""
-        return self.witnesses[:MOST_SHOWN]
+        return () if self.only_listed else self.witnesses[:MOST_SHOWN]
 
     @property
     def left_out(self) -> str:
         """What a text says of those that it does not show; empty for none."""
-        left = self.witnesses[MOST_SHOWN:]
+        left = () if self.only_listed else self.witnesses[MOST_SHOWN:]
         inputs = self.more + sum(witness.inputs or 1 for witness in left)
         words = f"{inputs} more input{'' if inputs == 1 else 's'}" if inputs else ""
         if not left:

@@ -1,5 +1,6 @@
 """What was found of a table, as diagnostics."""
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import prod
@@ -26,6 +27,8 @@ from rcsc.table.verdict import (
 
 MOST_PAIRS = 20
 """Overlapping pairs shown of one table; then how many more."""
+MOST_NAMED = 5
+"""Lines that are named because they overlap with the most others."""
 MANY = 3
 """Regions of a gap from which on it is said, too, how they lie over an enumeration."""
 
@@ -42,7 +45,16 @@ def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[st
         message = (
             f"and {least}{len(overlaps) - MOST_PAIRS} more pairs of lines of table `{table.name}` overlap"
         )
-        shown.append(Diagnostic(Code.OVERLAP, message, Label(table.span)))
+        others = tuple(
+            _column(program, table, each.witness, (each.first, each.second), each.region)
+            for each in overlaps[MOST_PAIRS:]
+        )
+        notes = (_most_overlapping(table, overlaps), "--json lists every pair with its witness")
+        shown.append(
+            Diagnostic(
+                Code.OVERLAP, message, Label(table.span), notes=notes, witnesses=others, only_listed=True
+            )
+        )
     return shown + list(_others(program, verdict, unproved))
 
 
@@ -113,6 +125,16 @@ def _overlap(program: Program, table: Table, overlap: Overlap) -> Diagnostic:
         help=(repair,) if repair else (),
         witnesses=(column,),
     )
+
+
+def _most_overlapping(table: Table, overlaps: Sequence[Overlap]) -> str:
+    """Name the lines that overlap with the most others: mending these mends the most."""
+    counts = Counter(line for overlap in overlaps for line in (overlap.first, overlap.second))
+    most = [
+        f"`{table.lines[at].name}` with {many}"
+        for at, many in sorted(counts.items(), key=lambda item: (-item[1], item[0]))[:MOST_NAMED]
+    ]
+    return f"which lines overlap with the most others: {', '.join(most)}"
 
 
 def _together(program: Program, table: Table, overlaps: Sequence[Overlap]) -> str:

@@ -366,3 +366,20 @@ def test_what_falls_to_default_is_told_by_its_first_regions() -> None:
     [falls] = reported(text, Options())
     assert (falls.code, len(falls.witnesses), falls.notes) == (Code.DEFAULT_COVERS, 3, ())
     assert falls.more == 1162 - sum(witness.inputs or 0 for witness in falls.witnesses)
+
+
+def test_every_pair_of_lines_that_overlap_is_listed() -> None:
+    rows = "".join(f"  | l{at} | >= {at} ||\n" for at in range(12))
+    text = f"input x : int 0 .. 100\ntable t {{\n  | line | x ||\n{rows}}}\n"
+    every = reported(text, Options())
+    [last] = [each for each in every if each.only_listed]
+    shown = [each for each in every if not each.only_listed]
+    assert len(shown) == 20
+    assert last.message == "and 46 more pairs of lines of table `t` overlap"
+    pairs = {tuple(line.name for line in each.witnesses[0].lines) for each in shown}
+    pairs |= {tuple(line.name for line in witness.lines) for witness in last.witnesses}
+    assert len(pairs) == 12 * 11 // 2
+    assert last.notes[0].startswith("which lines overlap with the most others: `l0` with 11, ")
+    assert "witness" not in plain(full(last, {"case.rcs": Source("case.rcs", text)})).replace(
+        "its witness", ""
+    )
