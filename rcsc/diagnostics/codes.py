@@ -758,7 +758,8 @@ class Code(StrEnum):
     """
     OVERLAP = """RCS402: an input that two lines match
 
-    Exactly one line matches in every cycle; here is an input that two match, shown beside the cells of both. The help proposes the
+    Exactly one line matches in every cycle; here is an input that two match, shown beside the cells of both. A note says what the two
+    lines leave different where both match, or that both do the same: that is decided, whatever their text. The help proposes the
     smallest change of a cell that parts them. If the input cannot occur, say why in an assumption.
 
         input width_mm : int 0 .. 110

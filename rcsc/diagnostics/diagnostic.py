@@ -59,6 +59,28 @@ class WitnessColumn:
 
 
 @dataclass(frozen=True, slots=True)
+class Effects:
+    """What two lines that overlap do where both match.
+
+    Attributes:
+        same: Whether both do the same for every such input; None where nobody could tell.
+        differ_in: What some such input leaves different: variables in declared order, after what else the actions do.
+    """
+
+    same: bool | None
+    differ_in: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        if self.same is None:
+            return "whether both do the same where both match could not be decided"
+        return (
+            "both do the same where both match"
+            if self.same
+            else f"they differ in: {', '.join(self.differ_in)}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnostic:
     """One problem, stated once; rendering lives in `render`.
 
@@ -75,6 +97,7 @@ class Diagnostic:
     witnesses: tuple[WitnessColumn, ...] = ()
     more: int = 0  # witnesses of the same cause that are not shown
     severity: Severity = Severity.ERROR
+    effects: Effects | None = None  # of an overlap; `notes` say it, too
     only_listed: bool = False  # witnesses stand in the JSON form alone
 
     @property

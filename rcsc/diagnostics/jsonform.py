@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from rcsc import __version__
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, WitnessColumn
+from rcsc.diagnostics.diagnostic import Diagnostic, Effects, Label, Severity, WitnessColumn
 from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport
 from rcsc.diagnostics.source import Source, Sources, Span
 
@@ -53,7 +53,7 @@ def table_to_json(table: TableReport) -> Json:
     }
 
 
-def _listed(known: InSystem | SystemReport) -> Json:
+def _listed(known: InSystem | SystemReport | Effects) -> Json:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(known).items()}
 
 
@@ -69,6 +69,7 @@ def diagnostic_to_json(diagnostic: Diagnostic, sources: Sources) -> Json:
         "help": list(diagnostic.help),
         "witnesses": [_witness_to_json(witness, sources) for witness in diagnostic.witnesses],
         "more": diagnostic.more,
+        "effects": None if diagnostic.effects is None else _listed(diagnostic.effects),
     }
 
 

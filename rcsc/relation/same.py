@@ -17,22 +17,13 @@ from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
-from rcsc.symbolic.effect import (
-    Effect,
-    Meaning,
-    Shared,
-    goes_wrong_otherwise,
-    same_calls,
-    several,
-    value_after,
-)
+from rcsc.symbolic.effect import Effect, Meaning, Shared, differences, several
 from rcsc.symbolic.encode import Frame, least_witness
 from rcsc.symbolic.evaluation import TooLongError
 from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node
 
 NO_LINE, SEVERAL_LINES, UNDEFINED = "no line", "several lines", "an undefined condition"
-RUN, CALLS = "whether the actions come to their end", "which extern procedures are called, or with what"
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,15 +137,7 @@ class _Question:
 
     def _changes(self, first: Effect, second: Effect) -> Iterator[tuple[str, Node]]:
         """Yield what can differ afterwards, and where it does."""
-        leaves = [name for name in self.kinds if name in first.leaves or name in second.leaves]
-        good = values.both(first.good, second.good)
-        yield RUN, goes_wrong_otherwise(first, second, self.shared)
-        yield CALLS, values.both(good, values.negation(same_calls(first, second, leaves, self.shared)))
-        for name in leaves:
-            pair = [value_after(effect, name, self.shared) for effect in (first, second)]
-            same = self.shared.equal(*pair)
-            if same is not values.TRUE:
-                yield name, values.both(good, values.negation(same))
+        return differences(first, second, self.kinds, self.shared)
 
     def _check(self, wrong: Node) -> tuple[Answer, Solver | None, dict[str, Node]]:
         """Ask whether `wrong` is possible; return the answer, its solver and variables."""

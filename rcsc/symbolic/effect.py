@@ -7,7 +7,7 @@ Nodes that are built alike become one (`Shared`), so that most of what two versi
 a solver.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from rcsc.diagnostics.source import Span
@@ -16,6 +16,9 @@ from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import Obligation
 from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import CONSTANT, FALSE, NARROWED, TRUE, Node
+
+RUN, CALLS = "whether the actions come to their end", "which extern procedures are called, or with what"
+"""What two runs can do otherwise besides leaving a variable different."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -245,6 +248,20 @@ def same_calls(left: Effect, right: Effect, leaves: Collection[str], shared: Sha
             values.either(values.both(both, values.all_of(shared.equal(a, b) for a, b in pairs)), neither)
         )
     return values.all_of(conditions)
+
+
+def differences(
+    left: Effect, right: Effect, leaves: Iterable[str], shared: Shared
+) -> Iterator[tuple[str, Node]]:
+    """Yield what two runs can do otherwise (`RUN`, `CALLS`, then leaves by name, in the order of `leaves`), and where they do."""
+    written = [name for name in leaves if name in left.leaves or name in right.leaves]
+    good = values.both(left.good, right.good)
+    yield RUN, goes_wrong_otherwise(left, right, shared)
+    yield CALLS, values.both(good, values.negation(same_calls(left, right, written, shared)))
+    for name in written:
+        same = shared.equal(value_after(left, name, shared), value_after(right, name, shared))
+        if same is not values.TRUE:
+            yield name, values.both(good, values.negation(same))
 
 
 def several(nodes: Iterable[Node]) -> Node:

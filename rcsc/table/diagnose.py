@@ -9,6 +9,8 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.lang.interval_sets import size
 from rcsc.lang.model import Box, Enum, Program, Scalar, Table, key_bounds, spell
+from rcsc.solvers.options import Options
+from rcsc.symbolic.alike import alike
 from rcsc.table import cells as words
 from rcsc.table.certificate import must_cover
 from rcsc.table.regions import partition
@@ -33,11 +35,13 @@ MANY = 3
 """Regions of a gap from which on it is said, too, how they lie over an enumeration."""
 
 
-def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[str] = ()) -> list[Diagnostic]:
+def diagnostics(
+    program: Program, verdict: TableVerdict, options: Options, unproved: Collection[str] = ()
+) -> list[Diagnostic]:
     """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
     table = verdict.table
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
-    shown = [_overlap(program, table, overlap) for overlap in overlaps[:MOST_PAIRS]]
+    shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
     if shown and (together := _together(program, table, overlaps[:MOST_PAIRS])):
         shown[-1] = replace(shown[-1], notes=(*shown[-1].notes, together))
     if len(overlaps) > MOST_PAIRS:
@@ -113,17 +117,20 @@ def _under(table: Table, unproved: Collection[str]) -> tuple[str, ...]:
 # --- overlaps ------------------------------------------------------------------------
 
 
-def _overlap(program: Program, table: Table, overlap: Overlap) -> Diagnostic:
+def _overlap(program: Program, table: Table, overlap: Overlap, options: Options) -> Diagnostic:
     first, second = table.lines[overlap.first], table.lines[overlap.second]
     column = _column(program, table, overlap.witness, (overlap.first, overlap.second), overlap.region)
     repair = parting_cell(program, table, overlap)
+    effects = alike(program, table, (overlap.first, overlap.second), options)
     return Diagnostic(
         Code.OVERLAP,
         f"lines `{first.name}` and `{second.name}` of table `{table.name}` both match some input",
         Label(second.cell_span(-1), "this line"),
         related=(Label(first.cell_span(-1), "and this one"),),
+        notes=(str(effects),),
         help=(repair,) if repair else (),
         witnesses=(column,),
+        effects=effects,
     )
 
 

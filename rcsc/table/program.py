@@ -78,7 +78,7 @@ def prove_program(
     verdicts = tuple(_with_invariants(program, verdict) for verdict in decided)
     for verdict in verdicts:
         if verdict.table.name not in owed.undefined:
-            findings += diagnostics(assuming, verdict, unproved)
+            findings += diagnostics(assuming, verdict, options, unproved)
     reported = tuple(sorted(dict.fromkeys(findings), key=sort_key))
     wrong = any(finding.severity is Severity.ERROR for finding in reported)
     if wrong or only is not None:

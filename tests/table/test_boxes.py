@@ -167,7 +167,7 @@ def test_a_report_of_very_many_overlaps_ends() -> None:
     program = program_of(written(rows))
     found = prove_table(program, program.tables[0], BOXES)
     assert len(found.findings) == partition.MOST_PAIRS
-    assert "at least" in diagnostics(program, found)[-1].message
+    assert "at least" in diagnostics(program, found, Options())[-1].message
 
 
 def maximal(program: Program, region: Region, bare: set[Point]) -> None:
