@@ -26,6 +26,7 @@ from rcsc.lang.model import (
 from rcsc.lang.questions import question
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
+from rcsc.solvers.search import furthest
 from rcsc.solvers.smt import Answer, Term
 from rcsc.symbolic import trial
 from rcsc.symbolic.encode import encode
@@ -346,7 +347,10 @@ class _Decision:
         return {v.name: value_of_key(v.type, point[column]) for v, column in pairs}
 
     def around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region:
-        """The widest box around the point in which, under the assumptions, none of `wrong` can hold."""
+        """The widest box around the point in which, under the assumptions, none of `wrong` can hold.
+
+        Its ends are values that the assumptions allow: where they allow nothing, nothing holds.
+        """
         never = [list(formulas) for formulas in wrong]
 
         def holds(box: list[Formula]) -> bool:
@@ -355,11 +359,29 @@ class _Decision:
             )
 
         box = widest(self.universe, point, self.columns, holds)
+        if self.assumed:
+            box = self._possible(box, point)
         return {
             v.name: (bounds,)
             for v, column in zip(self.variables, self.columns, strict=True)
             if (bounds := box[column]) != self._extent(column)
         }
+
+    def _possible(self, box: Mapping[int, Bounds], point: Point) -> dict[int, Bounds]:
+        """The box without values at its ends with which no input in it meets the assumptions; the point meets them."""
+        narrow = dict(box)
+
+        def meets(column: int, low: int, high: int) -> bool:
+            inside_ = {**narrow, column: (low, high)}
+            atoms = [self.universe.atom(self.universe.single[c], (bounds,)) for c, bounds in inside_.items()]
+            return find(self.universe, [*atoms, *self.assumed]) is not NoWitness.NONE
+
+        for column, (low, high) in box.items():
+            at = point[column]
+            top = furthest(at, high, lambda end, c=column, h=high: meets(c, end, h))  # type: ignore[misc]  # bound early
+            bottom = -furthest(-at, -low, lambda end, c=column, b=low: meets(c, b, -end))  # type: ignore[misc]  # as above
+            narrow[column] = (bottom, top)
+        return narrow
 
     def _extent(self, column: int) -> Bounds:
         bounds = self.universe.columns[column]

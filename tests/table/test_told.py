@@ -383,3 +383,18 @@ def test_every_pair_of_lines_that_overlap_is_listed() -> None:
     assert "witness" not in plain(full(last, {"case.rcs": Source("case.rcs", text)})).replace(
         "its witness", ""
     )
+
+
+@pytest.mark.parametrize(
+    ("assumed", "region"),
+    [
+        ("x + y <= 12 and x >= 2", ("x in 2 .. 6", "y in 6 .. 10")),
+        ("x = y", ("x >= 6", "y >= 6")),
+        ("x + y <= 30", ("y >= 6",)),
+    ],
+)
+def test_a_region_ends_at_values_that_the_assumptions_allow(assumed: str, region: tuple[str, ...]) -> None:
+    text = f"input x : int 0 .. 20\ninput y : int 0 .. 20\nassume a monitored : {assumed}\n"
+    text += "table t assuming a {\n  | line | y    ||\n  | low  | <= 5 ||\n}\n"
+    [gap] = [each for each in reported(text, Options()) if each.code is Code.GAP]
+    assert gap.witnesses[0].region == region
