@@ -17,7 +17,7 @@ from rcsc.diagnostics.source import Span
 from rcsc.driver.settings import Proof
 from rcsc.host.cache import Cache
 from rcsc.lang.meaning import digest
-from rcsc.lang.model import Program, Standing, Table
+from rcsc.lang.model import Program, Table
 from rcsc.lang.project import Loaded
 from rcsc.procedures.invariants import properties_elsewhere
 from rcsc.procedures.obligations import called_by_lines
@@ -182,9 +182,7 @@ def _moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
 def table_report(verdict: TableVerdict, program: Program) -> TableReport:
     """A verdict as the report shows it."""
     backing, stops = verdict.backing, verdict.table.stops
-    checked = [
-        assumption.name for assumption in program.assumptions if assumption.standing is Standing.MONITORED
-    ]
+    checked = [assumption.name for assumption in program.assumptions if assumption.standing.checked]
     tells = [name for name in checked if name in verdict.table.assumptions and name not in stops]
     return TableReport(
         verdict.table.name,

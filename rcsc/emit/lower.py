@@ -26,7 +26,6 @@ from rcsc.lang.model import (
     Program,
     ProvedProgram,
     Real,
-    Standing,
     Table,
     Test,
     Variable,
@@ -90,8 +89,7 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
     relied = tuple(
         place
         for place, assumption in named
-        if place in stops
-        or (assumption.standing is Standing.MONITORED and assumption.name in table.assumptions)
+        if place in stops or (assumption.standing.checked and assumption.name in table.assumptions)
     )
     return PlanTable(table, _matcher(program, table), tuple(lines), relied, stops)
 

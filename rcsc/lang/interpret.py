@@ -37,7 +37,6 @@ from rcsc.lang.model import (
     Scalar,
     Select,
     Snapshot,
-    Standing,
     Statement,
     Table,
     Test,
@@ -393,7 +392,7 @@ def failed_assumptions(program: Program, table: Table, now: Snapshot) -> tuple[s
         assumption.name
         for assumption in program.assumptions
         if assumption.name in table.assumptions
-        and (assumption.standing is Standing.MONITORED or assumption.name in table.stops)
+        and (assumption.standing.checked or assumption.name in table.stops)
         and not holds(assumption.condition, now)
     )
 

@@ -81,7 +81,7 @@ def checked(program: Program) -> tuple[int, ...]:
     return tuple(
         at
         for at, assumption in enumerate(program.assumptions)
-        if assumption.standing is Standing.MONITORED or assumption.name in stopping
+        if assumption.standing.checked or assumption.name in stopping
     )
 
 

@@ -483,7 +483,18 @@ class Standing(StrEnum):
 
     ASSUMED = "assumed"
     MONITORED = "monitored"  # checked by the executors each cycle
+    WATCHED = "assumed monitored"  # both: taken for granted by proofs, and checked each cycle
     PROVED = "proved"  # from declared ranges and invariants; what the levels together show is not declared
+
+    @property
+    def checked(self) -> bool:
+        """Whether the executors check it in each cycle, even where no safety rests on it."""
+        return self in {Standing.MONITORED, Standing.WATCHED}
+
+    @property
+    def believed(self) -> bool:
+        """Whether the proof of the levels together takes it for granted, where it speaks of inputs."""
+        return self in {Standing.ASSUMED, Standing.WATCHED}
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,8 @@ from rcsc.compose.proof.standing import Known, KnownSystem, SystemOutline, stand
 from rcsc.driver import outline
 from rcsc.host.cache import FOLDER, Cache
 from rcsc.host.files.plain import plain, read
+from rcsc.lang.interpret import run_table
+from tests.support.programs.stages import program_of
 from tests.support.programs.systems import HOPED, small_system, small_text, solo_system
 from tests.support.programs.texts import edit_file, level, table
 
@@ -383,3 +385,90 @@ def test_an_outline_comes_back_as_it_was(here: Path) -> None:
 
 def standing_of(made: SystemOutline) -> KnownSystem:
     return standing(Cache(Path("nowhere"), b"secret", "tool"), made)
+
+
+# --- facts about the environment ------------------------------------------------------------------
+
+
+DOOR = "input at_left : bool\ninput at_right : bool\noutput closed : bool\nassume one_end {}: not (at_left and at_right)\n"
+DOOR_LINES = (
+    "line | at_left | at_right || closed",
+    "l | true | || true",
+    "r | | true || true",
+    "m | false | false || false",
+)
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("standing", "status", "told"),
+    [
+        ("", 0, []),
+        ("assumed ", 0, []),
+        ("assumed monitored ", 0, ["one_end"]),
+        ("monitored ", 1, ["one_end"]),
+    ],
+)
+def test_a_fact_about_inputs_is_trusted_where_assumed_and_watched_where_monitored(
+    standing: str, status: int, told: list[str], check: Said, capfd: pytest.CaptureFixture[str]
+) -> None:
+    one_level(DOOR.format(standing), table("t", *DOOR_LINES, assuming="one_end"))
+    assert prove() == status
+    trusting = "trusting assumption `one_end` of level `solo`"
+    said = capfd.readouterr().out
+    assert (f"no two lines match: 1 of 1 proved, {trusting}\n" in said) == (not status)
+    form = reported_table(check("--json", "solo.rcs"), "t")
+    assert form["tells"] == told
+    assert form["assumptions"] == [{"name": "one_end", "standing": standing.strip() or "assumed"}]
+    program = program_of(Path("solo.rcs").read_text(encoding="utf-8"))
+    both = {"at_left": True, "at_right": True, "closed": False}
+    assert list(run_table(program, program.tables[0], both).failed_assumptions) == told
+    assert run_table(program, program.tables[0], {**both, "at_left": False}).failed_assumptions == ()
+
+
+@pytest.mark.usefixtures("here")
+def test_executors_tell_where_a_fact_that_is_trusted_and_watched_fails(
+    check: Said, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """`rcsc test` compares what failed, too, in inputs for which the assumption does not hold."""
+    one_level(
+        DOOR.format("assumed monitored "),
+        table(
+            "t", "line | at_left || closed", "l | true || at_right", "r | false || true", assuming="one_end"
+        ),
+    )
+    assert run(["test", "--examples", "5", "--mutants", "0", "--no-cortex", "solo.rcs"]) == 0
+    assert "interpreter = Python = C" in capfd.readouterr().out
+    assert "only tells where `one_end` fails" in check("solo.rcs")
+    assert run(["compile", "--out", "made", "solo.rcs"]) == 0
+    for file in ("made/c/solo.h", "made/python/solo.py"):
+        assert "one_end: only told in t" in Path(file).read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("facts", [("x > z", "z > x"), ("x + z > 18",), ("x > 4 and z = x + 5",)])
+def test_facts_that_no_input_satisfies_prove_nothing(facts: tuple[str, ...], check: Said) -> None:
+    declared = "".join(f"assume f{at} assumed : {fact}\n" for at, fact in enumerate(facts))
+    names = ", ".join(f"f{at}" for at in range(len(facts)))
+    one_level(
+        f"input x : int 0 .. 9\ninput z : int 0 .. 9\n{declared}",
+        table("t", "line | x ||", "a | > 3 ||", assuming=names),
+    )
+    assert "error[RCS405]" in check("solo.rcs", status=1)
+    assert prove() == 1
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("fact", "status"),
+    [("new_command implies not there", 0), ("command.input_command = pause", 1), ("there and not there", 1)],
+)
+def test_a_fact_below_a_superior_is_believed_only_where_its_commands_leave_a_cycle_for_it(
+    fact: str, status: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Alone the second can hold; of a table that runs under another command, it cannot."""
+    edit_file(Path("lower.rcs"), ("table go {", f"assume so assumed : {fact}\ntable go assuming so {{"))
+    assert prove() == status
+    said = capfd.readouterr().out
+    assert ("so                       assumed, as the tables declare it" in said) == (not status)
+    assert ("proved, trusting assumption `so` of level `lower`" in said) == (not status)

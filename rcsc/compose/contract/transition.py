@@ -25,7 +25,6 @@ from rcsc.lang.model import (  # fmt: skip
     Program,
     Scalar,
     Snapshot,
-    Standing,
     Table,
 )
 from rcsc.lang.restart import After, Fixed, SameAs
@@ -189,9 +188,7 @@ class TransitionSystem:
     def _of_the_environment(self) -> frozenset[str]:
         """Find the *assumed* assumptions about what a cycle takes; those about state alone are to be proved."""
         wanted = {
-            str(assumption.name)
-            for assumption in self.program.assumptions
-            if assumption.standing is Standing.ASSUMED
+            str(assumption.name) for assumption in self.program.assumptions if assumption.standing.believed
         }
         if not wanted:
             return frozenset()

@@ -25,7 +25,7 @@ from rcsc.lang.interpret import (
     matching_lines,
     settle,
 )
-from rcsc.lang.model import Action, Default, Line, Snapshot, Standing, Value
+from rcsc.lang.model import Action, Default, Line, Snapshot, Value
 from rcsc.symbolic import values
 from rcsc.symbolic.values import Node
 
@@ -173,7 +173,7 @@ def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
         assumption
         for assumption in ts.program.assumptions
         if assumption.name in table.assumptions
-        and assumption.standing is not Standing.MONITORED
+        and not assumption.standing.checked
         and assumption.name not in step.failed
     ]
     seen = seen_by_table(ts, step) if others else None

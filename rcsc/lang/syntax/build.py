@@ -129,7 +129,10 @@ class Build:
         head = self._head(node)
         standing = self._kind(node.children, "STANDING")
         return tree.AssumeDecl(
-            self._name(node.children[0]), self.expr(node.children[-1]), str(standing or ""), **head
+            self._name(node.children[0]),
+            self.expr(node.children[-1]),
+            " ".join((standing or "").split()),
+            **head,
         )
 
     def _invariant_decl(self, node: ParseNode) -> tree.InvariantDecl:

@@ -37,7 +37,7 @@ _WORDS = {
     "MINUS": "`-`",
     "ADMIT": "`clamp` or `reject`",
     "SAFE": "`safe`",
-    "STANDING": "`assumed`, `monitored` or `proved`",
+    "STANDING": "`assumed`, `monitored`, `assumed monitored` or `proved`",
     "BOOL": "a type",
     "_DOTS": "`..`",
     "_BECOMES": "`:=`",

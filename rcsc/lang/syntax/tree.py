@@ -505,7 +505,7 @@ class VariableDecl(Documented):
 
 @dataclass(frozen=True, slots=True)
 class AssumeDecl(Documented):
-    """`assume name [assumed|monitored|proved] : expr`; "" is `assumed`."""
+    """`assume name [assumed|monitored|assumed monitored|proved] : expr`; "" is `assumed`."""
 
     name: Name
     condition: Expr

@@ -14,7 +14,6 @@ from rcsc.lang.model import (
     OneTable,
     Program,
     Real,
-    Standing,
     Statement,
     Table,
     Variable,
@@ -135,7 +134,7 @@ def all_lines(table: Table) -> list[tuple[str, tuple[Statement, ...]]]:
 def monitored(program: Program) -> tuple[str, ...]:
     """Names of the assumptions that the executors check, in order."""
     stopping = {name for table in program.tables for name in table.stops}
-    checked = (a for a in program.assumptions if a.standing is Standing.MONITORED or a.name in stopping)
+    checked = (a for a in program.assumptions if a.standing.checked or a.name in stopping)
     return tuple(str(a.name) for a in checked)
 
 
@@ -156,7 +155,7 @@ def _monitors(writer: Writer, number: int, table: Table) -> Iterator[str]:
     names = monitored(writer.program)
     for assumption in writer.program.assumptions:
         stops = assumption.name in table.stops
-        told = assumption.standing is Standing.MONITORED and assumption.name in table.assumptions
+        told = assumption.standing.checked and assumption.name in table.assumptions
         if stops or told:
             at = names.index(str(assumption.name))
             yield f"r->failed[{at}] = (uint8_t)!{writer.expr(assumption.condition)};"
