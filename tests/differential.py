@@ -401,6 +401,8 @@ class Maker:
         way = rng.randrange(9)
         if way == 1:
             return self.counted(depth - 1)
+        if way == 2:
+            return self.bits()
         if way == 0:
             one = self.real(depth - 1)
             return Expr(one.kind, f"int(min(900.0, max(-900.0, {one.text})))",
@@ -410,6 +412,48 @@ class Maker:
             rng.choice(("+", "-", "*", "/", "/", "mod", "mod", "mod", "min", "max", "abs", "neg")), a, b
         )
         return found or a
+
+    def byte(self) -> Expr:
+        """A number of eight bits, the first of which is set: it has as many whatever its bounds."""
+        rest = self.index(128)
+        return Expr(
+            rest.kind,
+            f"({rest.text} + 128)",
+            lambda s, v: rest.of(s, v) + 128,
+            rest.low + 128,
+            rest.high + 128,
+        )
+
+    def bits(self) -> Expr:
+        """Some bits of a byte, as a number."""
+        byte, kind = self.byte(), Kind("int", "", 0, 255)
+        high = self.rng.randrange(8)
+        low, mask = self.rng.randrange(high + 1), self.rng.randrange(256)
+        if byte.low == byte.high:
+            return byte
+        if self.rng.randrange(2):
+            field = (2 << high - low) - 1
+            return Expr(
+                kind, f"{byte.text}[{high}..{low}]", lambda s, v: byte.of(s, v) >> low & field, 0, field
+            )
+        return Expr(
+            kind,
+            f"({byte.text} & {mask:#b} >> {low})",
+            lambda s, v: (byte.of(s, v) & mask) >> low,
+            0,
+            mask >> low,
+        )
+
+    def masked(self) -> Expr:
+        """Whether a byte fits a mask, or has a bit set."""
+        byte, digits = self.byte(), [self.rng.choice("01xx") for _ in range(8)]
+        place = self.rng.randrange(8)
+        if byte.low == byte.high:
+            return Expr(BOOL, f"({byte.text} = 0)", lambda s, v: byte.of(s, v) == 0)
+        if "x" not in digits:
+            return Expr(BOOL, f"{byte.text}[{place}]", lambda s, v: bool(byte.of(s, v) >> place & 1))
+        return Expr(BOOL, f"({byte.text} = 0b{''.join(digits)})",
+                    lambda s, v: all(digit in ("x", bit) for digit, bit in zip(digits, f"{byte.of(s, v):08b}", strict=True)))  # fmt: skip
 
     def counted(self, depth: int) -> Expr:
         """How many of some conditions hold, or one condition as a number."""
@@ -476,6 +520,8 @@ class Maker:
         way = rng.randrange(8) if depth > 0 else rng.randrange(3)
         if way == 0:
             return self.read(BOOL)
+        if way == 3 and rng.randrange(2):
+            return self.masked()
         if way < 4:
             return self.compared(depth - 1)
         if way == 4:

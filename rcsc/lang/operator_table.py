@@ -72,6 +72,9 @@ class Op(StrEnum):
     TO_REAL = "real", POSTFIX, float
 
 
+BITWISE = {"&": PRODUCT, "<<": PRODUCT, ">>": PRODUCT, "|": SUM}
+"""Operators on the bits of a word, and how tightly they bind, as in Go; they are resolved to arithmetic."""
+
 Logic: TypeAlias = Literal[Op.AND, Op.OR, Op.XOR, Op.IMPLIES]
 """Truth functions of two operands. The right one is looked at only where the left one does not decide."""
 Comparison: TypeAlias = Literal[Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE]

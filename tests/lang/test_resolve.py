@@ -1,13 +1,14 @@
 """Names, kinds, units and ranges: every code from a minimal text, on its line and on the smallest span."""
 
 import sys
+from collections.abc import Callable
 from itertools import product
 
 import pytest
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
-from rcsc.lang.interpret import holds
+from rcsc.lang.interpret import evaluate, holds
 from rcsc.lang.model import Assign, Call, Int, Program, Real, Select, Test, ToElement, ToLeaf, VariableName
 from rcsc.lang.resolve import compile_text
 from tests.support.programs.stages import program_of, refused
@@ -612,3 +613,110 @@ def test_elsewhere_count_is_a_name() -> None:
         + "procedure count_up { count := min(count + 1, 9) }\nprocedure p { count_up }"
     )
     assert program.tables[0].variables == ("a", "b", "lid", "count")
+
+
+WORDS = """\
+const three = 0b11
+input w : int 0 .. 1023
+input several : array[2] of int 0 .. 7
+input at : int 0 .. 1
+input signed : int -1 .. 9
+input length : int 0 .. 9 [mm]
+input on : bool
+state n : int 0 .. 1000000
+table t {
+  | line | HEADING ||
+  | a    | CELL    ||
+}
+"""
+Holds = Callable[[int], bool]
+
+
+def word_table(heading: str, cell: str) -> str:
+    return WORDS.replace("HEADING", heading).replace("CELL", cell)
+
+
+@pytest.mark.parametrize(
+    ("heading", "cell", "wanted"),
+    [
+        ("w", "xx 01x0 1xx1", lambda w: w & 0b1101_1001 == 0b0100_1001),
+        ("w", "/= 0bxx_xxxx_xx10", lambda w: w & 3 != 2),
+        ("w", "00 0000 0101", lambda w: w == 5),
+        ("w", "0b101", lambda w: w == 5),
+        ("w", "0x10", lambda w: w == 16),
+        ("w", "10", lambda w: w == 10),
+        ("w", "0b0xxxxxxxxx, 1023", lambda w: w < 512 or w == 1023),
+        ("w", "not in {0bxxxxxxxxx1, 0b1xxxxxxxxx}", lambda w: not (w & 1 or w & 512)),
+        ("w[7..4]", "1x x0", lambda w: w >> 4 & 0b1001 == 0b1000),
+        ("w[7..4][2..1]", "0b01", lambda w: w >> 5 & 3 == 1),
+        ("w / 2 mod 16", "x1 0x", lambda w: w >> 1 & 0b0110 == 0b0100),
+        ("w[9..0]", "5", lambda w: w == 5),
+        ("w[9]", "true", lambda w: w >= 512),
+        ("w[three]", "false", lambda w: not w & 8),
+        ("three[1]", "true", lambda w: w >= 0),
+        ("w & 0b1110 << 2", "0b11000", lambda w: w & 14 == 6),
+        ("(w & 0b11_0101_1001) * 2", "0b1000010", lambda w: (w & 0b1101011001) * 2 == 66),
+        ("0xF0F0 & w", "0x50", lambda w: w & 0xF0F0 == 0x50),
+        ("w & 0", "0", lambda w: w >= 0),
+        ("w >> 3 & 1", "1", lambda w: bool(w & 8)),
+        ("w << 2 >> 4", "3", lambda w: w << 2 >> 4 == 3),
+        ("w >> 63", "0", lambda w: w >= 0),
+        ("when", "w = 0bxx_xxxx_x11x and not w[0]", lambda w: w & 7 == 6),
+        ("when", "count(w[0], w[1], w[2]) = int(w[9])", lambda w: (w & 7).bit_count() == w >> 9),
+    ],
+)
+def test_bits_are_those_of_the_word(heading: str, cell: str, wanted: Holds) -> None:
+    found = compile_text(word_table(heading, cell))
+    assert isinstance(found, Program)
+    [test] = found.tables[0].lines[0].tests
+    for w in range(1024):
+        assert (test is None or holds(test.condition, {"w": w})) is wanted(w), w
+
+
+def test_a_constant_is_added_to_the_bits_of_a_word() -> None:
+    """`|`, which no cell can have."""
+    program = program_of(
+        f"{WORDS.replace('HEADING', 'on').replace('CELL', 'true')}procedure p {{ n := w | 0b101_0000 | 2 }}"
+    )
+    [assignment] = program.procedures[0].body
+    assert isinstance(assignment, Assign)
+    assert assignment.value.type == Int(0b101_0010, 1023)
+    for w in range(1024):
+        assert evaluate(assignment.value, {"w": w}) == w | 0b101_0010
+
+
+def test_masks_of_one_byte_are_boxes() -> None:
+    program = program_of(
+        "input b : int 0 .. 255\ntable t {\n| line | b ||\n| a | 1xxx xxxx ||\n| b | 01xx xxx0 ||\n| c | DEFAULT ||\n}"
+    )
+    boxes = [test.box for line in program.tables[0].lines for test in line.tests if test]
+    assert boxes == [((128, 255),), tuple((key, key) for key in range(64, 128, 2))]
+
+
+@pytest.mark.parametrize(
+    ("heading", "cell", "code", "message"),
+    [
+        ("w", "x1 0x", "RCS306", "the mask has 4 bits, the word has 10"),
+        ("w[10]", "true", "RCS306", "there is no bit 10, the word has 9..0"),
+        ("w[0..3]", "1", "RCS303", "the bits 0..3 are none"),
+        ("w[at]", "true", "RCS305", "the number of a bit is a constant"),
+        ("w[on..0]", "1", "RCS305", ""),
+        ("signed", "xx 11", "RCS301", "this is one that can be negative"),
+        ("signed[0]", "true", "RCS301", "this is one that can be negative"),
+        ("length[2..0]", "3", "RCS301", "this is one with a unit"),
+        ("on", "x1 11", "RCS301", "this is bool"),
+        ("on & on", "true", "RCS301", "this is bool"),
+        ("w & at", "1", "RCS305", "one side of `&` is a constant"),
+        ("w << at", "1", "RCS305", "a shift is by a constant from 0 to 63"),
+        ("w >> 64", "0", "RCS305", "a shift is by a constant from 0 to 63"),
+        ("w", "< 0bxx", "RCS301", "a mask is no value"),
+        ("when", "0bxx", "RCS301", "a mask is no value"),
+        ("several[at][3]", "true", "RCS306", "there is no bit 3"),
+        ("several[2][1]", "true", "RCS306", "the index 2 is not in 0 .. 1"),
+        ("nothing[1]", "true", "RCS201", "nothing"),
+    ],
+)
+def test_what_is_wrong_with_bits_is_said(heading: str, cell: str, code: str, message: str) -> None:
+    diagnostics = refused(word_table(heading, cell))
+    assert (code, True) in {(each.code.value, message in each.message) for each in diagnostics}
+    assert len(diagnostics) == 1

@@ -8,7 +8,7 @@ from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.scope import Body, Scope
-from rcsc.lang.expressions.typed import among, between, boolean, other_than, typed
+from rcsc.lang.expressions.typed import among, between, boolean, masked, other_than, typed
 from rcsc.lang.interval_sets import compared as keys_compared
 from rcsc.lang.interval_sets import complement, joined, meet, scaled
 from rcsc.lang.leaves import read_by
@@ -101,6 +101,9 @@ class Tests:
         condition: Typed | None
         match written:
             case tree.Comparison(written_op, value, span):
+                if isinstance(value, tree.Mask) and written_op in ("=", "/="):
+                    pattern = masked(scope, subject, written_op, value)
+                    return None if pattern is None else pattern.expr
                 op: Operator = Op(written_op)
                 assert is_comparison(op)
                 other = typed(scope, body, value, subject.expr.type)

@@ -17,8 +17,9 @@ LONGEST = 1_000
 def integer(scope: Scope, written: tree.IntLiteral) -> Typed | None:
     """A whole number that fits in 64 bits."""
     text = written.text.replace("_", "")
-    digits = text[2:] if text[:2] in ("0x", "0X") else text
-    value = int(digits.lstrip("0")[:40] or "0", 10 if digits is text else 16)
+    base = {"0x": 16, "0b": 2}.get(text[:2].lower(), 10)
+    digits = text if base == 10 else text[2:]
+    value = int(digits.lstrip("0")[:80] or "0", base)
     if value > U64_MAX:
         message = "no 64-bit integer holds this number"
         scope.report(Code.TOO_WIDE, message, written.span, f"the greatest is {U64_MAX}")

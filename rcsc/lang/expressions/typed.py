@@ -7,6 +7,7 @@ from functools import reduce
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions import words
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.literals import integer, real
 from rcsc.lang.expressions.operators import (
@@ -44,7 +45,7 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
-from rcsc.lang.operator_table import Op, Operator, is_comparison, is_logic
+from rcsc.lang.operator_table import BITWISE, Op, Operator, is_comparison, is_logic
 from rcsc.lang.syntax import tree
 
 DEEPEST = 200
@@ -64,16 +65,14 @@ def typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None = No
 
 def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) -> Typed | None:
     match written:
-        case tree.BoolLiteral(value, span):
-            return Typed(Literal(value, Bool(), span))
-        case tree.IntLiteral():
-            return integer(scope, written)
-        case tree.RealLiteral():
-            return real(scope, written)
+        case tree.BoolLiteral() | tree.IntLiteral() | tree.RealLiteral() | tree.Mask():
+            return _literal(scope, written)
         case tree.Reference(name, span):
             return _reference(scope, body, name, span, want)
         case tree.FieldOf() | tree.IndexOf():
             return _path(scope, body, written)
+        case tree.BitsOf():
+            return _bits_of(scope, body, written)
         case tree.Unary():
             return _unary(scope, body, written)
         case tree.Was(operand, span):
@@ -90,6 +89,21 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
             scope.report(
                 Code.KIND, f"`{command.text}(...)` is an order, and no value", written.span, ORDER_STANDS
             )
+            return None
+
+
+def _literal(
+    scope: Scope, written: tree.BoolLiteral | tree.IntLiteral | tree.RealLiteral | tree.Mask
+) -> Typed | None:
+    match written:
+        case tree.BoolLiteral(value, span):
+            return Typed(Literal(value, Bool(), span))
+        case tree.IntLiteral():
+            return integer(scope, written)
+        case tree.RealLiteral():
+            return real(scope, written)
+        case tree.Mask(span=span):
+            scope.report(Code.KIND, "a mask is no value", span, "write `WORD = 0bx0`, or a cell under a word")
             return None
 
 
@@ -249,7 +263,16 @@ def _path(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
         owner = scope.types.get(written.base.name.text)
         if isinstance(owner, Enum) and written.base.name.text not in scope.declared:
             return _member(scope, owner, written)
-    path = path_of(scope, body, written)
+    path: Path | None
+    if isinstance(written, tree.IndexOf):
+        if _is_value(scope, body, written.base):
+            return _bit(scope, body, typed(scope, body, written.base), written)
+        base = path_of(scope, body, written.base)
+        if base is not None and isinstance(base.type, Int):
+            return _bit(scope, body, _read(base, written.base.span), written)
+        path = _element(scope, body, base, written.index)
+    else:
+        path = path_of(scope, body, written)
     if path is None:
         return None
     if not isinstance(path.type, Bool | Enum | Int | Real):
@@ -257,10 +280,47 @@ def _path(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
         helps = [f"write `{path.names[0]}.input_command`"] if "input_command" in own else []
         scope.report(Code.KIND, f"`{path.names[0]}` is a whole record or array", written.span, *helps)
         return None
+    return _read(path, written.span)
+
+
+def _read(path: Path, span: Span) -> Typed:
+    """Read a path to scalars."""
+    assert isinstance(path.type, Bool | Enum | Int | Real)
     leaves = tuple(VariableName(name) for name in path.names)
     if path.index is None:
-        return Typed(Read(leaves[0], path.type, written.span))
-    return Typed(Select(leaves, path.index, path.type, written.span))
+        return Typed(Read(leaves[0], path.type, span))
+    return Typed(Select(leaves, path.index, path.type, span))
+
+
+def _is_value(scope: Scope, body: Body, written: tree.Expr) -> bool:
+    """Whether it is a value that has bits, and no path: a local, a constant, or what is computed."""
+    if not isinstance(written, tree.Reference):
+        return not isinstance(written, tree.FieldOf | tree.IndexOf)
+    name = written.name.text
+    return name in body.visible or (name not in scope.declared and name in scope.constants)
+
+
+def _bits_of(scope: Scope, body: Body, written: tree.BitsOf) -> Typed | None:
+    """Resolve `word[3..0]`."""
+    word = typed(scope, body, written.base)
+    ends = _place(scope, body, written.high), _place(scope, body, written.low)
+    return None if word is None else words.field(scope, word, ends, written.span)
+
+
+def _bit(scope: Scope, body: Body, word: Typed | None, written: tree.IndexOf) -> Typed | None:
+    """Resolve `word[3]`: whether the bit is set."""
+    place = _place(scope, body, written.index)
+    return None if word is None else words.bit(scope, word, place, written.span)
+
+
+def _place(scope: Scope, body: Body, written: tree.Expr) -> int | None:
+    """The number of a bit; None (reported) where it is no constant."""
+    place = typed(scope, body, written)
+    number = None if place is None else fold(place.expr)
+    if place is not None and (number is None or not isinstance(place.expr.type, Int)):
+        scope.report(Code.NOT_CONSTANT, "the number of a bit is a constant", written.span)
+        return None
+    return None if number is None else int(number)
 
 
 def _member(scope: Scope, owner: Enum, written: tree.FieldOf) -> Typed | None:
@@ -324,6 +384,12 @@ def _may_be_member(scope: Scope, body: Body, written: tree.Expr) -> bool:
 
 
 def _binary(scope: Scope, body: Body, written: tree.Binary) -> Typed | None:
+    if isinstance(written.right, tree.Mask) and written.op in ("=", "/="):
+        subject = typed(scope, body, written.left)
+        return None if subject is None else masked(scope, subject, written.op, written.right)
+    if written.op in BITWISE:
+        operands = typed(scope, body, written.left), typed(scope, body, written.right)
+        return words.bitwise(scope, written.op, operands, written.span)
     op: Operator = Op(written.op)
     if is_logic(op):
         first, second = boolean(scope, body, written.left), boolean(scope, body, written.right)
@@ -358,6 +424,12 @@ def _in_set(scope: Scope, body: Body, written: tree.InSet) -> Typed | None:
     return other_than(condition) if condition is not None and written.negated else condition
 
 
+def masked(scope: Scope, subject: Typed, op: str, mask: tree.Mask) -> Typed | None:
+    """`word = 0bx0xx`, or with `/=`."""
+    condition = words.matches(scope, subject, mask.text.replace("_", ""), mask.span)
+    return condition if op == "=" or condition is None else other_than(condition)
+
+
 def other_than(condition: Typed) -> Typed:
     """`not in`."""
     return Typed(Apply(Op.NOT, (condition.expr,), Bool(), condition.expr.span))
@@ -378,6 +450,12 @@ def among(
             if inside is None:
                 return None
             ranges.append(inside.expr)
+            continue
+        if isinstance(member, tree.Mask):
+            fits = masked(scope, subject, "=", member)
+            if fits is None:
+                return None
+            ranges.append(fits.expr)
             continue
         element = typed(scope, body, member, subject.expr.type)
         if element is None:

@@ -347,6 +347,9 @@ class Build:
     def _index_of(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.IndexOf(self.expr(parts[0]), self.expr(parts[1]), span)
 
+    def _bits_of(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.BitsOf(self.expr(parts[0]), self.expr(parts[1]), self.expr(parts[2]), span)
+
     def _true(self, _: list[Any], span: Span) -> tree.Expr:
         return tree.BoolLiteral(True, span)
 
@@ -355,6 +358,9 @@ class Build:
 
     def _integer(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.IntLiteral(str(parts[0]), self._unit(parts[1:]), span)
+
+    def _mask(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Mask("_".join(parts[0][2:].lower().replace("_", " ").split()), span)
 
     def _real_number(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.RealLiteral(str(parts[0]), self._unit(parts[1:]), span)
@@ -395,6 +401,8 @@ class Build:
         match node.data:
             case "equals":
                 return tree.Comparison("=", self.expr(parts[0]), span)
+            case "groups":
+                return tree.Comparison("=", tree.Mask("_".join(parts[0].lower().split()), span), span)
             case "comparison":
                 return tree.Comparison(str(parts[0]), self.expr(parts[1]), span)
             case "one_of":

@@ -9,7 +9,7 @@ _DECLARATION = frozenset(
     "USE UNIT CONST ENUM TYPE RECORD LINK SERVES COMMANDS ADOPT KIND ASSUME INVARIANT PROPERTY PROCEDURE MODULE".split()
     + "EXTERN OWNER TABLE LEVEL".split()
 )
-_EXPRESSION = frozenset("TRUE FALSE REAL LPAR FUNCTION NOT WAS".split())
+_EXPRESSION = frozenset("TRUE FALSE REAL MASK LPAR FUNCTION NOT WAS".split())
 _OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL IN DOT LSQB".split()) | {op.upper() for op in LOGIC}
 _STATEMENT = frozenset("IF CASE FOR LOCAL NEXT".split())
 
@@ -41,6 +41,8 @@ _WORDS = {
     "BOOL": "a type",
     "_DOTS": "`..`",
     "_BECOMES": "`:=`",
+    "GROUPS": "bits",
+    "MASK": "bits",
     "_INT": "`int`",
     "_REAL": "`real`",
 }
@@ -55,14 +57,14 @@ _CLASSES = {
 }
 """The words of the terminals that are not called as their one word is."""
 _SYMBOLS = frozenset(
-    "NAME INT REAL STRING ROW COMPARE ADD_OP MUL_OP LBRACE RBRACE LPAR RPAR LSQB RSQB COLON COMMA SEMICOLON SLASH STAR CIRCUMFLEX DOT"
-    " EQUAL MINUS".split()
+    "NAME INT REAL MASK GROUPS STRING ROW COMPARE ADD_OP MUL_OP LBRACE RBRACE LPAR RPAR LSQB RSQB COLON COMMA SEMICOLON SLASH STAR"
+    " CIRCUMFLEX DOT EQUAL MINUS".split()
 )
 """Terminals that are no words, whatever they are called."""
 _STATUS = "a link says what its statuses mean: `status : TYPE done MEMBER failed MEMBER executing MEMBER`"
 ELSEWHERE = {
     "===": "=", "!==": "/=", "==": "=", "!=": "/=", "<>": "/=", "&&": "and", "||": "or", "=>": "implies", "->": "implies",
-    "=<": "<=", "&": "and", "!": "not", "~": "not", "%": "mod",
+    "=<": "<=", "!": "not", "~": "not", "%": "mod",
 }  # fmt: skip
 """Operators of other languages, and how this one writes them; the longest first where one begins another."""
 

@@ -2,7 +2,7 @@
 
 from typing import assert_never
 
-from rcsc.lang.operator_table import IMPLICATION, NEGATION, POSTFIX, RELATION, SIGN, SUM, Op
+from rcsc.lang.operator_table import BITWISE, IMPLICATION, NEGATION, POSTFIX, RELATION, SIGN, SUM, Op
 from rcsc.lang.syntax import tree
 
 
@@ -15,16 +15,10 @@ def spell_expr(expr: tree.Expr, least: int = 0) -> str:
 def _expr(expr: tree.Expr) -> tuple[str, int]:
     """The text, and how tightly it binds."""
     match expr:
-        case tree.BoolLiteral(value):
-            return ("true" if value else "false"), POSTFIX
-        case tree.IntLiteral(text, unit) | tree.RealLiteral(text, unit):
-            return text + (f" {spell_unit(unit)}" if unit else ""), POSTFIX
-        case tree.Reference(name):
-            return name.text, POSTFIX
-        case tree.FieldOf(base, name):
-            return f"{spell_expr(base, POSTFIX)}.{name.text}", POSTFIX
-        case tree.IndexOf(base, index):
-            return f"{spell_expr(base, POSTFIX)}[{spell_expr(index)}]", POSTFIX
+        case tree.BoolLiteral() | tree.IntLiteral() | tree.RealLiteral() | tree.Mask():
+            return _literal(expr), POSTFIX
+        case tree.Reference() | tree.FieldOf() | tree.IndexOf() | tree.BitsOf():
+            return _place(expr), POSTFIX
         case tree.Unary("not", operand):
             return f"not {spell_expr(operand, NEGATION)}", NEGATION
         case tree.Unary(_, operand):
@@ -44,6 +38,28 @@ def _expr(expr: tree.Expr) -> tuple[str, int]:
             assert_never(expr)
 
 
+def _literal(expr: tree.BoolLiteral | tree.IntLiteral | tree.RealLiteral | tree.Mask) -> str:
+    match expr:
+        case tree.BoolLiteral(value):
+            return "true" if value else "false"
+        case tree.IntLiteral(text, unit) | tree.RealLiteral(text, unit):
+            return text + (f" {spell_unit(unit)}" if unit else "")
+        case tree.Mask(text):
+            return f"0b{text}"
+
+
+def _place(expr: tree.Reference | tree.FieldOf | tree.IndexOf | tree.BitsOf) -> str:
+    match expr:
+        case tree.Reference(name):
+            return name.text
+        case tree.FieldOf(base, name):
+            return f"{spell_expr(base, POSTFIX)}.{name.text}"
+        case tree.IndexOf(base, index):
+            return f"{spell_expr(base, POSTFIX)}[{spell_expr(index)}]"
+        case tree.BitsOf(base, high, low):
+            return f"{spell_expr(base, POSTFIX)}[{spell_expr(high, SUM)}..{spell_expr(low, SUM)}]"
+
+
 def _with_arguments(expr: tree.Apply | tree.Order) -> str:
     if isinstance(expr, tree.Apply):
         return f"{expr.function.text}({', '.join(spell_expr(arg) for arg in expr.args)})"
@@ -53,9 +69,14 @@ def _with_arguments(expr: tree.Apply | tree.Order) -> str:
 
 def _binary(op: str, left: tree.Expr, right: tree.Expr) -> tuple[str, int]:
     """Relations do not stand in a row; `implies` takes what follows it, the others what stands before them."""
-    strength = Op(op).strength
-    first = spell_expr(left, strength + (strength in (IMPLICATION, RELATION)))
+    strength = BITWISE.get(op) or Op(op).strength
+    first = spell_expr(left, strength + (strength in (IMPLICATION, RELATION) or _mixed(op, left)))
     return f"{first} {op} {spell_expr(right, strength + (strength != IMPLICATION))}", strength
+
+
+def _mixed(op: str, left: tree.Expr) -> bool:
+    """Whether arithmetic and bits meet, or two operators on bits: other languages bind them otherwise."""
+    return isinstance(left, tree.Binary) and left.op != op and not BITWISE.keys().isdisjoint((op, left.op))
 
 
 def spell_set(members: tuple[tree.Member, ...]) -> str:
@@ -115,6 +136,8 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
         case tree.Comparison(op, value):
             if whole:
                 return spell_expr(value) if _plain(value) else f"({spell_expr(value)})"
+            if op == "=" and isinstance(value, tree.Mask) and "_" in value.text:
+                return value.text.replace("_", " ")
             return spell_expr(value, SUM) if op == "=" and _plain(value) else f"{op} {spell_expr(value, SUM)}"
         case tree.OneOf(members):
             return f"{_in(condition)} {spell_set(members)}"

@@ -69,7 +69,7 @@ class BoolLiteral:
 
 @dataclass(frozen=True, slots=True)
 class IntLiteral:
-    """`40`, `0x28`, `1_000`, each with an optional unit. `text` is as written."""
+    """`40`, `0x28`, `0b101000`, `1_000`, each with an optional unit. `text` is as written."""
 
     text: str
     unit: Unit | None = None
@@ -108,6 +108,24 @@ class IndexOf:
 
     base: "Expr"
     index: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class BitsOf:
+    """`word[high..low]`: a field of a word."""
+
+    base: "Expr"
+    high: "Expr"
+    low: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Mask:
+    """`0bx0xx_1010`, in a cell `x0xx 1010`: bits, `x` for any; `text` is in groups, `x0xx_1010`."""
+
+    text: str
     span: Span = at()
 
 
@@ -178,7 +196,7 @@ class InRange:
 
 @dataclass(frozen=True, slots=True)
 class Apply:
-    """`abs(x)`, `min(a, b)`, `max(a, b)`, `int(x)`, `real(x)`."""
+    """`abs(x)`, `min(a, b)`, `max(a, b)`, `int(x)`, `real(x)`, `count(a, b, c)`."""
 
     function: Name
     args: "tuple[Expr, ...]"
@@ -210,6 +228,8 @@ Expr: TypeAlias = (
     | Reference
     | FieldOf
     | IndexOf
+    | BitsOf
+    | Mask
     | Unary
     | Was
     | Binary

@@ -41,14 +41,35 @@ LITERALS: SearchStrategy[tree.Expr] = st.one_of(
     st.builds(tree.BoolLiteral, st.booleans()),
     st.builds(
         tree.IntLiteral,
-        st.sampled_from(["0", "7", "1_000", "0x2F", "18446744073709551615"]),
+        st.sampled_from(["0", "7", "1_000", "0x2F", "0b1_01", "18446744073709551615"]),
         st.none() | UNITS,
     ),
+    st.builds(tree.Mask, st.sampled_from(["x", "x0xx", "0x01_1010", "1_x", "11_0X".lower()])),
     st.builds(tree.RealLiteral, st.sampled_from(["0.5", "1e-3", "2.5E7"]), st.none() | UNITS),
 )
 REFERENCES: SearchStrategy[tree.Expr] = NAMES.map(tree.Reference)
+# Without `|`, which ends a cell of a table.
 BINARY = st.sampled_from(
-    ["implies", "and", "or", "xor", "=", "/=", "<", "<=", ">", ">=", "+", "-", "*", "/", "mod"]
+    [
+        "implies",
+        "and",
+        "or",
+        "xor",
+        "=",
+        "/=",
+        "<",
+        "<=",
+        ">",
+        ">=",
+        "+",
+        "-",
+        "*",
+        "/",
+        "mod",
+        "&",
+        "<<",
+        ">>",
+    ]
 )
 
 
@@ -73,6 +94,7 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
         st.builds(tree.Apply, st.just(Name("count")), st.lists(inner, min_size=1, max_size=3).map(tuple)),
         st.builds(tree.FieldOf, REFERENCES, NAMES),
         st.builds(tree.IndexOf, REFERENCES, inner),
+        st.builds(tree.BitsOf, REFERENCES, inner, inner),
         st.builds(
             tree.Order,
             NAMES,

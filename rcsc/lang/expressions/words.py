@@ -1,0 +1,160 @@
+"""Bits of words: fields, masks, `&`, `|` and shifts by constants, made of quotients and remainders by powers of two.
+
+In: a typed whole number that is never negative. Out: arithmetic that every later stage knows. A *word* has the bits of the
+greatest value of its type, numbered from 0, the least: `int 0 .. 65535` has 15 down to 0. Bits 5 and 4 of `w` are
+`w / 16 mod 4`; `w & 0b11_0000` is those, times 16; `w | 0b1` is the other bits of `w`, and 1. A mask is a conjunction, one
+test a bit, so that two masks of one word speak of the same things, however their bits are grouped.
+"""
+
+from collections.abc import Iterator
+from functools import reduce
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.folding import fold
+from rcsc.lang.expressions.operators import Typed, applied, kind_word
+from rcsc.lang.expressions.scope import Scope
+from rcsc.lang.model import Apply, Bool, Expr, Int, Literal, Value
+from rcsc.lang.operator_table import Arithmetic, Op
+
+MOST_BITS = 64
+NARROWER = "head the column by a part, as `WORD[7..0]`, or write `x` for the other bits"
+
+
+def field(scope: Scope, word: Typed, ends: tuple[int | None, int | None], span: Span) -> Typed | None:
+    """`word[high..low]`; None after an error, as where an end is None."""
+    high, low = ends
+    width = _width(scope, word, span)
+    if width is None or high is None or low is None:
+        return None
+    if high < low:
+        helps = f"write `[{low}..{high}]`: the greater number stands first"
+        scope.report(Code.EMPTY_RANGE, f"the bits {high}..{low} are none", span, helps)
+        return None
+    if not (_has(scope, width, high, span) and _has(scope, width, low, span)):
+        return None
+    return Typed(_field(scope, word.expr, high, low, span))
+
+
+def bit(scope: Scope, word: Typed, place: int | None, span: Span) -> Typed | None:
+    """`word[3]`: whether the bit is set; None after an error, as where the place is None."""
+    number = field(scope, word, (place, place), span)
+    return None if number is None else Typed(_is(number.expr, 1, span))
+
+
+def matches(scope: Scope, word: Typed, digits: str, span: Span) -> Typed | None:
+    """Whether the word has these bits, the greatest first; `x` is any. None after an error."""
+    width = _width(scope, word, span)
+    if width is None:
+        return None
+    if len(digits) != width:
+        message = f"the mask has {len(digits)} bits, the word has {width}"
+        scope.report(Code.OUT_OF_RANGE_CONSTANT, message, span, NARROWER)
+        return None
+    tests = [
+        _is(_field(scope, word.expr, place, place, span), int(digit), span)
+        for place, digit in enumerate(reversed(digits))
+        if digit != "x"
+    ]
+    tests.reverse()
+    if not tests:
+        return Typed(Literal(value=True, type=Bool(), span=span))
+    return Typed(reduce(lambda left, right: Apply(Op.AND, (left, right), Bool(), span), tests))
+
+
+def bitwise(scope: Scope, op: str, operands: tuple[Typed | None, Typed | None], span: Span) -> Typed | None:
+    """`&`, `|`, `<<` and `>>`; the right side of a shift and one side of the others is a constant. None after an error."""
+    left, right = operands
+    if left is None or right is None or any(_width(scope, side, span) is None for side in (left, right)):
+        return None
+    shift, known = op in ("<<", ">>"), fold(right.expr)
+    if known is None and not shift:
+        left, right, known = right, left, fold(left.expr)
+    if known is None or (shift and known >= MOST_BITS):
+        what = "a shift is by a constant from 0 to 63" if shift else f"one side of `{op}` is a constant"
+        scope.report(Code.NOT_CONSTANT, what, span)
+        return None
+    number = int(known)
+    if shift:
+        return Typed(_by(scope, Op.MUL if op == "<<" else Op.DIV, left.expr, 1 << number, span), left.bare)
+    kept = number if op == "&" else ~number
+    parts = [
+        _by(scope, Op.MUL, _field(scope, left.expr, high, low, span), 1 << low, span)
+        for high, low in _runs(kept, _bits(left.expr))
+    ]
+    if op == "|":
+        parts.append(_number(number, span))
+    return Typed(reduce(lambda one, two: _apply(scope, Op.ADD, one, two, span), parts or [_number(0, span)]))
+
+
+def _runs(kept: int, width: int) -> Iterator[tuple[int, int]]:
+    """The greatest and the least place of each run of ones."""
+    low = None
+    for place in range(width + 1):
+        one = place < width and kept >> place & 1 == 1
+        if one and low is None:
+            low = place
+        elif not one and low is not None:
+            yield place - 1, low
+            low = None
+
+
+def _width(scope: Scope, word: Typed, span: Span) -> int | None:
+    """How many bits it has; None (reported) where it is no word."""
+    kind = word.expr.type
+    if isinstance(kind, Int) and kind.low >= 0 and not kind.unit:
+        return _bits(word.expr)
+    if not isinstance(kind, Int):
+        shown = kind_word(kind)
+        helps = ("write `and`, `or`",) if isinstance(kind, Bool) else ()
+    else:
+        shown, helps = "one that can be negative" if kind.low < 0 else "one with a unit", ()
+    scope.report(Code.KIND, f"bits are of a whole number from 0 upwards, this is {shown}", span, *helps)
+    return None
+
+
+def _bits(word: Expr) -> int:
+    assert isinstance(word.type, Int)
+    return max(word.type.high.bit_length(), 1)
+
+
+def _has(scope: Scope, width: int, place: int, span: Span) -> bool:
+    if 0 <= place < width:
+        return True
+    scope.report(Code.OUT_OF_RANGE_CONSTANT, f"there is no bit {place}, the word has {width - 1}..0", span)
+    return False
+
+
+def _field(scope: Scope, word: Expr, high: int, low: int, span: Span) -> Expr:
+    """The bits as a number; of a field of a word, those of the word, so that one bit has one spelling."""
+    match word:
+        case Apply(op=Op.DIV, args=(inner, Literal(value=by))) if _is_power(inner, by):
+            places = int(by).bit_length() - 1
+            return _field(scope, inner, high + places, low + places, span)
+        case Apply(op=Op.MOD, args=(inner, Literal(value=by))) if _is_power(inner, by):
+            return _field(scope, inner, high, low, span)  # it has no more bits than the remainder
+    upper = _by(scope, Op.DIV, word, 1 << low, span)
+    return upper if high >= _bits(word) - 1 else _by(scope, Op.MOD, upper, 1 << high - low + 1, span)
+
+
+def _is_power(word: Expr, divisor: Value) -> bool:
+    """Whether it divides a word by 2, 4, 8 or a greater power of two."""
+    return isinstance(word.type, Int) and word.type.low >= 0 and divisor > 1 and int(divisor).bit_count() == 1
+
+
+def _is(number: Expr, value: int, span: Span) -> Expr:
+    return Apply(Op.EQ, (number, _number(value, span)), Bool(), span)
+
+
+def _by(scope: Scope, op: Arithmetic, left: Expr, value: int, span: Span) -> Expr:
+    """An operation with a constant; nothing where it is one by 1 that changes nothing."""
+    return left if value == 1 and op is not Op.MOD else _apply(scope, op, left, _number(value, span), span)
+
+
+def _apply(scope: Scope, op: Arithmetic, left: Expr, right: Expr, span: Span) -> Expr:
+    made = applied(scope, op, (Typed(left), Typed(right)), (), span)
+    return _number(0, span) if made is None else made.expr
+
+
+def _number(value: int, span: Span) -> Literal:
+    return Literal(value, Int(value, value), span)
