@@ -707,14 +707,15 @@ class Code(StrEnum):
     """
     NO_CYCLE_BEFORE = """RCS315: there is no cycle before to speak of
 
-    `was x` is the value that `x` had after the cycle before. Only a property speaks of two cycles: lines, procedures, assumptions and
-    invariants see one, and keep in a `state` what they need later. `was` does not nest, and neither what stands before `then` nor
-    either side of `until` or `upon` can have it: these are each about one cycle.
+    `was x` is the value that `x` had after the cycle before, and an event, `@T(c)`, is of that cycle and this one. An invariant is about
+    one state, and a constant about none: they cannot look back. `was` is about variables, not about locals or constants. Neither `was`
+    nor events nest, and neither what stands before `then` nor either side of `until` or `upon` can have them: these are each about one
+    cycle.
 
         state n : int 0 .. 9
         invariant grows : n >= was n
 
-    error: `was` stands in a property only
+    error: `was` is of two cycles, an invariant of one: write it as a property
 
         state n : int 0 .. 9
         property grows : n >= was n

@@ -82,7 +82,11 @@ def _undecided(table: Table) -> Diagnostic:
 
 def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic:
     """The variable whose values are the states."""
-    fit = [v for v in program.variables if v.kind is Kind.STATE and not v.name.endswith(".next") and _few(v)]
+    fit = [
+        v
+        for v in program.variables
+        if v.kind is Kind.STATE and not v.name.endswith(".next") and v.previous_of is None and _few(v)
+    ]
     if wanted:
         candidates = [v for v in fit if v.name == wanted]
     else:

@@ -66,14 +66,15 @@ def read_by(expr: Expr) -> Iterator[VariableName]:
 
 def one_earlier(expr: Expr) -> Expr:
     """The same expression of the values after the cycle before (`model.earlier`)."""
+    return renamed(expr, earlier)
+
+
+def renamed(expr: Expr, name_of: Callable[[VariableName], VariableName]) -> Expr:
+    """The same expression of leaves of other names."""
     if isinstance(expr, Read):
-        return replace(expr, name=earlier(expr.name))
-    renamed = rebuilt(expr, one_earlier)
-    return (
-        replace(renamed, leaves=tuple(map(earlier, renamed.leaves)))
-        if isinstance(renamed, Select)
-        else renamed
-    )
+        return replace(expr, name=name_of(expr.name))
+    rest = rebuilt(expr, lambda part: renamed(part, name_of))
+    return replace(rest, leaves=tuple(map(name_of, rest.leaves))) if isinstance(rest, Select) else rest
 
 
 def expressions(statement: Statement) -> Iterator[Expr]:

@@ -214,6 +214,7 @@ class Variable:
         deferred_until: For a deferred variable: at the start of a cycle, when this holds of
             the snapshot, `x` takes the value of `x.next`. `next x := e` writes `x.next`.
         safe: What an output shows after a cycle that ended in a fault; None where it stays as it is.
+        previous_of: Of a hidden state, the leaf whose value after the cycle before it holds.
         restart: What it has when the level starts anew; None where it is then as it is initially, or as `Program.restart` says.
     """
 
@@ -227,6 +228,7 @@ class Variable:
     span: Span = at()
     safe: Value | None = None
     restart: Value | None = None
+    previous_of: VariableName | None = field(default=None, compare=False)
 
     @property
     def part(self) -> Part:

@@ -5,6 +5,7 @@ a state; all of it is read from the model:
 
 - truth values and enumerations that conditions of tables, assumptions or the contract read, and flags;
 - whether two leaves are equal that the level itself compares: an order and the last one, a number and the one seen;
+- whether what a cycle looks back at is the value that it was;
 - whether a number is in a class of values that a cell of a table distinguishes;
 - whether a test variable still is what its module would compute now: a module that reads only inputs gives the same result
   while they stay, so that a line that matches again does the same again.
@@ -132,7 +133,7 @@ def predicates(
         *(name for name in chosen if _flag(program, name) and name not in computed),
     }
     selected = [Predicate(name, kinds[name], parts=name in parting) for name in chosen]
-    pairs = sorted({*compared(program), *_questions(ts)})
+    pairs = sorted({*compared(program), *_questions(ts), *_kept(program)})
     selected += [
         Predicate(leaf, Bool(), other) for leaf, other in pairs if {leaf, other} <= inside and leaf in kinds
     ]
@@ -143,6 +144,11 @@ def predicates(
     if closely:
         selected += _branches(ts, inside, {predicate.leaf for predicate in selected})
     return tuple(selected)
+
+
+def _kept(program: Program) -> Iterator[tuple[str, str]]:
+    """Pair what a cycle looks back at with the leaf that it was: after every cycle but a fault they are equal."""
+    yield from ((str(v.name), str(v.previous_of)) for v in program.variables if v.previous_of is not None)
 
 
 def point(ts: TransitionSystem, chosen: tuple[Predicate, ...], state: Mapping[str, Value]) -> tuple[int, ...]:

@@ -54,14 +54,12 @@ class Tests:
     Attributes:
         subjects: What each column's heading means; None under `when`, and after an error.
         texts: What each heading says.
-        order: The place of each leaf in declared order.
     """
 
     scope: Scope
     headings: tuple[tree.Heading, ...]
     subjects: tuple[Typed | None, ...]
     texts: tuple[str, ...]
-    order: dict[str, int]
     known: dict[tuple[int, int], Test | None] = field(default_factory=dict)
     meant: dict[tuple[int, tree.Condition], Test | None] = field(default_factory=dict)
     __test__ = False
@@ -81,7 +79,7 @@ class Tests:
         if condition is None:
             return None
         value = fold(condition)
-        names = tuple(sorted(set(read_by(condition)), key=self.order.__getitem__))
+        names = tuple(sorted(set(read_by(condition)), key=self.scope.order))
         box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
         text = " ".join(cell.text.split())
         if value is False or box == ():

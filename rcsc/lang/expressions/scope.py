@@ -19,10 +19,12 @@ from rcsc.lang.model import (
     Unit,
     Value,
     Variable,
+    VariableName,
 )
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import CALL_UNDER, Cell
 
+MOST_LEAVES = 10_000
 BASE_UNITS = frozenset("m mm s ms N kg deg rad Hz A V lb".split())
 
 
@@ -53,6 +55,9 @@ class Scope:
         commands: Of each subordinate that is commanded, its commands.
         links: Names of links.
         numbers: Leaves that only the protocol writes: numbers, echoes, and what a subordinate said.
+        previous: The hidden state of each leaf that something looks back at.
+        kept: Those states as declared, which no text can name.
+        in_property: Whether a property is being resolved, which has both cycles before it and needs no hidden state.
         no_before: Why `was` cannot stand in the expression that is being resolved; empty where it can.
     """
 
@@ -82,7 +87,10 @@ class Scope:
     commands: dict[str, tuple[str, ...]] = field(default_factory=dict)
     links: tuple[str, ...] = ()
     numbers: frozenset[str] = frozenset()
-    no_before: str = "`was` stands in a property only"
+    previous: dict[VariableName, VariableName] = field(default_factory=dict)
+    kept: list[Declared] = field(default_factory=list)
+    in_property: bool = False
+    no_before: str = ""
 
     def report(
         self, code: Code, message: str, span: Span, *helps: str, related: tuple[Label, ...] = ()

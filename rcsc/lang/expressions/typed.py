@@ -22,8 +22,8 @@ from rcsc.lang.expressions.operators import (
     one_kind,
     scaled,
 )
+from rcsc.lang.expressions.previous import before
 from rcsc.lang.expressions.scope import Body, Scope
-from rcsc.lang.leaves import one_earlier
 from rcsc.lang.model import (
     Among,
     Apply,
@@ -77,6 +77,8 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
             return _unary(scope, body, written)
         case tree.Was(operand, span):
             return _was(scope, body, operand, span, want)
+        case tree.Event():
+            return _event(scope, body, written)
         case tree.Binary():
             return _binary(scope, body, written)
         case tree.InSet():
@@ -347,7 +349,60 @@ def _was(scope: Scope, body: Body, written: tree.Expr, span: Span, want: Scalar 
         return None
     with without_before(scope, "`was` goes back one cycle, not two"):
         operand = typed(scope, body, written, want)
-    return None if operand is None else Typed(one_earlier(operand.expr), operand.bare)
+    past = None if operand is None else before(scope, operand.expr, span)
+    return None if operand is None or past is None else Typed(past, operand.bare)
+
+
+_EVENTS = {
+    "@T": "`@T(c)`: the condition c comes to hold",
+    "@F": "`@F(c)`: the condition c ceases to hold",
+    "@C": "`@C(x)`: the value x changes",
+}
+
+
+def _event(scope: Scope, body: Body, written: tree.Event) -> Typed | None:
+    """Resolve `@T(c) when d`: `not was c and c and was d`.
+
+    Source: Heitmeyer, Jeffords and Labaw, "Automated consistency checking of requirements specifications", ACM TOSEM 5(3), 1996: of
+    the old state c does not hold and d does, of the new one c holds. `@F(c)` is `@T(not c)`, and `@C(x)` that x differs.
+    """
+    word, span = written.word.text, written.span
+    if word not in _EVENTS:
+        near = _EVENTS.get(word.upper())
+        helps = f"write {near}" if near else "; ".join(_EVENTS.values())
+        scope.report(Code.UNKNOWN_NAME, f"no event is called `{word}`", written.word.span, helps)
+        return None
+    if scope.no_before:
+        message = scope.no_before.replace("`was`", "an event")
+        scope.report(Code.NO_CYCLE_BEFORE, message, span)
+        return None
+    with without_before(scope, "an event is of two cycles, and cannot be part of `was` or of another event"):
+        now = typed(scope, body, written.operand) if word == "@C" else _held(scope, body, written.operand)
+        guard = None if written.guard is None else boolean(scope, body, written.guard)
+    past = None if now is None else before(scope, now.expr, span)
+    if now is None or past is None:
+        return None
+    happens = (
+        compared(scope, Op.NE, (now, Typed(past, now.bare)), span)
+        if word == "@C"
+        else Typed(_changes(past, now.expr, to=word == "@T", span=span))
+    )
+    if written.guard is None or happens is None:
+        return happens
+    then = None if guard is None else before(scope, guard, written.guard.span)
+    return None if then is None else Typed(Apply(Op.AND, (happens.expr, then), Bool(), span))
+
+
+def _held(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
+    condition = boolean(scope, body, written)
+    return None if condition is None else Typed(condition)
+
+
+def _changes(past: Expr, now: Expr, *, to: bool, span: Span) -> Expr:
+    """The condition begins to hold, or ceases to."""
+    not_, and_ = (Apply(Op.NOT, (past if to else now,), Bool(), span), now if to else past)
+    pair = (not_, and_) if to else (and_, not_)
+    return Apply(Op.AND, pair, Bool(), span)
 
 
 @contextmanager

@@ -6,8 +6,8 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed
-from rcsc.lang.expressions.scope import Body, Scope
-from rcsc.lang.expressions.typed import typed
+from rcsc.lang.expressions.scope import MOST_LEAVES, Body, Scope
+from rcsc.lang.expressions.typed import typed, without_before
 from rcsc.lang.model import (
     I64_MAX,
     I64_MIN,
@@ -27,7 +27,6 @@ from rcsc.lang.model import (
 from rcsc.lang.syntax import tree
 
 MOST_ELEMENTS = 4096
-MOST_LEAVES = 10_000
 
 
 def type_of(scope: Scope, written: tree.TypeExpr) -> Type:
@@ -79,7 +78,8 @@ def scalar_of(scope: Scope, written: tree.TypeExpr) -> Scalar:
 
 def constant(scope: Scope, written: tree.Expr, want: Scalar | None = None) -> Typed | None:
     """The folded value of a constant expression; None (reported) where it is not one."""
-    value = typed(scope, Body(), written, want)
+    with without_before(scope, "a constant has no cycle before: `was` is about a variable"):
+        value = typed(scope, Body(), written, want)
     if value is None:
         return None
     folded = fold(value.expr)

@@ -110,9 +110,11 @@ def _procedure(
 ) -> Procedure:
     reads, writes = touched(body[1], known)
     if written.kind != "procedure":
+        before = _previous(scope, reads)
         declared_reads = _places(scope, written.reads, writing=False)
         declared_writes = _places(scope, written.writes, writing=True)
         if written.kind == "module":
+            declared_reads |= {hidden for hidden, of in before.items() if of in declared_reads}
             _check_declared(scope, body[1], known, declared_reads, declared_writes)
         reads, writes = declared_reads, declared_writes
     named = extern(scope, written) if written.kind == "extern" else None
@@ -126,6 +128,11 @@ def _procedure(
         " ".join(written.doc),
         written.name.span,
     )
+
+
+def _previous(scope: Scope, reads: set[VariableName]) -> dict[VariableName, VariableName]:
+    """The hidden states among the leaves that are read, each with the leaf that it is of."""
+    return {hidden: name for name, hidden in scope.previous.items() if hidden in reads}
 
 
 def touched(
@@ -190,7 +197,8 @@ def _reading(expr: Expr) -> Iterator[tuple[tuple[VariableName, ...], Span]]:
 def _undeclared(scope: Scope, verb: str, extra: set[VariableName], span: Span) -> None:
     """One report a variable: by its leaf where only one is touched."""
     leaves: dict[str, list[VariableName]] = {}
-    for name in sorted(extra, key=scope.order):
+    of = {hidden: name for name, hidden in scope.previous.items()}
+    for name in sorted({of.get(name, name) for name in extra}, key=scope.order):
         leaves.setdefault(root_of(name), []).append(name)
     for root, names in leaves.items():
         shown = root if len(names) > 1 else names[0].removesuffix(".next")

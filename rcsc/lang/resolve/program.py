@@ -7,8 +7,10 @@ from dataclasses import replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.previous import keeping, with_keeping
 from rcsc.lang.expressions.scope import Body, Scope
-from rcsc.lang.expressions.typed import boolean
+from rcsc.lang.expressions.typed import boolean, without_before
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
     Assumption,
@@ -118,6 +120,10 @@ class _Resolver:
             more, tables = offered(scope, parties, deferred, tables, procedures)
             assumptions += more
         levels = self._levels(all_, tables, owners, procedures)
+        keep = keeping(scope, {*scope.procedures, *owners.written}, Span(self.root, 0, 0))
+        if keep is not None:
+            procedures += (keep,)
+            levels, tables = with_keeping(keep, levels, tables)
         restart = restart_of(scope, parties, all_)
         if scope.diagnostics:
             return tuple(sorted(set(scope.diagnostics), key=sort_key))
@@ -128,7 +134,7 @@ class _Resolver:
             self.root,
             enums,
             tuple(scope.records),
-            tuple(scope.declared.values()),
+            (*scope.declared.values(), *scope.kept),
             tuple(scope.leaves.values()),
             procedures,
             assumptions,
@@ -162,7 +168,10 @@ class _Resolver:
                 isinstance(invariant, tree.InvariantDecl) and self.scope.claim(invariant.name, "assumption")
             ):
                 continue
-            condition = boolean(self.scope, Body(), invariant.condition)
+            with without_before(
+                self.scope, "`was` is of two cycles, an invariant of one: write it as a property"
+            ):
+                condition = boolean(self.scope, Body(), invariant.condition)
             if condition is None:
                 continue
             inputs = [n for n in read_by(condition) if self.scope.leaves[n].kind is Kind.INPUT]

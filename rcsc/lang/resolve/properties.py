@@ -40,8 +40,10 @@ def resolve_property(scope: Scope, written: tree.PropertyDecl) -> Property | Non
 
 def _condition(scope: Scope, written: tree.Expr, why_no_before: str) -> Expr | None:
     """A condition that speaks of something."""
+    scope.in_property = True
     with without_before(scope, why_no_before):
         condition = boolean(scope, Body(), written)
+    scope.in_property = False
     if condition is not None and next(read_by(condition), None) is None:
         message = "this is about no variable: it is always so, or never"
         scope.report(Code.NO_PROPERTY, message, written.span)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from rcsc.diagnostics.codes import Code
+from rcsc.lang.expressions.previous import adopted_before
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean, typed
 from rcsc.lang.model import (
@@ -71,11 +72,12 @@ def restart_of(
     for written in declarations:
         if isinstance(written, tree.AdoptDecl):
             declared |= _declared(scope, written)
-    if not parties and not declared:
-        return None
     parts = {name: leaf.part for name, leaf in scope.leaves.items()}
-    adopted = dict(_protocol(scope, parties)) if parties else by_names(parts)
-    return tuple((VariableName(leaf), value) for leaf, value in (adopted | declared).items())
+    adopted = (dict(_protocol(scope, parties)) if parties else by_names(parts)) | declared
+    before = adopted_before(scope, adopted)
+    if not parties and not declared and not before:
+        return None
+    return tuple((VariableName(leaf), value) for leaf, value in (adopted | before).items())
 
 
 def _declared(scope: Scope, written: tree.AdoptDecl) -> dict[str, Adopted]:

@@ -28,13 +28,12 @@ from rcsc.lang.syntax.rows import Cell
 
 def table(scope: Scope, written: tree.TableDecl) -> Table:
     """The table; what is wrong with it has been reported."""
-    order = {name: at for at, name in enumerate(scope.leaves)}
     subjects = tuple(_subject(scope, heading) for heading in written.conditions)
     columns = tuple(
         _column(heading, subject) for heading, subject in zip(written.conditions, subjects, strict=True)
     )
     headings = tuple(column.heading for column in columns)
-    cells = _Cells(scope, written, Tests(scope, written.conditions, subjects, headings, order))
+    cells = _Cells(scope, written, Tests(scope, written.conditions, subjects, headings))
     lines: list[Line] = []
     default: Default | None = None
     names: dict[str, tree.Row] = {}

@@ -6,9 +6,9 @@ from dataclasses import replace
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.operators import Typed, common_unit, kind_word, same_kind
-from rcsc.lang.expressions.scope import Body, Constant, Scope
+from rcsc.lang.expressions.scope import MOST_LEAVES, Body, Constant, Scope
 from rcsc.lang.expressions.typed import boolean, declare_set
-from rcsc.lang.expressions.types import MOST_LEAVES, constant, size, type_of
+from rcsc.lang.expressions.types import constant, size, type_of
 from rcsc.lang.model import (
     Admit,
     Array,

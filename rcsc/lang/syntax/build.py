@@ -318,6 +318,13 @@ class Build:
     def _was(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.Was(self.expr(parts[0]), span)
 
+    def _event(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Event(self._name(parts[0]), self.expr(parts[1]), None, span)
+
+    def _event_when(self, parts: list[Any], span: Span) -> tree.Expr:
+        word, condition = parts[0].children
+        return tree.Event(self._name(word), self.expr(condition), self.expr(parts[-1]), span)
+
     def _in_set(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.InSet(self.expr(parts[0]), self._members(parts[-1].children), span, len(parts) > 2)
 

@@ -9,7 +9,7 @@ _DECLARATION = frozenset(
     "USE UNIT CONST ENUM TYPE RECORD LINK SERVES COMMANDS ADOPT KIND ASSUME INVARIANT PROPERTY PROCEDURE MODULE".split()
     + "EXTERN OWNER TABLE LEVEL".split()
 )
-_EXPRESSION = frozenset("TRUE FALSE REAL MASK LPAR FUNCTION NOT WAS".split())
+_EXPRESSION = frozenset("TRUE FALSE REAL MASK LPAR FUNCTION NOT WAS EVENT".split())
 _OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL IN DOT LSQB".split()) | {op.upper() for op in LOGIC}
 _STATEMENT = frozenset("IF CASE FOR LOCAL NEXT".split())
 
@@ -18,6 +18,7 @@ _WORDS = {
     "INT": "a whole number",
     "REAL": "a number with a decimal point",
     "STRING": 'a string in `"`',
+    "EVENT": "an event",
     "ROW": "a table row, which begins with `|`",
     "$END": "the end",
     "LBRACE": "`{`",
@@ -57,7 +58,7 @@ _CLASSES = {
 }
 """The words of the terminals that are not called as their one word is."""
 _SYMBOLS = frozenset(
-    "NAME INT REAL MASK GROUPS STRING ROW COMPARE ADD_OP MUL_OP LBRACE RBRACE LPAR RPAR LSQB RSQB COLON COMMA SEMICOLON SLASH STAR"
+    "NAME INT REAL MASK GROUPS STRING EVENT ROW COMPARE ADD_OP MUL_OP LBRACE RBRACE LPAR RPAR LSQB RSQB COLON COMMA SEMICOLON SLASH STAR"
     " CIRCUMFLEX DOT EQUAL MINUS".split()
 )
 """Terminals that are no words, whatever they are called."""

@@ -2,7 +2,18 @@
 
 from typing import assert_never
 
-from rcsc.lang.operator_table import BITWISE, IMPLICATION, NEGATION, POSTFIX, RELATION, SIGN, SUM, Op
+from rcsc.lang.operator_table import (
+    BITWISE,
+    CONJUNCTION,
+    EXCLUSION,
+    IMPLICATION,
+    NEGATION,
+    POSTFIX,
+    RELATION,
+    SIGN,
+    SUM,
+    Op,
+)
 from rcsc.lang.syntax import tree
 
 
@@ -23,8 +34,8 @@ def _expr(expr: tree.Expr) -> tuple[str, int]:
             return f"not {spell_expr(operand, NEGATION)}", NEGATION
         case tree.Unary(_, operand):
             return f"-{spell_expr(operand, SIGN)}", SIGN
-        case tree.Was(operand):
-            return f"was {spell_expr(operand, POSTFIX)}", SIGN
+        case tree.Was() | tree.Event():
+            return _of_two_cycles(expr)
         case tree.Binary(op, left, right):
             return _binary(op, left, right)
         case tree.InSet(subject, members):
@@ -58,6 +69,15 @@ def _place(expr: tree.Reference | tree.FieldOf | tree.IndexOf | tree.BitsOf) -> 
             return f"{spell_expr(base, POSTFIX)}[{spell_expr(index)}]"
         case tree.BitsOf(base, high, low):
             return f"{spell_expr(base, POSTFIX)}[{spell_expr(high, SUM)}..{spell_expr(low, SUM)}]"
+
+
+def _of_two_cycles(expr: tree.Was | tree.Event) -> tuple[str, int]:
+    if isinstance(expr, tree.Was):
+        return f"was {spell_expr(expr.operand, POSTFIX)}", SIGN
+    happens = f"{expr.word.text}({spell_expr(expr.operand)})"
+    if expr.guard is None:
+        return happens, POSTFIX
+    return f"{happens} when {spell_expr(expr.guard, CONJUNCTION)}", EXCLUSION
 
 
 def _with_arguments(expr: tree.Apply | tree.Order) -> str:

@@ -140,9 +140,23 @@ class Unary:
 
 @dataclass(frozen=True, slots=True)
 class Was:
-    """`was a`: the value after the cycle before; in properties only."""
+    """`was a`: the value after the cycle before."""
 
     operand: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """`@T(a) when b`, `@F(a)`, `@C(a)`: what came to hold, ceased to hold or changed with this cycle; `b` held before it.
+
+    Attributes:
+        word: `@T`, `@F` or `@C`; others are reported when names are resolved.
+    """
+
+    word: Name
+    operand: "Expr"
+    guard: "Expr | None" = None
     span: Span = at()
 
 
@@ -232,6 +246,7 @@ Expr: TypeAlias = (
     | Mask
     | Unary
     | Was
+    | Event
     | Binary
     | InSet
     | InRange

@@ -192,3 +192,51 @@ table walk {
 level walker { period 40 [ms]  preprocess sense  table walk }
 """
 """A level that goes from place to place, each step taken when its number is echoed: a deferred state."""
+
+LOOKING_BACK = """
+enum mode { low, mid, high }
+record pair { a : bool
+  clamp_at : int 0 .. 9 }
+input p : int 0 .. 9 = 2
+input on : bool
+input g : int 0 .. 2
+input r : real 0.0 .. 1.0
+state count : int 0 .. 9 = 3 restart 4
+state m : mode restart mid
+state list : array[3] of int 0 .. 9
+state both : pair
+output seen : array[12] of bool
+output old : int 0 .. 9
+assume calm monitored : p - was p <= 5
+module tick reads count, list, both, p writes count, list, both {
+  if count < 9 { count := count + 1 } else { count := 0 }
+  list[count / 4] := p
+  both.clamp_at := p
+}
+procedure see {
+  old := was p
+  seen[0] := @T(p >= 5) when on
+  seen[1] := @F(p >= 5)
+  seen[2] := @C(p) when not on and p > 3
+  seen[3] := @C(count)
+  seen[4] := was (p + count > 8)
+  seen[5] := @T(list[count / 4] > 4)
+  seen[6] := @C(both.clamp_at)
+  seen[7] := not (@T(on) when p < 5) xor @F(on)
+  seen[8] := m /= was m
+  seen[9] := @C(r)
+  seen[10] := @C(on)
+  for i in 0 .. 2 { if was list[i] > 8 { seen[11] := @T(on) } }
+}
+table t assuming calm {
+  | line | g | p        | when                            | @T(on) || m    | procedures |
+  |------|---|----------|---------------------------------|--------||------|------------|
+  | rise | 0 | > was p  |                                 |        || high | see        |
+  | fall | 0 | <= was p | @T(p < 3) when m = high or on   |        || low  | see        |
+  | stay | 0 | <= was p | not (@T(p < 3) when m = high or on) |    || mid  | see        |
+  | on_  | 1 |          |                                 | true   || high | see        |
+  | off  | 1 |          |                                 | false  ||      | see        |
+}
+level one { period 40 [ms] preprocess tick table t }
+"""
+"""Looks back at inputs, states, elements and fields; g = 2 ends the cycle with no line."""
