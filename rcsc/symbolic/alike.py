@@ -23,7 +23,7 @@ from rcsc.symbolic.values import Node
 
 
 def alike(program: Program, table: Table, pair: tuple[int, int], options: Options) -> Effects:
-    """Compare two lines, by position, for every input that both match and the table's assumptions admit.
+    """Compare two lines, by position, for every input that both match and the table's assumptions admit: there is one.
 
     Invariants count where they are among these assumptions (`meaning.relying`).
     """
@@ -78,6 +78,9 @@ def _here(program: Program, table: Table, pair: Sequence[Line], shared: Shared) 
 
 
 def _possible(nodes: list[Node], options: Options) -> Answer:
+    *_, change = nodes
+    if change is values.TRUE:  # wherever both match
+        return Answer.SATISFIABLE
     solver = Solver(options.limits)
     solver.add(*values.domain(values.variables(nodes).values()), *map(values.term_of, nodes))
     return solver.check()

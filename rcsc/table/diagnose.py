@@ -9,6 +9,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.lang.interval_sets import size
 from rcsc.lang.model import Box, Enum, Program, Scalar, Table, key_bounds, spell
+from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.symbolic.alike import alike
 from rcsc.table import cells as words
@@ -41,7 +42,8 @@ def diagnostics(
     """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
     table = verdict.table
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
-    shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
+    with smt.together(options.together):
+        shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
     if shown and (together := _together(program, table, overlaps[:MOST_PAIRS])):
         shown[-1] = replace(shown[-1], notes=(*shown[-1].notes, together))
     if len(overlaps) > MOST_PAIRS:

@@ -12,10 +12,13 @@ from rcsc.commands import run
 from rcsc.diagnostics.diagnostic import Effects
 from rcsc.lang.interpret import execute, matching_lines
 from rcsc.lang.meaning import relying
-from rcsc.lang.model import Program, Value
+from rcsc.lang.model import Backing, Program, Value
+from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.symbolic.alike import alike
 from rcsc.symbolic.effect import CALLS, RUN
+from rcsc.table.diagnose import diagnostics
+from rcsc.table.verdict import Overlap, TableVerdict
 from tests.support.programs.stages import program_of
 
 HEAD = """
@@ -154,3 +157,25 @@ def test_the_report_says_it_in_text_and_json(tmp_path: Path, capsys: pytest.Capt
         {"same": True, "differ_in": []},
         {"same": False, "differ_in": ["z"]},
     ]
+
+
+def test_all_overlaps_of_a_table_share_one_budget() -> None:
+    """However many pairs there are, what they ask together costs no more than the questions about one table."""
+    columns = range(30)
+    rows = "".join(
+        f"| l{at} | >= {at} || {' | '.join(f'(a * b + {at + k}) * (a * b - {at - k}) mod 999983' for k in columns)} |\n"
+        for at in range(6)
+    )
+    states = "".join(f"state n{k} : int -1000000 .. 1000000\n" for k in columns)
+    program = program_of(
+        f"input a : int 0 .. 1000000\ninput b : int 0 .. 1000\n{states}"
+        f"table t {{\n| line | a || {' | '.join(f'n{k}' for k in columns)} |\n{rows}}}\n"
+    )
+    pairs = [(first, second) for first in range(6) for second in range(first)]
+    overlaps = tuple(Overlap(first, second, {"a": 9}) for first, second in pairs)
+    verdict = TableVerdict(program.tables[0], overlaps, Backing("none", confirmed_by_z3=False), None, 0.0)
+    few = Options(steps=20)
+    with smt.together(2**40) as asked:
+        told = diagnostics(program, verdict, few)
+    assert told[-1].effects == Effects(None)
+    assert 2**40 - asked.left <= few.together + few.steps
