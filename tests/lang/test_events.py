@@ -139,6 +139,20 @@ def test_a_table_outside_any_level_keeps_what_it_saw() -> None:
     assert ups == [True, False, False, True]
 
 
+def test_what_the_postprocess_writes_is_kept() -> None:
+    text = (
+        "input a : bool\nstate n : int 0 .. 9\noutput old : int 0 .. 9\n"
+        "module add reads n writes n { if n < 9 { n := n + 1 } }\n"
+        "table t {\n| line | a || old |\n| x | DEFAULT || was n |\n}\nlevel l { table t postprocess add }"
+    )
+    program = program_of(text)
+    now, olds = initial(program), []
+    for _ in range(3):
+        now = cycle(program, program.levels[0], now).snapshot
+        olds.append(now["old"])
+    assert olds == [0, 1, 2]
+
+
 def test_only_what_is_looked_back_at_is_kept() -> None:
     kept = {str(v.previous_of) for v in PROGRAM.variables if v.previous_of is not None}
     elements = {f"list[{number}]" for number in range(3)}
@@ -272,6 +286,13 @@ def test_a_module_names_what_it_looks_back_at() -> None:
     assert program_of(text.format("a")).procedures[0].reads == ("a", "was_a")
     findings = refused(text.format("up"))
     assert {(f.code.value, f.help) for f in findings} == {("RCS208", ("add `a` to its `reads`",))}
+
+
+def test_one_input_at_a_time_may_be_assumed() -> None:
+    columns = "table t {} {{\n| line | when || o |\n| x | @C(a) || 1 |\n| y | @C(b) || 2 |\n| z | DEFAULT || 0 |\n}}"
+    text = f"input a : bool\ninput b : bool\noutput o : int 0 .. 2\nassume one : not (@C(a) and @C(b))\n{columns}\n"
+    assert [f.code.value for f in reported(text.format(""))] == ["RCS402", "RCS407"]
+    assert [f.code.value for f in reported(text.format("assuming one"))] == ["RCS407"]
 
 
 def test_every_pair_of_bits_of_an_event() -> None:
