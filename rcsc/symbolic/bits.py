@@ -15,7 +15,7 @@ from typing import Self
 
 from rcsc.lang.model import Bool, Enum, Real, Scalar, key_bounds, real_key
 from rcsc.lang.operator_table import COMPARISONS, Arithmetic, Conversion, Op, Ordering
-from rcsc.symbolic.values import Node, Shape, parts_first, wraps_once
+from rcsc.symbolic.values import Node, Shape, parts_first, takes_bits, wraps_once
 
 Literal = int
 """A variable, counted from 1, or its opposite, negative."""
@@ -247,6 +247,10 @@ class Bits:
                 return self._product(b, int(left.low)) if left.known else self._product(a, int(right.low))
             case Op.MOD if wraps_once(node):
                 return self._choice(self._below(a, b), a, self._difference(a, b))
+            case Op.DIV if takes_bits(node):
+                return a[int(right.low).bit_length() - 1 :] or (FALSE,)
+            case Op.MOD if takes_bits(node):
+                return (*a[: int(right.low).bit_length() - 1], FALSE)
             case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL:
                 return self._any(node)
 

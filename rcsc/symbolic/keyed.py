@@ -19,7 +19,7 @@ from rcsc.lang.operator_table import Arithmetic, Conversion, Op
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Term
 from rcsc.symbolic import values
-from rcsc.symbolic.values import Node, Shape, parts_first, wraps_once
+from rcsc.symbolic.values import Node, Shape, parts_first, takes_bits, wraps_once
 
 KEY = Int(-(2**63), 2**63)
 """The type in which every number stands."""
@@ -136,6 +136,8 @@ class Keyed:
             case Op.MOD if wraps_once(node):
                 wrapped = smt.integer_operation("-", parts[0], parts[1])
                 return smt.choice(smt.below(parts[0], parts[1], KEY), parts[0], wrapped)
+            case Op.DIV | Op.MOD if takes_bits(node):
+                return smt.integer_operation(op.value, parts[0], parts[1])
             case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL:
                 return self.any(node)
 

@@ -254,6 +254,12 @@ def wraps_once(remainder: Node) -> bool:
     return divisor.known and value.low >= 0 and value.high < 2 * divisor.low
 
 
+def takes_bits(node: Node) -> bool:
+    """Whether a `/` or `mod` is by a power of two, of what is never negative: then it takes some bits of it."""
+    value, divisor = node.args
+    return divisor.known and value.low >= 0 and divisor.low > 0 and int(divisor.low).bit_count() == 1
+
+
 def equal(left: Node, right: Node) -> Node:
     """Equality of two values of one type."""
     return compare(Op.EQ, left, right)

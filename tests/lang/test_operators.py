@@ -384,16 +384,16 @@ def test_bits_of_composed_levels(op: Core, whole: bool) -> None:
         assert (found[0] if isinstance(node.kind, Bool) else key_of_bits(found)) == key(value), operands
 
 
-@pytest.mark.parametrize("divisor", [1, 2, 3, 8])
+@pytest.mark.parametrize("divisor", [1, 2, 3, 7, 8])
 def test_remainders_of_composed_levels(divisor: int) -> None:
-    """By choice where the value is below twice its divisor, and any remainder elsewhere: no case is left out."""
+    """By choice where the value is below twice its divisor, bits where that is a power of two, and any remainder elsewhere."""
     for high in range(3 * divisor):
         kind = Int(0, high)
         number, constant_ = values.variable("x", kind), values.constant(Int(divisor, divisor), divisor)
         node = values.arithmetic(Op.MOD, (number, constant_), Int(0, divisor))
         terms, bits = Keyed(), Bits()
         term_, word = terms.term(node), bits.word(node)
-        exact = high < 2 * divisor
+        exact = high < 2 * divisor or divisor in (1, 2, 8)
         assert (terms.guessed == 0) == (exact or node.known)
         for value in range(high + 1):
             solver = smt.Solver()
@@ -409,6 +409,33 @@ def test_remainders_of_composed_levels(divisor: int) -> None:
             clauses = Sat(bits.clauses)
             assert clauses.holds([given, right]), (high, value)
             assert not (exact and clauses.holds([given, -right])), (high, value)
+
+
+@pytest.mark.parametrize("divisor", [1, 2, 8, 64])
+def test_quotients_of_composed_levels_by_powers_of_two(divisor: int) -> None:
+    """Exactly, in words and in bits; of what may be negative, and by anything else, any quotient."""
+    for high in range(0, 40, 3):
+        kind = Int(0, high)
+        number, by = values.variable("x", kind), values.constant(Int(divisor, divisor), divisor)
+        node = values.arithmetic(Op.DIV, (number, by), Int(0, high))
+        terms, bits = Keyed(), Bits()
+        quotient, word, given = terms.term(node), bits.word(node), bits.word(number)
+        assert terms.guessed == 0
+        for value in range(high + 1):
+            solver = smt.Solver()
+            solver.add(*terms.ranges, terms.equal(terms.term(number), values.constant(kind, value)))
+            right = values.constant(node.kind, value // divisor)
+            assert solver.check(terms.equal(quotient, right)) is smt.Answer.SATISFIABLE
+            assert solver.check(smt.negation(terms.equal(quotient, right))) is smt.Answer.UNSATISFIABLE
+            same_number = bits.equals(given, kind, value)
+            clauses = Sat(bits.clauses)
+            assert clauses.holds([same_number])
+            assert key_of_bits([clauses.value(bit) for bit in word]) == value // divisor, (high, value)
+    for low, other in ((-1, 8), (0, 6)):
+        terms = Keyed()
+        number, by = values.variable("x", Int(low, 99)), values.constant(Int(other, other), other)
+        terms.term(values.arithmetic(Op.DIV, (number, by), Int(low, 99)))
+        assert terms.guessed == 1
 
 
 # --- executors ------------------------------------------------------------------------------
