@@ -1,6 +1,7 @@
 """What `rcsc check` says of the levels together: only what was proved, of this very content, and nothing else."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from importlib import resources
@@ -15,7 +16,7 @@ from rcsc.compose.proof.standing import Known, KnownSystem, SystemOutline, stand
 from rcsc.driver import outline
 from rcsc.host.cache import FOLDER, Cache
 from rcsc.host.files.plain import plain, read
-from rcsc.lang.interpret import run_table
+from rcsc.lang.interpret import initial, run_table
 from tests.support.programs.stages import program_of
 from tests.support.programs.systems import HOPED, small_system, small_text, solo_system
 from tests.support.programs.texts import edit_file, level, table
@@ -472,3 +473,32 @@ def test_a_fact_below_a_superior_is_believed_only_where_its_commands_leave_a_cyc
     said = capfd.readouterr().out
     assert ("so                       assumed, as the tables declare it" in said) == (not status)
     assert ("proved, trusting assumption `so` of level `lower`" in said) == (not status)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_fact_about_change_is_believed_from_one_cycle_to_the_next(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """A rate of change carries a property that is false without it; the executors watch it."""
+    declared = (
+        "input x : int 0 .. 9\noutput fast : bool\nassume slow assumed monitored : abs(x - was x) <= 2\n"
+        "property smooth : not fast\nproperty slow_itself : x - was x <= {0}\n"
+    )
+
+    def written(most: int) -> None:
+        rows = "line | x - was x || fast", "a | -2 .. 0 || false", f"b | 1 .. 2 || x - was x > {most}"
+        one_level(declared.format(most), table("t", *rows, assuming="slow"))
+
+    written(2)
+    assert prove() == 0
+    said = capfd.readouterr().out
+    trusting = "proved, trusting assumption `slow` of level `solo`"
+    assert re.search(rf"property +smooth +{trusting}\n", said)
+    assert f"no two lines match: 1 of 1 {trusting}\n" in said
+    written(1)
+    assert prove() == 1
+    assert "not proved: property `smooth`" in "".join(capfd.readouterr())
+    program = program_of(Path("solo.rcs").read_text(encoding="utf-8"))
+    jump = {**initial(program), "x": 3}
+    assert run_table(program, program.tables[0], jump).failed_assumptions == ("slow",)
+    assert run_table(program, program.tables[0], {**jump, "x": 2}).failed_assumptions == ()
