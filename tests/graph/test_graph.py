@@ -47,7 +47,7 @@ def shipped() -> dict[str, FoundTable]:
     return {
         f"{entry.program.name}.{entry.table.name}": entry
         for entry in found
-        if "examples" not in entry.table.file
+        if not {"examples", "gallery"} & set(Path(entry.table.file).parts)
     }
 
 

@@ -720,3 +720,8 @@ def test_what_is_wrong_with_bits_is_said(heading: str, cell: str, code: str, mes
     diagnostics = refused(word_table(heading, cell))
     assert (code, True) in {(each.code.value, message in each.message) for each in diagnostics}
     assert len(diagnostics) == 1
+
+
+def test_a_field_may_be_called_set() -> None:
+    text = "record r { set : bool  in_set : bool }\ninput set : r\nset few : int 0 .. 9 = {1, 3}\ninput x : int 0 .. 9\n"
+    program_of(text + "table t {\n  | line | x | set.set ||\n  | a | in few | ||\n}\n")
