@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from rcsc.lang.operator_table import LOGIC
 
 _DECLARATION = frozenset(
-    "USE UNIT CONST ENUM TYPE RECORD LINK SERVES COMMANDS ADOPT KIND ASSUME INVARIANT PROPERTY PROCEDURE MODULE".split()
+    "USE UNIT CONST ENUM TYPE RECORD LINK SERVES COMMANDS ADOPT KIND ASSUME INVARIANT PROPERTY PROCEDURE MODULE _SET".split()
     + "EXTERN OWNER TABLE LEVEL".split()
 )
 _EXPRESSION = frozenset("TRUE FALSE REAL MASK LPAR FUNCTION NOT WAS EVENT".split())
@@ -46,6 +46,7 @@ _WORDS = {
     "MASK": "bits",
     "_INT": "`int`",
     "_REAL": "`real`",
+    "_SET": "`set`",
 }
 _MOST = 6
 _CLASSES = {
@@ -55,6 +56,7 @@ _CLASSES = {
     "FUNCTION": ("abs", "min", "max", "count"),
     "_INT": ("int",),
     "_REAL": ("real",),
+    "_SET": ("set",),
 }
 """The words of the terminals that are not called as their one word is."""
 _SYMBOLS = frozenset(
