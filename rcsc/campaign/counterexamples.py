@@ -52,7 +52,12 @@ class Choice:
 
     def name(self, seed: int) -> str:
         """Of its folder."""
-        return f"{seed}-{self.index}-{re.sub('[^a-z0-9]+', '-', self.property.lower()).strip('-')[:MOST_CHARACTERS]}"
+        return f"{seed}-{self.index}-{folder_word(self.property)}"
+
+
+def folder_word(property_: str) -> str:
+    """A property as a part of a folder's name."""
+    return re.sub("[^a-z0-9]+", "-", property_.lower()).strip("-")[:MOST_CHARACTERS]
 
 
 def choices(records: Iterable[EpisodeRecord]) -> tuple[Choice, ...]:

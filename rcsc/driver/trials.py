@@ -3,12 +3,12 @@
 In: proved programs and their generated files. Out: what the suite found, and its figures as text.
 """
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from rcsc.campaign.choose import plant_name, plant_of
+from rcsc.campaign.counterexamples import folder_word
 from rcsc.campaign.shrink import MOST_TRIES, shrink
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
@@ -69,9 +69,10 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
         diagnostics += failures
         figures.append(text)
     for path in systems:
+        generated = _generated(path, project)
         for trial in (_beside, _in_plant):
             settings.progress(f"running {path}")
-            wrong, text = trial(path, project, effort)
+            wrong, text = trial(path, generated, effort)
             diagnostics += wrong
             figures.append(text)
     if effort.vectors is not None:
@@ -84,9 +85,8 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
     return Conclusion(project.report(tuple(diagnostics)), "\n".join(figures))
 
 
-def _beside(path: Path, project: Proved, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
+def _beside(path: Path, generated: Generated, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
     """Run the C of a system beside the Python system; the first difference, and what was run."""
-    generated = _generated(path, project)
     if generated.clashes:
         return tuple(generated.clashes), ""
     whole = generated.systems[path]
@@ -120,9 +120,8 @@ def _generated(path: Path, project: Proved) -> Generated:
     return generated
 
 
-def _in_plant(path: Path, project: Proved, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
+def _in_plant(path: Path, generated: Generated, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
     """Run drawn episodes of a system in its plant; the first that breaks a property, made small and saved, and what was run."""
-    generated = _generated(path, project)
     if generated.clashes:
         return (), ""
     whole = generated.systems[path]
@@ -175,7 +174,7 @@ def _falsified(
     name = finding.property
     least = shrink(episode, lambda simpler: found_again(simpler, its, name, kinds) is not None, MOST_TRIES)
     shown = found_again(least, its, name, kinds) or finding
-    folder = SAVED / f"test-{re.sub('[^a-z0-9]+', '-', name.lower()).strip('-')}"
+    folder = SAVED / f"test-{folder_word(name)}"
     help_ = f"`rcsc campaign {path} --again {folder}` runs it again"
     try:
         folder.mkdir(parents=True, exist_ok=True)

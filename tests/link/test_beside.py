@@ -22,7 +22,7 @@ def beside_python(path: Path) -> tuple[list[tuple[Code, str]], str]:
     """What is reported of a system's C, and the figure."""
     given = (str(path),)
     project = proved(settings.Settings(tables_in(given, (path,)), Options()))
-    diagnostics, figure = trials._beside(path, project, settings.TestEffort(60))
+    diagnostics, figure = trials._beside(path, trials._generated(path, project), settings.TestEffort(60))
     return [(found.code, found.message) for found in diagnostics], figure
 
 
