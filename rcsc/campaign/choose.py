@@ -11,7 +11,7 @@ from rcsc.campaign.rig import EpisodeKind
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description
 from rcsc.run.plant.bind import BadPlant, plant_page
-from rcsc.run.plant.load import chosen, named
+from rcsc.run.plant.load import by_hand, chosen, named
 
 
 def plant_of(system: Description, wanted: str | None) -> PlantSpec | None:
@@ -20,8 +20,7 @@ def plant_of(system: Description, wanted: str | None) -> PlantSpec | None:
     Raises:
         BadPlant: The description has none of that name.
     """
-    by_hand = next((spec.name for spec in system.plants if spec.by_hand), None)
-    return chosen(system, wanted if wanted is not None else by_hand)
+    return chosen(system, wanted if wanted is not None else by_hand(system))
 
 
 def plant_name(spec: PlantSpec | None) -> str:

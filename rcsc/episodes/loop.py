@@ -16,6 +16,7 @@ from rcsc.episodes.operator import WAITING, EpisodeOperator, operator, value_of
 from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome, Excused
 from rcsc.episodes.properties import ENDS, NO_ERROR, properties, was_refused
 from rcsc.episodes.stand import Field, Stand, stand
+from rcsc.run.faults import faults_of, switch
 from rcsc.run.levels import BadState, RunningLevel, StateTableError, running_level
 from rcsc.run.orders.roles import FAILED
 from rcsc.run.orders.together import Together
@@ -94,8 +95,8 @@ def _checked(episode: Episode, its: Stand) -> tuple[Staged, EpisodeOperator, lis
     for name in (restart.level for restart in episode.restarts):
         if name not in its.signs:
             raise ValueError(f"there is no level `{name}`")
-    known = {name for part in stage.switched for name in part.faults}
-    for name in (switch.fault for switch in episode.switches):
+    known = faults_of(stage.outside)
+    for name in (switched.fault for switched in episode.switches):
         if name not in known:
             raise ValueError(f"the plant has no fault `{name}`")
     return stage, operator(its.served, episode.orders), list(held(its, episode.readings))
@@ -106,7 +107,7 @@ def _windows(episode: Episode) -> Iterator[tuple[int, int]]:
     for harm in episode.harms:
         yield harm.first_tick, harm.last_tick + (harm.ticks if harm.kind == "late" else 0)
     yield from ((reading.first_tick, reading.last_tick) for reading in episode.readings)
-    yield from ((switch.first_tick, switch.last_tick) for switch in episode.switches)
+    yield from ((switched.first_tick, switched.last_tick) for switched in episode.switches)
     for restart in episode.restarts:
         yield restart.tick, restart.tick
 
@@ -236,9 +237,8 @@ class Loop:
         if not any(tick in (one.first_tick, one.last_tick + 1) for one in switches):
             return
         wanted = {one.fault for one in switches if one.first_tick <= tick <= one.last_tick}
-        for part in self._stage.switched:
-            for name in part.faults:
-                part.switch(name, on=name in wanted)
+        for name in faults_of(self._stage.outside):
+            switch(self._stage.outside, name, on=name in wanted)
 
     def _restart(self, name: str) -> None:
         try:

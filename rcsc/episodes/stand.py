@@ -15,6 +15,7 @@ from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.lang.restart import After
 from rcsc.run.description import BadDescription, Description, description, places
+from rcsc.run.faults import faults_of
 from rcsc.run.orders.roles import PROTOCOL, Served, field_of, ordered
 from rcsc.run.orders.script import OutsideBuffer, outside_buffers
 from rcsc.run.plant.staging import StageOrder, staged
@@ -208,5 +209,5 @@ def switches(its: Stand, plant: str = "") -> tuple[str, ...]:
     key = its.files, plant
     if key not in _SWITCHES:
         stage = staged(StageOrder(str(its.path), plant), its.system, its.signs)
-        _SWITCHES[key] = tuple(dict.fromkeys(name for part in stage.switched for name in part.faults))
+        _SWITCHES[key] = faults_of(stage.outside)
     return _SWITCHES[key]

@@ -250,7 +250,7 @@ def test_a_model_that_flies_apart_ends_the_run(dock: Path) -> None:
 
 
 def test_faults_are_switched_and_what_stood_comes_back(dock: Path) -> None:
-    [model] = stage(dock).switched
+    [model] = stage(dock).outside
     assert isinstance(model, BoundModel)
     assert model.faults == ("wheels_stuck", "pin_dead")
     for tick in range(10):
@@ -273,7 +273,7 @@ def test_faults_are_switched_and_what_stood_comes_back(dock: Path) -> None:
 
 def test_a_plant_in_python_is_switched_likewise(dock: Path) -> None:
     system = description(dock / "system.toml")
-    [plant] = load(system, signatures(system)).switched
+    [plant] = load(system, signatures(system)).outside
     assert isinstance(plant, BoundPlant)
     plant.switch("wheel_slips", on=True)
     assert plant.faults == ("wheel_slips",)

@@ -10,7 +10,7 @@ import click
 
 from rcsc.commands.shared.systems import EXECUTOR, PLANT, system_path
 from rcsc.run.description import NO_DATA, BadDescription, Description, description
-from rcsc.run.plant.load import Staged, load
+from rcsc.run.plant.load import Staged, by_hand, load
 from rcsc.run.signature import Signature
 from rcsc.run.system import Kind, assemble, signatures
 from rcsc.shell.commands import Commands
@@ -73,9 +73,8 @@ def _stage(system: Description, signs: Mapping[str, Signature], wanted: str | No
     Raises:
         CodedError: The plant that was named is not in order.
     """
-    by_hand = next((spec.name for spec in system.plants if spec.by_hand), None)
     try:
-        return load(system, signs, wanted or by_hand)
+        return load(system, signs, wanted or by_hand(system))
     except BadDescription:
         if wanted is None and system.database.name != NO_DATA and not system.database.is_file():
             return Staged()

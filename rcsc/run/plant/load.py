@@ -20,7 +20,6 @@ from rcsc.host.files.names import BadName, within
 from rcsc.lang.project import project_root
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description
-from rcsc.run.faults import Switched
 from rcsc.run.levels import Query
 from rcsc.run.orders.operator import Operator, ScriptedRun
 from rcsc.run.orders.stopped import StoppedRuns
@@ -80,11 +79,6 @@ class Staged:
         return any(getattr(part, "over", False) for part in self.outside)
 
     @property
-    def switched(self) -> tuple[Switched, ...]:
-        """The plants among them that have faults to be switched."""
-        return tuple(part for part in self.outside if isinstance(part, Switched) and part.faults)
-
-    @property
     def plants(self) -> tuple[BoundPlant, ...]:
         """The plants among them whose fields are bound."""
         return tuple(part for part in self.outside if isinstance(part, BoundPlant))
@@ -92,6 +86,11 @@ class Staged:
 
 StageFunction: TypeAlias = Callable[[Setup], Staged]
 """A plant that does more than fields can say is a function."""
+
+
+def by_hand(system: Description) -> str | None:
+    """The plant that is taken by hand when nobody says which; None where the description names none."""
+    return next((spec.name for spec in system.plants if spec.by_hand), None)
 
 
 def chosen(system: Description, wanted: str | None) -> PlantSpec | None:
