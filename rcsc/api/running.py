@@ -16,7 +16,8 @@ from rcsc.diagnostics.coded import CodedError
 from rcsc.driver.compile import compile_system
 from rcsc.run.description import Description, description
 from rcsc.run.faults import faults_of, switch
-from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
+from rcsc.run.orders.numbered import Orders
+from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun, line_to
 from rcsc.run.orders.roles import COMMAND, Served, field_of, served
 from rcsc.run.plant.load import Staged
 from rcsc.run.plant.staging import StageOrder, staged, standing
@@ -36,14 +37,14 @@ class _Orders:
     """Whoever gives the orders: something outside, as any other.
 
     Attributes:
-        standing: What stands in each buffer of orders, by its name.
+        lines: The orders to each level that was ordered, by its name.
     """
 
-    standing: dict[str, Values] = field(default_factory=dict)
+    lines: dict[str, Orders] = field(default_factory=dict)
 
     def step(self, _tick: int, _latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
         """One tick: what stands is published."""
-        return dict(self.standing)
+        return {line.order: line.sent for line in self.lines.values()}
 
 
 @dataclass(slots=True)
@@ -146,15 +147,8 @@ class LoadedSystem:
         names = [field_of(leaf) for leaf in to.order_leaves]
         if unknown := [name for name in given if name not in names]:
             raise KeyError(unknown[0])
-        standing = self._orders.standing.get(to.order)
-        number = 0 if standing is None else int(standing[to.number])
-        numbers = int(to.order_leaves[to.number].high or 0) + 1
-        values: list[Value] = [
-            leaf.read(_text(given[name])) if name in given else leaf.initial
-            for name, leaf in zip(names, to.order_leaves, strict=True)
-        ]
-        values[to.number] = (number + 1) % numbers
-        self._orders.standing[to.order] = tuple(values)
+        values = {name: leaf.read(_text(given[name])) for name, leaf in to.fields.items() if name in given}
+        self._orders.lines.setdefault(to.level, line_to(to)).send(to.order_with(values))
 
     def report(self, level: str | None = None) -> dict[str, Shown] | None:
         """What a level reports of its last order from outside, by field; None while it has not echoed it.
@@ -163,8 +157,9 @@ class LoadedSystem:
             KeyError: No such level is ordered from outside.
         """
         of = self._ordered(level)
-        order, report = self._orders.standing.get(of.order), self.system.buffers.latest(of.report)
-        if order is None or report is None or report[of.echo] != order[of.number]:
+        line = self._orders.lines.get(of.level)
+        report = None if line is None else line.answer(self.system.buffers.latest)
+        if report is None:
             return None
         pairs = zip(of.report_leaves, report, strict=True)
         return {field_of(leaf): _shown(leaf, value) for leaf, value in pairs}

@@ -10,7 +10,7 @@ from rcsc.episodes.episode import OrderSpec, Setting
 from rcsc.episodes.outcome import RowEnd
 from rcsc.run.orders.numbered import Latest, Orders
 from rcsc.run.orders.operator import answer_reason, line_to
-from rcsc.run.orders.roles import DONE, FAILED, Served, field_of
+from rcsc.run.orders.roles import COMMAND, DONE, FAILED, Served
 from rcsc.run.signature import Leaf, Value, Values
 
 CHANGED, WAITING = "changed", "waiting"
@@ -44,18 +44,12 @@ def order_of(served: Served, spec: OrderSpec) -> tuple[Value, ...]:
         ValueError: The order has no such field, or a value is none of the field's.
     """
     given = {one.name: one.value for one in spec.fields}
-    protocol = {served.command, served.number}
-    leaves = {field_of(leaf) for place, leaf in enumerate(served.order_leaves) if place not in protocol}
-    if stray := sorted(set(given) - leaves):
+    if stray := sorted(set(given) - (served.fields.keys() - {COMMAND})):
         raise ValueError(f"an order to `{served.level}` has no field `{stray[0]}`")
-    values = []
-    for place, leaf in enumerate(served.order_leaves):
-        name = field_of(leaf)
-        if place == served.command:
-            values.append(value_of(leaf, spec.command))
-        elif place != served.number:
-            values.append(value_of(leaf, given[name]) if name in given else leaf.initial)
-    return tuple(values)
+    settings = {COMMAND: spec.command, **given}
+    return served.order_with(
+        {name: value_of(leaf, settings[name]) for name, leaf in served.fields.items() if name in settings}
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,8 @@ from rcsc.lang.model import Program
 from rcsc.run.description import BadDescription, Description, LevelSpec
 from rcsc.run.levels import Fill, Query, RunningLevel
 from rcsc.run.log.schema import fingerprints
-from rcsc.run.orders.roles import COMMAND, Served, field_of
+from rcsc.run.orders.operator import line_to
+from rcsc.run.orders.roles import Served
 from rcsc.run.signature import Signature, Value, Values
 from rcsc.run.system import StateTableError, System
 from rcsc.shell import history, typed_names
@@ -227,26 +228,22 @@ class Session:
         Raises:
             Refused: The order has no such field, or a text is no value of one; nothing was set.
         """
-        fields = [COMMAND if at == to.command else field_of(leaf) for at, leaf in enumerate(to.order_leaves)]
-        known = [name for at, name in enumerate(fields) if at != to.number]
+        fields = to.fields
         for name in given:
-            if name not in known:
-                helps = nearest(name, known)
+            if name not in fields:
+                helps = nearest(name, list(fields))
                 raise Refused(Code.SHELL_NAME, f"an order of `{to.level}` has no field `{name}`", *helps)
+        line = line_to(to)
         standing = self.memory.latest(to.order)
         level = next(level for level in self.levels if level.name == to.level)
         last = level.value(to.order_leaves[to.number].name) if standing is None else standing[to.number]
-        number = (int(last) + 1) % (int(to.order_leaves[to.number].high or 0) + 1)
-        texts = [
-            given.get(name, leaf.shown(leaf.initial))
-            for name, leaf in zip(fields, to.order_leaves, strict=True)
-        ]
-        texts[to.number] = str(number)
-        for leaf, text in zip(to.order_leaves, texts, strict=True):
-            typed_names.value_of(leaf, text)
-        for leaf, text in zip(to.order_leaves, texts, strict=True):
-            self.set(f"{to.level}.{leaf.name}", text)
-        return number
+        line.number = int(last)
+        line.send(
+            to.order_with({name: typed_names.value_of(fields[name], text) for name, text in given.items()})
+        )
+        for leaf, value in zip(to.order_leaves, line.sent, strict=True):
+            self.set(f"{to.level}.{leaf.name}", leaf.shown(value))
+        return line.number
 
     def _answer(self, level: RunningLevel, at: int) -> None:
         """Keep a value set by hand as the database's answer to the same question from now on."""

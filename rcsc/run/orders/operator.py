@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from rcsc.run.orders.numbered import Latest, Orders
-from rcsc.run.orders.roles import DONE, FAILED, PROTOCOL, Served, field_of
+from rcsc.run.orders.roles import COMMAND, DONE, FAILED, PROTOCOL, Served, field_of
 from rcsc.run.orders.script import OrderRow
 from rcsc.run.signature import Value, Values
 from rcsc.run.system import System
@@ -232,12 +232,8 @@ class ScriptOperator:
         if state == DONE:
             self.at += 1
         elif row.served is not None:
-            resting = [
-                row.served.rest if place == row.served.command else leaf.initial
-                for place, leaf in enumerate(row.served.order_leaves)
-            ]
-            del resting[row.served.number]
-            self._lines[row.served.level].send(resting)
+            resting = {COMMAND: row.served.rest}
+            self._lines[row.served.level].send(row.served.order_with(resting))
             self._resting = tick
 
     def _await_rest(self, tick: int, latest: Latest) -> None:

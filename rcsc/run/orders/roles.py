@@ -49,6 +49,15 @@ class Served:
     done: str = DONE
     failed: str = FAILED
 
+    @property
+    def fields(self) -> dict[str, Leaf]:
+        """The fields of an order but its number, by name, in the buffer's order."""
+        return {field_of(leaf): leaf for place, leaf in enumerate(self.order_leaves) if place != self.number}
+
+    def order_with(self, given: Mapping[str, Value]) -> tuple[Value, ...]:
+        """The fields of an order but its number; what is not given is as its variable is at first."""
+        return tuple(given.get(name, leaf.initial) for name, leaf in self.fields.items())
+
 
 def served(system: Description, signs: Mapping[str, Signature]) -> tuple[Served, ...]:
     """Find the levels that somebody outside orders by number and to whom they report, from the top down."""

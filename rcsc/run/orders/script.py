@@ -253,14 +253,12 @@ class _Reader:
 
 
 def _order(level: Served, line: Mapping[str, str]) -> tuple[Value, ...]:
-    """The fields of an order but its number; what the row does not say is as the variable is at first."""
-    values = []
-    for place, leaf in enumerate(level.order_leaves):
-        if place == level.number:
-            continue
-        name = COMMAND if place == level.command else field_of(leaf)
-        values.append(_read(leaf, line[name], name) if name in line else leaf.initial)
-    return tuple(values)
+    """The fields of an order but its number, as the row says them."""
+    command = level.order_leaves[level.command]
+    columns = {name: COMMAND if leaf is command else name for name, leaf in level.fields.items()}
+    return level.order_with(
+        {name: _read(level.fields[name], line[at], at) for name, at in columns.items() if at in line}
+    )
 
 
 def _read(leaf: Leaf, cell: str, column: str) -> Value:
