@@ -3,27 +3,20 @@
 import re
 import shlex
 import shutil
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from rcsc.commands import run
-from tests.support.programs.stages import shipped
+from tests.gallery.page import ENTRIES, GALLERY, PAGE, REPO, page
 
-REPO = Path(__file__).parents[2]
-GALLERY = REPO / "tables" / "gallery"
-PAGES = (GALLERY / "README.md", *sorted(GALLERY.glob("*/README.md")))
+PAGES = (PAGE, *(entry / "README.md" for entry in ENTRIES))
 TABLES = sorted(path for path in GALLERY.glob("*/*.rcs") if path.name != "words.rcs")
 MENDED = [path for path in TABLES if "published" not in path.name]
 SHOWN = re.compile(
     r"^```sh\n(?P<commands>.*?)^```\n(?:\n```text\n(?P<shown>.*?)^```\n)?", re.MULTILINE | re.DOTALL
 )
-ROW = re.compile(
-    r"^\| \[(?P<entry>\w+)\]\(\S+\) ?(?P<table>\w*) \|[^|]*\|[^|]*\| (?P<here>\d+ x \d+) \| (?P<findings>[^|]*?) \|"
-)
-
 Say = Callable[[str], tuple[int, str]]
 
 
@@ -66,26 +59,8 @@ def test_a_page_shows_what_its_commands_print(page: Path, say: Say) -> None:
             assert plain(line) in printed, f"{part['commands']}does not show\n{line}"
 
 
-def test_the_figures_of_the_page_are_those_of_the_tables_as_published(say: Say) -> None:
-    text = PAGES[0].read_text(encoding="utf-8")
-    rows = [row.groupdict() for row in map(ROW.match, text.splitlines()) if row]
-    published = {path for path in TABLES if path not in MENDED}
-    for row in rows:
-        name = f"{row['table']}_published.rcs".lstrip("_")
-        path = GALLERY / row["entry"] / name
-        published.remove(path)
-        [table] = shipped(str(path), REPO).tables
-        assert row["here"] == f"{len(table.lines)} x {len(table.columns)}", path
-        _, printed = say(f"rcsc check --color never {path.relative_to(REPO)}")
-        codes = Counter(re.findall(r"error\[(RCS\d+)\]", printed))
-        assert row["findings"] == f"{counted(codes['RCS401'], 'gap')}, {counted(codes['RCS402'], 'overlap')}"
-        assert set(codes) <= {"RCS401", "RCS402"}
-    assert not published
-
-
-def counted(number: int, what: str) -> str:
-    """`1 gap`, `2 gaps`."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
+def test_the_page_is_fresh() -> None:
+    assert page() == PAGE.read_text(encoding="utf-8"), "python -m tests.gallery makes it anew"
 
 
 def test_what_is_mended_proves_and_does_the_same_in_python_and_c(say: Say) -> None:

@@ -1,0 +1,148 @@
+"""The gallery's page: sizes and findings out of the tables, words out of each entry's own page, features out of the sources."""
+
+import re
+from collections import Counter
+from pathlib import Path
+
+from rcsc import check
+from rcsc.diagnostics.diagnostic import Severity
+from tests.support.programs.stages import shipped
+
+REPO = Path(__file__).parents[2]
+GALLERY = REPO / "tables" / "gallery"
+PAGE = GALLERY / "README.md"
+ENTRIES = tuple(sorted(path.parent for path in GALLERY.glob("*/README.md")))
+
+NAMES = {
+    "RCS401": "gap",
+    "RCS402": "overlap",
+    "RCS412": "index out of range",
+    "RCS417": "broken invariant",
+}
+"""What one finding of a code is called; the first two are told of every table."""
+
+FEATURES = {
+    "named sets": r"^set ",
+    "`not in`": r"\bnot in\b",
+    "`-` or a blank for what does not count, `DEFAULT` for all else": r"\| DEFAULT",
+    "masks of a word": r"(?<!\w)(?:0b)?(?=[01x ]*x)[01x]{4}[ _][01x]{4}(?!\w)",
+    "conditions over several variables, under `when`": r"\| when +\|",
+    "`was`, `@T`, `@F`, `@C`": r"\bwas\b|@[TFC]\(",
+    "time: `for`": r"\bfor \d",
+    "several tables in a cycle": r"^level \w+ \{[^}]*^  table [^}]*^  table ",
+    "an order between lines: `above`": r"^ *\|[^|\n]*\babove\b",
+    "lines that do the same: `same`": r"^ *\|[^|\n]*\bsame\b",
+    "facts about inputs and state: `assume`": r"^assume ",
+    "invariants": r"^invariant ",
+    "properties over cycles, for `rcsc prove`": r"^property ",
+    "procedures": r"^procedure ",
+    "arrays": r"\barray\[",
+}
+"""A feature of the language, and what its use looks like in a source without its comments."""
+
+
+def page() -> str:
+    """Return the gallery's page as it ought to be: what is made stands between its marks, all else as it is."""
+    text = PAGE.read_text(encoding="utf-8")
+    for name, rows in (
+        ("findings", findings_table()),
+        ("features", features_table()),
+        ("lacks", lacks_table()),
+    ):
+        before, mark, rest = text.partition(f"<!-- {name} -->\n")
+        _, end, after = rest.partition(f"<!-- end of {name} -->")
+        assert all((mark, end)), f"{PAGE}: no place for {name}"
+        text = before + mark + rows + end + after
+    return text
+
+
+def findings_table() -> str:
+    """Return a row for each table as published, in the order of the entries."""
+    head = ("entry", "source", "theirs", "here", "findings", "the one that matters")
+    return table(head, [row for entry in ENTRIES for row in findings_of(entry)])
+
+
+def findings_of(entry: Path) -> list[tuple[str, ...]]:
+    """Return the rows of an entry; each of its tables as published must be named in its page once."""
+    described = words_of(entry)
+    published = {path.name for path in entry.glob("*published.rcs")}
+    assert sorted(file for file, *_ in described) == sorted(published), f"{entry}: {published}"
+    rows: list[tuple[str, ...]] = []
+    for file, source, theirs, matters in described:
+        short = file.removesuffix("published.rcs").strip("_")
+        link = f"[{entry.name}]({entry.name}/README.md) {short}".strip()
+        rows.append((link, source, theirs, size(entry / file), findings(entry / file), matters))
+    return rows
+
+
+def words_of(entry: Path) -> list[tuple[str, str, str, str]]:
+    """Return what an entry's page says of its tables: file, source, what the source has, the finding that matters."""
+    last = (entry / "README.md").read_text(encoding="utf-8").partition("## On the gallery's page\n")[2]
+    rows = re.findall(r"^\| `(\S+)` \| (.*?) \| (.*?) \| (.*?) \|$", last, re.MULTILINE)
+    return [(file, source, theirs, matters) for file, source, theirs, matters in rows]
+
+
+def size(path: Path) -> str:
+    """Return how many lines and columns of conditions a table has, as `8 x 1`."""
+    [published] = shipped(str(path), REPO).tables
+    return f"{len(published.lines)} x {len(published.columns)}"
+
+
+def findings(path: Path) -> str:
+    """Return how many findings of each kind `rcsc check` has of a file, as `1 gap, 2 overlaps`."""
+    errors = Counter(
+        found.code.value for found in check(path).diagnostics if found.severity is Severity.ERROR
+    )
+    assert errors.keys() <= NAMES.keys(), f"{path}: {errors}"
+    always = [counted(errors[code], NAMES[code]) for code in ("RCS401", "RCS402")]
+    others = [counted(errors[code], NAMES[code]) for code in sorted(errors) if code > "RCS402"]
+    return ", ".join(always + others)
+
+
+def counted(number: int, what: str) -> str:
+    """Return `1 gap`, `2 gaps`."""
+    many = {"index out of range": "indexes out of range"}.get(what, f"{what}s")
+    return f"{number} {what if number == 1 else many}"
+
+
+def features_table() -> str:
+    """Return a row for each feature that an entry uses: the entries whose sources have it."""
+    sources = {entry: sources_of(entry) for entry in ENTRIES}
+    rows = [
+        (
+            feature,
+            ", ".join(
+                entry.name
+                for entry, text in sources.items()
+                if re.search(use, text, re.MULTILINE | re.DOTALL)
+            ),
+        )
+        for feature, use in FEATURES.items()
+    ]
+    return table(("feature", "entries that use it"), [row for row in rows if row[1]])
+
+
+def sources_of(entry: Path) -> str:
+    """Return all sources of an entry without their comments."""
+    texts = (path.read_text(encoding="utf-8") for path in sorted(entry.glob("*.rcs")))
+    return "\n".join(re.sub(r"#.*", "", text) for text in texts)
+
+
+def lacks_table() -> str:
+    """Return a row for each entry that says what it lacks."""
+    lacks = (
+        (
+            entry.name,
+            re.search(r"^\*Lacks\.\* (.*)$", (entry / "README.md").read_text(encoding="utf-8"), re.MULTILINE),
+        )
+        for entry in ENTRIES
+    )
+    return table(
+        ("entry", "what it lacks, and writes instead"), [(name, said[1]) for name, said in lacks if said]
+    )
+
+
+def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """Return a table of Markdown."""
+    lines = (head, ("---",) * len(head), *rows)
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines).replace(" --- ", "---")
