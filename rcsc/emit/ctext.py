@@ -1,7 +1,8 @@
 """Types, constants, expressions and statements as a tree of C99.
 
 Integers are computed in `int64_t`, or in `uint64_t` where the bounds of operands and result need it and none is negative; that all of
-them fit there was proved (`symbolic.execution.word`). Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
+them fit there was proved (`symbolic.execution.word`). Bits of words are masked and shifted without a sign.
+Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
 """
 
 import math
@@ -33,6 +34,7 @@ from rcsc.emit.code_tree import (
 from rcsc.emit.identifiers import Names
 from rcsc.emit.translate import FAULTLESS, Text, constant, local
 from rcsc.lang import model
+from rcsc.lang.expressions.words import bits_of, field_of, mask_of
 from rcsc.lang.leaves import everything
 from rcsc.lang.model import I64_MAX, I64_MIN, Bool, Enum, Expr, Int, Op, Real, Scalar, Value
 from rcsc.lang.operator_table import Arithmetic, Comparison, Operator, is_comparison
@@ -153,6 +155,11 @@ def _widened(kind: Scalar, code: Code) -> Code:
     return code if isinstance(kind, Bool | Real) else Cast(wide_type(kind), code)
 
 
+def _unsigned(word: Expr) -> str:
+    """The type without a sign in which bits of a word are computed."""
+    return "uint32_t" if bits_of(word) <= 32 else "uint64_t"
+
+
 @dataclass
 class CText(Text):
     """C99.
@@ -188,9 +195,29 @@ class CText(Text):
                 able = [value for value in values if isinstance(kind, Real) or low <= value <= high]
                 return Round(self.among(self.expr(subject), kind, able))
             case model.Apply(op=op, args=args, type=kind):
-                return self._applied(op, args, kind)
+                return self._bits(expr) or self._applied(op, args, kind)
             case _:
                 assert_never(expr)
+
+    def _bits(self, expr: model.Apply) -> Code | None:
+        """A mask as one comparison, a field as a shift and a mask; None where the expression is neither."""
+        mask, part = mask_of(expr), field_of(expr)
+        if mask is not None:
+            care, value = (Constant(bits, _unsigned(mask.word)) for bits in (mask.care, mask.value))
+            return Round(infix("==", Round(infix("&", self._word(mask.word), care)), value))
+        if part is None:
+            return None
+        number, ones = self._word(part.word), (2 << part.high - part.low) - 1
+        if part.low:
+            number = infix(">>", number, Constant(part.low, "uint32_t"))
+        if part.high < bits_of(part.word) - 1:
+            number = infix("&", number, Constant(ones, _unsigned(part.word)))
+        return self.converted(Round(number), _unsigned(part.word), wide_type(expr.type))
+
+    def _word(self, word: Expr) -> Code:
+        """A word in the type in which its bits are computed."""
+        code = self.expr(word)
+        return Cast(_unsigned(word), code.operand if isinstance(code, Cast) else code)
 
     def _element(self, leaves: Sequence[str], kind: Scalar, index: Expr | None = None) -> Place:
         """An array element by a computed index, which is left out where it can only be 0."""

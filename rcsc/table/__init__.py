@@ -21,6 +21,8 @@ disjoint in pairs, and their sizes add up to the size of the input space. Here 4
 >>> (verdict.findings, verdict.backing.method, verdict.backing.confirmed_by_z3)
 ((), 'boxes', True)
 
+A word whose bits are looked at one by one is as many axes (`regions.word_bits`): masks are boxes of bits.
+
 Tests across variables, and assumptions, take a tree of regions (`regions`), and Z3 for what is not linear. Trusted,
 without `rcsc certify`: `boxes`, `relational`, `regions` and what they rest on; by default Z3 confirms
 every table that is cheap enough, and a disagreement is a bug in rcsc.

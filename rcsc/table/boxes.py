@@ -1,15 +1,17 @@
 """Tables whose tests are all sets of keys of one leaf: decided exactly by masks and counting.
 
-In: a table without relational tests. Out: every overlapping pair, the dead lines, and the inputs that no
-line matches, with least witnesses and maximal regions. No solver.
+In: a table without relational tests; of words that are taken apart bits are the axes (`regions.word_bits`). Out: every
+overlapping pair, the dead lines, and the inputs that no line matches, with least witnesses and maximal regions. No solver.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import prod
 
 from rcsc.lang.interval_sets import meet
-from rcsc.lang.model import Box, Program, Table, key_bounds, value_of_key
+from rcsc.lang.model import Box, Program, Table, Test, Value, key_bounds, value_of_key
 from rcsc.table.regions.partition import Boxes, BudgetError, Gaps, common
+from rcsc.table.regions.word_bits import Part, Words, boxes_of
 from rcsc.table.verdict import Gap, Overlap, Region, Witness
 
 MOST_GAPS, MOST_FALLS = 64, 3
@@ -21,32 +23,53 @@ def applies(table: Table) -> bool:
     return all(test is None or test.box is not None for line in table.lines for test in line.tests)
 
 
-def lines_of(table: Table) -> list[dict[str, Box]]:
-    """Return each line's keys by leaf; several tests of one leaf intersect."""
+def lines_of(table: Table, words: Words | None = None) -> list[dict[str, Box]]:
+    """Return each line's keys by leaf, or by part of a word; several tests of one leaf intersect."""
+    known: dict[int, Mapping[str, Box]] = {}
     lines = []
     for line in table.lines:
         boxes: dict[str, Box] = {}
         for test in line.tests:
             if test is not None:
-                assert test.box is not None
-                name = test.variables[0]
-                boxes[name] = meet(boxes[name], test.box) if name in boxes else test.box
+                if id(test) not in known:
+                    known[id(test)] = _of_test(test, words or {})
+                for name, box in known[id(test)].items():
+                    boxes[name] = meet(boxes[name], box) if name in boxes else box
         lines.append(boxes)
     return lines
 
 
+def _of_test(test: Test, words: Words) -> Mapping[str, Box]:
+    leaf = test.variables[0]
+    if leaf in words:
+        boxes = boxes_of(test, words[leaf])
+        assert boxes is not None
+        return boxes
+    assert test.box is not None
+    return {leaf: test.box}
+
+
 @dataclass(slots=True)
 class TableBoxes(Boxes[str]):
-    """One table as boxes of its test variables' keys, in declared order."""
+    """One table as boxes of its test variables' keys, in declared order; of a word that is taken apart, of its parts.
+
+    Attributes:
+        words: The words that are taken apart.
+    """
 
     program: Program = field(kw_only=True)
+    words: Words = field(default_factory=dict, kw_only=True)
 
     @classmethod
-    def of(cls, program: Program, table: Table) -> "TableBoxes":
-        """The table's boxes; all its tests must be boxes."""
-        wanted = set(table.variables)
-        extents = {v.name: key_bounds(v.type) for v in program.variables if v.name in wanted}
-        return cls({n: extents[n] for n in table.variables}, list(lines_of(table)), program=program)
+    def of(cls, program: Program, table: Table, words: Words | None = None) -> "TableBoxes":
+        """The table's boxes; all its tests must be boxes, those of the words boxes of their parts."""
+        split = words or {}
+        kinds = {v.name: v.type for v in program.variables}
+        extents: dict[str, tuple[int, int]] = {}
+        for leaf in table.variables:
+            parts = {part.name: key_bounds(part.kind) for part in split.get(leaf, ())}
+            extents |= parts or {leaf: key_bounds(kinds[leaf])}
+        return cls(extents, list(lines_of(table, split)), program=program, words=split)
 
     def both(self, first: int, second: int) -> Overlap:
         """The overlap of two lines: its least witness, and the whole region where both match."""
@@ -58,8 +81,17 @@ class TableBoxes(Boxes[str]):
 
     def witness(self, keys: Mapping[str, int]) -> Witness:
         """The values of these keys; the least of every other variable."""
-        kinds = {v.name: v.type for v in self.program.variables}
-        return {n: value_of_key(kinds[n], keys.get(n, self.extents[n][0])) for n in self.names}  # type: ignore[index]
+        kinds = {str(v.name): v.type for v in self.program.variables}
+        apart = {part.name for parts in self.words.values() for part in parts}
+        values: dict[str, Value] = {leaf: self._word(parts, keys) for leaf, parts in self.words.items()}
+        values |= {
+            n: value_of_key(kinds[n], keys.get(n, self.extents[n][0])) for n in self.names if n not in apart
+        }
+        return {leaf: values[leaf] for leaf in kinds if leaf in values}
+
+    @staticmethod
+    def _word(parts: Sequence[Part], keys: Mapping[str, int]) -> int:
+        return sum(keys.get(part.name, 0) << part.low for part in parts)
 
     def narrowed(self, region: Mapping[str, Box]) -> Region:
         """Leave out variables that may have any key."""
@@ -76,6 +108,8 @@ class TableBoxes(Boxes[str]):
         if not missing:
             return None
         count = (missing, self.volume()) if search.exact else None
+        idle = self._idle() if self.words else 1
+        patterns = (missing // idle, self.volume() // idle) if search.exact and idle > 1 else None
         shown: list[dict[str, Box]] = []
         witnesses = []
         try:
@@ -87,4 +121,10 @@ class TableBoxes(Boxes[str]):
                 raise
         if not witnesses:
             return None
-        return Gap(tuple(witnesses), tuple(self.narrowed(region) for region in shown), count)
+        return Gap(tuple(witnesses), tuple(self.narrowed(region) for region in shown), count, patterns)
+
+    def _idle(self) -> int:
+        """How many inputs are alike to every line, as they differ in bits that none looks at."""
+        looked_at = {name for line in self.lines for name in line}
+        apart = {part.name for parts in self.words.values() for part in parts}
+        return prod(high + 1 for name, (_, high) in self.extents.items() if name in apart - looked_at)

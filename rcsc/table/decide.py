@@ -10,6 +10,7 @@ from rcsc.solvers.options import Options
 from rcsc.table import boxes
 from rcsc.table.certificate import box_certificate, must_cover
 from rcsc.table.regions import partition
+from rcsc.table.regions.word_bits import Words, words_of
 from rcsc.table.verdict import DeadLine, Gap, Overlap, SolversDisagree, TableFinding, TableVerdict, Undecided
 
 if TYPE_CHECKING:
@@ -21,11 +22,12 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
     begun = time.perf_counter()
     used: tuple[AssumptionName, ...] = ()
     certificate: Mapping[str, object] | None = None
-    settled = _by_boxes(program, table) if boxes.applies(table) else None
+    words = words_of(program, table)
+    settled = None if words is None else _by_boxes(program, table, words)
     if settled is not None and (not table.assumptions or not _wrong(table, settled)):
         method, findings = "boxes", settled
         if not _wrong(table, findings):
-            certificate = box_certificate(program, table)
+            certificate = _certificate(program, table, options)
             if _narrows(program, table):
                 from rcsc.table.relational import under_assumptions
 
@@ -43,8 +45,17 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
     return TableVerdict(table, findings, backing, certificate, time.perf_counter() - begun)
 
 
-def _by_boxes(program: Program, table: Table) -> tuple[TableFinding, ...]:
-    decided = boxes.TableBoxes.of(program, table)
+def _certificate(program: Program, table: Table, options: Options) -> "Mapping[str, object] | None":
+    """The certificate of a table of boxes that is right; one with words taken apart is a tree of regions for the checker."""
+    if boxes.applies(table):
+        return box_certificate(program, table)
+    from rcsc.table.relational import certificate_alone
+
+    return certificate_alone(program, table, options)
+
+
+def _by_boxes(program: Program, table: Table, words: Words) -> tuple[TableFinding, ...]:
+    decided = boxes.TableBoxes.of(program, table, words)
     pairs = list(islice(decided.overlaps(), partition.MOST_PAIRS))
     findings: list[TableFinding] = [DeadLine(at) for at in decided.dead()]
     findings.extend(decided.both(first, second) for first, second in pairs)

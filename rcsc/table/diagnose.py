@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import prod
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
@@ -163,7 +162,7 @@ def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
         replace(_column(program, table, witness, (), region), inputs=inputs)
         for witness, region, inputs in zip(gap.witnesses, gap.regions, _inputs(program, gap), strict=True)
     )
-    notes = _by_member(program, gap)
+    notes = (*_patterns(gap), *_by_member(program, gap))
     share = f"{_share(*gap.count)} of the inputs" if gap.count else "some inputs"
     if must_cover(table) and table.default is None:
         repair = closing_line(program, table, gap)
@@ -189,10 +188,18 @@ def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
         Code.DEFAULT_COVERS,
         message,
         label,
+        notes=_patterns(gap),
         witnesses=columns,
         more=_more(program, gap),
         severity=Severity.NOTE,
     )
+
+
+def _patterns(gap: Gap) -> tuple[str, ...]:
+    """Say how many patterns of the bits that lines look at a gap has."""
+    if gap.patterns is None:
+        return ()
+    return (f"{gap.patterns[0]:,} of {gap.patterns[1]:,} patterns of the bits that lines look at",)
 
 
 def _more(program: Program, gap: Gap) -> int:
@@ -204,9 +211,9 @@ def _more(program: Program, gap: Gap) -> int:
 
 def _inputs(program: Program, gap: Gap) -> list[int | None]:
     """Count the inputs of each region; None where there is none."""
-    kinds = {str(v.name): v.type for v in program.variables}
+    kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
     return [
-        None if region is None else prod(size(_box(kinds, region, name)) for name in witness)
+        None if region is None else words.inputs(kinds, region, witness)
         for witness, region in zip(gap.witnesses, gap.regions, strict=True)
     ]
 

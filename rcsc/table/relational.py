@@ -76,6 +76,15 @@ def decide(program: Program, table: Table, options: Options) -> Decided:
     return _Decision(program, table, options).decided()
 
 
+def certificate_alone(program: Program, table: Table, options: Options) -> Mapping[str, object] | None:
+    """Return the certificate of a table that is right without assumptions, as a tree of regions; None where there is none."""
+    decision = _Decision(program, table, options)
+    search = decision.search((), alone=True)
+    if not search.proved:
+        search = decision.search(())
+    return tree_certificate(table, decision.universe, search.nodes, ()) if search.proved else None
+
+
 def under_assumptions(
     program: Program, table: Table, options: Options, settled: tuple[TableFinding, ...]
 ) -> tuple[TableFinding, ...]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 
+from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interval_sets import complement, holds, meet, size
 from rcsc.lang.model import (
@@ -35,6 +36,7 @@ from rcsc.table.regions.least import find, negated, whole
 from rcsc.table.regions.partition import BudgetError, Gaps
 from rcsc.table.regions.region import NoWitness
 from rcsc.table.regions.splitting import Tree
+from rcsc.table.regions.word_bits import Part, Words, words_of
 from rcsc.table.verdict import Gap, Overlap, Region, Witness
 
 MOST_ASKED = 4_000
@@ -47,14 +49,16 @@ class PartingCell:
 
     Attributes:
         line: The line with the cell, by position; `other`, the line that then runs where both matched.
-        name: The column's variable; `text`, the cell as it would be; `box`, the keys that it takes.
+        column: Where the cell stands, by position; `name`, of what it takes fewer keys: a variable, or bits of a word.
+        text: The cell as it would be; `box`, the keys that it takes.
         lost: How many keys the cell no longer takes.
         falls: Whether the line loses more than the other has, so that DEFAULT takes the rest.
     """
 
     line: int
     other: int
-    name: VariableName
+    column: int
+    name: str
     text: str
     box: Box
     lost: int
@@ -72,7 +76,8 @@ class PartingCell:
         ]
         beside = f" ({'; '.join(instead)})" if instead else ""
         rest = "; DEFAULT takes what else it loses" if self.falls else ""
-        write = f"in line `{line.name}` write `{self.text}` under `{self.name}`: proved to part the two lines"
+        heading = table.columns[self.column].heading
+        write = f"in line `{line.name}` write `{self.text}` under `{heading}`: proved to part the two lines"
         return f"{write}; line `{other.name}` then runs where both match{beside}{rest}"
 
 
@@ -88,59 +93,73 @@ def parting_cells(program: Program, table: Table, overlap: Overlap) -> tuple[Par
     Narrowing line A on variable v by what line B has there parts the two. What A loses is then matched by B, if on
     every other variable B has all that A has: that is checked exactly. Else it falls to DEFAULT, if there is one that may be reached.
     """
-    if not boxes.applies(table):
+    words = words_of(program, table)
+    if words is None:
         return ()
-    lines = boxes.lines_of(table)
+    decided = boxes.TableBoxes.of(program, table, words)
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
     default = table.default is not None and not table.default.unreachable
     every = (
-        _narrowed(lines, kinds, table, line, other, name)
+        _narrowed(decided, kinds, table, line, other, name)
         for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second))
-        for name in table.variables
+        for name in decided.names
     )
     cells_ = (cell for cell in every if cell is not None and (default or not cell.falls))
     return tuple(sorted(cells_, key=lambda cell: (cell.falls, cell.lost)))
 
 
 def _narrowed(
-    lines: list[dict[str, Box]],
-    kinds: dict[str, Scalar],
+    decided: boxes.TableBoxes,
+    kinds: Mapping[str, Scalar],
     table: Table,
     line: int,
     other: int,
-    name: VariableName,
+    name: str,
 ) -> PartingCell | None:
-    column = [c for c in table.columns if c.variable == name]
-    if len(column) != 1:
-        return None
-    mine, theirs = lines[line], lines[other]
-    whole = (key_bounds(kinds[name]),)
-    everything = {another: (key_bounds(kinds[another]),) for another in table.variables}
+    mine, theirs = decided.lines[line], decided.lines[other]
+    extents = decided.extents
     falls = any(
-        another != name and not _within(mine.get(another, every), theirs.get(another, every))
-        for another, every in everything.items()
+        another != name and not _within(mine.get(another, (every,)), theirs.get(another, (every,)))
+        for another, every in extents.items()
     )
-    before = mine.get(name, whole)
-    left = meet(before, complement(theirs.get(name, whole), *whole[0]))
-    text = cells.cell(kinds[name], left) if left else None
-    if not text or meet(left, theirs.get(name, whole)):
+    before = mine.get(name, (extents[name],))
+    left = meet(before, complement(theirs.get(name, (extents[name],)), *extents[name]))
+    told = [cells.cell_under(column, kinds, {**mine, name: left}) for column in table.columns] if left else []
+    said = [(at, cell[0]) for at, cell in enumerate(told) if cell is not None and name in cell[1]]
+    if len(said) != 1 or not said[0][1]:
         return None
-    return PartingCell(line, other, name, text, left, size(before) - size(left), falls)
+    at, text = said[0]
+    return PartingCell(line, other, at, name, text, left, size(before) - size(left), falls)
 
 
 def with_cells(program: Program, table: Table, changed: Sequence[PartingCell]) -> Table | None:
     """Return the table with these cells; of one cell changed twice, what both take. None if a line would never match."""
     lines = list(table.lines)
     for cell in changed:
-        at = next(at for at, column in enumerate(table.columns) if column.variable == cell.name)
-        kind, tests = program.variable(cell.name).type, list(lines[cell.line].tests)
-        old = tests[at]
-        box = cell.box if old is None or old.box is None else meet(old.box, cell.box)
-        if not box:
+        tests = list(lines[cell.line].tests)
+        test = _with_cell(program, tests[cell.column], cell)
+        if test is None:
             return None
-        tests[at] = Test(cells.cell(kind, box) or cell.text, _says(cell.name, kind, box), (cell.name,), box)
+        tests[cell.column] = test
         lines[cell.line] = replace(lines[cell.line], tests=tuple(tests))
     return replace(table, lines=tuple(lines))
+
+
+def _with_cell(program: Program, old: Test | None, cell: PartingCell) -> Test | None:
+    """Return what the cell says, and what the old one says beside it of other bits; None where nothing fits."""
+    part = Part.named(cell.name)
+    leaf = program.variable(cell.name if part is None else part.leaf)
+    if part is not None:
+        condition = _says(part.of(leaf), cell.box)
+        if old is not None:
+            condition = Apply(Op.AND, (old.condition, condition), Bool())
+        box = box_of(condition, leaf)
+        return None if box == () else Test(cell.text, condition, (leaf.name,), box)
+    box = cell.box if old is None or old.box is None else meet(old.box, cell.box)
+    if not box:
+        return None
+    read = Read(leaf.name, leaf.type)
+    return Test(cells.cell(leaf.type, box) or cell.text, _says(read, box), (leaf.name,), box)
 
 
 def left_by(program: Program, table: Table, changed: Sequence[PartingCell]) -> str:
@@ -148,7 +167,7 @@ def left_by(program: Program, table: Table, changed: Sequence[PartingCell]) -> s
     after = with_cells(program, table, changed)
     if after is None:
         return "they contradict each other: a line would never match"
-    decided = boxes.TableBoxes.of(program, after)
+    decided = boxes.TableBoxes.of(program, after, words_of(program, after))
     left = next(iter(decided.overlaps()), None)
     if left is not None:
         first, second = (table.lines[at].name for at in left)
@@ -156,19 +175,22 @@ def left_by(program: Program, table: Table, changed: Sequence[PartingCell]) -> s
     return "proved that no two lines match any more"
 
 
-def _says(name: VariableName, kind: Scalar, box: Box) -> Expr:
-    """Return the condition that a leaf has one of the keys."""
-    read = Read(name, kind)
+def _says(number: Expr, box: Box) -> Expr:
+    """Return the condition that a leaf, or bits of one, have one of the keys."""
+    kind = number.type
 
     def compared(op: Op, key: int) -> Expr:
-        return Apply(op, (read, Literal(value_of_key(kind, key), kind)), Bool())
+        return Apply(op, (number, Literal(value_of_key(kind, key), kind)), Bool())
 
     listed = isinstance(kind, Bool | Enum)
-    parts = (
-        [compared(Op.EQ, key) for low, high in box for key in range(low, high + 1)]
-        if listed
-        else [Apply(Op.AND, (compared(Op.GE, low), compared(Op.LE, high)), Bool()) for low, high in box]
-    )
+    parts = [
+        *(compared(Op.EQ, key) for low, high in box for key in range(low, high + 1) if listed or low == high),
+        *(
+            Apply(Op.AND, (compared(Op.GE, low), compared(Op.LE, high)), Bool())
+            for low, high in box
+            if not listed and low < high
+        ),
+    ]
     return reduce(lambda either, part: Apply(Op.OR, (either, part), Bool()), parts)
 
 
@@ -180,8 +202,9 @@ def closing_line(program: Program, table: Table, gap: Gap) -> str | None:
     """Propose a line for the gap's first region; it overlaps none, and whether it closes the gap is counted, or proved."""
     region, witness = gap.regions[0], gap.witnesses[0]
     row = None
-    if region is not None and boxes.applies(table) and not table.assumptions:
-        row = _line_of_boxes(program, table, region)
+    words = words_of(program, table)
+    if region is not None and words is not None and not table.assumptions:
+        row = _line_of_boxes(program, table, region, words)
     return row or _line_across(program, table, witness, region or {})
 
 
@@ -190,20 +213,17 @@ def _said(row: str, closes: bool) -> str:
     return f"a line `| {row} || ... |` {what} and overlaps no other: proved"
 
 
-def _line_of_boxes(program: Program, table: Table, region: Region) -> str | None:
+def _line_of_boxes(program: Program, table: Table, region: Region, words: Words) -> str | None:
     """The line of a table of boxes whose cells say the region."""
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
-    texts = []
-    for column in table.columns:
-        name = column.variable
-        box = region.get(name) if name is not None else None
-        cell = "" if box is None or name is None else cells.cell(kinds[name], box)
-        if cell is None:
-            return None
-        texts.append(cell)
-    if not set(region) <= {str(c.variable) for c in table.columns} & set(map(str, table.variables)):
+    told = [cells.cell_under(column, kinds, region) for column in table.columns]
+    said = [cell for cell in told if cell is not None]
+    decided = boxes.TableBoxes.of(program, table, words)
+    if len(said) < len(told) or set(region) - frozenset().union(*(names for _, names in said)):
+        return None
+    if not set(region) <= set(decided.names):
         return None  # bounds of what only an assumption reads
-    decided = boxes.TableBoxes.of(program, table)
+    texts = [text for text, _ in said]
     decided.lines.append(dict(region.items()))
     pairs = list(decided.overlaps())
     if any(len(decided.lines) - 1 in pair for pair in pairs):

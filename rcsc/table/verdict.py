@@ -13,7 +13,7 @@ Witness: TypeAlias = Snapshot
 """A value for every test variable of the table."""
 
 Region: TypeAlias = Mapping[str, Box]
-"""Keys that some variables may have; the others are free."""
+"""Keys that some variables, or parts of words (`regions.word_bits`), may have; the others are free."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +34,13 @@ class Gap:
         witnesses: The least one, and the least outside the regions already shown.
         regions: Around each a region that no line matches.
         count: How many inputs there are, and of how many; None where nobody counted.
+        patterns: The same of the bits that some line looks at, where there are others.
     """
 
     witnesses: tuple[Witness, ...]
     regions: tuple[Region | None, ...]
     count: tuple[int, int] | None = None
+    patterns: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)

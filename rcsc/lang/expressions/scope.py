@@ -22,7 +22,7 @@ from rcsc.lang.model import (
     VariableName,
 )
 from rcsc.lang.syntax import tree
-from rcsc.lang.syntax.rows import CALL_UNDER, Cell
+from rcsc.lang.syntax.rows import BITS, CALL_UNDER, ONE_GROUP, Cell
 
 MOST_LEAVES = 10_000
 BASE_UNITS = frozenset("m mm s ms N kg deg rad Hz A V lb".split())
@@ -138,6 +138,8 @@ class Scope:
         helps = (f"did you mean `{near[0]}`?",) if near else ()
         made = self._made_by(kind, name.text, near=bool(near))
         helps = (made,) if made else helps
+        if self.cell is not None and BITS.fullmatch(name.text):
+            helps = (*helps, ONE_GROUP.format(name.text))
         if name.text in self.procedures:
             helps = (f"`{name.text}` is a procedure and has no value: {CALL_UNDER}",)
         self.report(Code.UNKNOWN_NAME, f"no {kind} is called `{name.text}`", span or name.span, *helps)

@@ -3,10 +3,12 @@
 In: a typed whole number that is never negative. Out: arithmetic that every later stage knows. A *word* has the bits of the
 greatest value of its type, numbered from 0, the least: `int 0 .. 65535` has 15 down to 0. Bits 5 and 4 of `w` are
 `w / 16 mod 4`; `w & 0b11_0000` is those, times 16; `w | 0b1` is the other bits of `w`, and 1. A mask is a conjunction, one
-test a bit, so that two masks of one word speak of the same things, however their bits are grouped.
+test a bit, so that two masks of one word speak of the same things, however their bits are grouped. Later stages find fields
+(`field_of`) and masks (`mask_of`) in such arithmetic again, whoever wrote it: proofs count over bits, C tests a mask at once.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import reduce
 
 from rcsc.diagnostics.codes import Code
@@ -14,11 +16,87 @@ from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, applied, kind_word
 from rcsc.lang.expressions.scope import Scope
-from rcsc.lang.model import Apply, Bool, Expr, Int, Literal, Value
+from rcsc.lang.model import Apply, Bool, Expr, Int, Literal, Read, ReadLocal, Select, Value
 from rcsc.lang.operator_table import Arithmetic, Op
 
 MOST_BITS = 64
 NARROWER = "head the column by a part, as `WORD[7..0]`, or write `x` for the other bits"
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """Bits `high .. low` of a word."""
+
+    word: Expr
+    high: int
+    low: int
+
+    @property
+    def whole(self) -> bool:
+        """Whether these are all bits of the word."""
+        return self.low == 0 and self.high == bits_of(self.word) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Mask:
+    """That a word has `value` where `care` has ones."""
+
+    word: Expr
+    care: int
+    value: int
+
+
+def field_of(number: Expr) -> Field | None:
+    """The bits of a variable, element or local that the number is made of; None for any other number."""
+    match number:
+        case Read() | ReadLocal() | Select() if isinstance(number.type, Int) and number.type.low >= 0:
+            return Field(number, bits_of(number) - 1, 0)
+        case Apply(op=Op.DIV | Op.MOD as op, args=(inner, Literal(value=by))) if _is_power(inner, by):
+            part, places = field_of(inner), int(by).bit_length() - 1
+            if part is None or (op is Op.DIV and part.low + places > part.high):
+                return None
+            if op is Op.DIV:
+                return replace(part, low=part.low + places)
+            return replace(part, high=min(part.high, part.low + places - 1))
+    return None
+
+
+def mask_of(condition: Expr) -> Mask | None:
+    """The mask that the condition is; None where it is none, or compares a word as a whole."""
+    match condition:
+        case Apply(op=Op.AND, args=(left, right)):
+            return _both(mask_of(left), mask_of(right))
+        case Apply(op=Op.NOT, args=(inner,)) if isinstance(inner, Apply):
+            return _opposite(mask_of(inner))
+        case Apply(op=Op.EQ | Op.NE as op, args=(inner, Literal(value=value, type=Bool()))) if isinstance(
+            inner, Apply
+        ):
+            mask = mask_of(inner)
+            return mask if bool(value) is (op is Op.EQ) else _opposite(mask)
+        case Apply(op=Op.EQ | Op.NE as op, args=(number, Literal(value=value, type=Int()))):
+            part = field_of(number)
+            if part is None or part.whole or not 0 <= value < 2 << part.high - part.low:
+                return None
+            care = (2 << part.high - part.low) - 1
+            mask = Mask(part.word, care << part.low, int(value) << part.low)
+            return mask if op is Op.EQ else _opposite(mask)
+    return None
+
+
+def _both(left: Mask | None, right: Mask | None) -> Mask | None:
+    """The mask of both; None where they are about two words, or contradict each other."""
+    if left is None or right is None or left.word != right.word:
+        return None
+    if (left.value ^ right.value) & left.care & right.care:
+        return None
+    return Mask(left.word, left.care | right.care, left.value | right.value)
+
+
+def _opposite(mask: Mask | None) -> Mask | None:
+    """The mask that holds where this one does not; None where it has more than one bit."""
+    if mask is None or mask.care.bit_count() != 1:
+        return None
+    return replace(mask, value=mask.value ^ mask.care)
 
 
 def field(scope: Scope, word: Typed, ends: tuple[int | None, int | None], span: Span) -> Typed | None:
@@ -80,7 +158,7 @@ def bitwise(scope: Scope, op: str, operands: tuple[Typed | None, Typed | None], 
     kept = number if op == "&" else ~number
     parts = [
         _by(scope, Op.MUL, _field(scope, left.expr, high, low, span), 1 << low, span)
-        for high, low in _runs(kept, _bits(left.expr))
+        for high, low in _runs(kept, bits_of(left.expr))
     ]
     if op == "|":
         parts.append(_number(number, span))
@@ -103,7 +181,7 @@ def _width(scope: Scope, word: Typed, span: Span) -> int | None:
     """How many bits it has; None (reported) where it is no word."""
     kind = word.expr.type
     if isinstance(kind, Int) and kind.low >= 0 and not kind.unit:
-        return _bits(word.expr)
+        return bits_of(word.expr)
     if not isinstance(kind, Int):
         shown = kind_word(kind)
         helps = ("write `and`, `or`",) if isinstance(kind, Bool) else ()
@@ -113,7 +191,8 @@ def _width(scope: Scope, word: Typed, span: Span) -> int | None:
     return None
 
 
-def _bits(word: Expr) -> int:
+def bits_of(word: Expr) -> int:
+    """How many bits it has, by the greatest value of its type."""
     assert isinstance(word.type, Int)
     return max(word.type.high.bit_length(), 1)
 
@@ -134,7 +213,7 @@ def _field(scope: Scope, word: Expr, high: int, low: int, span: Span) -> Expr:
         case Apply(op=Op.MOD, args=(inner, Literal(value=by))) if _is_power(inner, by):
             return _field(scope, inner, high, low, span)  # it has no more bits than the remainder
     upper = _by(scope, Op.DIV, word, 1 << low, span)
-    return upper if high >= _bits(word) - 1 else _by(scope, Op.MOD, upper, 1 << high - low + 1, span)
+    return upper if high >= bits_of(word) - 1 else _by(scope, Op.MOD, upper, 1 << high - low + 1, span)
 
 
 def _is_power(word: Expr, divisor: Value) -> bool:

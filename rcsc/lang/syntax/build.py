@@ -338,7 +338,13 @@ class Build:
     def _members(self, parts: list[Any]) -> tuple[tree.Member, ...]:
         return tuple(self._member(part) for part in parts)
 
-    def _member(self, node: ParseNode) -> tree.Member:
+    @staticmethod
+    def _groups(token: Any, span: Span) -> tree.Expr:
+        return tree.Mask("_".join(token.lower().split()), span)
+
+    def _member(self, node: Any) -> tree.Member:
+        if not isinstance(node, ParseNode):
+            return self._groups(node, self._span(node))
         if node.data != "range":
             return self.expr(node)
         low, high = node.children
@@ -409,7 +415,7 @@ class Build:
             case "equals":
                 return tree.Comparison("=", self.expr(parts[0]), span)
             case "groups":
-                return tree.Comparison("=", tree.Mask("_".join(parts[0].lower().split()), span), span)
+                return tree.Comparison("=", self._groups(parts[0], span), span)
             case "comparison":
                 return tree.Comparison(str(parts[0]), self.expr(parts[1]), span)
             case "one_of":

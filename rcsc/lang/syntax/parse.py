@@ -22,13 +22,16 @@ from rcsc.lang.syntax.expected import ELSEWHERE, expected, missing_word, operato
 from rcsc.lang.syntax.lalr import ParseLeaf, ParseNode, Tables
 from rcsc.lang.syntax.rows import (
     ACTION_WORDS,
+    BITS,
     CALL,
     CALL_UNDER,
     EMPTY_CELL,
     NAME,
     NAMED_FIELDS,
     NEW_PART,
+    ONE_GROUP,
     ORDER,
+    PARTED,
     PIECES,
     SAME_LINES,
     TO_WHOM,
@@ -336,7 +339,8 @@ class _Rows:
         ):
             if len(got) != len(want):
                 start = row.start_pos
-                helps = (NEW_PART,) if cells.conditions[0].text == "line" else (EMPTY_CELL,)
+                begins = NEW_PART if cells.conditions[0].text == "line" else EMPTY_CELL
+                helps = (begins, PARTED) if len(got) > len(want) else (begins,)
                 self.diagnostics.append(
                     _error(
                         Code.RAGGED_ROW,
@@ -354,7 +358,8 @@ class _Rows:
         if heading.subject is None:
             whole = self._parse("when", cell)
             return None if whole is None else tree.Comparison("=", whole, Span("", 0, len(cell.text)))
-        return cast("tree.Condition | None", self._parse("cell", cell))
+        helps = ONE_GROUP.format(cell.text) if BITS.fullmatch(cell.text) else ""
+        return cast("tree.Condition | None", self._parse("cell", cell, helps))
 
     def _action(self, cell: Cell, heading: tree.Heading) -> tuple[tree.Statement, ...] | tree.Comparison:
         if not cell.text:

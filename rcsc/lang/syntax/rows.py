@@ -27,6 +27,10 @@ NAMED_FIELDS = "an order to a subordinate names its fields: `{}(FIELD := VALUE)`
 TO_WHOM = "an order says to whom: `SUBORDINATE := {}(FIELD := VALUE)`"
 EMPTY_CELL = "an empty cell is `| |`, with a blank; `||` stands once in a row, between conditions and actions"
 """What helps where cells of a row are missing, or stand on the wrong side."""
+BITS = re.compile(r"(?=[01]*[xX])[01xX]+")
+"""A mask of one group, which would be a name or a number elsewhere."""
+ONE_GROUP = "bits of one group are written with `0b`: `0b{}`"
+PARTED = "`|` parts cells: values and masks are listed with `,`, conditions joined by `or` under `when`, bits put together in a procedure"
 NEW_PART = "a heading that begins another part of the table has a row `|---|` below it"
 PIECES = (
     "a row with an empty first cell goes on with the cells of the row above it; a line has its name there"

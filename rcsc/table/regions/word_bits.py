@@ -1,0 +1,250 @@
+"""Tables that look at bits of words, as boxes: a word is split into parts, each an axis of its own.
+
+In: a table, some of whose tests are made of fields and masks of a word. Out: for each such word its parts, from the greatest
+bits down, and every test as a box of parts. For `x0xx 1010` and `x1xx xxxx` a byte has eight parts of one bit; bits that a
+condition looks at together, as in a list of masks or `word[3..0] < 5`, stay together. Every value of the word is one
+choice of a value for each part, and the order of values is the order of such choices: so what is counted of parts, and the
+least of them, is what it is of words. A word whose range is not that of all its bits has no parts.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from rcsc.lang.expressions.conditions import box_of
+from rcsc.lang.expressions.words import Field, Mask, field_of, mask_of
+from rcsc.lang.interval_sets import joined, meet
+from rcsc.lang.leaves import rebuilt
+from rcsc.lang.model import (
+    Apply,
+    Box,
+    Expr,
+    Int,
+    Kind,
+    Literal,
+    Op,
+    Program,
+    Read,
+    Scalar,
+    Table,
+    Test,
+    Variable,
+    VariableName,
+    key_bounds,
+)
+from rcsc.lang.operator_table import Arithmetic
+
+MOST_TOGETHER = 12
+"""Bits of one part: what a condition says of them is tried for each value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Bits `high .. low` of a leaf."""
+
+    leaf: str
+    high: int
+    low: int
+
+    @property
+    def name(self) -> str:
+        """As a field is written; of one bit with both ends, which no element of an array has."""
+        return f"{self.leaf}[{self.high}..{self.low}]"
+
+    @property
+    def bits(self) -> int:
+        """How many they are."""
+        return self.high - self.low + 1
+
+    @property
+    def kind(self) -> Int:
+        """The values that they have as a number."""
+        return Int(0, (1 << self.bits) - 1)
+
+    @property
+    def ones(self) -> int:
+        """The word that has ones here and nowhere else."""
+        return self.kind.high << self.low
+
+    def of(self, leaf: Variable) -> Expr:
+        """The bits as a number, of the word in whole."""
+        number: Expr = Read(leaf.name, leaf.type)
+        top = key_bounds(leaf.type)[1] >> self.low
+        if self.low:
+            number = _by(Op.DIV, number, 1 << self.low, top)
+        return number if top <= self.kind.high else _by(Op.MOD, number, 1 << self.bits, self.kind.high)
+
+    @classmethod
+    def named(cls, name: str) -> "Part | None":
+        """The part with this name; None for a leaf."""
+        leaf, bracket, ends = name.rpartition("[")
+        high, dots, low = ends.removesuffix("]").partition("..")
+        return cls(leaf, int(high), int(low)) if bracket and dots else None
+
+
+Words = Mapping[str, tuple[Part, ...]]
+"""For each word that is split its parts, the greatest bits first."""
+
+
+def kind_of(kinds: Mapping[str, Scalar], name: str) -> Scalar:
+    """The kind of a leaf or of a part."""
+    part = None if name in kinds else Part.named(name)
+    return kinds[name] if part is None else part.kind
+
+
+def words_of(program: Program, table: Table) -> Words | None:
+    """The words that the table's tests take apart; None where some test is no box, of leaves or of parts."""
+    kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
+    tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
+    looked_at: dict[str, list[Test]] = {}
+    for test in tests.values():
+        looked_at.setdefault(str(test.variables[0]), []).append(test)
+    words = {leaf: _parts(leaf, kinds[leaf], of_leaf) for leaf, of_leaf in looked_at.items()}
+    split = {leaf: parts for leaf, parts in words.items() if len(parts) > 1}
+    for test in tests.values():
+        parts = split.get(str(test.variables[0]))
+        if parts is not None and boxes_of(test, parts) is None:
+            if any(other.box is None for other in looked_at[str(test.variables[0])]):
+                return None
+            del split[str(test.variables[0])]
+    whole = (test for test in tests.values() if str(test.variables[0]) not in split)
+    return split if all(test.box is not None for test in whole) else None
+
+
+def boxes_of(test: Test, parts: Sequence[Part]) -> dict[str, Box] | None:
+    """The test of a split word as a box of its parts; None where it is none."""
+    boxes: dict[str, Box] = {}
+    for condition in _conjuncts(test.condition):
+        mask = _mask(condition)
+        named = _of_mask(mask, parts) if mask is not None else _of_condition(condition, parts)
+        if named is None:
+            return None
+        for name, box in named.items():
+            boxes[name] = meet(boxes[name], box) if name in boxes else box
+    return boxes
+
+
+def mask_text(parts: Sequence[Part], region: Mapping[str, Box], high: int, low: int) -> str | None:
+    """The digits of bits `high .. low` for which the parts have what the region says; None where no mask says it."""
+    digits = ["x"] * (high + 1)
+    for part in parts:
+        box = region.get(part.name)
+        cube = None if box is None else _cube(box, part.bits)
+        if box is not None and cube is None:
+            return None
+        care, value = cube or (0, 0)
+        for place in range(part.bits):
+            if care >> place & 1:
+                if not low <= part.low + place <= high:
+                    return None
+                digits[part.low + place] = str(value >> place & 1)
+    return "".join(reversed(digits[low:]))
+
+
+def _cube(box: Box, bits: int) -> tuple[int, int] | None:
+    """The bits that all keys have alike, and their values; None where other keys have these, too."""
+    keys = [key for first, last in box for key in range(first, last + 1)]
+    alike = (1 << bits) - 1
+    for key in keys:
+        alike &= ~(key ^ keys[0])
+    return (alike, keys[0] & alike) if len(keys) == 1 << bits - alike.bit_count() else None
+
+
+# --- how a word is split ---------------------------------------------------------------
+
+
+def _parts(leaf: str, kind: Scalar, tests: Sequence[Test]) -> tuple[Part, ...]:
+    """The parts into which tests split a word, none where they are not about its bits."""
+    if not isinstance(kind, Int) or kind.low != 0 or kind.unit or (kind.high + 1).bit_count() != 1:
+        return ()
+    width = max(kind.high.bit_length(), 1)
+    together = []
+    for test in tests:
+        if len(test.variables) != 1:
+            return ()
+        for condition in _conjuncts(test.condition):
+            if _mask(condition) is None:
+                fields = list(_fields(condition))
+                if not fields:
+                    return ()
+                together.append((max(part.high for part in fields), min(part.low for part in fields)))
+    cuts = [at for at in range(width + 1) if not any(low < at <= high for high, low in together)]
+    parts = tuple(Part(leaf, high - 1, low) for low, high in pairwise(cuts))[::-1]
+    return parts if all(part.bits <= MOST_TOGETHER for part in parts) else ()
+
+
+def _conjuncts(condition: Expr) -> Iterator[Expr]:
+    match condition:
+        case Apply(op=Op.AND, args=(left, right)):
+            yield from _conjuncts(left)
+            yield from _conjuncts(right)
+        case _:
+            yield condition
+
+
+def _mask(condition: Expr) -> Mask | None:
+    """The mask that a condition is; of a word compared as a whole, too."""
+    match condition:
+        case Apply(op=Op.EQ, args=(Read(type=Int()) as word, Literal(value=value))):
+            part = field_of(word)
+            return None if part is None else Mask(word, (2 << part.high) - 1, int(value))
+    return mask_of(condition)
+
+
+def _fields(condition: Expr) -> Iterator[Field]:
+    """Every field that the condition looks at."""
+    part = field_of(condition)
+    if part is not None:
+        yield part
+    else:
+        for inner in _operands(condition):
+            yield from _fields(inner)
+
+
+def _operands(expr: Expr) -> list[Expr]:
+    operands: list[Expr] = []
+
+    def seen(operand: Expr) -> Expr:
+        operands.append(operand)
+        return operand
+
+    rebuilt(expr, seen)
+    return operands
+
+
+def _of_mask(mask: Mask, parts: Sequence[Part]) -> dict[str, Box]:
+    """What the mask says of each part that it looks at."""
+    boxes = {}
+    for part in parts:
+        care = (mask.care & part.ones) >> part.low
+        if care:
+            value = (mask.value & part.ones) >> part.low
+            keys = (key for key in range(1 << part.bits) if key & care == value)
+            boxes[part.name] = joined((key, key) for key in keys)
+    return boxes
+
+
+def _of_condition(condition: Expr, parts: Sequence[Part]) -> dict[str, Box] | None:
+    """What a condition says that looks at one part alone."""
+    fields = list(_fields(condition))
+    [part] = [part for part in parts if part.low <= fields[0].low <= part.high]
+    axis = Variable(VariableName(part.name), Kind.INPUT, part.kind, 0)
+    box = box_of(_within(condition, part), axis)
+    return None if box is None else {part.name: box}
+
+
+def _within(condition: Expr, part: Part) -> Expr:
+    """The condition with the part in place of its word."""
+    field = field_of(condition)
+    if field is None:
+        return rebuilt(condition, lambda operand: _within(operand, part))
+    number: Expr = Read(VariableName(part.name), part.kind)
+    if field.low > part.low:
+        by = 1 << field.low - part.low
+        number = _by(Op.DIV, number, by, part.kind.high // by)
+    many = 1 << field.high - field.low + 1
+    return _by(Op.MOD, number, many, many - 1) if field.high < part.high else number
+
+
+def _by(op: Arithmetic, number: Expr, by: int, most: int) -> Expr:
+    return Apply(op, (number, Literal(by, Int(by, by))), Int(0, most))
