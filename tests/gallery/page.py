@@ -16,10 +16,12 @@ ENTRIES = tuple(sorted(path.parent for path in GALLERY.glob("*/README.md")))
 NAMES = {
     "RCS401": "gap",
     "RCS402": "overlap",
+    "RCS403": "line that never matches",
     "RCS412": "index out of range",
     "RCS417": "broken invariant",
 }
-"""What one finding of a code is called; the first two are told of every table."""
+"""What one finding of a code is called."""
+ALWAYS_TOLD = ("RCS401", "RCS402")
 
 FEATURES = {
     "named sets": r"^set ",
@@ -89,19 +91,29 @@ def size(path: Path) -> str:
 
 
 def findings(path: Path) -> str:
-    """Return how many findings of each kind `rcsc check` has of a file, as `1 gap, 2 overlaps`."""
-    errors = Counter(
-        found.code.value for found in check(path).diagnostics if found.severity is Severity.ERROR
+    """Return how many findings of each kind `rcsc check` has of a file, as `1 gap, 2 overlaps`; an overlap is a pair of lines."""
+    errors = [found for found in check(path).diagnostics if found.severity is Severity.ERROR]
+    numbers = Counter(found.code.value for found in errors)
+    assert numbers.keys() <= NAMES.keys(), f"{path}: {numbers}"
+    numbers["RCS402"] = len(
+        {
+            tuple(line.name for line in witness.lines)
+            for found in errors
+            if found.code.value == "RCS402"
+            for witness in found.witnesses
+        }
     )
-    assert errors.keys() <= NAMES.keys(), f"{path}: {errors}"
-    always = [counted(errors[code], NAMES[code]) for code in ("RCS401", "RCS402")]
-    others = [counted(errors[code], NAMES[code]) for code in sorted(errors) if code > "RCS402"]
-    return ", ".join(always + others)
+    return ", ".join(
+        counted(numbers[code], name) for code, name in NAMES.items() if numbers[code] or code in ALWAYS_TOLD
+    )
 
 
 def counted(number: int, what: str) -> str:
     """Return `1 gap`, `2 gaps`."""
-    many = {"index out of range": "indexes out of range"}.get(what, f"{what}s")
+    many = {
+        "line that never matches": "lines that never match",
+        "index out of range": "indexes out of range",
+    }.get(what, f"{what}s")
     return f"{number} {what if number == 1 else many}"
 
 
