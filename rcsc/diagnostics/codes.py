@@ -509,6 +509,34 @@ class Code(StrEnum):
           table by now { first : begin  second : end }
         }
     """
+    LINE_ORDER = """RCS217: lines whose order cannot be
+
+    `above` says which line runs where two match, and is an order: no line stands above itself, directly or through others. Every line
+    stands above the DEFAULT line, which needs no word for it; and nothing could run below a line without conditions. `above all` means
+    every line but those that stand above this one, or above all, too.
+
+        input stop : bool
+        input ended : bool
+        output go : bool
+        table t {
+          | line             | stop  | ended || go    |
+          | stops above ends | true  |       || false |
+          | ends above stops |       | true  || false |
+          | runs             | false | false || true  |
+        }
+
+    error: lines stand above each other in a circle: `stops` above `ends` above `stops`
+
+        input stop : bool
+        input ended : bool
+        output go : bool
+        table t {
+          | line             | stop  | ended || go    |
+          | stops above ends | true  |       || false |
+          | ends             |       | true  || false |
+          | runs             | false | false || true  |
+        }
+    """
     KIND = """RCS301: the wrong kind of value
 
     A bool, a number, a member of an enumeration stands where another kind is wanted. Nothing converts by itself: compare (`n > 0`) to
@@ -1109,6 +1137,34 @@ class Code(StrEnum):
     such as differences of variables with large ranges or arithmetic on doubles, there is only the prover's word, which is Z3's.
     `--certify` puts it to cvc5, which has no part in the proof; `--questions DIR` writes it as SMT-LIB for any other solver. It is a
     note where the program was proved in the same run, and an error with `--strict` and for a certificate from a file (`--against`).
+    """
+    GIVES_WAY = """RCS424: lines that give way to others
+
+    A line below others (`above`) runs where it matches and none of them does. The proof and the executors see that as one condition more
+    of the line; the note shows it, and `rcsc fmt --expanded` prints the table with it. It says no more than it has to: what the line's
+    own cells exclude is left out.
+
+        input stop : bool
+        input ended : bool
+        output go : bool
+        table t {
+          | line             | stop  | ended || go    |
+          | stops above ends | true  |       || false |
+          | ends             |       | true  || false |
+          | runs             | false | false || true  |
+        }
+
+    note: 1 line of table `t` gives way to lines above
+
+        input stop : bool
+        input ended : bool
+        output go : bool
+        table t {
+          | line  | stop  | ended || go    |
+          | stops | true  |       || false |
+          | ends  | false | true  || false |
+          | runs  | false | false || true  |
+        }
     """
     STALE = """RCS501: the generated files are not fresh
 

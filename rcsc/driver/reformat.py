@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
 
@@ -13,7 +13,10 @@ from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Source, Span
 from rcsc.diff.upgrade import Upgraded, upgrade
 from rcsc.host.files import write_atomically
+from rcsc.lang.model import Program
 from rcsc.lang.project import load, project_root
+from rcsc.lang.resolve import resolve
+from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.layout import WIDTH
@@ -65,6 +68,37 @@ def reformat(
     diff = "".join(line for name in changed for line in _diff(loaded.sources[name], texts[name]))
     report = Report(tuple(sorted(diagnostics, key=sort_key)), (), loaded.sources)
     return Formatted(report, texts, diff, len(changed), (*upgraded.done, *upgraded.left))
+
+
+def expand(paths: tuple[str, ...], stdin: bytes | None, *, width: int = WIDTH) -> Formatted:
+    """The files as their tables are resolved: what `above` comes to in each line stands in a column of its own.
+
+    Nothing is written. A file whose program has errors is left out, and they are reported.
+    """
+    loaded = load(paths, stdin)
+    diagnostics = list(loaded.diagnostics)
+    texts: dict[str, str] = {}
+    for name in (name for name in loaded.given if name in loaded.files):
+        program = resolve(name, loaded)
+        if isinstance(program, Program):
+            texts[name] = format_file(_expanded(loaded.files[name], program), width)
+        else:
+            diagnostics += [diagnostic for diagnostic in program if diagnostic not in diagnostics]
+    report = Report(tuple(sorted(diagnostics, key=sort_key)), (), loaded.sources)
+    return Formatted(report, texts, "", 0)
+
+
+def _expanded(file: tree.File, program: Program) -> tree.File:
+    tables = {str(table.name): table for table in program.tables}
+    return replace(
+        file,
+        declarations=tuple(
+            expanded(declaration, tables[declaration.name.text])
+            if isinstance(declaration, tree.TableDecl)
+            else declaration
+            for declaration in file.declarations
+        ),
+    )
 
 
 def _upgraded(paths: tuple[str, ...], stdin: bytes | None, names: list[str]) -> Upgraded:

@@ -23,6 +23,7 @@ from rcsc.lang.model import (
     Bool,
     Box,
     Enum,
+    Line,
     Program,
     ProvedProgram,
     Real,
@@ -80,7 +81,9 @@ def _place(file: str, root: str) -> str:
 
 
 def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str) -> PlanTable:
-    lines = [PlanLine(line.name, line.actions, f"{file} line {line.name}") for line in table.lines]
+    lines = [
+        PlanLine(line.name, line.actions, f"{file} line {line.name}{_below(line)}") for line in table.lines
+    ]
     if table.default is not None:
         name = table.default.name
         lines.append(PlanLine(name, table.default.actions, f"{file} line {name}"))
@@ -92,6 +95,11 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
         if place in stops or (assumption.standing.checked and assumption.name in table.assumptions)
     )
     return PlanTable(table, _matcher(program, table), tuple(lines), relied, stops)
+
+
+def _below(line: Line) -> str:
+    """Name the lines that run instead where both match, for a comment; empty where there are none."""
+    return f", where none above it matches: {', '.join(line.below)}" if line.below else ""
 
 
 def _matcher(program: Program, table: Table) -> Matcher:

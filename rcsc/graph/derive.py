@@ -26,6 +26,7 @@ from rcsc.lang.model import (
     key_bounds,
     spell,
 )
+from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_condition, spell_expr
 from rcsc.relation.steps import MOST_STATES, Step, Steps, UnansweredError
@@ -63,7 +64,7 @@ def derive(
     if isinstance(chosen, Diagnostic):
         return chosen
     written = next(
-        declaration
+        expanded(declaration, table)
         for declaration in file.declarations
         if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
     )
@@ -171,7 +172,7 @@ class _Derivation:
         return heading.subject is not None and spell_expr(heading.subject) == self.steps.state.name
 
     def _columns(self) -> str:
-        left = [_heading(condition) for condition in self.written.conditions]
+        left = dict.fromkeys(_heading(condition) for condition in self.written.conditions)  # `when` once
         right = [_heading(action) for action in self.written.actions]
         return f"{' | '.join(left)} || {' | '.join(right)}".strip()
 
@@ -179,7 +180,7 @@ class _Derivation:
         """What the line's cells say, the state's left out; of these columns only where they are given."""
         cells = zip(self.written.conditions, self._row(at).conditions, strict=True)
         return [
-            labels.term(heading, cell)
+            tree.term(heading, cell)
             for column, (heading, cell) in enumerate(cells)
             if cell is not None and not self._is_state(heading) and (columns is None or column in columns)
         ]

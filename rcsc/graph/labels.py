@@ -35,20 +35,6 @@ class WordsError(Exception):
 # --- guards ------------------------------------------------------------------------------
 
 
-def term(heading: tree.Heading, cell: tree.Condition) -> tree.Expr:
-    """What a condition cell says, as an expression."""
-    if heading.subject is None:
-        assert isinstance(cell, tree.Comparison)
-        return cell.value
-    match cell:
-        case tree.Comparison(op, value):
-            return tree.Binary(op, heading.subject, value)
-        case tree.OneOf(members):
-            return tree.InSet(heading.subject, members, negated=cell.negated)
-        case tree.Between(low, high):
-            return tree.InRange(heading.subject, low, high, negated=cell.negated)
-
-
 def guard(terms: list[tree.Expr]) -> str:
     """The terms joined by `and`; "" without any."""
     return " and ".join(spell_expr(term, NEGATION) for term in terms)

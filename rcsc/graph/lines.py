@@ -11,6 +11,7 @@ from rcsc.graph import labels
 from rcsc.graph.derive import Derived
 from rcsc.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
 from rcsc.lang.model import Program, Table
+from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.relation.follow import Follow, following
 from rcsc.relation.steps import UnansweredError
@@ -28,7 +29,7 @@ def derive_lines(program: Program, table: Table, file: tree.File, options: Optio
         message = f"which lines of table `{table.name}` can follow which is not decided within the limits"
         return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
     written = next(
-        declaration
+        expanded(declaration, table)
         for declaration in file.declarations
         if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
     )
@@ -56,7 +57,7 @@ def derive_lines(program: Program, table: Table, file: tree.File, options: Optio
 
 def _terms(written: tree.TableDecl, row: tree.Row) -> dict[int, tree.Expr]:
     cells = enumerate(zip(written.conditions, row.conditions, strict=True))
-    return {at: labels.term(heading, cell) for at, (heading, cell) in cells if cell is not None}
+    return {at: tree.term(heading, cell) for at, (heading, cell) in cells if cell is not None}
 
 
 def _common(every: list[list[tree.Expr]]) -> list[tree.Expr]:

@@ -571,12 +571,16 @@ class Test:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A condition column; `variable` is its leaf where the heading is just a leaf."""
+    """A condition column; `variable` is its leaf where the heading is just a leaf.
+
+    One that is not `written` holds what `above` adds to the conditions of lines.
+    """
 
     heading: str
     subject: Expr | None  # None for `when`
     variable: VariableName | None
     span: Span = at()
+    written: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -595,6 +599,7 @@ class Line:
     Attributes:
         tests: One a condition column.
         bounds: Start and end offsets of each cell, flattened; see `cell_span`.
+        below: The lines that run instead where both match: they stand `above`. Its tests say so.
     """
 
     name: LineName
@@ -602,6 +607,7 @@ class Line:
     actions: tuple[Action, ...]
     span: Span = at()
     bounds: tuple[int, ...] = field(default=(), compare=False, repr=False)
+    below: tuple[LineName, ...] = field(default=(), compare=False)
 
     def cell_span(self, column: int) -> Span:
         """The span of the condition cell in `column` (the row's if unknown)."""

@@ -60,7 +60,7 @@ def diagnostics(
                 Code.OVERLAP, message, Label(table.span), notes=notes, witnesses=others, only_listed=True
             )
         )
-    return shown + list(_others(program, verdict, unproved))
+    return shown + list(_others(program, verdict, unproved)) + _lower(table)
 
 
 def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) -> Iterator[Diagnostic]:
@@ -99,12 +99,54 @@ def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) 
         )
 
 
+def _lower(table: Table) -> list[Diagnostic]:
+    """Show what `above` comes to, line by line."""
+    lower = [line for line in table.lines if line.below]
+    if not lower:
+        return []
+    alike: dict[tuple[tuple[str, ...], str], list[str]] = {}
+    for line in lower:
+        test = line.tests[-1]
+        if test is not None:
+            alike.setdefault((line.below, test.text), []).append(line.name)
+    notes = [
+        f"below {_names(uppers)}, only where {text}: {_names(names)}"
+        for (uppers, text), names in list(alike.items())[:MOST_NAMED]
+    ]
+    if len(alike) > MOST_NAMED:
+        notes.append(f"and others: `rcsc fmt --expanded {table.file}` shows the table without `above`")
+    many = (
+        f"{len(lower)} lines of table `{table.name}` give"
+        if len(lower) > 1
+        else f"1 line of table `{table.name}` gives"
+    )
+    return [
+        Diagnostic(
+            Code.GIVES_WAY,
+            f"{many} way to lines above",
+            Label(table.span),
+            notes=tuple(notes),
+            severity=Severity.NOTE,
+        )
+    ]
+
+
+def _names(names: Collection[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
+
+
 def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Diagnostic:
     label = Label(table.lines[line].cell_span(-1))
     name = f"line `{table.lines[line].name}` of table `{table.name}`"
     if not assuming:
         helps = ("delete the line, or correct its conditions",)
-        return Diagnostic(Code.DEAD_LINE, f"{name} can never match", label, help=helps)
+        uppers = table.lines[line].below
+        notes = (
+            (f"wherever its cells hold one of these runs, which stand above it: {_names(uppers)}",)
+            if uppers
+            else ()
+        )
+        return Diagnostic(Code.DEAD_LINE, f"{name} can never match", label, notes=notes, help=helps)
     message = f"{name} matches only where an assumption fails"
     return Diagnostic(Code.DEAD_LINE, message, label, notes=under, severity=Severity.WARNING)
 

@@ -216,7 +216,7 @@ def _said(row: str, closes: bool) -> str:
 def _line_of_boxes(program: Program, table: Table, region: Region, words: Words) -> str | None:
     """The line of a table of boxes whose cells say the region."""
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
-    told = [cells.cell_under(column, kinds, region) for column in table.columns]
+    told = [cells.cell_under(column, kinds, region) for column in _written(table)]
     said = [cell for cell in told if cell is not None]
     decided = boxes.TableBoxes.of(program, table, words)
     if len(said) < len(told) or set(region) - frozenset().union(*(names for _, names in said)):
@@ -304,7 +304,7 @@ class _Row:
 
     def _possible(self) -> Iterator[tuple[int, str, Formula]]:
         """For each column what a line says there, or its opposite, as the witness has it; and what the region says."""
-        for at, column in enumerate(self.table.columns):
+        for at, column in enumerate(_written(self.table)):
             name = column.variable
             every = dict.fromkeys(test for line in self.table.lines if (test := line.tests[at]) is not None)
             if name is not None and name in self.witness:
@@ -354,7 +354,12 @@ class _Row:
     def text(self) -> str:
         """The row, up to the `||`."""
         found: Mapping[int, str] = {at: cell.text for at, cell in self.cells.items()}
-        return " | ".join(["new", *(found.get(at, "") for at in range(len(self.table.columns)))])
+        return " | ".join(["new", *(found.get(at, "") for at in range(len(_written(self.table))))])
+
+
+def _written(table: Table) -> list[Column]:
+    """The columns in which cells can be written; they stand before those that `above` adds."""
+    return [column for column in table.columns if column.written]
 
 
 def _line_across(program: Program, table: Table, witness: Witness, region: Region) -> str | None:

@@ -9,7 +9,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.solvers.options import Options
 from tests.support.programs.stages import reported
 
-NOTES = {Code.DEFAULT_COVERS, Code.PROPERTY_ELSEWHERE}
+NOTES = {Code.DEFAULT_COVERS, Code.GIVES_WAY, Code.PROPERTY_ELSEWHERE}
 """Codes whose right form is the wrong one's, or that are said of what is right."""
 
 

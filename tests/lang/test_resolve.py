@@ -89,6 +89,10 @@ CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
         "input a : bool\ntable t {\n| line | a ||\n| x | DEFAULT ||\n| y | DEFAULT ||\n}",
         [(5, "RCS212", "y")],
     ),
+    "lines above each other": (
+        "input a : bool\ntable t {\n| line | a ||\n| x above y | true ||\n| y above x | true ||\n}",
+        [(4, "RCS217", "y")],
+    ),
     "owner cycle": ("owner a { b }\nowner b { a }", [(2, "RCS213", "a")]),
     "bool and int": ("state n : int 0 .. 3\ninvariant i : n = true", [(2, "RCS301", "n = true")]),
     "two enumerations": (

@@ -6,7 +6,7 @@ import click
 
 from rcsc.commands.shared.options import PATHS, piped, showing
 from rcsc.commands.shared.show import Output, finish
-from rcsc.driver.reformat import reformat
+from rcsc.driver.reformat import expand, reformat
 from rcsc.lang.syntax.layout import WIDTH
 
 
@@ -19,6 +19,7 @@ Examples:
   rcsc fmt --diff a.rcs    show what would change
   rcsc fmt --width 200     tables in a wider window
   rcsc fmt --upgrade a.rcs older forms, too, where nothing comes to mean something else
+  rcsc fmt --expanded a.rcs  what `above` comes to in each line, on standard output
   rcsc fmt - < a.rcs       from standard input to standard output""",
 )
 @PATHS
@@ -31,14 +32,32 @@ Examples:
     is_flag=True,
     help="Rewrite older forms, too, where that changes no program; say what was left.",
 )
+@click.option(
+    "--expanded",
+    is_flag=True,
+    help="Change nothing; print the files as their tables are resolved, without `above`.",
+)
 @showing
 def command(
-    paths: tuple[str, ...], only_check: bool, diff: bool, width: int, upgrade: bool, output: Output
+    paths: tuple[str, ...],
+    only_check: bool,
+    diff: bool,
+    width: int,
+    upgrade: bool,
+    expanded: bool,
+    output: Output,
 ) -> int:
     """Align tables and lay out the rest, always in the same way.
 
     What a file says stays the same, comments included; that is checked before a file is replaced.
     """
+    if expanded:
+        if only_check or diff or upgrade:
+            raise click.UsageError("--expanded prints, and goes with --width alone")
+        resolved = expand(paths or (".",), piped(paths), width=width)
+        for text in resolved.texts.values():
+            click.echo(text, nl=False)
+        return finish(resolved.report, "fmt", output, "") if resolved.report.failed else 0
     write = not (only_check or diff)
     formatted = reformat(paths or (".",), piped(paths), write=write, width=width, older=upgrade)
     for words in formatted.upgraded:

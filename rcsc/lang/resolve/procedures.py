@@ -1,5 +1,7 @@
 """Procedures, modules and extern procedures; owners; what calls what."""
 
+import keyword
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 
@@ -12,6 +14,7 @@ from rcsc.lang.leaves import everything, expressions, parts, read_by, written_by
 from rcsc.lang.model import (
     Call,
     Expr,
+    Extern,
     Kind,
     Parameter,
     Procedure,
@@ -23,11 +26,14 @@ from rcsc.lang.model import (
     pending,
 )
 from rcsc.lang.protocol.written import AFTER, BEFORE
-from rcsc.lang.resolve.externs import extern
+from rcsc.lang.reserved import C_COMPOSED, C_KEYWORDS, C_MACROS
 from rcsc.lang.resolve.statements import MOST_STATEMENTS, Statements, below, cost
 from rcsc.lang.syntax import tree
 
 MOST_CALLS = 100
+_PYTHON = re.compile(r"[a-z_]\w*(\.[a-z_]\w*)*:[a-z_]\w*", re.ASCII | re.IGNORECASE)
+_C = re.compile(r"[a-z]\w{0,62}", re.ASCII | re.IGNORECASE)
+_C_WORDS = C_KEYWORDS | C_MACROS | C_COMPOSED
 
 _Body: TypeAlias = tuple[tuple[Parameter, ...], tuple[Statement, ...]]
 
@@ -117,7 +123,7 @@ def _procedure(
             declared_reads |= {hidden for hidden, of in before.items() if of in declared_reads}
             _check_declared(scope, body[1], known, declared_reads, declared_writes)
         reads, writes = declared_reads, declared_writes
-    named = extern(scope, written) if written.kind == "extern" else None
+    named = _extern(scope, written) if written.kind == "extern" else None
     return Procedure(
         ProcedureName(written.name.text),
         body[0],
@@ -204,3 +210,23 @@ def _undeclared(scope: Scope, verb: str, extra: set[VariableName], span: Span) -
         shown = root if len(names) > 1 else names[0].removesuffix(".next")
         message = f"the module {verb} `{shown}`, which it does not name"
         scope.report(Code.UNDECLARED_ACCESS, message, span, f"add `{shown}` to its `{verb}`")
+
+
+def _extern(scope: Scope, written: tree.ProcedureDecl) -> Extern:
+    """The names that an extern procedure gives of the user's functions, after a report of each that does not fit.
+
+    Source: ISO C99, 6.4.1 (keywords) and 5.2.4.1 (63 significant characters of an internal name).
+    """
+    python, c = written.python, written.c
+    if not _PYTHON.fullmatch(python) or any(map(keyword.iskeyword, re.split("[.:]", python))):
+        message = f"`{python}` does not name a Python function"
+        scope.report(Code.EXTERN_NAME, message, written.name.span, "write `package.module:function`")
+    if not _C.fullmatch(c) or c in _C_WORDS:
+        message = f"`{c}` does not name a C function"
+        scope.report(
+            Code.EXTERN_NAME,
+            message,
+            written.name.span,
+            "write a C identifier of at most 63 characters that no library keeps",
+        )
+    return Extern(python, c)

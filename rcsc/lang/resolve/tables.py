@@ -21,6 +21,7 @@ from rcsc.lang.model import (
     Test,
     VariableName,
 )
+from rcsc.lang.resolve.precedence import with_precedence
 from rcsc.lang.resolve.statements import Statements
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import Cell
@@ -55,11 +56,12 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
             scope.report(Code.SEVERAL_DEFAULTS, "a table has at most one DEFAULT line", name_span)
         else:
             default = Default(LineName(row.name), cells.actions(row), row.unreachable, row.cells[1].span)
-    read = {name for line in lines for test in line.tests if test is not None for name in test.variables}
+    columns, resolved = with_precedence(scope, written, columns, tuple(lines))
+    read = {name for line in resolved for test in line.tests if test is not None for name in test.variables}
     return Table(
         TableName(written.name.text),
         columns,
-        tuple(lines),
+        resolved,
         default,
         tuple(VariableName(name) for name in scope.leaves if name in read),
         tuple(AssumptionName(name.text) for name in written.assuming),

@@ -133,12 +133,13 @@ def _filled_last(atoms: Sequence[str], width: int) -> list[str]:
 def table_rows(table: tree.TableDecl, width: int) -> Iterator[tuple[tree.Row | None, str]]:
     """The rows of a table, each with the line whose comments stand above it, if any."""
     columns = _columns(table)
-    names = ["line", *(row.name for row in table.rows)]
+    names = ["line", *(row.stub for row in table.rows)]
+    again = ["line", *(row.name for row in table.rows)]
     stub = max(map(len, names))
     for number, part in enumerate(_parts(columns, width - _INDENT, stub)):
         if number:
             yield None, ""
-        yield from _part(names, stub, part, () if number else table.rows)
+        yield from _part(again if number else names, stub, part, () if number else table.rows)
 
 
 def _columns(table: tree.TableDecl) -> list[_Column]:

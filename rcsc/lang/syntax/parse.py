@@ -26,19 +26,22 @@ from rcsc.lang.syntax.rows import (
     CALL,
     CALL_UNDER,
     EMPTY_CELL,
-    NAME,
+    MARKS,
     NAMED_FIELDS,
     NEW_PART,
     ONE_GROUP,
     ORDER,
     PARTED,
     PIECES,
+    PLAIN,
     SAME_LINES,
+    STUB,
     TO_WHOM,
     Cell,
     Cells,
     cut,
     joined,
+    marked,
     parts,
 )
 
@@ -232,8 +235,10 @@ class _Rows:
         cells = self._whole(rows)
         if cells is None or not self._even(rows[0], cells, head, "the heading"):
             return None
-        if not NAME.match(cells.conditions[0].text):
-            self._report(Code.SYNTAX, "a line needs a name of letters, digits and `_`", cells.conditions[0])
+        stub = cells.conditions[0]
+        if not STUB.match(stub.text):
+            helps = (MARKS,) if " " in stub.text else ()
+            self._report(Code.SYNTAX, "a line needs a name of letters, digits and `_`", stub, *helps)
         comments = tuple(words(text) for row in rows for text in self.comments.take(row.start_pos))
         return _Line(rows[0].start_pos, cells.all[-1].span.end, cells, comments)
 
@@ -265,9 +270,12 @@ class _Rows:
     def _across(self, read: list[list[_Line]], heads: list[Cells]) -> list[_Line]:
         """The lines, each with its cells of all parts; none where a part names others."""
         first = read[0]
-        names = [line.cells.conditions[0].text for line in first]
+        names = [marked(line.cells.conditions[0])[0].text for line in first]
         for head, part in zip(heads[1:], read[1:], strict=True):
-            given = [line.cells.conditions[0].text for line in part]
+            given = [marked(line.cells.conditions[0])[0].text for line in part]
+            for stub in (line.cells.conditions[0] for line in part):
+                if marked(stub)[1]:
+                    self._report(Code.GOES_ON, "`above` stands in a further part of the table", stub, PLAIN)
             if given != names and not self.diagnostics:
                 at = next(
                     (at for at, pair in enumerate(zip(given, names, strict=False)) if pair[0] != pair[1]),
@@ -304,7 +312,8 @@ class _Rows:
     def _row(
         self, line: _Line, conditions: tuple[tree.Heading, ...], actions: tuple[tree.Heading, ...]
     ) -> tree.Row:
-        name, *tests = (cell.blank() for cell in line.cells.conditions)
+        stub, *tests = (cell.blank() for cell in line.cells.conditions)
+        name, above = marked(stub)
         default = bool(tests) and _says_default(tests[0])
         for cell in tests[1:]:
             if default and cell.text:
@@ -327,8 +336,9 @@ class _Rows:
             default,
             default and tests[0].text.endswith("unreachable"),
             Span(self.source.name, line.start, line.end),
-            line.cells.all,
+            (name, *line.cells.all[1:]),
             line.comments,
+            tuple(tree.Name(lower.text, lower.span) for lower in above),
         )
 
     def _even(self, row: ParseLeaf, cells: Cells, other: Cells, called: str) -> bool:

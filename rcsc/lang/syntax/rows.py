@@ -17,7 +17,9 @@ ACTION_WORDS = frozenset({"procedures", "command_out", "status_out"})
 SEPARATOR = re.compile(r"\|[\s|:-]*-[\s|:-]*$")
 GOES_ON = re.compile(r"\|[ \t]*\|")
 AGAIN = re.compile(r"\|[ \t]*line[ \t]*\|")
-NAME = re.compile(r"[A-Za-z0-9_]+$")
+STUB = re.compile(r"(?P<name>\w+)(?P<marks>(\s+above\s+\w+(\s*,\s*\w+)*)?)$", re.ASCII)
+"""The first cell of a line: its name, and the lines above which it stands."""
+MARKS = "after a line's name may stand `above LINE, LINE`, or `above all`"
 CALL = re.compile(r"(?!(?:abs|min|max|int|real|not)\b)[A-Za-z_][A-Za-z0-9_]*\s*\(|[^=]*:=")
 """What looks like a call or an assignment, and stands perhaps where a value should."""
 CALL_UNDER = "a call or an assignment stands under `procedures`, `command_out` or `status_out`"
@@ -36,6 +38,7 @@ PIECES = (
     "a row with an empty first cell goes on with the cells of the row above it; a line has its name there"
 )
 SAME_LINES = "each part of a table has a row for each line, in the same order"
+PLAIN = "how a line stands to others is said where it is named first; further parts of the table repeat its name alone"
 _Row = TypeVar("_Row", bound=str)
 
 
@@ -81,6 +84,14 @@ class Cell:
         """The cell, without the `-` that may stand in an empty one."""
         return replace(self, text="") if self.text == "-" else self
 
+    def part(self, start: int, end: int) -> "Cell":
+        """Some characters of the first piece, as a cell.
+
+        >>> Cell("halted above ready", "a.rcs", 40).part(13, 18)
+        Cell(text='ready', file='a.rcs', start=53, further=())
+        """
+        return Cell(self.text[start:end], self.file, self.start + start)
+
     def with_piece(self, piece: "Cell") -> "Cell":
         """The cell with one piece more; a blank between, but after `_` and `.`.
 
@@ -91,6 +102,22 @@ class Cell:
         """
         before = self.text if self.text.endswith(("_", ".")) else f"{self.text} "
         return Cell(before + piece.text, self.file, self.start, (*self.further, (len(before), piece.start)))
+
+
+def marked(cell: Cell) -> tuple[Cell, tuple[Cell, ...]]:
+    """The name in the first cell of a line, and the lines above which it stands; the cell alone where it is no such thing.
+
+    >>> name, above = marked(Cell("halted above ready, idle", "a.rcs", 0))
+    >>> name.text, [(line.text, line.start) for line in above]
+    ('halted', [('ready', 13), ('idle', 20)])
+    """
+    stub = STUB.match(cell.text)
+    if stub is None:
+        return cell, ()
+    words = [
+        cell.part(*word.span()) for word in re.finditer(r"\w+", cell.text) if word.start() >= stub.end("name")
+    ]
+    return cell.part(*stub.span("name")), tuple(words[1:])
 
 
 @dataclass(frozen=True, slots=True)

@@ -426,6 +426,7 @@ class Row:
         cells: Where each cell stands: name, conditions, actions.
         default: Whether this is the DEFAULT line; then all conditions are None.
         unreachable: `DEFAULT unreachable`.
+        above: The lines before which it goes where both match; `all` is every other.
     """
 
     name: str
@@ -436,6 +437,13 @@ class Row:
     span: Span = at()
     cells: tuple[Cell, ...] = field(default=(), compare=False, repr=False)
     comments: tuple[str, ...] = ()
+    above: tuple[Name, ...] = ()
+
+    @property
+    def stub(self) -> str:
+        """The first cell: the name, and how the line stands to others."""
+        names = ", ".join(name.text for name in self.above)
+        return f"{self.name} above {names}" if names else self.name
 
 
 @dataclass(frozen=True, slots=True)
@@ -744,3 +752,17 @@ class File:
 def absolute(relative: Span, cell: Cell) -> Span:
     """The span in the file of a node inside a table cell."""
     return cell.at(relative.start, relative.end)
+
+
+def term(heading: Heading, cell: Condition) -> Expr:
+    """What a condition cell says, as an expression."""
+    if heading.subject is None:
+        assert isinstance(cell, Comparison)
+        return cell.value
+    match cell:
+        case Comparison(op, value):
+            return Binary(op, heading.subject, value)
+        case OneOf(members):
+            return InSet(heading.subject, members, negated=cell.negated)
+        case Between(low, high):
+            return InRange(heading.subject, low, high, negated=cell.negated)

@@ -213,7 +213,10 @@ def tables(draw: st.DrawFn) -> tree.TableDecl:
         )
         done = tuple(draw(_cells()) if h.subject is None else _value(draw) for h in actions)
         unreachable = default and draw(st.booleans())
-        rows.append(tree.Row(f"l{number}", conditions_, done, default, unreachable, comments=draw(WORDS)))
+        above = draw(FEW)
+        rows.append(
+            tree.Row(f"l{number}", conditions_, done, default, unreachable, comments=draw(WORDS), above=above)
+        )
     assuming = draw(FEW)
     return tree.TableDecl(
         draw(NAMES), assuming, headings, actions, tuple(rows), comments=draw(WORDS), doc=draw(DOCS)

@@ -95,7 +95,10 @@ def parted_and_broken(text: str, random: Random) -> str:
         if parts[-1] and (parts[-1][-1][0] > place[0] or random.random() < 0.3):
             parts.append([])
         parts[-1].append(place)
-    shown = [_part_rows(split, part, random) for part in parts]
+    names = [
+        [[left[0].split()[0], *left[1:]], right] for left, right in split
+    ]  # in further parts without `above`
+    shown = [_part_rows(names if at else split, part, random) for at, part in enumerate(parts)]
     head, *below = shown[0]
     result = [*lines[:first], *head]
     bodies = iter(below)

@@ -1,0 +1,383 @@
+"""Which line runs where two match, where the table says it: `above`, resolved into conditions.
+
+In: a table as written, and its lines. Out: the lines, each with one test more where others stand above it: that none of these matches.
+So every later stage sees a table in which order plays no part. `above` is an order: what stands above a line stands above all that this
+line stands above, and nothing above itself. A line runs where it matches and none above it does; there is one wherever any
+matches, so nothing falls into a gap by it.
+
+The test says no more than it has to: of the upper line's conditions those that the lower one's do not imply, and nothing
+where the two never meet. Where `stop` (called = stop) stands above `ended` (now = starting, done = true), `ended` gets `called /= stop`.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import reduce
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Label
+from rcsc.diagnostics.source import Source, Span
+from rcsc.lang.expressions.conditions import box_of
+from rcsc.lang.expressions.scope import Scope
+from rcsc.lang.expressions.words import Mask, mask_of
+from rcsc.lang.interval_sets import meet
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import Apply, Bool, Box, Column, Expr, Line, LineName, Op, Real, Table, Test, key_bounds
+from rcsc.lang.operator_table import NEGATION, OPPOSITE
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.parse import parse
+from rcsc.lang.syntax.rows import Cell
+from rcsc.lang.syntax.spell import spell_expr
+
+ALL = "all"
+"""What stands for every line but those that stand above this one, or above all, too."""
+_OPPOSITE = {str(op.value): str(other.value) for op, other in OPPOSITE.items()}
+
+
+def with_precedence(
+    scope: Scope, written: tree.TableDecl, columns: tuple[Column, ...], lines: tuple[Line, ...]
+) -> tuple[tuple[Column, ...], tuple[Line, ...]]:
+    """The columns and lines, with a column for what the lines above a line add to it; what is wrong is reported."""
+    if not any(row.above for row in written.rows):
+        return columns, lines
+    below = _below(scope, written)
+    if scope.diagnostics:
+        return columns, lines
+    always = [
+        line
+        for line in lines
+        if not any(line.tests) and any(line.name in uppers for uppers in below.values())
+    ]
+    for line in always:
+        what = f"line `{line.name}` matches every input: no line below it could ever match"
+        scope.report(Code.LINE_ORDER, what, line.cell_span(-1))
+    if always:
+        return columns, lines
+    known = _Lines(scope, written, lines)
+    resolved = [known.given(at, below[line.name]) for at, line in enumerate(lines)]
+    if not any(line.below for line in resolved):
+        return columns, lines
+    column = Column("when", None, None, written.name.span, written=False)
+    return (*columns, column), tuple(resolved)
+
+
+def expanded(written: tree.TableDecl, table: Table) -> tree.TableDecl:
+    """The table as it is resolved: without `above`, and with a column for what it comes to."""
+    rows = tuple(replace(row, above=()) for row in written.rows)
+    if all(column.written for column in table.columns):
+        return replace(written, rows=rows)
+    added = {line.name: line.tests[-1] for line in table.lines}
+    nowhere = Cell("", "", 0)
+    split = 1 + len(written.conditions)
+    return replace(
+        written,
+        conditions=(*written.conditions, tree.Heading(None, "when", Cell("when", "", 0))),
+        rows=tuple(
+            replace(
+                row,
+                conditions=(*row.conditions, _condition(added.get(LineName(row.name)))),
+                cells=(*row.cells[:split], nowhere, *row.cells[split:]),
+            )
+            for row in rows
+        ),
+    )
+
+
+def _condition(test: Test | None) -> tree.Condition | None:
+    """A test as a cell under `when`."""
+    if test is None:
+        return None
+    parsed = parse(Source("", f"assume it : {test.text}"))
+    assert isinstance(parsed, tree.File)
+    [claim] = parsed.declarations
+    assert isinstance(claim, tree.AssumeDecl)
+    return tree.Comparison("=", claim.condition)
+
+
+# --- the order ---------------------------------------------------------------------------
+
+
+def _below(scope: Scope, written: tree.TableDecl) -> dict[str, set[str]]:
+    """For each line those that stand above it; what names no line, or goes in a circle, is reported."""
+    named = {row.name: list(_named(scope, written, row)) for row in written.rows}
+    circle = _circle(named)
+    if circle:
+        _report_circle(scope, written, circle)
+        return {}
+    above = {name: _reached(name, named) for name in named}
+    whole = {row.name for row in written.rows if any(lower.text == ALL for lower in row.above)}
+    for name in whole:
+        above[name] |= {other for other in named if other not in whole and name not in above[other]}
+    circle = _circle({name: sorted(lower) for name, lower in above.items()})
+    if circle:
+        _report_circle(scope, written, circle)
+        return {}
+    closed = {name: _reached(name, above) for name in above}
+    return {name: {upper for upper, lower in closed.items() if name in lower} for name in closed}
+
+
+def _named(scope: Scope, written: tree.TableDecl, row: tree.Row) -> Iterator[str]:
+    """The lines that a row names after `above`, without `all`."""
+    rows = {other.name: other for other in written.rows}
+    for lower in row.above:
+        other = rows.get(lower.text)
+        if row.default:
+            what = f"the DEFAULT line `{row.name}` runs where no other matches: it stands above none"
+            scope.report(Code.LINE_ORDER, what, lower.span)
+        elif lower.text == ALL and other is None:
+            continue
+        elif lower.text == ALL:
+            what = f"`{ALL}` means every other line, and there is a line of that name"
+            scope.report(Code.LINE_ORDER, what, lower.span, "call the line something else")
+        elif other is None:
+            scope.unknown(
+                f"line of table `{written.name.text}`", lower, [name for name in rows if name != row.name]
+            )
+        elif other is row:
+            scope.report(Code.LINE_ORDER, f"line `{row.name}` stands above itself", lower.span)
+        elif other.default:
+            what = f"`{other.name}` is the DEFAULT line: every line stands above it"
+            scope.report(Code.LINE_ORDER, what, lower.span, f"leave `{other.name}` out")
+        else:
+            yield lower.text
+
+
+def _reached(name: str, edges: "dict[str, list[str]] | dict[str, set[str]]") -> set[str]:
+    """What can be reached from a line."""
+    reached: set[str] = set()
+    waiting = [name]
+    while waiting:
+        for lower in edges[waiting.pop()]:
+            if lower not in reached:
+                reached.add(lower)
+                waiting.append(lower)
+    return reached
+
+
+def _circle(edges: dict[str, list[str]]) -> list[str]:
+    """A shortest circle, its first line at both ends; empty where there is none."""
+    circles = [path for name in edges if (path := _back(name, edges))]
+    return min(circles, key=len, default=[])
+
+
+def _back(name: str, edges: dict[str, list[str]]) -> list[str]:
+    """A shortest way from a line back to it; empty where there is none."""
+    came: dict[str, str] = {}
+    waiting = [name]
+    for at in waiting:
+        for lower in edges[at]:
+            if lower == name:
+                path = [name, at]
+                while path[-1] != name:
+                    path.append(came[path[-1]])
+                return [*reversed(path)] if at != name else [name, name]
+            if lower not in came:
+                came[lower] = at
+                waiting.append(lower)
+    return []
+
+
+def _report_circle(scope: Scope, written: tree.TableDecl, circle: list[str]) -> None:
+    rows = {row.name: row for row in written.rows}
+    first, *others = (rows[name] for name in circle[:-1])
+    what = f"lines stand above each other in a circle: {' above '.join(f'`{name}`' for name in circle)}"
+    related = tuple(Label(_marks(row), "and here") for row in others)
+    scope.report(Code.LINE_ORDER, what, _marks(first), "take one of these out", related=related)
+
+
+def _marks(row: tree.Row) -> Span:
+    """Where a row says above what it stands."""
+    return Span(row.above[0].span.file, row.above[0].span.start, row.above[-1].span.end)
+
+
+# --- conditions --------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class _Lines:
+    """The lines of a table, to tell what those above a line add to it.
+
+    Attributes:
+        boxes: For each line the keys that it may have, by leaf.
+        masks: For each line the masks of its words.
+        shared: Each test that was made, by its condition: lines that say the same share it.
+    """
+
+    scope: Scope
+    written: tree.TableDecl
+    lines: tuple[Line, ...]
+    boxes: list[dict[str, Box]] = field(init=False)
+    masks: list[list[Mask]] = field(init=False)
+    rows: dict[str, tree.Row] = field(init=False)
+    shared: dict[Expr, Test] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Works out the boxes."""
+        self.boxes = [self._box(line) for line in self.lines]
+        self.masks = [
+            [
+                mask
+                for test in line.tests
+                if test is not None and (mask := mask_of(test.condition)) is not None
+            ]
+            for line in self.lines
+        ]
+        self.rows = {row.name: row for row in self.written.rows}
+
+    def _box(self, line: Line) -> dict[str, Box]:
+        boxes: dict[str, Box] = {}
+        for test in line.tests:
+            if test is not None and test.box is not None:
+                boxes[test.variables[0]] = meet(boxes.get(test.variables[0], test.box), test.box)
+        return boxes
+
+    def given(self, at: int, above: set[str]) -> Line:
+        """The line, with a test that none of these lines matches; its place is that of the line's name."""
+        line = self.lines[at]
+        left = dict(self._meeting(at, above))
+        split = 2 * (1 + len(line.tests))
+        return replace(
+            line,
+            tests=(*line.tests, self._none_of(left) if left else None),
+            bounds=(*line.bounds[:split], *line.bounds[:2], *line.bounds[split:]),
+            below=tuple(self.lines[upper].name for upper in left),
+        )
+
+    def _meeting(self, at: int, above: set[str]) -> Iterator[tuple[int, tuple[int, ...]]]:
+        """Each of the lines above that can meet a line, with the columns of its tests that the line does not imply."""
+        for upper, other in enumerate(self.lines):
+            if other.name not in above or self._apart(at, upper):
+                continue
+            stated = [column for column, test in enumerate(other.tests) if test is not None]
+            yield (
+                upper,
+                tuple(column for column in stated if not self._implied(at, other.tests[column]))
+                or tuple(stated),
+            )
+
+    def _apart(self, at: int, upper: int) -> bool:
+        """Whether two lines never match together, as far as it can be seen in cells."""
+        boxes, masks = self.boxes[at], self.masks[at]
+        return any(
+            not meet(box, boxes[leaf]) for leaf, box in self.boxes[upper].items() if leaf in boxes
+        ) or any(
+            (mask.value ^ mine.value) & mask.care & mine.care
+            for mask in self.masks[upper]
+            for mine in masks
+            if mine.word == mask.word
+        )
+
+    def _implied(self, at: int, test: Test | None) -> bool:
+        """Whether a test holds wherever the line matches, as far as it can be seen in cells."""
+        if test is None or test in self.lines[at].tests:
+            return True
+        if test.box is None:
+            mask = mask_of(test.condition)
+            return mask is not None and any(
+                mine.word == mask.word
+                and mine.care & mask.care == mask.care
+                and mine.value & mask.care == mask.value
+                for mine in self.masks[at]
+            )
+        leaf = test.variables[0]
+        mine = self.boxes[at].get(leaf, (key_bounds(self.scope.leaves[leaf].type),))
+        return meet(mine, test.box) == mine
+
+    def _none_of(self, uppers: dict[int, tuple[int, ...]]) -> Test:
+        """The test that none of these lines matches, of which these columns count."""
+        condition = _all_of(
+            [
+                Apply(Op.NOT, (_all_of([test.condition for test in self._tests(upper, columns)]),), Bool())
+                for upper, columns in uppers.items()
+            ]
+        )
+        if condition not in self.shared:
+            words = _merged(
+                [
+                    (self._words(upper, columns), self._of_one_leaf(upper, columns))
+                    for upper, columns in uppers.items()
+                ]
+            )
+            text = " and ".join(dict.fromkeys(spell_expr(word, NEGATION) for word in words))
+            names = tuple(sorted(set(read_by(condition)), key=self.scope.order))
+            box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
+            self.shared[condition] = Test(text, condition, names, box)
+        return self.shared[condition]
+
+    def _tests(self, upper: int, columns: Sequence[int]) -> list[Test]:
+        tests = self.lines[upper].tests
+        return [test for column in columns if (test := tests[column]) is not None]
+
+    def _of_one_leaf(self, upper: int, columns: Sequence[int]) -> bool:
+        """Whether these columns compare one leaf with constants."""
+        return len(columns) == 1 and all(test.box is not None for test in self._tests(upper, columns))
+
+    def _words(self, upper: int, columns: Sequence[int]) -> tree.Expr:
+        """That the cells of these columns do not hold, as it would be written."""
+        row = self.rows[self.lines[upper].name]
+        terms = [
+            tree.term(self.written.conditions[column], cell)
+            for column in columns
+            if (cell := row.conditions[column]) is not None
+        ]
+        if len(terms) == 1:
+            [test] = self._tests(upper, columns)
+            kinds = [self.scope.leaves[name].type for name in test.variables]
+            return _other(terms[0], ordered=not any(isinstance(kind, Real) for kind in kinds))
+        return tree.Unary("not", reduce(lambda left, right: tree.Binary("and", left, right), terms))
+
+
+def _all_of(conditions: Sequence[Expr]) -> Expr:
+    return reduce(lambda left, right: Apply(Op.AND, (left, right), Bool()), conditions)
+
+
+def _merged(words: Sequence[tuple[tree.Expr, bool]]) -> list[tree.Expr]:
+    """The conditions; those that exclude constants of one subject as one: `a not in {x, y}` for `a /= x`, `a /= y`.
+
+    Each comes with whether it compares with constants: a set has no others.
+    """
+    merged: list[tuple[tree.Expr, bool]] = []
+    for word, constant in words:
+        for at, (other, also) in enumerate(merged):
+            whole = _excluded(other, word) if constant and also else None
+            if whole is not None:
+                merged[at] = whole, True
+                break
+        else:
+            merged.append((word, constant))
+    return [word for word, _ in merged]
+
+
+def _excluded(first: tree.Expr, second: tree.Expr) -> tree.Expr | None:
+    """What excludes all that two conditions exclude of one subject; None where one of them does something else."""
+    match _excluding(first), _excluding(second):
+        case (subject, members), (other, more) if subject == other:
+            every = tuple(dict.fromkeys((*members, *more)))
+            return first if every == members else tree.InSet(subject, every, negated=True)
+    return None
+
+
+def _excluding(word: tree.Expr) -> tuple[tree.Expr, tuple[tree.Member, ...]] | None:
+    """The subject of a condition that excludes constants, and these."""
+    match word:
+        case tree.Binary("/=", subject, tree.Reference() | tree.IntLiteral() | tree.Mask() as value):
+            return subject, (value,)
+        case tree.InSet(subject, members, negated=True):
+            return subject, members
+    return None
+
+
+def _other(expr: tree.Expr, *, ordered: bool) -> tree.Expr:
+    """The opposite of a condition; comparisons turn where neither side can be a NaN."""
+    match expr:
+        case tree.Unary("not", operand):
+            return operand
+        case tree.Binary("=", left, tree.BoolLiteral(value)):
+            return tree.Binary("=", left, tree.BoolLiteral(not value))
+        case tree.Binary("=" | "/=" as op, left, right):
+            return tree.Binary(_OPPOSITE[op], left, right)
+        case tree.Binary(op, left, right) if ordered and op in _OPPOSITE:
+            return tree.Binary(_OPPOSITE[op], left, right)
+        case tree.InSet() | tree.InRange():
+            return replace(expr, negated=not expr.negated)
+        case _:
+            return tree.Unary("not", expr)

@@ -1,0 +1,358 @@
+"""`above`: a line runs where it matches and none above it does; nothing else changes."""
+
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.diagnostics.diagnostic import Severity
+from rcsc.diagnostics.source import Source
+from rcsc.driver.reformat import expand
+from rcsc.lang.interpret import matching_lines
+from rcsc.lang.model import Bool, Enum, Int, Program, Value, key_bounds
+from rcsc.lang.resolve import compile_text
+from rcsc.lang.resolve.precedence import expanded
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
+from rcsc.lang.syntax.rows import MARKS
+from tests.support.programs.stages import codes, program_of, refused, reported
+from tests.support.programs.texts import edited
+
+HEAD = """
+enum call { none, stop, hold }
+set ends : call = {stop}
+input called : call
+input done : bool
+input near : int 0 .. 3
+input far : int 0 .. 3
+state now : bool
+"""
+MACHINE = f"""{HEAD}
+table unit {{
+  | line                 | called | done | near - far | when           || now   |
+  |----------------------|--------|------|------------|----------------||-------|
+  | ended                |        | true |            |                || true  |
+  | stop above all       | stop   |      |            |                || false |
+  | hold above ended     | hold   |      |            |                || false |
+  | wide above hold      |        | true | > 1        |                || false |
+  | odd above ended, wide|        | true |            | near + far = 5 || true  |
+  | rest                 | none   | false|            |                || now   |
+}}
+"""
+CELLS = {
+    "called": ["stop", "in {none, hold}", "/= none", "in ends"],
+    "done": ["true", "false"],
+    "near": ["<= 1", "2", "not in 1 .. 2", "far"],
+    "near + far": ["> 2", "/= 3", "in {1, 5}"],
+    "when": ["near < far", "done or near = 0", "not (called = hold)", "near in 1 .. 2 implies done"],
+}
+
+
+def snapshots(program: Program) -> Iterator[dict[str, Value]]:
+    """Every input; states are as they begin."""
+    read = [v for v in program.variables if v.name in program.tables[0].variables]
+    free = {str(v.name): v.initial for v in program.variables}
+    for keys in product(*(range(key_bounds(v.type)[0], key_bounds(v.type)[1] + 1) for v in read)):
+        assert all(isinstance(v.type, Bool | Enum | Int) for v in read)
+        given = {
+            str(v.name): bool(key) if isinstance(v.type, Bool) else key
+            for v, key in zip(read, keys, strict=True)
+        }
+        yield free | given
+
+
+def drawn(random: Random) -> tuple[str, list[str], dict[str, set[str]]]:
+    """A table, the names of its lines, and for each line those that stand above it."""
+    columns = random.sample(sorted(CELLS), random.randint(1, 3))
+    names = [f"l{number}" for number in range(random.randint(2, 5))]
+    order = random.sample(names, len(names))
+    above = {
+        name: {lower for lower in order[at + 1 :] if random.random() < 0.4} for at, name in enumerate(order)
+    }
+    whole = order[0] if random.random() < 0.3 else ""
+    if whole:
+        above[whole] = set(order[1:])
+    rows = []
+    for name in names:
+        cells = [random.choice(["", *CELLS[column]]) for column in columns]
+        if not any(cells):
+            cells[0] = CELLS[columns[0]][0]
+        marks = "all" if name == whole else ", ".join(sorted(above[name]))
+        rows.append(f"| {name}{' above ' * bool(marks)}{marks} | {' | '.join(cells)} || now |")
+    text = "\n".join(["table t {", f"| line | {' | '.join(columns)} || now |", *rows, "}"])
+    for upper in reversed(order):  # closed from below
+        above[upper] |= {more for lower in above[upper] for more in above[lower]}
+    return HEAD + text, names, {name: {upper for upper in names if name in above[upper]} for name in names}
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_line_runs_where_it_matches_and_none_above_it_does(seed: int) -> None:
+    text, names, uppers = drawn(Random(seed))  # noqa: S311 - a draw that repeats
+    program = program_of(text)
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File)
+    plain = program_of(
+        format_file(tree.File(tuple(
+            tree.TableDecl(d.name, d.assuming, d.conditions, d.actions, tuple(tree.Row(r.name, r.conditions, r.actions) for r in d.rows))
+            if isinstance(d, tree.TableDecl) else d for d in parsed.declarations
+        )))
+    )  # fmt: skip
+    text = format_file(tree.File(tuple(
+        expanded(d, program.tables[0]) if isinstance(d, tree.TableDecl) else d for d in parsed.declarations
+    )))  # fmt: skip
+    shown = compile_text(text)
+    if not isinstance(shown, Program):  # a line wholly below others
+        assert set(codes(shown)) == {"RCS314"}
+        shown = program
+    for snapshot in snapshots(plain):
+        raw = matching_lines(plain.tables[0], snapshot)
+        runs = [name for name in names if name in raw and not uppers[name].intersection(raw)]
+        assert matching_lines(program.tables[0], snapshot) == runs
+        assert matching_lines(shown.tables[0], snapshot) == runs
+        assert bool(runs) == bool(raw)  # never a gap that was not there
+
+
+def test_what_it_comes_to_is_the_least_that_parts_the_lines_and_is_shown() -> None:
+    program = program_of(MACHINE)
+    lines = {
+        line.name: (line.tests[-1] and line.tests[-1].text, line.below) for line in program.tables[0].lines
+    }
+    assert lines == {
+        "ended": ("called not in {stop, hold} and near - far <= 1 and near + far /= 5", ("stop", "hold", "wide", "odd")),
+        "stop": (None, ()),
+        "hold": ("not (done = true and near - far > 1) and not (done = true and near + far = 5)", ("wide", "odd")),
+        "wide": ("called /= stop and near + far /= 5", ("stop", "odd")),
+        "odd": ("called /= stop", ("stop",)),
+        "rest": (None, ()),
+    }  # fmt: skip
+    [note] = [found for found in reported(MACHINE) if found.code.value == "RCS424"]
+    assert note.severity is Severity.NOTE
+    assert "below `stop`, only where called /= stop: `odd`" in note.notes
+
+
+def test_lines_that_give_way_alike_share_one_test() -> None:
+    [table] = program_of(f"""{HEAD}
+table t {{
+  | line         | called | near || now |
+  | a            | none   | 0    || now |
+  | b            | hold   | 0    || now |
+  | top above all|        | > 2  || now |
+  | c above a    | none   | < 2  || now |
+}}""").tables
+    assert [line.below for line in table.lines] == [("c",), (), (), ()]  # `> 2` meets none of them
+    [one, two] = (
+        program_of(f"""{HEAD}
+table t {{
+  | line          | called | done || now |
+  | a             | none   |      || now |
+  | b             | hold   |      || now |
+  | top above all |        | true || now |
+}}""")
+        .tables[0]
+        .lines[:2]
+    )
+    assert one.tests[-1] is two.tests[-1] is not None
+
+
+def test_the_cells_of_a_line_keep_their_places() -> None:
+    for line in program_of(MACHINE).tables[0].lines:
+        for column, test in enumerate(line.tests[:-1]):
+            span = line.cell_span(column)
+            assert MACHINE[span.start : span.end] == ("" if test is None else test.text)
+        assert line.cell_span(-1) == line.cell_span(len(line.tests) - 1)
+        span = line.cell_span(-1)
+        assert MACHINE[span.start : span.end] == line.name
+
+
+def test_all_is_every_line_but_those_above_or_above_all() -> None:
+    [table] = program_of(f"""{HEAD}
+table t {{
+  | line             | called | done | near || now |
+  | one above all    | stop   |      |      || now |
+  | low              |        | true |      || now |
+  | two above all    | hold   |      |      || now |
+  | top above one    |        |      | 0    || now |
+}}""").tables
+    assert {line.name: set(line.below) for line in table.lines} == {
+        "low": {"one", "two", "top"},
+        "one": {"top"},
+        "two": set(),
+        "top": {"two"},
+    }
+
+
+NO_NAME = "a line needs a name of letters, digits and `_`"
+
+
+@pytest.mark.parametrize(
+    ("cell", "what", "helps"),
+    [
+        ("ended above stops", "no line of table `unit` is called `stops`", "did you mean `stop`?"),
+        ("ended above ended", "line `ended` stands above itself", ""),
+        ("ended above hold", "lines stand above each other in a circle: `ended` above `hold` above `ended`", "take one of these out"),
+        ("ended above odd", "lines stand above each other in a circle: `ended` above `odd` above `ended`", "take one of these out"),
+        ("ended above hold,", NO_NAME, MARKS),
+        ("ended over hold", NO_NAME, MARKS),
+    ],
+)  # fmt: skip
+def test_an_order_that_cannot_be_is_refused_at_its_place(cell: str, what: str, helps: str) -> None:
+    text = edited(MACHINE, ("| ended                ", f"| {cell} "))
+    found = refused(text)
+    assert found[0].message == what
+    assert found[0].help == ((helps,) if helps else ())
+    span = found[0].primary.span
+    assert text[span.start : span.end] in cell
+
+
+@pytest.mark.parametrize(
+    ("rows", "what"),
+    [
+        (["a above rest | stop", "rest | DEFAULT"], "`rest` is the DEFAULT line: every line stands above it"),
+        (["a | stop", "rest above a | DEFAULT"], "the DEFAULT line `rest` runs where no other matches: it stands above none"),
+        (["a above all | stop", "all | hold"], "`all` means every other line, and there is a line of that name"),
+        (["a above b | ", "b | stop"], "line `a` matches every input: no line below it could ever match"),
+    ],
+)  # fmt: skip
+def test_default_and_lines_that_match_everything_stand_above_none(rows: list[str], what: str) -> None:
+    body = "\n".join(f"| {row} || now |" for row in rows)
+    found = refused(f"{HEAD}\ntable t {{\n| line | called || now |\n{body}\n}}")
+    assert [(finding.code.value, finding.message) for finding in found] == [("RCS217", what)]
+
+
+def test_a_line_wholly_below_others_never_matches_and_says_why() -> None:
+    text = f"""{HEAD}
+table t {{
+  | line          | called       | done || now |
+  | a above low   | stop         |      || now |
+  | b above low   | in {{none, hold}} |  || now |
+  | low           |              | true || now |
+}}"""
+    [dead] = [finding for finding in reported(text) if finding.severity is Severity.ERROR]
+    assert (dead.code.value, dead.message) == ("RCS403", "line `low` of table `t` can never match")
+    assert dead.notes == ("wherever its cells hold one of these runs, which stand above it: `a`, `b`",)
+    whole = edited(
+        text, ("| low           |              | true |", "| low           | stop         | true |")
+    )
+    assert "RCS403" in codes(reported(whole))
+
+
+def test_what_is_not_ordered_still_overlaps() -> None:
+    overlapping = edited(MACHINE, ("hold above ended", "hold            "))
+    overlaps = [finding for finding in reported(overlapping) if finding.severity is Severity.ERROR]
+    assert (
+        [overlap.message for overlap in overlaps]
+        == [
+            "lines `ended` and `hold` of table `unit` both match some input",
+            "lines `ended` and `wide` of table `unit` both match some input",  # `wide` stood above it through `hold`
+        ]
+    )
+
+
+def test_a_gap_is_closed_by_a_line_of_the_written_columns() -> None:
+    rest = "  | rest                 | none   | false|            |                || now   |\n"
+    gap = edited(MACHINE, (rest, ""))
+    [finding] = [finding for finding in reported(gap) if finding.severity is Severity.ERROR]
+    row = finding.help[0].partition("`| ")[2].partition(" ||")[0]
+    assert row.count("|") == 4
+    closed = gap.replace("\n}\n", f"\n| {row} || now |\n}}\n")
+    assert not [finding for finding in reported(closed) if finding.severity is Severity.ERROR]
+
+
+def test_the_order_stands_in_the_first_part_alone() -> None:
+    parted = f"""{HEAD}
+table t {{
+  | line        | called ||
+  |-------------|--------||
+  | a above b   | stop   ||
+  | b           | /= none||
+  | c           | none   ||
+
+  | line || now   |
+  |------||-------|
+  | a    || true  |
+  | b    || false |
+  | c    ||       |
+}}"""
+    assert [line.below for line in program_of(parted).tables[0].lines] == [(), ("a",), ()]
+    [found] = refused(edited(parted, ("| a    || true", "| a above b || true")))
+    assert found.message == "`above` stands in a further part of the table"
+
+
+def test_layout_keeps_it_and_parses_back() -> None:
+    for width in (110, 40):
+        parsed = parse(Source("", MACHINE))
+        assert isinstance(parsed, tree.File)
+        text = format_file(parsed, width)
+        assert "odd above ended, wide" in text
+        assert parse(Source("", text)) == parsed
+
+
+def test_the_graph_holds_it_and_what_is_read_back_does_the_same(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "unit.rcs"
+    path.write_text(MACHINE, encoding="utf-8")
+    for form in ("dot", "scxml", "mermaid"):
+        assert run(["graph", str(path), "--state", "now", "--form", form]) == 0
+        shown = capfd.readouterr()
+        assert "the table read back from the graph does the same: proved" in shown.err
+        assert "called /= stop" in shown.out
+    assert run(["graph", str(path), "--lines", "--form", "dot"]) == 0
+
+
+def test_fmt_expanded_prints_a_table_that_does_the_same(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path, other = tmp_path / "unit.rcs", tmp_path / "other.rcs"
+    path.write_text(MACHINE, encoding="utf-8")
+    assert run(["fmt", "--expanded", str(path)]) == 0
+    other.write_text(capfd.readouterr().out, encoding="utf-8")
+    assert path.read_text(encoding="utf-8") == MACHINE
+    assert "above" not in other.read_text(encoding="utf-8")
+    assert run(["diff", str(path), str(other)]) == 0
+    assert "proved: nothing changed" in capfd.readouterr().out
+    assert run(["fmt", "--expanded", "--check", str(path)]) == 2
+    path.write_text("use nowhere\n", encoding="utf-8")
+    assert run(["fmt", "--expanded", str(path)]) == 1
+    assert expand((str(path),), None).texts == {}
+
+
+def test_both_executors_do_it_and_their_code_says_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "unit.rcs"
+    path.write_text(MACHINE, encoding="utf-8")
+    assert run(["test", "--examples", "20", "--mutants", "0", "--no-cortex", str(path)]) == 0
+    assert "interpreter = Python = C" in capfd.readouterr().out
+    assert run(["compile", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert (
+        "unit.rcs line wide, where none above it matches: stop, odd"
+        in (tmp_path / "out" / "c" / "unit.c").read_text()
+    )
+
+
+def test_masks_that_part_lines_or_follow_are_not_said_again() -> None:
+    [table] = program_of("""
+input w : int 0 .. 65535
+input done : bool
+state n : bool
+table t {
+  | line        | w[7..0]   | w[15] | done || n     |
+  | a           | x0xx 1xxx |       | true || true  |
+  | b above all | x0xx xxxx |       | true || true  |
+  | c           | x1xx 0000 | true  |      || false |
+  | d above c   | x1xx 0xxx |       | true || false |
+  | e above d   |           | false |      || false |
+}""").tables
+    added = {line.name: line.tests[-1] and (line.tests[-1].text, line.below) for line in table.lines}
+    assert added == {
+        "a": ("not (w[7..0] = 0bx0xx_xxxx and done = true)", ("b",)),  # it says so twice: it never matches
+        "b": None,
+        "c": ("done = false", ("d",)),
+        "d": ("w[15] = true", ("e",)),
+        "e": ("not (w[7..0] = 0bx0xx_xxxx and done = true)", ("b",)),
+    }
