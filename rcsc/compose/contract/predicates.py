@@ -5,7 +5,7 @@ a state; all of it is read from the model:
 
 - truth values and enumerations that conditions of tables, assumptions or the contract read, and flags;
 - whether two leaves are equal that the level itself compares: an order and the last one, a number and the one seen;
-- whether what a cycle looks back at is the value that it was;
+- whether what a cycle looks back at is the value that it was, and what cells and properties say of it;
 - whether a number is in a class of values that a cell of a table distinguishes;
 - whether a test variable still is what its module would compute now: a module that reads only inputs gives the same result
   while they stay, so that a line that matches again does the same again.
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 from rcsc.compose.contract.transition import GHOST, Cycle, Leaves, TransitionSystem
 from rcsc.lang.interpret import call, holds
-from rcsc.lang.leaves import everything, expressions, parts, read_by
+from rcsc.lang.leaves import everything, expressions, parts, read_by, renamed
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (  # fmt: skip
     COMPARISONS,
@@ -26,6 +26,7 @@ from rcsc.lang.model import (  # fmt: skip
     Enum,
     Expr,
     If,
+    Int,
     Kind,
     Literal,
     OneTable,
@@ -34,7 +35,9 @@ from rcsc.lang.model import (  # fmt: skip
     Program,
     Read,
     Scalar,
+    Select,
     Value,
+    VariableName,
     key_of,
     pending,
     spell,
@@ -143,6 +146,7 @@ def predicates(
     selected += _cells(ts, {*inside, *computed})
     if closely:
         selected += _branches(ts, inside, {predicate.leaf for predicate in selected})
+        selected += _cells_looked_back_at(ts, inside)
     return tuple(selected)
 
 
@@ -236,6 +240,42 @@ def _cells(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
                 if name not in seen and all(leaf in inside for leaf in test.variables):
                     seen.add(name)
                     yield Predicate(f"{column.heading} {test.text}", Bool(), condition=test.condition)
+
+
+def _cells_looked_back_at(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
+    """Make predicates of what cells said of inputs in the cycle before, where a fact about their change carries it on."""
+    kept, seen = looked_back_at(ts.program), set()
+    for table in ts.program.tables:
+        for test in (test for line in table.lines for test in line.tests if test is not None):
+            before = renamed(test.condition, lambda name: kept.get(name, name))
+            name, leaves = spelled(before), set(map(str, read_by(before)))
+            if before == test.condition or name in seen or not all(leaf in inside for leaf in leaves):
+                continue
+            seen.add(name)
+            if always_defined(before) and not all(listed(ts.kinds[leaf]) for leaf in leaves):
+                yield Predicate(name, Bool(), condition=before)
+
+
+def always_defined(condition: Expr) -> bool:
+    """Return whether no value of its leaves makes the condition undefined, as far as its operators say."""
+    return not any(isinstance(part, Select) or _may_fail(part) for part in parts(condition))
+
+
+def _may_fail(part: Expr) -> bool:
+    match part:
+        case Apply(op=Op.DIV | Op.MOD, args=(_, Literal(value=divisor)), type=Int()):
+            return divisor == 0
+        case Apply(op=Op.DIV | Op.MOD):
+            return True
+        case Apply(op=Op.TO_INT, args=(operand,)):
+            return not isinstance(operand.type, Bool)
+    return False
+
+
+def looked_back_at(program: Program) -> dict[VariableName, VariableName]:
+    """Map each input that something looks back at to the state that keeps it."""
+    inputs = {v.name for v in program.variables if v.kind is Kind.INPUT}
+    return {v.previous_of: v.name for v in program.variables if v.previous_of in inputs}
 
 
 def _branches(ts: TransitionSystem, inside: Container[str], there: Container[str]) -> Iterator[Predicate]:

@@ -11,10 +11,17 @@ condition (a division by zero, an index out of range) does not hold.
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
-from rcsc.compose.contract.predicates import Predicate, cone, listed, predicates
+from rcsc.compose.contract.predicates import (
+    Predicate,
+    always_defined,
+    cone,
+    listed,
+    looked_back_at,
+    predicates,
+)
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
 from rcsc.lang.interpret import UNDEFINED, holds
-from rcsc.lang.leaves import parts, read_by
+from rcsc.lang.leaves import parts, read_by, renamed
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     BEFORE,
@@ -27,7 +34,6 @@ from rcsc.lang.model import (
     Program,
     Read,
     Scalar,
-    Select,
     Value,
     VariableName,
     earlier,
@@ -35,14 +41,6 @@ from rcsc.lang.model import (
 from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node
-
-_PARTIAL = frozenset({Op.DIV, Op.MOD, Op.TO_INT})
-"""Operations that are not defined for every value; no predicate evaluates them."""
-
-
-def _is_partial(operation: Apply) -> bool:
-    return operation.op in _PARTIAL and not isinstance(operation.args[0].type, Bool)
-
 
 # --- as conditions on a cycle ----------------------------------------------------------------
 
@@ -159,11 +157,16 @@ def _stated_predicates(
 ) -> tuple[Predicate, ...]:
     """Make predicates of those parts of invariants and properties that can influence a later cycle."""
     by_name: dict[str, Predicate] = {}
+    kept = looked_back_at(ts.program)
     for condition in _stated_conditions(ts):
         for part in parts(condition):
             if len({name.startswith(BEFORE) for name in read_by(part)}) > 1:
                 continue  # it compares two cycles, which no single state shows
-            for predicate in _predicates_of(_of_one_cycle(part), ts.kinds):
+            alone = _of_one_cycle(part)
+            kept_of = renamed(
+                alone, lambda name: kept.get(name, name)
+            )  # an input is no state, what keeps it is
+            for predicate in _predicates_of(kept_of, ts.kinds):
                 read = {predicate.leaf, *([predicate.other] if predicate.other else [])}
                 if predicate.condition is not None:
                     read = set(map(str, read_by(predicate.condition)))
@@ -202,9 +205,5 @@ def _predicates_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicat
 
 def _condition(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
     """Make a predicate of a comparison of numbers that is defined for every value."""
-    whole = all(
-        not isinstance(apply, Select) and not (isinstance(apply, Apply) and _is_partial(apply))
-        for apply in parts(part)
-    )
-    if whole and not all(listed(kinds[leaf]) for leaf in read_by(part)):
+    if always_defined(part) and not all(listed(kinds[leaf]) for leaf in read_by(part)):
         yield Predicate(spelled(part), Bool(), condition=part)
