@@ -105,9 +105,10 @@ class LoadedSystem:
 
     @property
     def lines(self) -> dict[str, str]:
-        """The line that each level ran last, as `TABLE.LINE`; empty before its first cycle."""
+        """The line that each level ran last, as `TABLE.LINE`, of several tables in one cycle each; empty before its first cycle."""
         return {
-            level.name: f"{level.table}.{level.line}" if level.line else "" for level in self.system.levels
+            level.name: " ".join(f"{table}.{line}" for table, line in level.lines if line)
+            for level in self.system.levels
         }
 
     def step(self, ticks: int = 1) -> None:

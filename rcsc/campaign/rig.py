@@ -130,8 +130,7 @@ def known_lines(system: Path) -> tuple[LineName, ...]:
     lines = []
     for name, sign in signatures(described).items():
         level = next(level for level in sign.levels if level.name == name)
-        tables = [level.table] if level.table else list(dict.fromkeys(level.tables.values()))
-        lines += [(name, table, line) for table in tables for line in sign.tables.get(table, ())]
+        lines += [(name, table, line) for table in level.every_table for line in sign.tables.get(table, ())]
     return tuple(lines)
 
 

@@ -37,7 +37,6 @@ from rcsc.lang.model import (
     Program,
     Standing,
     Table,
-    TableByCommand,
     Value,
     Variable,
     pending,
@@ -128,10 +127,9 @@ class Debts:
                     leaf.deferred_until, f"`deferred until` of `{leaf.name}`", self.holding, leaf.span
                 )
         for level in self.program.levels:
-            if isinstance(level.tables, TableByCommand):
-                yield self._defined(
-                    level.tables.selector, f"`table by` of level `{level.name}`", self.holding, level.span
-                )
+            for selector in level.selectors:
+                where = f"`table by` of level `{level.name}`"
+                yield self._defined(selector, where, self.holding, level.span)
         for assumption in self.program.assumptions:
             yield self._assumption(assumption)
 

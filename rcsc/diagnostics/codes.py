@@ -509,6 +509,80 @@ class Code(StrEnum):
           table by now { first : begin  second : end }
         }
     """
+    TABLE_CYCLE = """RCS215: tables of one cycle that wait for each other
+
+    Several tables of a level run in one cycle, each after those that write what it reads: in its conditions, its actions, what these
+    call, and its assumptions. Their order in the text means nothing. Where each waits for another there is no such order. One of them
+    then reads what the cycle before left, `was x`; or what only passes between the two is one table.
+
+        input pulse : bool
+        state a : bool
+        state b : bool
+        table one {
+          | line | b     || a     |
+          | on   | true  || pulse |
+          | off  | false || false |
+        }
+        table two {
+          | line | a     || b     |
+          | on   | true  || true  |
+          | off  | false || pulse |
+        }
+        level task { table one table two }
+
+    error: the tables of level `task` wait for each other: `one` reads `b`, which `two` writes; `two` reads `a`, which `one` writes
+
+        input pulse : bool
+        state a : bool
+        state b : bool
+        table one {
+          | line | was b || a     |
+          | on   | true  || pulse |
+          | off  | false || false |
+        }
+        table two {
+          | line | a     || b     |
+          | on   | true  || true  |
+          | off  | false || pulse |
+        }
+        level task { table one table two }
+    """
+    TWO_TABLES_WRITE = """RCS216: two tables of one cycle that write one variable
+
+    Of several tables that run in one cycle each variable has one writer: what it holds after the cycle does not hang on which of them
+    came last. Let one table write it, or choose between the two by a value, `table by SELECTOR { ... }`: then one of them runs.
+
+        input pulse : bool
+        output lamp : bool
+        table first {
+          | line | pulse || lamp  |
+          | on   | true  || true  |
+          | off  | false || false |
+        }
+        table second {
+          | line | pulse || lamp  |
+          | on   | true  || false |
+          | off  | false || true  |
+        }
+        level task { table first table second }
+
+    error: tables `first` and `second` both write `lamp` in one cycle of level `task`
+
+        input pulse : bool
+        output lamp : bool
+        output dark : bool
+        table first {
+          | line | pulse || lamp  |
+          | on   | true  || true  |
+          | off  | false || false |
+        }
+        table second {
+          | line | pulse || dark  |
+          | on   | true  || false |
+          | off  | false || true  |
+        }
+        level task { table first table second }
+    """
     LINE_ORDER = """RCS217: lines whose order cannot be
 
     `above` says which line runs where two match, and is an order: no line stands above itself, directly or through others. Every line

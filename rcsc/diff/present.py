@@ -65,7 +65,7 @@ def within_reach(
         now: Values of all leaves, in the numbers of that version; those of inputs are not looked at.
         options: Limits of the solver.
     """
-    own = level.tables.names
+    own = level.table_names
     declared = tuple(_declared(difference))
     parts = [
         part
@@ -128,8 +128,14 @@ class _Cycle:
         run.settle(program)
         self.settled = self._leaves(run)
         run.execute(Call(ProcedureName(name)) for name in level.preprocess)
-        self.seen = self._leaves(run)
-        self.chosen = run.choices(level)
+        tables = {str(table.name): table for table in program.tables}
+        self.seen: dict[str, dict[str, Node]] = {}
+        self.chosen: dict[str, Node] = {}
+        for choice in level.choices:
+            self.chosen |= run.chosen(choice)
+            self.seen |= dict.fromkeys(choice.names, self._leaves(run))
+            if choice is not level.tables:
+                run.run_choice(choice, tables)
 
     def _leaves(self, run: Run) -> dict[str, Node]:
         return {name: run.leaf(name) for name in self.kinds}
@@ -138,7 +144,9 @@ class _Cycle:
         """Whether some inputs lead into the region; in doubt they do."""
         if not change.where.exact:
             return True
-        leaves = {"table": self.seen, "deferred value": self.inputs}.get(part.what, self.settled)
+        leaves = self.inputs if part.what == "deferred value" else self.settled
+        if part.what == "table":
+            leaves = self.seen.get(part.name, leaves)
         inside = values.any_of(
             values.all_of(self._in(leaves[name], name, box[name]) for name in box if name in leaves)
             for box in change.where.boxes

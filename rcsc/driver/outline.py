@@ -78,7 +78,6 @@ def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] |
 
 def outline(systems: "Mapping[str, TransitionSystem]") -> SystemOutline:
     """The outline of all levels."""
-    from rcsc.compose.contract.obligations import run_by
     from rcsc.compose.proof.assume_guarantee import promises
     from rcsc.compose.proof.kept import content
 
@@ -89,7 +88,7 @@ def outline(systems: "Mapping[str, TransitionSystem]") -> SystemOutline:
             os.path.realpath(ts.level.span.file),
             ts.level.span.start,
             ts.level.span.end,
-            tuple(map(_table, run_by(ts))),
+            tuple(map(_table, map(ts.table, ts.level.table_names))),
             tuple((each.name, os.path.realpath(each.span.file)) for each in ts.program.properties),
         )
         for name, ts in systems.items()

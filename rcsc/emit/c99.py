@@ -1,6 +1,6 @@
 """A plan to C99: `<program>.h`, `<program>.c`, the symbol file, CMake and pkg-config files."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TypeAlias, assert_never
 
 from rcsc.emit.code_tree import (
@@ -43,7 +43,20 @@ from rcsc.emit.identifiers import (
     types_guard,
     types_header,
 )
-from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, Plan, PlanTable, Truth, joined
+from rcsc.emit.plan import (
+    WORD,
+    Coded,
+    Cuts,
+    Direct,
+    Group,
+    Index,
+    Matcher,
+    Plan,
+    PlanTable,
+    Truth,
+    joined,
+    table_position,
+)
 from rcsc.emit.rendering import render
 from rcsc.emit.symbols import symbols, unit_text
 from rcsc.emit.translate import FAULT, FAULT_AT, FAULTED, FAULTLESS, LINE, STATE, constant, local
@@ -439,7 +452,9 @@ class _Maker:
             for flag, (v, _) in pairs
         )
         doc = "Deferred variables take their next values, all at once."
-        return self._on_state(doc, "settle", *lets, *sets, *(() if deferred else (_unused(STATE),)))
+        none = [self._assigned(self.program.variable(leaf), 0) for leaf in self.program.line_leaves.values()]
+        unused = () if deferred or none else (_unused(STATE),)
+        return self._on_state(doc, "settle", *lets, *sets, *none, *unused)
 
     def _safe(self) -> Iterator[Function]:
         shown = [
@@ -602,7 +617,7 @@ class _Maker:
         for number, line in enumerate(table.lines):
             body = self.text.block([action.statement for action in line.actions])
             head = "case ", Constant(number), f": /* {comment(line.source)} */"
-            cases.append(Frame(head, (*body, Line("break;"))))
+            cases.append(Frame(head, (*self._kept(table, number + 1), *body, Line("break;"))))
         none, several = Set(FAULT, Constant(Fault.NO_LINE)), Set(FAULT, Constant(Fault.SEVERAL_LINES))
         return (
             Set(LINE, Invoke(f"{self.p}_{name}_line", (STATE,))),
@@ -612,6 +627,11 @@ class _Maker:
             Frame(("default:",), (Set(LINE, NONE), several, Line("break;"))),
             Line("}"),
         )
+
+    def _kept(self, table: PlanTable, line: int) -> Body:
+        """Keeps the line of a table that others follow in a cycle."""
+        leaf = self.program.line_leaves.get(table.table.name)
+        return () if leaf is None else (self._assigned(self.program.variable(leaf), line),)
 
     # --- steps and cycles ---
 
@@ -631,23 +651,44 @@ class _Maker:
 
     def _level(self, level: model.Level) -> Function:
         before = (when(FAULTLESS, Do(self.text.call(name))) for name in level.preprocess)
+        stages = (when(FAULTLESS, *self._chosen(stage, self._stage)) for stage in level.stages)
         after = (when(FAULTLESS, Do(self.text.call(name))) for name in level.postprocess)
-        doc = f"One cycle of level {level.name}, every {level.period_ms} ms: returns the fault, 0 for none."
+        doc = f"One cycle of level {level.name}, every {level.period_ms} ms: returns the fault, 0 for none.{self._order(level)}"
         name = f"{self.names.levels[level.name]}_cycle"
-        return self._cycle(doc, name, *before, when(FAULTLESS, *self._chosen(level)), *after)
+        last = when(FAULTLESS, *self._chosen(level.tables, lambda table: (self._table_run(table),)))
+        return self._cycle(doc, name, *before, *stages, last, *after)
 
-    def _chosen(self, level: model.Level) -> Iterator[Stmt]:
-        """Runs the level's table."""
-        run = {table: self._run_on_state(f"run_{stem}") for table, stem in self.names.tables.items()}
-        if isinstance(level.tables, model.OneTable):
-            yield run[level.tables.table]
-            return
-        kind, chosen = level.tables.selector.type, Name("chosen")
-        yield Let(f"const {wide_type(kind)}", "chosen", self.text.expr(level.tables.selector))
-        arms = (
-            (infix("==", chosen, constant(kind, value)), (run[table_name],))
-            for value, table_name in level.tables.tables
+    def _order(self, level: model.Level) -> str:
+        """The order of several tables, and how a fault tells one before the last."""
+        if not level.stages:
+            return ""
+        places = (f"{name} ({table_position(self.program, name)})" for name in level.staged)
+        order = ", ".join((*places, " or ".join(level.tables.names)))
+        return (
+            f" Its tables run in this order: {order}; where one before the last has no line, or several, `fault_at` is the number "
+            "given here."
         )
+
+    def _table_run(self, table: str) -> Do:
+        return self._run_on_state(f"run_{self.names.tables[table]}")
+
+    def _stage(self, table: str) -> Body:
+        """Runs a table that others follow: the trace's line is the last one's, a fault for want of a line names the table."""
+        unmatched = Infix(
+            "||",
+            tuple(Round(infix("==", FAULT, Constant(end))) for end in (Fault.NO_LINE, Fault.SEVERAL_LINES)),
+        )
+        named = when(unmatched, Set(FAULT_AT, Constant(table_position(self.program, table))))
+        return self._table_run(table), Set(LINE, NONE), named
+
+    def _chosen(self, choice: model.TableChoice, run: Callable[[str], Body]) -> Iterator[Stmt]:
+        """Runs the table of a choice."""
+        if isinstance(choice, model.OneTable):
+            yield from run(choice.table)
+            return
+        kind, chosen = choice.selector.type, Name("chosen")
+        yield Let(f"const {wide_type(kind)}", "chosen", self.text.expr(choice.selector))
+        arms = ((infix("==", chosen, constant(kind, value)), run(name)) for value, name in choice.tables)
         yield Branch(
             tuple(arms),
             (Frame((FAULT, " = ", Constant(Fault.NO_LINE), "; /* no table for it: proved impossible */")),),

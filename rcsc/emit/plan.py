@@ -10,7 +10,7 @@ from math import prod
 from typing import TypeAlias
 
 from rcsc.host.files.write import UNPROVED
-from rcsc.lang.model import Action, Expr, LineName, Program, Scalar, Table, VariableName
+from rcsc.lang.model import Action, Expr, LineName, Program, Scalar, Table, TableName, VariableName
 
 WORD = 64
 
@@ -120,6 +120,11 @@ def grouped(probes: Iterable[Probe], most: int) -> tuple[Group, ...]:
         else:
             bins.append([probe])
     return tuple(tuple(group) for group in bins)
+
+
+def table_position(program: Program, table: str) -> int:
+    """The position of a table, by which a fault names one before the last of a cycle."""
+    return [candidate.name for candidate in program.tables].index(TableName(table))
 
 
 @dataclass(frozen=True, slots=True)

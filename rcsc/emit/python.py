@@ -31,7 +31,19 @@ from rcsc.emit.code_tree import (
     when,
 )
 from rcsc.emit.identifiers import FAILED_BITS, comment, names_of
-from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
+from rcsc.emit.plan import (
+    WORD,
+    Coded,
+    Cuts,
+    Direct,
+    Group,
+    Index,
+    Plan,
+    PlanTable,
+    Truth,
+    grouped,
+    table_position,
+)
 from rcsc.emit.rendering import render
 from rcsc.emit.translate import FAULT, FAULT_AT, FAULTED, FAULTLESS, LINE, STATE, PyText, constant, local
 from rcsc.lang import model
@@ -185,7 +197,10 @@ class _Maker:
             when(Name(f"ready{at}"), Set(self.text.place(v.name), self.text.place(pending(v.name))))
             for at, (v, _) in enumerate(deferred)
         )
-        return _on_state("Deferred variables take their next values, all at once.", "_settle", *lets, *sets)
+        none = (Set(self.text.place(leaf), Constant(0)) for leaf in self.program.line_leaves.values())
+        return _on_state(
+            "Deferred variables take their next values, all at once.", "_settle", *lets, *sets, *none
+        )
 
     def _safe(self) -> Iterator[Function]:
         pairs = [
@@ -304,6 +319,9 @@ class _Maker:
         yield Set(line, Invoke(f"{name}_line", (STATE,)))
         yield when(infix("<", line, Constant(0)), Set(FAULT, fault), Line("return"))
         yield Set(LINE, line)
+        leaf = self.program.line_leaves.get(table.table.name)
+        if leaf is not None:
+            yield Set(self.text.place(leaf), infix("+", line, Constant(1)))
         yield _run(f"{actions}[line]")
 
     # --- levels ---
@@ -311,16 +329,35 @@ class _Maker:
     def _level(self, level: model.Level) -> Function:
         before = (Do(self.text.call(name)) for name in level.preprocess)
         after = [Do(self.text.call(name)) for name in level.postprocess]
-        if isinstance(level.tables, model.OneTable):
-            chosen = f"_run_{self.names.tables[level.tables.table]}"
-        else:
-            selector = level.tables.selector
-            pairs = [(constant(selector.type, v), self.names.tables[t]) for v, t in level.tables.tables]
-            rows = ", ".join(f"{IN_PYTHON.code(value)}: _run_{stem}" for value, stem in pairs)
-            chosen = f"{{{rows}}}[{IN_PYTHON.code(self.text.expr(selector))}]"
         doc = f"One cycle of level {level.name}, every {level.period_ms} ms; the fault, 0 for none."
-        guarded = (when(FAULTLESS, *after),) if after else ()
-        return self._cycle(doc, f"{self.names.levels[level.name]}_cycle", *before, _run(chosen), *guarded)
+        last = _run(self._chosen(level.tables))
+        rest: Body = (last, when(FAULTLESS, *after)) if after else (last,)
+        for stage in reversed(level.stages):
+            rest = (*self._stage(stage), when(FAULTLESS, *rest))
+        return self._cycle(doc, f"{self.names.levels[level.name]}_cycle", *before, *rest)
+
+    def _chosen(self, choice: model.TableChoice) -> str:
+        """The function of the table that a choice runs."""
+        if isinstance(choice, model.OneTable):
+            return f"_run_{self.names.tables[choice.table]}"
+        selector = choice.selector
+        pairs = [(constant(selector.type, v), self.names.tables[t]) for v, t in choice.tables]
+        rows = ", ".join(f"{IN_PYTHON.code(value)}: _run_{stem}" for value, stem in pairs)
+        return f"{{{rows}}}[{IN_PYTHON.code(self.text.expr(selector))}]"
+
+    def _stage(self, choice: model.TableChoice) -> Iterator[Stmt]:
+        """As in C: the trace's line is the last table's, a fault for want of a line names the table."""
+        yield Frame(("try:",), (_run(self._chosen(choice)),))
+        yield Frame(("finally:",), (Set(LINE, Constant(-1)),))
+        unmatched = infix("<=", Constant(Fault.NO_LINE), FAULT, Constant(Fault.SEVERAL_LINES))
+        at: Code = Constant(table_position(self.program, choice.names[0]))
+        if isinstance(choice, model.TableByCommand):
+            pairs = [
+                f"{IN_PYTHON.code(constant(choice.selector.type, v))}: {table_position(self.program, t)}"
+                for v, t in choice.tables
+            ]
+            at = Name(f"{{{', '.join(pairs)}}}[{IN_PYTHON.code(self.text.expr(choice.selector))}]")
+        yield when(unmatched, Set(FAULT_AT, at))
 
 
 def _on_state(doc: str, name: str, *body: Stmt) -> Function:

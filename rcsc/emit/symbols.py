@@ -11,12 +11,13 @@ from rcsc.lang.model import (
     Bool,
     Enum,
     Int,
-    Level,
     OneTable,
+    Program,
     Read,
     Real,
     Role,
     Roles,
+    TableChoice,
     Unit,
     Variable,
     VariableName,
@@ -69,7 +70,12 @@ def symbols(plan: Plan, names: Names) -> str:
                 "name": level.name,
                 "cycle": f"{p}_{names.levels[level.name]}_cycle",
                 "period_ms": level.period_ms,
-                **_dispatched(level),
+                **_dispatched(level.tables),
+                **(
+                    {"stages": [_stage(plan.program, stage) for stage in level.stages]}
+                    if level.stages
+                    else {}
+                ),
             }
             for level in plan.program.levels
         ],
@@ -132,10 +138,15 @@ def _described(variable: Variable) -> dict[str, object]:
     return entry
 
 
-def _dispatched(level: Level) -> dict[str, object]:
-    """Which table a level runs: one, or by the value of a leaf."""
-    if isinstance(level.tables, OneTable):
-        return {"table": level.tables.table}
-    selector = level.tables.selector
-    by = selector.name if isinstance(selector, Read) else ""
-    return {"by": by, "tables": {str(int(value)): table for value, table in level.tables.tables}}
+def _stage(program: Program, stage: TableChoice) -> dict[str, object]:
+    """What runs before the last table, and the leaf that holds the line of each."""
+    leaves = program.line_leaves
+    return {**_dispatched(stage), "kept": {name: leaves[name] for name in stage.names}}
+
+
+def _dispatched(choice: TableChoice) -> dict[str, object]:
+    """Which table runs: one, or by the value of a leaf."""
+    if isinstance(choice, OneTable):
+        return {"table": choice.table}
+    by = choice.selector.name if isinstance(choice.selector, Read) else ""
+    return {"by": by, "tables": {str(int(value)): table for value, table in choice.tables}}

@@ -119,6 +119,7 @@ class _Seen:
     findings: dict[str, EpisodeFinding] = field(default_factory=dict)
     excused: dict[str, Excused] = field(default_factory=dict)
     lines: set[tuple[str, int, int]] = field(default_factory=set)
+    staged: set[tuple[str, str, str]] = field(default_factory=set)
 
 
 class Loop:
@@ -207,12 +208,12 @@ class Loop:
 
     def outcome(self) -> EpisodeOutcome:
         """What has become of it so far."""
-        lines = set()
+        lines = set(self._seen.staged)
         for name, by, at in self._seen.lines:
             sign = self._its.signs[name]
             level = next(level for level in sign.levels if level.name == name)
             table = level.table or level.tables.get(by, "?")
-            lines.add((name, table, sign.tables[table][at] if table in sign.tables else ""))
+            lines.add((name, table, sign.tables[table][at] if table in sign.tables and at >= 0 else ""))
         ends = [*self.operator.ends]
         ends += [
             line.end(WAITING, "", self.system.tick - 1)
@@ -267,6 +268,9 @@ class Loop:
             self._seen.lines.add(
                 (level.name, -1 if by < 0 else int(values[by]), int(values[len(level.sign.leaves)]))
             )
+            if level.level.stages:
+                before = level.sign.lines_before(level.level, values)
+                self._seen.staged.update((level.name, table, line) for table, line in before)
         cycle.tick, cycle.ran = system.tick, ran
         self._explained.note({name: self._why(name) for name in self._memory.changed}, self._memory.changed)
         for watcher in self._properties:

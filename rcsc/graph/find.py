@@ -125,7 +125,7 @@ def _nothing(message: str, file: str, *helps: str) -> NotFound:
 
 
 def _run_here(entry: FoundTable) -> bool:
-    return any(entry.table.name in level.tables.names for level in entry.program.levels)
+    return any(entry.table.name in level.table_names for level in entry.program.levels)
 
 
 def _in_level(entry: FoundTable) -> FoundTable:

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import partial
 from typing import Any, TypeAlias, assert_never
 
 from rcsc.lang.model import (
@@ -39,6 +40,7 @@ from rcsc.lang.model import (
     Snapshot,
     Statement,
     Table,
+    TableChoice,
     Test,
     ToElement,
     ToLeaf,
@@ -74,7 +76,7 @@ class Outcome:
         line_index: Its position; DEFAULT is after the last; -1 where there was none.
         fault: OK, or why it ended early.
         failed_assumptions: Assumptions that the executors check and that did not hold.
-        fault_at: The leaf that was refused, or the first assumption that ended the cycle.
+        fault_at: The leaf that was refused, the first assumption that ended the cycle, or the table before the last without its line.
     """
 
     snapshot: dict[str, Value]
@@ -318,7 +320,7 @@ def unfit(program: Program, snapshot: Snapshot) -> str:
 
 
 def settle(program: Program, snapshot: dict[str, Value]) -> None:
-    """Deferred variables whose condition holds take their next value, all at once."""
+    """Deferred variables whose condition holds take their next value, all at once; no table has run yet."""
     ready = [
         v.name
         for v in program.variables
@@ -326,23 +328,42 @@ def settle(program: Program, snapshot: dict[str, Value]) -> None:
     ]
     for name in ready:
         snapshot[name] = snapshot[pending(name)]
+    snapshot.update(dict.fromkeys(program.line_leaves.values(), 0))
+
+
+Chosen: TypeAlias = Callable[[Snapshot], Table]
+"""Which table runs, by the values at its place in the cycle."""
 
 
 def run_table(program: Program, table: Table, snapshot: Snapshot) -> Outcome:
     """One step of a table outside any level."""
-    return _shown(program, _cycle(program, lambda _: table, (), (), snapshot))
+    return _shown(program, _cycle(program, (lambda _: table,), (), (), snapshot))
 
 
 def cycle(program: Program, level: Level, snapshot: Snapshot) -> Outcome:
     """One cycle of a level."""
-    by_name = {table.name: table for table in program.tables}
-
-    def chosen(now: Snapshot) -> Table:
-        if isinstance(level.tables, OneTable):
-            return by_name[level.tables.table]
-        return by_name[dict(level.tables.tables)[evaluate(level.tables.selector, now)]]
-
+    chosen = tuple(partial(chosen_table, program, choice) for choice in level.choices)
     return _shown(program, _cycle(program, chosen, level.preprocess, level.postprocess, snapshot))
+
+
+def chosen_table(program: Program, choice: TableChoice, now: Snapshot) -> Table:
+    """The table that runs on these values."""
+    name = (
+        choice.table if isinstance(choice, OneTable) else dict(choice.tables)[evaluate(choice.selector, now)]
+    )
+    return next(table for table in program.tables if table.name == name)
+
+
+def run_stage(program: Program, table: Table, now: dict[str, Value]) -> Fault:
+    """Run a table that others follow, at its place in a cycle: OK, or why the cycle ends there.
+
+    Raises:
+        ExternError: As `execute`.
+    """
+    done = _run(program, table, now, _Matched(), last=False)
+    if done.fault is Fault.OK:
+        execute(program, [action.statement for action in done.actions], now, {})
+    return done.fault
 
 
 def _shown(program: Program, outcome: Outcome) -> Outcome:
@@ -355,7 +376,7 @@ def _shown(program: Program, outcome: Outcome) -> Outcome:
 
 def _cycle(
     program: Program,
-    chosen: Callable[[Snapshot], Table],
+    choices: tuple[Chosen, ...],
     preprocess: tuple[str, ...],
     postprocess: tuple[str, ...],
     snapshot: Snapshot,
@@ -364,26 +385,51 @@ def _cycle(
     if isinstance(now, str):
         return Outcome(dict(snapshot), None, -1, Fault.ADMIT, (), now)
     settle(program, now)
-    line: LineName | None = None
-    index, failed = -1, tuple[str, ...]()
+    done = _Matched()
     try:
         for name in preprocess:
             call(program, name, [], now)
-        table = chosen(now)
-        failed = failed_assumptions(program, table, now)
-        stopped = next((name for name in failed if name in table.stops), None)
-        if stopped is not None:
-            return Outcome(now, None, -1, Fault.ASSUMPTION, failed, stopped)
-        matched = _match(table, now)
-        if isinstance(matched, Fault):
-            return Outcome(now, None, -1, matched, failed)
-        line, index, actions = matched
-        execute(program, [action.statement for action in actions], now, {})
+        for chosen in choices:
+            done = _run(program, chosen(now), now, done, last=chosen is choices[-1])
+            if done.fault is not Fault.OK:
+                return Outcome(now, None, -1, done.fault, done.failed, done.fault_at)
+            execute(program, [action.statement for action in done.actions], now, {})
         for name in postprocess:
             call(program, name, [], now)
     except ExternError as error:
-        return Outcome(now, line, index, Fault.EXTERN, failed, str(error))
-    return Outcome(now, line, index, Fault.OK, failed)
+        return Outcome(now, done.line, done.index, Fault.EXTERN, done.failed, str(error))
+    return Outcome(now, done.line, done.index, Fault.OK, done.failed)
+
+
+@dataclass(frozen=True, slots=True)
+class _Matched:
+    """How far a cycle's tables have come: the fields of `Outcome`, and what the line does; only the last table's line is told."""
+
+    line: LineName | None = None
+    index: int = -1
+    actions: tuple[Action, ...] = ()
+    failed: tuple[str, ...] = ()
+    fault: Fault = Fault.OK
+    fault_at: str = ""
+
+
+def _run(program: Program, table: Table, now: dict[str, Value], before: _Matched, *, last: bool) -> _Matched:
+    """Match one table on the values at its place; keep the line of one that other tables follow."""
+    failed = failed_assumptions(program, table, now)
+    stopped = next((name for name in failed if name in table.stops), None)
+    every = tuple(
+        assumption.name for assumption in program.assumptions if assumption.name in {*before.failed, *failed}
+    )
+    if stopped is not None:
+        return _Matched(failed=every, fault=Fault.ASSUMPTION, fault_at=stopped)
+    matched = _match(table, now)
+    if isinstance(matched, Fault):
+        return _Matched(failed=every, fault=matched, fault_at="" if last else table.name)
+    line, index, actions = matched
+    kept = program.line_leaves.get(table.name)
+    if kept is not None:
+        now[kept] = index + 1
+    return _Matched(line if last else None, index if last else -1, actions, every)
 
 
 def failed_assumptions(program: Program, table: Table, now: Snapshot) -> tuple[str, ...]:

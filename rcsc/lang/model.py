@@ -215,6 +215,7 @@ class Variable:
             the snapshot, `x` takes the value of `x.next`. `next x := e` writes `x.next`.
         safe: What an output shows after a cycle that ended in a fault; None where it stays as it is.
         previous_of: Of a hidden state, the leaf whose value after the cycle before it holds.
+        line_of: Of a hidden state, the table whose line of this cycle it holds: 0 for none, else one more than the line's position.
         restart: What it has when the level starts anew; None where it is then as it is initially, or as `Program.restart` says.
     """
 
@@ -229,6 +230,7 @@ class Variable:
     safe: Value | None = None
     restart: Value | None = None
     previous_of: VariableName | None = field(default=None, compare=False)
+    line_of: TableName | None = field(default=None, compare=False)
 
     @property
     def part(self) -> Part:
@@ -688,17 +690,46 @@ class TableByCommand:
         return tuple(dict.fromkeys(name for _, name in self.tables))
 
 
+TableChoice: TypeAlias = OneTable | TableByCommand
+
+
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One control level: every cycle deferred values, preprocess, table, postprocess."""
+    """One control level: every cycle deferred values, preprocess, stages, table, postprocess.
+
+    Attributes:
+        tables: What runs last of its tables; where it has one, that.
+        stages: What runs before, in the order of what they read and write: each on the values that those before it leave.
+    """
 
     name: str
     period_ms: int
     preprocess: tuple[str, ...]  # procedures and owners, flattened to procedure names
-    tables: OneTable | TableByCommand
+    tables: TableChoice
     postprocess: tuple[str, ...]
     doc: str = ""
     span: Span = at()
+    stages: tuple[TableChoice, ...] = ()
+
+    @property
+    def choices(self) -> tuple[TableChoice, ...]:
+        """All that it runs, in order."""
+        return (*self.stages, self.tables)
+
+    @property
+    def selectors(self) -> tuple[Expr, ...]:
+        """What its choices are made by, in order."""
+        return tuple(choice.selector for choice in self.choices if isinstance(choice, TableByCommand))
+
+    @property
+    def table_names(self) -> tuple[TableName, ...]:
+        """Every table that it may run."""
+        return tuple(name for choice in self.choices for name in choice.names)
+
+    @property
+    def staged(self) -> tuple[TableName, ...]:
+        """Every table that it may run before the last."""
+        return tuple(name for stage in self.stages for name in stage.names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -801,6 +832,13 @@ class Program:
         if self.restart is None:
             return by_names({str(variable.name): variable.part for variable in self.variables})
         return {str(leaf): adopted for leaf, adopted in self.restart}
+
+    @property
+    def line_leaves(self) -> dict[TableName, VariableName]:
+        """The hidden state that holds the line of each table that runs before another."""
+        return {
+            variable.line_of: variable.name for variable in self.variables if variable.line_of is not None
+        }
 
     def variable(self, name: str) -> Variable:
         """The leaf called `name`; KeyError if there is none."""

@@ -44,7 +44,6 @@ from rcsc.lang.model import (
     Standing,
     Statement,
     Table,
-    TableByCommand,
     ToLeaf,
     pending,
 )
@@ -180,9 +179,7 @@ class Obligations:
     def _conditions(self) -> None:
         """Assumptions, invariants, `deferred until` and selectors."""
         deferred = [v.deferred_until for v in self.program.variables if v.deferred_until is not None]
-        selectors = [
-            level.tables.selector for level in self.program.levels if isinstance(level.tables, TableByCommand)
-        ]
+        selectors = [selector for level in self.program.levels for selector in level.selectors]
         for invariant in self.program.invariants:
             self._defined(invariant.condition, [])
         for condition in (*deferred, *selectors):

@@ -19,6 +19,7 @@ from rcsc.lang.model import (
     Int,
     Kind,
     Level,
+    OneTable,
     Op,
     Program,
     Real,
@@ -76,13 +77,14 @@ def following(program: Program, table: Table, options: Options) -> list[Follow]:
 def _level_of(program: Program, table: Table) -> tuple[Level, Value | None] | None:
     """The level that runs the table, and the value of its selector; None where none does."""
     for level in program.levels:
-        if not isinstance(level.tables, TableByCommand):
-            if level.tables.table == table.name:
-                return level, None
-            continue
-        for value, name in level.tables.tables:
-            if name == table.name:
-                return level, value
+        for choice in level.choices:
+            if isinstance(choice, OneTable):
+                if choice.table == table.name:
+                    return level, None
+                continue
+            for value, name in choice.tables:
+                if name == table.name:
+                    return level, value
     return None
 
 
@@ -133,6 +135,7 @@ class _Cycles:
             run = self._run()
             run.state = first.state.copy()
             run.execute(action.statement for action in actions)
+            self._others(run, after=True)
             self._procedures(run, () if self.level is None else self.level[0].postprocess)
             self._before_table(run)
             known = [*facts, lines[at], *self._facts(run)]
@@ -179,6 +182,15 @@ class _Cycles:
                 )
         run.settle(self.program)
         self._procedures(run, () if self.level is None else self.level[0].preprocess)
+        self._others(run, after=False)
+
+    def _others(self, run: Run, *, after: bool) -> None:
+        """The tables of the cycle before this one, or after it."""
+        choices = () if self.level is None else self.level[0].choices
+        own = next((at for at, choice in enumerate(choices) if self.table.name in choice.names), 0)
+        tables = {str(table.name): table for table in self.program.tables}
+        for choice in choices[own + 1 :] if after else choices[:own]:
+            run.run_choice(choice, tables)
 
     def _procedures(self, run: Run, names: Sequence[str]) -> None:
         run.execute(Call(self.procedures[name].name) for name in names)
@@ -186,12 +198,13 @@ class _Cycles:
     def _facts(self, run: Run) -> list[Node]:
         """Return what is known before the match."""
         facts = [run.evaluate(assumption) for assumption in assumed(self.program, self.table)]
-        if (
-            self.level is not None
-            and isinstance(self.level[0].tables, TableByCommand)
-            and self.level[1] is not None
-        ):
-            selector = self.level[0].tables.selector
+        own = (
+            [choice for choice in self.level[0].choices if self.table.name in choice.names]
+            if self.level
+            else []
+        )
+        if self.level is not None and self.level[1] is not None and isinstance(own[0], TableByCommand):
+            selector = own[0].selector
             facts.append(values.equal(run.evaluate(selector), values.constant(selector.type, self.level[1])))
         return facts
 

@@ -172,8 +172,13 @@ class RunningLevel:
         return self.sign.leaves[self.sign.index[name]].shown(self.value(name))
 
     @property
+    def lines(self) -> tuple[tuple[str, str], ...]:
+        """Table and line of each that the last cycle ran, in order; where it was ended, of the last that was tried, with no line."""
+        return (*self.sign.lines_before(self.level, self.values), (self.table, self.line))
+
+    @property
     def table(self) -> str:
-        """The table that the last cycle ran."""
+        """The table that the last cycle ran; of several the last, or the one that ended the cycle."""
         return self.sign.table_of(self.level, self.values)
 
     @property

@@ -39,6 +39,10 @@ FAULTS = (
     "reals computed otherwise here",
 )
 STOPPED = FAULTS.index("assumption failed")
+_UNMATCHED = frozenset(map(FAULTS.index, ("no line matches", "several lines match")))
+_ENDED_BY_A_TABLE = _UNMATCHED | {STOPPED}
+_NOT_BEGUN = frozenset(map(FAULTS.index, ("input refused", "state refused")))
+"""Faults after which every leaf is as the cycle before left it."""
 
 
 MOST_SYMBOL_BYTES, MOST_LEAVES, MOST_LEVELS, LONGEST_PERIOD_MS = 64 * MIB, 1_000_000, 100_000, 2**31 - 1
@@ -103,8 +107,22 @@ class Leaf:
 
 
 @dataclass(frozen=True, slots=True)
+class StageSign:
+    """What runs before the last table of a cycle: one table, or one by a leaf.
+
+    Attributes:
+        kept: By table the leaf that holds its line: 0 for none, else one more than its position.
+    """
+
+    table: str
+    by: str
+    tables: Mapping[int, str]
+    kept: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
 class LevelSign:
-    """A level: which functions run it, and which table."""
+    """A level: which functions run it, which table, and what runs before that in a cycle."""
 
     name: str
     cycle: str
@@ -112,6 +130,17 @@ class LevelSign:
     table: str
     by: str
     tables: Mapping[int, str]
+    stages: tuple[StageSign, ...] = ()
+
+    @property
+    def every_table(self) -> tuple[str, ...]:
+        """Every table that it may run, in the order of a cycle."""
+        return tuple(name for stage in self.stages for name in stage.kept) + self.last_tables
+
+    @property
+    def last_tables(self) -> tuple[str, ...]:
+        """Every table that it may run last."""
+        return (self.table,) if self.table else tuple(dict.fromkeys(self.tables.values()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,14 +236,42 @@ class Signature:
         return range(places[0], places[-1] + 1)
 
     def table_of(self, level: LevelSign, values: Values) -> str:
-        """The table that the level ran in the cycle that left these values."""
-        return level.table or level.tables.get(int(values[self.index[level.by]]), "?")
+        """The table that the level ran in the cycle that left these values; of several the last, or the one that ended the cycle."""
+        if level.stages and int(values[len(self.leaves) + 1]) in _ENDED_BY_A_TABLE:
+            names = (self._chosen(stage, values) for stage in level.stages)
+            ended = (
+                name
+                for stage, name in zip(level.stages, names, strict=True)
+                if not self._kept(stage, name, values)
+            )
+            if (name := next(ended, None)) is not None:
+                return name
+        return self._chosen(level, values)
+
+    def lines_before(self, level: LevelSign, values: Values) -> tuple[tuple[str, str], ...]:
+        """Table and line of each that ran before that one in the cycle, in order."""
+        if int(values[len(self.leaves) + 1]) in _NOT_BEGUN:
+            return ()
+        ran = (
+            (name := self._chosen(stage, values), self._kept(stage, name, values)) for stage in level.stages
+        )
+        return tuple(
+            (name, self.tables[name][at - 1]) for name, at in ran if 0 < at <= len(self.tables.get(name, ()))
+        )
+
+    def _chosen(self, choice: LevelSign | StageSign, values: Values) -> str:
+        return choice.table or choice.tables.get(int(values[self.index[choice.by]]), "?")
+
+    def _kept(self, stage: StageSign, table: str, values: Values) -> int:
+        return int(values[self.index[stage.kept[table]]]) if table in stage.kept else 0
 
     def fault_at(self, values: Values) -> str:
         """What the fault of a cycle is about: the leaf that was refused, or the assumption; empty for nothing."""
         fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
         if fault == STOPPED:
             return self.monitored[at] if 0 <= at < len(self.monitored) else f"{at}?"
+        if fault in _UNMATCHED:
+            return ""  # of several tables `table_of` says which
         if at >= len(self.leaves):
             return self._invariant(at)
         return self.leaves[at].name if 0 <= at < len(self.leaves) else ""
@@ -477,6 +534,31 @@ def _tables(symbols: CheckedFields) -> tuple[dict[str, tuple[str, ...]], dict[st
 
 
 def _level(entry: CheckedFields, program: str, index: Mapping[str, int]) -> LevelSign:
+    table, by, tables = _choice(entry, index)
+    return LevelSign(
+        entry.name("name"),
+        _own(entry.name("cycle"), f"{program}_", "..."),
+        entry.whole("period_ms", 1, LONGEST_PERIOD_MS),
+        table,
+        by,
+        tables,
+        tuple(_stage(stage, index) for stage in entry.each("stages", MOST_LEVELS))
+        if "stages" in entry.value
+        else (),
+    )
+
+
+def _stage(entry: CheckedFields, index: Mapping[str, int]) -> StageSign:
+    named = entry.table("kept")
+    kept = {identifier(name, "table"): named.member(name) for name in named.value}
+    strange = [leaf for leaf in kept.values() if leaf not in index]
+    if strange:
+        raise Malformed(f"{entry.where}.kept: {shown(strange[0])} is no leaf")
+    return StageSign(*_choice(entry, index), kept)
+
+
+def _choice(entry: CheckedFields, index: Mapping[str, int]) -> tuple[str, str, dict[int, str]]:
+    """The table that runs, or the leaf that chooses one, and each table by its value."""
     by, tables = entry.text("by", ""), {}
     if "tables" in entry.value:
         named = entry.table("tables")
@@ -486,14 +568,7 @@ def _level(entry: CheckedFields, program: str, index: Mapping[str, int]) -> Leve
     table = entry.name("table", "") if entry.value.get("table") else ""
     if not table and not by:
         raise Malformed(f"{entry.where} has no table")
-    return LevelSign(
-        entry.name("name"),
-        _own(entry.name("cycle"), f"{program}_", "..."),
-        entry.whole("period_ms", 1, LONGEST_PERIOD_MS),
-        table,
-        by,
-        tables,
-    )
+    return table, by, tables
 
 
 def _key(text: str) -> int:

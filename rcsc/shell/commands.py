@@ -339,8 +339,8 @@ class Commands:
 
 
 def _at(level: RunningLevel) -> str:
-    """`task.acquire.5`; a hyphen for no line."""
-    return f"{level.name}.{level.table}.{level.line or '-'}"
+    """`task.acquire.5`; a hyphen for no line; of several tables each."""
+    return " ".join(f"{level.name}.{table}.{line or '-'}" for table, line in level.lines)
 
 
 def _is_number(text: str) -> bool:

@@ -15,7 +15,7 @@ from rcsc.lang.interpret import (
     ExternError,
     admit,
     call,
-    evaluate,
+    chosen_table,
     execute,
     failed_assumptions,
     matching_lines,
@@ -26,7 +26,6 @@ from rcsc.lang.model import (
     AssumptionName,
     Enum,
     Level,
-    OneTable,
     Procedure,
     Program,
     Scalar,
@@ -147,7 +146,9 @@ def _step(part: _Part, name: str) -> str:
         return f"preprocess: {', '.join(_in_order(part, part.level.preprocess)) or 'nothing'}"
     if name == "postprocess":
         return f"postprocess: {', '.join(_in_order(part, part.level.postprocess)) or 'nothing'}"
-    return _match(part, _chosen(part))
+    return "; ".join(
+        _match(part, chosen_table(part.program, choice, part.now)) for choice in part.level.choices
+    )
 
 
 def _in_order(part: _Part, procedures: Sequence[str]) -> Sequence[str]:
@@ -164,16 +165,6 @@ def _flat(program: Program, members: Sequence[str]) -> list[str]:
         for member in members
         for name in (_flat(program, owners[member]) if member in owners else [member])
     ]
-
-
-def _chosen(part: _Part) -> Table:
-    tables = part.level.tables
-    name = (
-        tables.table
-        if isinstance(tables, OneTable)
-        else dict(tables.tables)[evaluate(tables.selector, part.now)]
-    )
-    return next(table for table in part.program.tables if table.name == name)
 
 
 def _match(part: _Part, table: Table) -> str:
@@ -196,9 +187,13 @@ def _match(part: _Part, table: Table) -> str:
     at = next((at for at, line in enumerate(table.lines) if line.name in matching), len(table.lines))
     line = table.lines[at] if matching else table.default
     assert line is not None  # it was looked at above
+    kept = part.program.line_leaves.get(table.name)
+    if kept is not None:
+        part.now[kept] = at + 1
     execute(part.program, [action.statement for action in line.actions], part.now, {})
-    # The line is kept in the trace as the level's own only where it is of the table that the level would run.
-    part.trace = (at, 0, -1, part.trace[-1]) if table is _chosen(part) else part.trace
+    # The line is kept in the trace as the level's own only where it is of the table that the level would run last.
+    own = chosen_table(part.program, part.level.tables, part.now)
+    part.trace = (at, 0, -1, part.trace[-1]) if table is own else part.trace
     done = "; ".join(
         text for _, text in dict.fromkeys((action.heading, action.text) for action in line.actions)
     )

@@ -26,7 +26,7 @@ class NamedLine:
 
     def matched(self, level: RunningLevel) -> bool:
         """Whether the level's last cycle ran it."""
-        return level.table == self.table and level.line == self.line
+        return (self.table, self.line) in level.lines
 
     def __str__(self) -> str:
         return f"{self.level}.{self.table}.{self.line}"
@@ -136,7 +136,7 @@ def line_of(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> 
 
 def tables_of(level: RunningLevel) -> tuple[str, ...]:
     """The tables that a level may run."""
-    return (level.level.table,) if level.level.table else tuple(level.level.tables.values())
+    return level.level.every_table
 
 
 def value_of(leaf: Leaf, text: str) -> Value:

@@ -4,7 +4,7 @@ In: statements and a state. Out: the state after them, and what they owe (`evalu
 `if` and `case` is followed once; states are merged after. Loops are unrolled, calls run in place.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
@@ -19,7 +19,6 @@ from rcsc.lang.model import (
     For,
     If,
     Int,
-    Level,
     Local,
     OneTable,
     Place,
@@ -28,6 +27,8 @@ from rcsc.lang.model import (
     Real,
     Scalar,
     Statement,
+    Table,
+    TableChoice,
     ToElement,
     ToLeaf,
     ToLocal,
@@ -78,14 +79,16 @@ class Run(Evaluation):
         later = [self.leaf(pending(variable.name)) for variable, _ in deferred]
         for (variable, _), when, value in zip(deferred, ready, later, strict=True):
             self.write(variable.name, value, when)
+        for leaf in program.line_leaves.values():
+            self.write(leaf, values.constant(self.kinds[leaf], 0), TRUE)
 
-    def choices(self, level: Level) -> dict[str, Node]:
-        """Return the condition under which each table of the level runs, now that what selects it is computed."""
-        if isinstance(level.tables, OneTable):
-            return {str(level.tables.table): TRUE}
-        selector = self.evaluate(level.tables.selector)
+    def chosen(self, choice: TableChoice) -> dict[str, Node]:
+        """Return the condition under which each table of a choice runs, now that what selects it is computed."""
+        if isinstance(choice, OneTable):
+            return {str(choice.table): TRUE}
+        selector = self.evaluate(choice.selector)
         conditions: dict[str, Node] = {}
-        for value, name in level.tables.tables:
+        for value, name in choice.tables:
             here = values.equal(selector, values.constant(selector.kind, value))
             conditions[str(name)] = values.either(conditions.get(str(name), FALSE), here)
         return conditions
@@ -151,20 +154,41 @@ class Run(Evaluation):
     def _case(self, statement: Case) -> None:
         """The arms are disjoint, so that their order does not matter."""
         subject = self.evaluate(statement.subject)
+        self._arms(
+            [(values.among(subject, arm.values), arm.body) for arm in statement.arms], statement.orelse
+        )
+
+    def run_choice(self, choice: TableChoice, tables: Mapping[str, Table]) -> None:
+        """Run the table of a choice, of which one line matches."""
+        arms: list[tuple[Node, list[Statement]]] = []
+        for name, here in self.chosen(choice).items():
+            table, none = tables[name], here
+            for line in table.lines:
+                tests = (self.evaluate(test.condition) for test in line.tests if test is not None)
+                match = values.both(here, values.all_of(tests))
+                arms.append((match, [action.statement for action in line.actions]))
+                none = values.both(none, values.negation(match))
+            if table.default is not None:
+                arms.append((none, [action.statement for action in table.default.actions]))
+        self._arms(arms, ())
+
+    def _arms(
+        self, conditions: Sequence[tuple[Node, Iterable[Statement]]], orelse: Iterable[Statement]
+    ) -> None:
+        """Run what stands under the one condition that holds, else `orelse`."""
         before, outer, facts = self.state, self.path, self.facts
         arms: list[tuple[Node, State]] = []
         left = TRUE
-        for arm in statement.arms:
-            chosen = values.among(subject, arm.values)
+        for chosen, body in conditions:
             if chosen is not FALSE:
                 self.state = before.copy()
                 with self.where(chosen):
-                    self.execute(arm.body)
+                    self.execute(body)
                 arms.append((chosen, self.state))
             left = values.both(left, values.negation(chosen))
         self.state, self.path, self.facts = before.copy(), values.both(outer, left), dict(facts)
         values.learn(left, self.facts)
-        self.execute(statement.orelse)
+        self.execute(orelse)
         self.path, self.facts = outer, facts
         for chosen, state in reversed(arms):
             self.state = self._merged(chosen, state, self.state)

@@ -15,6 +15,8 @@ from tests.support.programs.stages import program_of, refused
 from tests.support.programs.texts import edited
 
 # Each case: the text, and for every error in it its line, its code and the text of its span.
+TWO = "| x | true || true |\n| y | false || false |\n"
+U = f"table u {{\n| line | a || b |\n{TWO}}}\nlevel l {{ table t table u }}"
 CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
     "unknown type": ("state n : widht", [(1, "RCS201", "widht")]),
     "unknown variable": ("invariant i : nothing = 1", [(1, "RCS201", "nothing")]),
@@ -207,6 +209,18 @@ CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
     "contradiction under `when`": (
         "input w : int 0 .. 900\ntable t {\n| line | when ||\n| x | w < 3 and w > 3 ||\n}",
         [(4, "RCS314", "w < 3 and w > 3")],
+    ),
+    "tables that wait for each other": (
+        f"state a : bool state b : bool\ntable t {{\n| line | b || a |\n{TWO}}}\n{U}",
+        [(12, "RCS215", "l")],
+    ),
+    "tables that write one variable": (
+        f"input a : bool output b : bool\ntable t {{\n| line | a || b |\n{TWO}}}\n{U}",
+        [(12, "RCS216", "l")],
+    ),
+    "table that runs twice": (
+        f"input a : bool\noutput b : bool\ntable t {{\n| line | a || b |\n{TWO}}}\nlevel l {{ table t table t }}",
+        [(8, "RCS202", "t")],
     ),
     "extern names": (
         'state n : bool\nextern procedure e writes n python "a b" c "1"',

@@ -197,7 +197,7 @@ def _time_line(shown: Sequence[TimeLineRow]) -> Table:
             ", ".join(_unbroken(f"{name} = {value}") for name, value in changed.items())
             for changed in (row.takes, row.leaves)
         )
-        ran = f"{row.table}: {row.line}" if row.tick else row.line
+        ran = "\n".join(row.ran) if row.tick else row.line
         ran += f"\n! {row.wrong}" if row.wrong else ""
         table.add_row(str(row.tick or ""), *((row.level,) if several else ()), ran, takes, leaves)
     return table

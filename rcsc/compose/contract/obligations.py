@@ -137,7 +137,7 @@ def obligations(ts: TransitionSystem, cycle: Cycle) -> tuple[Obligation, ...]:
 
 
 def _tables(cycle: Cycle) -> Iterator[Obligation]:
-    for at in cycle.tables:
+    for at in cycle.every:
         name = str(at.table.name)
         for assumption, condition in at.assumptions.items():
             yield Obligation(Sort.ASSUMPTION, name, assumption, values.follows(at.chosen, condition))
@@ -152,7 +152,7 @@ def _tables(cycle: Cycle) -> Iterator[Obligation]:
 def pairs(cycle: Cycle) -> tuple[Obligation, ...]:
     """State for each pair of lines that they never both match, to refute one where `ONE_LINE` is not proved."""
     exclusions = []
-    for at in cycle.tables:
+    for at in cycle.every:
         for earlier, later in may_meet(at.table):
             first, second = (str(at.table.lines[place].name) for place in (earlier, later))
             never = values.negation(values.both(at.matches[earlier], at.matches[later]))
@@ -249,7 +249,7 @@ def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
                 yield _answered(ts, cycle, at, overlooking)
     for variable in ts.program.variables:
         if variable.deferred_until is not None:
-            untouched = values.equal(cycle.after[variable.name], cycle.middle[variable.name])
+            untouched = values.equal(cycle.after[variable.name], cycle.prepared[variable.name])
             agreed = values.equal(cycle.after[variable.name], cycle.after[pending(variable.name)])
             yield Obligation(Sort.DEFERRED, "", str(variable.name), values.either(untouched, agreed))
 
@@ -269,6 +269,10 @@ def unstated(ts: TransitionSystem) -> tuple[Unstated, ...]:
 def _unstated(ts: TransitionSystem) -> Iterator[Unstated]:
     links = ts.links
     for missing in links.unread:
+        yield Unstated(Sort.PROTOCOL, "", missing)
+    if links.above is not None and ts.level.stages:
+        order = ", ".join(f"`{name}`" for name in ts.level.table_names)
+        missing = f"the level takes orders and runs several tables in a cycle ({order}): which of them answers is not known"
         yield Unstated(Sort.PROTOCOL, "", missing)
     if links.above is None:
         if links.below:
@@ -325,7 +329,7 @@ def resting_table(ts: TransitionSystem) -> str:
 
 
 def run_by(ts: TransitionSystem) -> list[Table]:
-    """List the tables that the level runs."""
+    """List the tables that the level runs last: where it has a superior, those of its commands."""
     return [table for table in ts.program.tables if table.name in ts.level.tables.names]
 
 

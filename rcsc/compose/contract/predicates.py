@@ -29,7 +29,6 @@ from rcsc.lang.model import (  # fmt: skip
     Int,
     Kind,
     Literal,
-    OneTable,
     Op,
     Procedure,
     Program,
@@ -197,8 +196,7 @@ def _read(ts: TransitionSystem) -> set[str]:
         for test in line.tests
         if test is not None
     ]
-    if not isinstance(level.tables, OneTable):
-        conditions.append(level.tables.selector)
+    conditions += level.selectors
     leaves = {str(name) for condition in conditions for name in read_by(condition)}
     leaves |= {leaf for below in ts.links.below for leaf in (below.command, *below.held)}
     leaves |= {f"{GHOST}{asked.into}" for asked in ts.links.asked}
@@ -329,6 +327,6 @@ def _questions(ts: TransitionSystem) -> Iterator[tuple[str, str]]:
 
 
 def _selector(ts: TransitionSystem) -> Iterator[str]:
-    """List the leaves that select the table."""
-    if not isinstance(ts.level.tables, OneTable):
-        yield from map(str, read_by(ts.level.tables.selector))
+    """List the leaves that select a table."""
+    for selector in ts.level.selectors:
+        yield from map(str, read_by(selector))

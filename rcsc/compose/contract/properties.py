@@ -60,7 +60,7 @@ def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
         _true(invariant.condition, leaves)
         for invariant in program.invariants
         if invariant.name in names
-        for leaves in (cycle.settled, cycle.middle, cycle.acted)
+        for leaves in (cycle.settled, *cycle.seen, cycle.middle, cycle.acted)
     )
 
 

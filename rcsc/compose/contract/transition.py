@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from rcsc.compose.contract.environment import Below, Links
-from rcsc.lang.interpret import Fault, evaluate
+from rcsc.lang.interpret import Fault, chosen_table
 from rcsc.lang.model import (  # fmt: skip
     Action,
     Bool,
@@ -19,13 +19,13 @@ from rcsc.lang.model import (  # fmt: skip
     Kind,
     Level,
     Line,
-    OneTable,
     Op,
     Procedure,
     Program,
     Scalar,
     Snapshot,
     Table,
+    TableChoice,
 )
 from rcsc.lang.restart import After, Fixed, SameAs
 from rcsc.symbolic import values
@@ -104,7 +104,8 @@ class Cycle:
         taken: The inputs of this cycle.
         contract: The condition on the environment; `undeclared`, without assumptions that tables declare.
         middle: Every leaf as the table sees it.
-        tables: Each table that may run.
+        tables: Each table that may run last; `stages`, each that may run before it, and `every`, all.
+        seen: Every leaf as the tables of each stage see it, in order.
         after: Every leaf and ghost after the cycle.
         refused: The condition that the cycle ends early, by a refused result or a failed stopping assumption;
             `unmatched`, before the table is matched; `interrupted`, before its line is done.
@@ -125,6 +126,18 @@ class Cycle:
     settled: Leaves = field(default_factory=dict)
     acted: Leaves = field(default_factory=dict)
     undeclared: Node = TRUE
+    stages: tuple[TableAt, ...] = ()
+    seen: tuple[Leaves, ...] = ()
+
+    @property
+    def every(self) -> tuple[TableAt, ...]:
+        """Each table that may run, in order."""
+        return (*self.stages, *self.tables)
+
+    @property
+    def prepared(self) -> Leaves:
+        """Every leaf after the preprocess, before any table ran."""
+        return (*self.seen, self.middle)[0]
 
     @property
     def cases(self) -> tuple[Node, ...]:
@@ -135,7 +148,7 @@ class Cycle:
     @property
     def goes_on(self) -> Node:
         """The condition that a matched table runs one line or DEFAULT: the cycle ends in no fault that the proofs exclude."""
-        return values.all_of(values.follows(at.runs, at.one_line) for at in self.tables)
+        return values.all_of(values.follows(at.runs, at.one_line) for at in self.every)
 
 
 def _matches(run: Run, line: Line) -> Node:
@@ -193,11 +206,15 @@ class TransitionSystem:
         if not wanted:
             return frozenset()
         cycle = self.cycle(self.havoc())
+        known = Run(
+            self.procedures, self.kinds, dict(cycle.prepared)
+        )  # what stages compute is the level's own
         return frozenset(
-            name
-            for at in cycle.tables
-            for name, condition in at.assumptions.items()
-            if name in wanted and not set(values.variables([condition])) <= cycle.before.keys()
+            str(assumption.name)
+            for assumption in self.program.assumptions
+            if assumption.name in wanted
+            and any(assumption.name in at.assumptions for at in cycle.every)
+            and not set(values.variables([known.evaluate(assumption.condition)])) <= cycle.before.keys()
         )
 
     def havoc(self) -> Leaves:
@@ -251,10 +268,15 @@ class TransitionSystem:
         return next(table for table in self.program.tables if table.name == name)
 
     def table_of(self, snapshot: Snapshot) -> str:
-        """Return the table that ran, from the leaves after its cycle; its selector is steady (`UNSTEADY_SELECTOR`)."""
-        if isinstance(self.level.tables, OneTable):
-            return str(self.level.tables.table)
-        return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, snapshot)])
+        """Return the table that ran last, from the leaves after its cycle; its selector is steady (`UNSTEADY_SELECTOR`)."""
+        return str(chosen_table(self.program, self.level.tables, snapshot).name)
+
+    def lines_before(self, snapshot: Snapshot) -> tuple[tuple[str, str], ...]:
+        """Return table and line of each that ran before the last, from the leaves after the cycle."""
+        held = ((name, int(snapshot[leaf])) for name, leaf in self.program.line_leaves.items())
+        numbers = {name: number for name, number in held if number}
+        order = [name for name in self.level.staged if name in numbers]
+        return tuple((str(name), line_names(self.table(name))[numbers[name] - 1]) for name in order)
 
     def cycle(self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None) -> Cycle:
         """Run one cycle symbolically from `before`; inputs default to fresh variables, named with the suffix.
@@ -270,12 +292,14 @@ class TransitionSystem:
         run.settle(self.program)
         settled = {**before, **run.state.leaves}
         run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
+        stages, seen = list[TableAt](), list[Leaves]()
+        for choice in self.level.stages:
+            seen.append({**before, **run.state.leaves})
+            stages += self._run(run, choice)
         middle = {**before, **run.state.leaves}
         unmatched = run.ended
-        tables = tuple(self._tables(run))
-        contract = values.both(contract, self._trusted(tables))
-        run.ended = values.either(run.ended, values.any_of(at.stopped for at in tables))
-        self._lines(run, tables)
+        tables = self._run(run, self.level.tables)
+        contract = values.both(contract, self._trusted((*stages, *tables)))
         acted, interrupted = {**before, **run.state.leaves}, run.ended
         run.execute(Call(self.procedures[name].name) for name in self.level.postprocess)
         after = {**before, **run.state.leaves, **ghosts}
@@ -286,13 +310,13 @@ class TransitionSystem:
         calls = tuple(run.answered)
         return Cycle(
             before, taken, contract, middle, tables, after,
-            run.ended, unmatched, interrupted, calls, settled, acted, undeclared,
+            run.ended, unmatched, interrupted, calls, settled, acted, undeclared, tuple(stages), tuple(seen),
         )  # fmt: skip
 
-    def tables(self, middle: Leaves, *, matched: bool) -> tuple[TableAt, ...]:
-        """Match each table that may run on these leaves; none runs if the cycle is not `matched`."""
-        run = Run(self.procedures, self.kinds, dict(middle), ended=values.truth(not matched))
-        return tuple(self._tables(run))
+    def tables(self, choice: TableChoice, seen: Leaves, *, matched: bool) -> tuple[TableAt, ...]:
+        """Match each table of a choice on these leaves; none runs if the cycle does not come to it, `matched`."""
+        run = Run(self.procedures, self.kinds, dict(seen), ended=values.truth(not matched))
+        return tuple(self._tables(run, choice))
 
     # --- the environment ---
 
@@ -344,9 +368,16 @@ class TransitionSystem:
 
     # --- the level ---
 
-    def _tables(self, run: Run) -> Iterable[TableAt]:
+    def _run(self, run: Run, choice: TableChoice) -> tuple[TableAt, ...]:
+        """Run the chosen table, at its place in the cycle."""
+        tables = tuple(self._tables(run, choice))
+        run.ended = values.either(run.ended, values.any_of(at.stopped for at in tables))
+        self._lines(run, tables)
+        return tables
+
+    def _tables(self, run: Run, choice: TableChoice) -> Iterable[TableAt]:
         goes_on = values.negation(run.ended)
-        for name, selected in run.choices(self.level).items():
+        for name, selected in run.chosen(choice).items():
             table = self.table(name)
             assumptions = {
                 str(assumption.name): run.evaluate(assumption.condition)
@@ -358,20 +389,25 @@ class TransitionSystem:
 
     def matches(self, cycle: Cycle, table: Table, instead: Leaves) -> tuple[Node, ...]:
         """Return the condition of each line of a table, with these leaves in place of the cycle's own."""
-        run = Run(self.procedures, self.kinds, {**cycle.middle, **instead})
+        stages = (at for at, stage in enumerate(self.level.stages) if table.name in stage.names)
+        place = next(stages, None)
+        seen = cycle.middle if place is None else cycle.seen[place]
+        run = Run(self.procedures, self.kinds, {**seen, **instead})
         return tuple(map(partial(_matches, run), table.lines))
 
     def _lines(self, run: Run, tables: tuple[TableAt, ...]) -> None:
-        """Run the first matching line of the chosen table."""
+        """Run the first matching line of the chosen table, and keep it where other tables follow."""
         middle = run.state
         ways: list[tuple[Node, State]] = []
+        kept = self.program.line_leaves
         for at in tables:
             left = at.runs
-            for match, line in zip(at.matches, at.table.lines, strict=True):
-                ways.append(_way(run, middle, values.both(left, match), line.actions))
+            for number, (line, match) in enumerate(at.lines, 1):
+                when, state = _way(run, middle, values.both(left, match), line.actions)
+                if (leaf := kept.get(at.table.name)) is not None:
+                    state.leaves[leaf] = values.constant(self.kinds[leaf], number)
+                ways.append((when, state))
                 left = values.both(left, values.negation(match))
-            if at.table.default is not None:
-                ways.append(_way(run, middle, left, at.table.default.actions))
         names = {name for _, state in ways for name in state.leaves}
         leaves = {}
         for name in sorted(names):
@@ -399,3 +435,8 @@ def successor(number: Node) -> Node:
     return values.arithmetic(
         Op.MOD, (values.arithmetic(Op.ADD, (number, step), Int(0, NUMBERS)), modulus), number.kind
     )
+
+
+def line_names(table: Table) -> tuple[str, ...]:
+    """Return the names of a table's lines, DEFAULT last."""
+    return tuple(str(line.name) for line in (*table.lines, table.default) if line is not None)

@@ -53,6 +53,7 @@ class Walk:
             if outcome.fault not in {Fault.OK, *EARLY}:
                 return
             self.now = outcome.snapshot
+            self.ran.update(self.ts.lines_before(self.now))
             if outcome.line is not None:
                 self.ran.add((self.ts.table_of(self.now), str(outcome.line)))
             yield {**self.now, **self.ghosts}

@@ -242,7 +242,7 @@ class _Followed:
     def _alike(self, result: Consequence, cycle: Cycle) -> Node:
         """Return the condition that this cycle comes to the same as the last one of a consequence."""
         if result.how is How.STOPS:
-            at = next(at for at in cycle.tables if at.table.name == result.last.table)
+            at = next(at for at in cycle.every if at.table.name == result.last.table)
             lines = [match for line, match in at.lines if line.name in result.last.matched[:2]]
             return values.both(at.runs, values.all_of(lines) if lines else at.none)
         now = self._same(cycle.after, dict(result.report), dict(cycle.after))

@@ -6,7 +6,7 @@ obligation: one about matching by the interpreter's fault, any other by its own 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias, assert_never
 
 from rcsc.compose.contract.given import ExternAnswer, scripted
@@ -19,15 +19,26 @@ from rcsc.lang.interpret import (
     Outcome,
     admit,
     call,
+    chosen_table,
     cycle,
     execute,
     holds,
     matching_lines,
+    run_stage,
     settle,
 )
-from rcsc.lang.model import Action, Default, Line, Snapshot, Value
+from rcsc.lang.model import Default, Line, Snapshot, Statement, Table, Value
 from rcsc.symbolic import values
 from rcsc.symbolic.values import Node
+
+
+@dataclass(frozen=True, slots=True)
+class StageRun:
+    """A table that ran before the last of a cycle; `failed`, its assumptions that did not hold."""
+
+    table: str
+    line: str
+    failed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +47,14 @@ class CycleRun:
 
     Attributes:
         taken: The inputs.
-        table: The table that ran; `line`, its line, empty if none matched.
+        table: The table that ran last, or the one that ended the cycle; `line`, its line, empty if none matched.
         fault: What ended the cycle early.
         failed: Assumptions of the table that did not hold, monitored or not.
         before: Every leaf at its start, inputs as last taken.
         after: Every leaf at its end.
         matched: Every line that matched, DEFAULT left out.
         answers: The results of each call of an extern procedure, in order.
+        stages: The tables that ran before it in the cycle.
     """
 
     taken: Mapping[str, Value]
@@ -54,6 +66,7 @@ class CycleRun:
     after: Mapping[str, Value]
     matched: tuple[str, ...] = ()
     answers: tuple[ExternAnswer, ...] = ()
+    stages: tuple["StageRun", ...] = ()
 
     @property
     def ends_the_run(self) -> bool:
@@ -96,8 +109,10 @@ class Halfway:
     Attributes:
         middle: Every leaf as the table saw it: inputs taken, deferred values settled, preprocess run, as far as it came.
         settled: Every leaf before the preprocess; `done`, before the postprocess, as far as it came.
-        matched: Whether it came to the table.
+        matched: Whether it came to the last table.
         acted: Whether its line, if one ran, was done.
+        seen: What each table that it came to before the last saw, in order.
+        ended: The one of them whose lines, or assumptions, ended the cycle.
     """
 
     middle: dict[str, Value]
@@ -105,6 +120,8 @@ class Halfway:
     done: dict[str, Value]
     matched: bool = False
     acted: bool = False
+    seen: list[tuple[Table, dict[str, Value]]] = field(default_factory=list)
+    ended: Table | None = None
 
 
 def halfway(ts: TransitionSystem, step: CycleRun) -> Halfway:
@@ -118,24 +135,47 @@ def halfway(ts: TransitionSystem, step: CycleRun) -> Halfway:
         with scripted(program, step.answers):
             for name in ts.level.preprocess:
                 call(program, name, [], now)
+            if not _stages(ts, half, now):
+                return half
             half.matched, half.middle = True, dict(now)
-            execute(program, [action.statement for action in _actions(ts, step)], now, {})
+            execute(program, _actions(ts.table(step.table), step.line), now, {})
             half.acted = step.fault is not Fault.ASSUMPTION
     except ExternError:
         pass
     return half
 
 
-def _actions(ts: TransitionSystem, step: CycleRun) -> tuple[Action, ...]:
-    """Return the actions of the line that ran."""
-    table = ts.table(step.table)
+def _stages(ts: TransitionSystem, half: Halfway, now: dict[str, Value]) -> bool:
+    """Run the tables before the last; return whether none of them ended the cycle."""
+    for choice in ts.level.stages:
+        table = chosen_table(ts.program, choice, now)
+        half.seen.append((table, dict(now)))
+        if run_stage(ts.program, table, now) is not Fault.OK:
+            half.ended = table
+            return False
+    return True
+
+
+def _failed(ts: TransitionSystem, table: Table, now: Snapshot) -> tuple[str, ...]:
+    """Return the table's assumptions that do not hold where it runs."""
+    return tuple(
+        str(assumption.name)
+        for assumption in ts.program.assumptions
+        if assumption.name in table.assumptions and not holds(assumption.condition, now)
+    )
+
+
+def _actions(table: Table, name: str) -> list[Statement]:
+    """Return the actions of a line."""
     lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
-    return next((line.actions for line in lines if line.name == step.line), ())
+    return [action.statement for line in lines if line.name == name for action in line.actions]
 
 
 def seen_by_table(ts: TransitionSystem, step: CycleRun) -> Snapshot | None:
     """Return the leaves as the table saw them; None if the cycle ended before."""
     half = halfway(ts, step)
+    if half.ended is not None:
+        return half.seen[-1][1]
     return half.middle if half.matched else None
 
 
@@ -163,7 +203,37 @@ def _step(
         matched,
         answers,
     )
-    return replace(step, failed=(*step.failed, *_also_failed(ts, step)))
+    return (
+        _staged(ts, step)
+        if ts.level.stages
+        else replace(step, failed=(*step.failed, *_also_failed(ts, step)))
+    )
+
+
+def _staged(ts: TransitionSystem, step: CycleRun) -> CycleRun:
+    """Tell the tables of a cycle apart: each with what failed where it ran."""
+    if step.fault is Fault.ADMIT:
+        return replace(step, failed=())
+    half = halfway(ts, step)
+    ran = dict(ts.lines_before(step.after))
+    stages = tuple(
+        StageRun(name, ran[name], _failed(ts, table, seen))
+        for table, seen in half.seen
+        if (name := str(table.name)) in ran
+    )
+    if half.ended is None:
+        failed = _failed(ts, ts.table(step.table), half.middle) if half.matched else ()
+        return replace(step, failed=failed, stages=stages)
+    seen = half.seen[-1][1]
+    matched = tuple(map(str, matching_lines(half.ended, seen)))
+    return replace(
+        step,
+        table=str(half.ended.name),
+        line="",
+        failed=_failed(ts, half.ended, seen),
+        matched=matched if step.fault is Fault.SEVERAL_LINES else (),
+        stages=stages,
+    )
 
 
 def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
@@ -189,7 +259,7 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool
         StopIteration: The level has no such obligation.
     """
     if obligation.table and obligation.table != step.table:
-        return False
+        return _broken_before(ts, obligation, step)
     match obligation.sort:
         case Sort.ASSUMPTION:
             return obligation.name in step.failed
@@ -229,6 +299,18 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool
             assert_never(obligation.sort)
 
 
+def _broken_before(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
+    """Return whether a table that ran before the last breaks an obligation of its own: it ran one line, and the cycle went on."""
+    ran = next((stage for stage in step.stages if stage.table == obligation.table), None)
+    if ran is None:
+        return False
+    default = ts.table(ran.table).default
+    at_default = default is not None and ran.line == default.name
+    return (obligation.sort is Sort.ASSUMPTION and obligation.name in ran.failed) or (
+        obligation.sort is Sort.NO_DEFAULT and at_default
+    )
+
+
 def _broken_between(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
     """Return whether the leaves before and after the cycle break the obligation's condition."""
     every = obligations(ts, as_cycle(ts, step))
@@ -264,18 +346,27 @@ def as_cycle(ts: TransitionSystem, step: CycleRun) -> Cycle:
     taken = {name: after[name] for name in step.taken}
     half = halfway(ts, step)
     middle = _constants(ts, half.middle)
+    seen = tuple(_constants(ts, leaves) for _, leaves in half.seen)
     return Cycle(
         before,
         taken,
         values.TRUE,
         {**middle, **taken},
-        ts.tables(middle, matched=half.matched),
+        ts.tables(ts.level.tables, middle, matched=half.matched),
         after,
         values.truth(step.fault in EARLY),
         values.truth(not half.matched),
         values.truth(not half.acted),
         settled=_constants(ts, half.settled),
         acted=_constants(ts, half.done),
+        stages=tuple(
+            at
+            for place, choice in enumerate(ts.level.stages)
+            for at in ts.tables(
+                choice, seen[place] if place < len(seen) else middle, matched=place < len(seen)
+            )
+        ),
+        seen=seen,
     )
 
 

@@ -79,6 +79,7 @@ class TimeLineRow:
         takes: The inputs that changed, and their values.
         leaves: The other leaves that the cycle changed.
         wrong: What went wrong in it, or empty.
+        before: Table and line of each that ran before in the cycle.
     """
 
     tick: int
@@ -88,6 +89,12 @@ class TimeLineRow:
     takes: Mapping[str, str]
     leaves: Mapping[str, str]
     wrong: str
+    before: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def ran(self) -> tuple[str, ...]:
+        """Return every table with its line, in order."""
+        return tuple(f"{table}: {line}" for table, line in (*self.before, (self.table, self.line)))
 
 
 RESTART, BEGINS = "restart", "begins"
@@ -141,12 +148,26 @@ def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | N
     }
     takes = {name: text for name, text in changed.items() if name in step.taken}
     takes |= dict(_answers(ts, step))
-    leaves = {name: text for name, text in changed.items() if name not in step.taken}
-    wrong = [f"assumption `{name}` fails" for name in step.failed]
+    told = {*step.taken, *map(str, ts.program.line_leaves.values())}
+    leaves = {name: text for name, text in changed.items() if name not in told}
+    failed = dict.fromkeys(
+        name for part in (*(stage.failed for stage in step.stages), step.failed) for name in part
+    )
+    wrong = [f"assumption `{name}` fails" for name in failed]
     wrong += [_FAULTS[step.fault]] if step.fault in _FAULTS else []
     wrong += [BROKEN[broken.sort].format(broken.name)] if broken is not None and broken.sort in BROKEN else []
     line = " and ".join(step.matched) or "none"
-    return TimeLineRow(tick, ts.level.name, step.table, line, takes, leaves, "; ".join(wrong))
+    before = tuple((stage.table, stage.line) for stage in step.stages)
+    return TimeLineRow(
+        tick,
+        ts.level.name,
+        step.table,
+        line,
+        takes,
+        leaves,
+        "; ".join(wrong),
+        before,
+    )
 
 
 def _answers(ts: TransitionSystem, step: CycleRun) -> Iterator[tuple[str, str]]:

@@ -51,6 +51,8 @@ def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
         Sort.ASSUMPTION, Sort.SOME_LINE, Sort.ONE_LINE, Sort.NO_DEFAULT,
     }:  # fmt: skip
         return ()
+    if finding.obligation.table not in {"", step.table}:
+        return ()  # a table that others followed: the last one is not to be mended
     table = ts.table(step.table)
     if not boxes.applies(table):
         return tuple(_line(ts, replace(table, assumptions=()), step))
@@ -274,7 +276,7 @@ class _Trial:
 
     def _moved(self, cycle: Cycle) -> Node:
         """Return the condition that a line matched before, and does not with its changed cell."""
-        at = next(at for at in cycle.tables if at.table.name == self.table.name)
+        at = next(at for at in cycle.every if at.table.name == self.table.name)
         before = self.ts.matches(cycle, self.table, {})
         lost = (
             values.both(before[cell.line], values.negation(at.matches[cell.line])) for cell in self.changed
@@ -283,7 +285,7 @@ class _Trial:
 
     def _does(self, harm: Harm, cycle: Cycle) -> Node:
         if harm is Harm.DEFAULT:
-            at = next(at for at in cycle.tables if at.table.name == self.table.name)
+            at = next(at for at in cycle.every if at.table.name == self.table.name)
             return at.none if at.table.default is not None else values.FALSE
         if self.ts.links.above is None:
             return values.FALSE

@@ -112,7 +112,7 @@ def gives_an_order(ts: TransitionSystem, cycle: Cycle) -> Node:
 
 def _lines(cycle: Cycle) -> Iterator[tuple[LineName, Node]]:
     """Yield each line with the condition that it runs; an unreachable DEFAULT is an obligation instead."""
-    for at in cycle.tables:
+    for at in cycle.every:
         for line, match in at.lines:
             if not (isinstance(line, Default) and line.unreachable):
                 yield (str(at.table.name), str(line.name)), values.both(at.runs, match)
@@ -162,7 +162,7 @@ def _repeated(
             (str(table_at.table.name), str(line.name)),
             keyed.term(values.all_of((table_at.chosen, match, two.chosen, more))),
         )
-        for table_at, two in zip(cycle.tables, again.tables, strict=True)
+        for table_at, two in zip(cycle.every, again.every, strict=True)
         for (line, match), (_, more) in zip(table_at.lines, two.lines, strict=True)
     ]
     gives = keyed.term(gives_an_order(ts, cycle))

@@ -43,7 +43,10 @@ def _around(digests: Digests, level: Level) -> object:
     deferred = [
         (v.name, repr(v.deferred_until)) for v in digests.program.variables if v.deferred_until is not None
     ]
-    return [digests.body(body) for body in bodies], deferred
+    tables = (
+        [digests.table(table) for table in run_by(digests.program, level).values()] if level.stages else []
+    )
+    return [digests.body(body) for body in bodies], deferred, tables
 
 
 def _compared(versions: Versions, level: str, old: Table, new: Table) -> Follows:

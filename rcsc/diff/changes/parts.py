@@ -143,6 +143,13 @@ def _level(old: Level, new: Level) -> Iterator[str]:
             yield f"table for {at or 'every cycle'}: {first.get(at, 'none')}, now {second.get(at, 'none')}"
     if _selector(old) != _selector(new):
         yield "which command chooses the table"
+    if old.stages != new.stages:
+        yield f"tables that run before it: {_stages(old)}, now {_stages(new)}"
+
+
+def _stages(level: Level) -> str:
+    """What runs before the last table, in order."""
+    return ", ".join(" or ".join(f"`{name}`" for name in stage.names) for stage in level.stages) or "none"
 
 
 def _chosen(level: Level) -> Mapping[str, str]:

@@ -281,4 +281,4 @@ def is_across(condition: Node) -> bool:
 def run_by(program: Program, level: Level) -> dict[str, Table]:
     """The tables that a level runs, by name."""
     named = {table.name: table for table in program.tables}
-    return {str(name): named[name] for name in level.tables.names}
+    return {str(name): named[name] for name in level.table_names}

@@ -20,13 +20,11 @@ from rcsc.lang.model import (
     Expr,
     Kind,
     Level,
-    OneTable,
     Procedure,
     ProcedureName,
     Read,
     Record,
     Table,
-    TableName,
     ToLeaf,
     Type,
     Variable,
@@ -59,7 +57,7 @@ def _hidden(scope: Scope, name: VariableName) -> VariableName:
     if name not in scope.previous:
         base, bracket, _ = name.partition("[")
         leaves = [leaf for leaf in scope.leaves if leaf.startswith(f"{base}[")] if bracket else [name]
-        own = _fresh(scope, f"was_{base.replace('.', '_')}")
+        own = fresh(scope, f"was_{base.replace('.', '_')}")
         doc = f"{base} after the cycle before"
         first = scope.leaves[name]
         for leaf in map(VariableName, leaves):
@@ -96,7 +94,8 @@ def _type_at(scope: Scope, path: str) -> Type:
     return kind
 
 
-def _fresh(scope: Scope, name: str) -> str:
+def fresh(scope: Scope, name: str) -> str:
+    """The name, or the first of `NAME_2`, `NAME_3` that nothing else has."""
     taken = {*scope.leaves, *(kept.name for kept in scope.kept), *scope.declared, *scope.variables}
     taken |= {*scope.constants, *scope.members, *scope.types}
     number, unique = 2, name
@@ -138,16 +137,11 @@ def with_keeping(
     keep: Procedure, levels: tuple[Level, ...], tables: tuple[Table, ...]
 ) -> tuple[tuple[Level, ...], tuple[Table, ...]]:
     """Levels that keep as the last part of their postprocess, and tables outside any level that do as their last action."""
-    run = {name for level in levels for name in _tables_of(level)}
+    run = {name for level in levels for name in level.table_names}
     return (
         tuple(replace(level, postprocess=(*level.postprocess, keep.name)) for level in levels),
         tuple(table if table.name in run else _alone(keep, table) for table in tables),
     )
-
-
-def _tables_of(level: Level) -> tuple[TableName, ...]:
-    chosen = level.tables
-    return (chosen.table,) if isinstance(chosen, OneTable) else tuple(name for _, name in chosen.tables)
 
 
 def _alone(keep: Procedure, table: Table) -> Table:

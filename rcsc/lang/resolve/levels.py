@@ -1,16 +1,47 @@
-"""Control levels: a period, what runs before and after, and the table of each command."""
+"""Control levels: a period, what runs before and after, the table of each command, and the order of several tables.
 
-from collections.abc import Iterable, Mapping
+Several tables of one cycle run in the order of what they read and write: one that reads what another writes comes after it. So
+each reads values of this cycle, and the order in which they are written means nothing.
+
+>>> from rcsc.lang.resolve import compile_text
+>>> program = compile_text('''
+... input hot : bool
+... state alarm : bool
+... output horn : bool
+... table sound {
+...   | line | alarm || horn  |
+...   | on   | true  || true  |
+...   | off  | false || false |
+... }
+... table watch {
+...   | line | hot   || alarm |
+...   | up   | true  || true  |
+...   | stay | false ||       |
+... }
+... level guard { table sound table watch }''')
+>>> program.levels[0].table_names
+('watch', 'sound')
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, count
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Label
 from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.previous import fresh
 from rcsc.lang.expressions.scope import Body, Scope, spell_number
 from rcsc.lang.expressions.typed import typed
 from rcsc.lang.expressions.types import constant
+from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
+    Assumption,
+    Declared,
     Default,
+    Enum,
     Int,
+    Kind,
     Level,
     Line,
     OneTable,
@@ -19,8 +50,11 @@ from rcsc.lang.model import (
     Scalar,
     Table,
     TableByCommand,
+    TableChoice,
     TableName,
     Value,
+    Variable,
+    VariableName,
     key_bounds,
     spell,
     value_of_key,
@@ -34,23 +68,35 @@ USUAL_PERIOD = 40
 LONGEST_PERIOD = 3_600_000
 
 
-def level(
-    scope: Scope,
-    written: tree.LevelDecl,
-    tables: Mapping[TableName, Table],
-    owners: Owners,
-    procedures: Mapping[str, Procedure],
-) -> Level | None:
+@dataclass(frozen=True, slots=True)
+class Declarations:
+    """What levels run: tables, assumptions and procedures by name, and owners."""
+
+    tables: Mapping[TableName, Table]
+    assumptions: Mapping[str, Assumption]
+    procedures: Mapping[str, Procedure]
+    owners: Owners
+
+
+def level(scope: Scope, written: tree.LevelDecl, known: Declarations) -> Level | None:
     """The level; None after an error in its tables."""
-    before, after = owners.laid_out(written.preprocess), owners.laid_out(written.postprocess)
-    period, chosen = _period(scope, written), _chosen(scope, written, set(tables))
-    if chosen is None:
+    before, after = known.owners.laid_out(written.preprocess), known.owners.laid_out(written.postprocess)
+    period = _period(scope, written)
+    chosen = [_chosen(scope, clause, set(known.tables)) for clause in written.tables]
+    clauses = [choice for choice in chosen if choice is not None]
+    if len(clauses) < len(written.tables) or not _each_once(scope, written):
         return None
-    if isinstance(chosen, TableByCommand):
-        assert written.selector is not None
-        runs = [tables[name] for name in dict.fromkeys(name for _, name in chosen.tables)]
-        _stays(scope, chosen, written.selector.span, _written(runs, after, procedures))
-    return Level(written.name.text, period, before, chosen, after, " ".join(written.doc), written.name.span)
+    for clause, choice in zip(written.tables, clauses, strict=True):
+        if isinstance(choice, TableByCommand):
+            assert clause.selector is not None
+            runs = [known.tables[name] for name in choice.names]
+            _stays(scope, choice, clause.selector.span, _written(runs, after, known.procedures))
+    ordered = _in_order(scope, written, clauses, known)
+    if ordered is None:
+        return None
+    *stages, last = ordered
+    doc = " ".join(written.doc)
+    return Level(written.name.text, period, before, last, after, doc, written.name.span, tuple(stages))
 
 
 def _period(scope: Scope, written: tree.LevelDecl) -> int:
@@ -73,9 +119,7 @@ def _period(scope: Scope, written: tree.LevelDecl) -> int:
     return period
 
 
-def _chosen(
-    scope: Scope, written: tree.LevelDecl, tables: set[TableName]
-) -> OneTable | TableByCommand | None:
+def _chosen(scope: Scope, written: tree.TableClause, tables: set[TableName]) -> TableChoice | None:
     if written.table is not None:
         known = _table(scope, written.table, tables)
         return OneTable(TableName(written.table.text)) if known else None
@@ -156,3 +200,157 @@ def _complete(scope: Scope, kind: Scalar, pairs: dict[Value, TableName], span: S
     more = f" and {spell_number(count)} more have" if count else " has"
     scope.report(Code.MISSING_TABLE, f"`{words}`{more} no table", span, f"add `{words} : TABLE`")
     return False
+
+
+# --- several tables of one cycle --------------------------------------------------------
+
+
+def _each_once(scope: Scope, written: tree.LevelDecl) -> bool:
+    """Whether no table stands in two clauses; the second place is reported."""
+    first: dict[str, tuple[int, Span]] = {}
+    sound = True
+    for at, clause in enumerate(written.tables):
+        names = [dispatch.table for dispatch in clause.dispatch] if clause.table is None else [clause.table]
+        for name in names:
+            place, span = first.setdefault(name.text, (at, name.span))
+            if place != at:
+                message = f"table `{name.text}` would run twice in a cycle of level `{written.name.text}`"
+                scope.report(Code.DUPLICATE_NAME, message, name.span, related=(Label(span, "here first"),))
+                sound = False
+    return sound
+
+
+@dataclass(frozen=True, slots=True)
+class _Touched:
+    """What one clause of a level touches: of each leaf the table that reads it (first), and the one that writes it."""
+
+    reads: Mapping[str, str]
+    writes: Mapping[str, str]
+
+
+def _in_order(
+    scope: Scope, written: tree.LevelDecl, clauses: Sequence[TableChoice], known: Declarations
+) -> list[TableChoice] | None:
+    """The clauses, each after those that write what it reads; where that leaves it free, as their tables are declared.
+
+    None after an error: two that write one leaf, or that wait for each other.
+    """
+    if len(clauses) == 1:
+        return list(clauses)
+    place = {name: at for at, name in enumerate(known.tables)}
+    left = sorted(clauses, key=lambda choice: min(place[name] for name in choice.names))
+    touched = [_touched(choice, known) for choice in left]
+    sound = _one_writer(scope, written, touched)
+    waits = {
+        at: {
+            other: min(shared)
+            for other, writer in enumerate(touched)
+            if other != at and (shared := writer.writes.keys() & reader.reads.keys())
+        }
+        for at, reader in enumerate(touched)
+    }
+    ordered: list[int] = []
+    while len(ordered) < len(left):
+        ready = (at for at in waits if at not in ordered and not waits[at].keys() - ordered)
+        following = next(ready, None)
+        if following is None:
+            _circle(scope, written, touched, {at: waits[at] for at in waits if at not in ordered})
+            return None
+        ordered.append(following)
+    return [left[at] for at in ordered] if sound else None
+
+
+def _touched(choice: TableChoice, known: Declarations) -> _Touched:
+    """What a clause reads (in its selector, tests, actions and assumptions) and writes; hidden values of before are of no cycle."""
+    reads: dict[str, str] = {}
+    writes: dict[str, str] = {}
+    if isinstance(choice, TableByCommand):
+        reads |= dict.fromkeys(map(str, read_by(choice.selector)), str(choice.names[0]))
+    for name in choice.names:
+        table = known.tables[name]
+        lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
+        actions = [action.statement for line in lines for action in line.actions]
+        read, write = touched(actions, known.procedures)
+        told = [known.assumptions[own].condition for own in table.assumptions if own in known.assumptions]
+        every = {*table.variables, *read, *(leaf for condition in told for leaf in read_by(condition))}
+        reads |= {str(leaf): str(name) for leaf in every if leaf not in reads}
+        writes |= {str(leaf): str(name) for leaf in write if leaf not in writes}
+    return _Touched(reads, writes)
+
+
+def _one_writer(scope: Scope, written: tree.LevelDecl, touched: Sequence[_Touched]) -> bool:
+    """Whether no two clauses write one leaf; the first that two do is reported for each pair of tables."""
+    known: dict[tuple[str, str], str] = {}
+    writers: dict[str, str] = {}
+    for part in touched:
+        for leaf, table in part.writes.items():
+            other = writers.setdefault(leaf, table)
+            if other != table:
+                known.setdefault((other, table), leaf)
+    for (other, table), leaf in known.items():
+        scope.report(
+            Code.TWO_TABLES_WRITE,
+            f"tables `{other}` and `{table}` both write `{leaf}` in one cycle of level `{written.name.text}`",
+            written.name.span,
+            "let one table write it, or choose between the two: `table by SELECTOR { ... }`",
+        )
+    return not known
+
+
+def _circle(
+    scope: Scope, written: tree.LevelDecl, touched: Sequence[_Touched], waits: Mapping[int, Mapping[int, str]]
+) -> None:
+    """Report the shortest way round by which clauses wait for each other: each for one that is left, too."""
+    steps = min((_way_back(start, waits) for start in waits), key=len)
+    words = [
+        f"`{touched[reader].reads[leaf]}` reads `{leaf}`, which `{touched[writer].writes[leaf]}` writes"
+        for reader, leaf, writer in steps
+    ]
+    leaf = steps[-1][1]
+    scope.report(
+        Code.TABLE_CYCLE,
+        f"the tables of level `{written.name.text}` wait for each other: {'; '.join(words)}",
+        written.name.span,
+        f"one of them reads what the cycle before left: `was {leaf}`",
+    )
+
+
+def _way_back(start: int, waits: Mapping[int, Mapping[int, str]]) -> list[tuple[int, str, int]]:
+    """The shortest way from a clause over those that it waits for to one that was met: its round alone."""
+    ways: dict[int, list[tuple[int, str, int]]] = {start: []}
+    for reader in (queue := [start]):
+        for writer, leaf in waits[reader].items():
+            if writer == start:
+                return [*ways[reader], (reader, leaf, writer)]
+            if writer in waits and writer not in ways:
+                ways[writer] = [*ways[reader], (reader, leaf, writer)]
+                queue.append(writer)
+    return [(start, "", start)] * (len(waits) + 1)
+
+
+def lines_kept(scope: Scope, levels: Iterable[Level], tables: Iterable[Table], file: str) -> tuple[Enum, ...]:
+    """Declare, for each table that runs before another, the state that holds its line of the present cycle; return their types.
+
+    Only properties can name it: it is made after all else is resolved.
+    """
+    staged = {name for level in levels for name in level.staged}
+    return tuple(_line_kept(scope, table, file) for table in tables if table.name in staged)
+
+
+def _line_kept(scope: Scope, table: Table, file: str) -> Enum:
+    lines = [str(line.name) for line in (*table.lines, table.default) if line is not None]
+    others = (f"none_{number}" for number in count(2))
+    none = next(word for word in chain(("none",), others) if word not in lines)
+    name = fresh(scope, f"line_of_{table.name}")
+    kind = Enum(name, (none, *lines), file)
+    leaf, doc = (
+        VariableName(name),
+        f"the line of table {table.name} in this cycle; {none} where it did not run",
+    )
+    scope.leaves[leaf] = Variable(leaf, Kind.STATE, kind, 0, doc=doc, span=table.span, line_of=table.name)
+    scope.kept.append(Declared(name, Kind.STATE, kind, (leaf,), doc, table.span))
+    scope.declared[name] = scope.kept[-1]
+    scope.types[name] = kind
+    for member in kind.members:
+        scope.members.setdefault(member, []).append(kind)
+    return kind

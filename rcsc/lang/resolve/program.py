@@ -18,7 +18,6 @@ from rcsc.lang.model import (
     Invariant,
     Kind,
     Level,
-    Procedure,
     Program,
     Property,
     Standing,
@@ -29,7 +28,7 @@ from rcsc.lang.project import Loaded, load
 from rcsc.lang.protocol import declared, expanded
 from rcsc.lang.resolve import procedures as calls
 from rcsc.lang.resolve.declarations import Names
-from rcsc.lang.resolve.levels import level
+from rcsc.lang.resolve.levels import Declarations, level, lines_kept
 from rcsc.lang.resolve.owners import Owners
 from rcsc.lang.resolve.properties import resolve_property
 from rcsc.lang.resolve.roles import offered, restart_of, roles_of
@@ -112,14 +111,23 @@ class _Resolver:
         )
         assumptions = self._assumptions(all_)
         invariants = self._invariants(all_)
-        properties = tuple(
-            replace(each, standard=each.name not in claimed) for each in self._properties(all_)
-        )
         tables = self._tables(all_, {a.name for a in assumptions})
         if not scope.diagnostics:
             more, tables = offered(scope, parties, deferred, tables, procedures)
             assumptions += more
-        levels = self._levels(all_, tables, owners, procedures)
+        levels = self._levels(
+            all_,
+            Declarations(
+                {table.name: table for table in tables},
+                {str(assumption.name): assumption for assumption in assumptions},
+                {str(procedure.name): procedure for procedure in procedures},
+                owners,
+            ),
+        )
+        lines = lines_kept(scope, levels, tables, self.root)
+        properties = tuple(
+            replace(each, standard=each.name not in claimed) for each in self._properties(all_)
+        )
         keep = keeping(scope, {*scope.procedures, *owners.written}, Span(self.root, 0, 0))
         if keep is not None:
             procedures += (keep,)
@@ -132,9 +140,9 @@ class _Resolver:
         return Program(
             stem,
             self.root,
-            enums,
+            (*enums, *lines),
             tuple(scope.records),
-            (*scope.declared.values(), *scope.kept),
+            (*(every for every in scope.declared.values() if every not in scope.kept), *scope.kept),
             tuple(scope.leaves.values()),
             procedures,
             assumptions,
@@ -194,17 +202,9 @@ class _Resolver:
         )
         return tuple(resolved for resolved in properties if resolved is not None)
 
-    def _levels(
-        self,
-        all_: list[tree.Declaration],
-        tables: tuple[Table, ...],
-        owners: Owners,
-        procedures: tuple[Procedure, ...],
-    ) -> tuple[Level, ...]:
-        by_name = {table.name: table for table in tables}
-        bodies = {str(procedure.name): procedure for procedure in procedures}
+    def _levels(self, all_: list[tree.Declaration], known: Declarations) -> tuple[Level, ...]:
         written = [d for d in all_ if isinstance(d, tree.LevelDecl) and self.scope.claim(d.name, "table")]
-        levels = (level(self.scope, declaration, by_name, owners, bodies) for declaration in written)
+        levels = (level(self.scope, declaration, known) for declaration in written)
         return tuple(resolved for resolved in levels if resolved is not None)
 
     def _tables(self, all_: list[tree.Declaration], assumptions: set[AssumptionName]) -> tuple[Table, ...]:

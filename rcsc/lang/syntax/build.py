@@ -244,21 +244,25 @@ class Build:
         head = self._head(node)
         parts = node.children[1:]
         period, before = self._find(parts, "period"), self._find(parts, "preprocess")
-        table, by_command = self._find(parts, "one_table"), self._find(parts, "by_command")
         after = self._find(parts, "postprocess")
+        clauses = (part for part in parts if self._rule(part) in {"one_table", "by_command"})
         return tree.LevelDecl(
             self._name(node.children[0]),
             self.expr(period.children[0]) if period else None,
             self._names(before.children[0]) if before else (),
-            self._name(table.children[0]) if table else None,
-            self.expr(by_command.children[0]) if by_command else None,
-            tuple(
-                tree.Dispatch(self.expr(d.children[0]), self._name(d.children[1]), self._span(d))
-                for d in (by_command.children[1:] if by_command else ())
-            ),
+            tuple(map(self._table_clause, clauses)),
             self._names(after.children[0]) if after else (),
             **head,
         )
+
+    def _table_clause(self, node: ParseNode) -> tree.TableClause:
+        first, *rest = node.children
+        if node.data == "one_table":
+            return tree.TableClause(self._name(first), None, (), self._span(node))
+        arms = (
+            tree.Dispatch(self.expr(d.children[0]), self._name(d.children[1]), self._span(d)) for d in rest
+        )
+        return tree.TableClause(None, self.expr(first), tuple(arms), self._span(node))
 
     # --- types and units ---
 

@@ -235,13 +235,14 @@ def _level(level: tree.LevelDecl) -> Iterator[str]:
         yield f"  period {spell_expr(level.period)}"
     if level.preprocess:
         yield f"  preprocess {', '.join(name.text for name in level.preprocess)}"
-    if level.table is not None:
-        yield f"  table {level.table.text}"
-    elif level.selector is not None:
-        yield f"  table by {spell_expr(level.selector)} {{"
-        for dispatch in level.dispatch:
-            yield f"    {spell_expr(dispatch.value)} : {dispatch.table.text}"
-        yield "  }"
+    for clause in level.tables:
+        if clause.table is not None:
+            yield f"  table {clause.table.text}"
+        elif clause.selector is not None:
+            yield f"  table by {spell_expr(clause.selector)} {{"
+            for dispatch in clause.dispatch:
+                yield f"    {spell_expr(dispatch.value)} : {dispatch.table.text}"
+            yield "  }"
     if level.postprocess:
         yield f"  postprocess {', '.join(name.text for name in level.postprocess)}"
     yield "}"

@@ -701,19 +701,26 @@ class Dispatch:
 
 
 @dataclass(frozen=True, slots=True)
-class LevelDecl(Documented):
-    """A control level: preprocess, state table, postprocess; one cycle a period.
+class TableClause:
+    """`table t`, or with one table a command: `table by input_command { acquire : acquire_table ... }`."""
 
-    `level name { period 40 [ms] preprocess a, b table t postprocess c }`, or with one
-    table a command: `table by input_command { acquire : acquire_table ... }`.
+    table: Name | None
+    selector: Expr | None
+    dispatch: tuple[Dispatch, ...]
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class LevelDecl(Documented):
+    """A control level: preprocess, state tables, postprocess; one cycle a period.
+
+    `level name { period 40 [ms] preprocess a, b table t postprocess c }`; of several tables the order is free.
     """
 
     name: Name
     period: Expr | None
     preprocess: tuple[Name, ...]
-    table: Name | None
-    selector: Expr | None
-    dispatch: tuple[Dispatch, ...]
+    tables: tuple[TableClause, ...]
     postprocess: tuple[Name, ...]
 
 

@@ -45,8 +45,8 @@ def _coverage(level: LoggedLevel) -> Iterator[Coverage]:
     next(cycles)  # the state that recording started from
     for _, values in cycles:
         counts[level.sign.table_of(level.level, values), line_of(level.sign, level.level, values)] += 1
-    tables = [level.level.table] if level.level.table else list(dict.fromkeys(level.level.tables.values()))
-    for table in tables:
+        counts.update(level.sign.lines_before(level.level, values))
+    for table in level.level.every_table:
         lines = level.sign.tables.get(table, ())
         yield Coverage(level.name, table, {line: counts[table, line] for line in lines})
 

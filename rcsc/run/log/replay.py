@@ -159,7 +159,8 @@ def _translated(then: Leaf, now: Leaf, value: Value) -> Value:
 
 
 def _line(sign: Signature, level: LevelSign, values: Values) -> str:
-    return f"{sign.table_of(level, values)} line {line_of(sign, level, values) or 'none'}"
+    last = sign.table_of(level, values), line_of(sign, level, values) or "none"
+    return ", ".join(f"{table} line {line}" for table, line in (*sign.lines_before(level, values), last))
 
 
 @dataclass(slots=True)

@@ -90,6 +90,9 @@ def signature_text(sign: Signature) -> str:
     del written["restart"]
     if sign.serves is None:
         del written["serves"]
+    for level in written["levels"]:
+        if not level["stages"]:
+            del level["stages"]
     declared = restart_written(sign)
     return compact({**written, **({"restart": declared} if declared is not None else {})})
 

@@ -108,7 +108,7 @@ def _leaf(sign: Signature, at: int) -> LogColumn:
 
 
 def _trace(sign: Signature, level: LevelSign) -> tuple[LogColumn, ...]:
-    tables = (level.table,) if level.table else tuple(dict.fromkeys(level.tables.values()))
+    tables = level.every_table
     lines = tuple(dict.fromkeys(line for table in tables for line in sign.tables.get(table, ())))
     return (
         LogColumn("table", tables, "", "", lambda values: sign.table_of(level, values)),

@@ -17,9 +17,18 @@ from rcsc.diff.changes.difference import Difference, ProgramDifference
 from rcsc.diff.compare import compare
 from rcsc.diff.present import Met, knows, within_reach
 from rcsc.diff.rows import headline, rows
-from rcsc.lang.interpret import admit, call, evaluate, holds, matching_lines, settle
+from rcsc.lang.interpret import (
+    Fault,
+    admit,
+    call,
+    chosen_table,
+    holds,
+    matching_lines,
+    run_stage,
+    settle,
+)
 from rcsc.lang.leaves import read_by
-from rcsc.lang.model import Enum, Expr, Kind, Level, OneTable, Program, Table, Value, pending, spell
+from rcsc.lang.model import Enum, Expr, Kind, Level, Program, Table, Value, pending, spell
 from rcsc.run.buffers import Buffers
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import FAULTS, Signature, Values
@@ -142,11 +151,12 @@ def _look(program: Program, level: RunningLevel, taken: Values) -> tuple[Table, 
     settle(program, now)
     for procedure in model.preprocess:
         call(program, procedure, [], now)
-    tables = model.tables
-    name = (
-        tables.table if isinstance(tables, OneTable) else dict(tables.tables)[evaluate(tables.selector, now)]
-    )
-    return next(table for table in program.tables if table.name == name), now
+    for stage in model.stages:
+        table = chosen_table(program, stage, now)
+        seen = dict(now)
+        if run_stage(program, table, now) is not Fault.OK:
+            return table, seen
+    return chosen_table(program, model.tables, now), now
 
 
 def model_of(program: Program, running: RunningLevel) -> Level:
@@ -185,12 +195,16 @@ def _words(sign: Signature, values: Values) -> dict[str, str]:
 
 
 def _ran(level: RunningLevel, values: Values) -> str:
-    """`table position, line 4`; the fault where it met one."""
+    """`table position, line 4`, after those that ran before it in the cycle; the fault where it met one."""
     sign = level.sign
     table = sign.table_of(level.level, values)
     at, fault = int(values[len(sign.leaves)]), int(values[len(sign.leaves) + 1])
     lines = sign.tables.get(table, ())
-    return f"table `{table}`, {FAULTS[fault] if fault else f'line `{lines[at]}`' if 0 <= at < len(lines) else 'no line'}"
+    before = "".join(
+        f"table `{name}`, line `{line}`; " for name, line in sign.lines_before(level.level, values)
+    )
+    last = FAULTS[fault] if fault else f"line `{lines[at]}`" if 0 <= at < len(lines) else "no line"
+    return f"{before}table `{table}`, {last}"
 
 
 # --- the difference --------------------------------------------------------------------

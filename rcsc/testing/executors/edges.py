@@ -27,7 +27,6 @@ from rcsc.lang.model import (
     Snapshot,
     Statement,
     Table,
-    TableByCommand,
     Test,
     ToElement,
     Value,
@@ -96,8 +95,7 @@ def all_expressions(program: Program) -> Iterator[Expr]:
     yield from (invariant.condition for invariant in program.invariants)
     yield from (v.deferred_until for v in program.variables if v.deferred_until is not None)
     for level in program.levels:
-        if isinstance(level.tables, TableByCommand):
-            yield level.tables.selector
+        yield from level.selectors
 
 
 def _constants(expr: Expr) -> Iterator[tuple[Scalar, Value]]:

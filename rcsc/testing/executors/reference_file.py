@@ -5,7 +5,7 @@ emitted header. Functions: `ref_t<i>_line`, `ref_t<i>_step` (table i), `ref_l<i>
 `ref_t<i>_safe` (no stopping assumption of table i fails), `ref_ranges`, `ref_invariants`, `ref_init`.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import (
@@ -16,6 +16,8 @@ from rcsc.lang.model import (
     Real,
     Statement,
     Table,
+    TableChoice,
+    TableName,
     Variable,
     pending,
 )
@@ -78,6 +80,7 @@ def _deferred(writer: Writer) -> Iterator[str]:
     for i, (variable, _) in enumerate(deferred):
         to, of = writer.place(variable.name), writer.place(pending(variable.name))
         yield f"if (due{i}) {{ {to} = {of}; }}"
+    yield from (f"{writer.place(leaf)} = 0;" for leaf in program.line_leaves.values())
     yield "}"
 
 
@@ -139,7 +142,9 @@ def monitored(program: Program) -> tuple[str, ...]:
 
 
 def fault_named(program: Program, symbols: Symbols, fault: int, at: int) -> str:
-    """The leaf that was refused, or the assumption that ended the cycle; empty for other faults."""
+    """The leaf that was refused, the assumption that ended the cycle, or the table before the last that had no line; else empty."""
+    if fault in (Fault.NO_LINE, Fault.SEVERAL_LINES) and 0 <= at < len(program.tables):
+        return str(program.tables[at].name)
     if fault in (Fault.ADMIT, Fault.EXTERN):
         return symbols.leaf_at(at)
     names = monitored(program)
@@ -190,13 +195,16 @@ def _known(writer: Writer) -> Iterator[str]:
     yield f"(void)s; return {' && '.join(kept) or '1'}; }}"
 
 
-def _body(writer: Writer, number: int) -> Iterator[str]:
+def _body(writer: Writer, number: int, table: Table) -> Iterator[str]:
     """Monitor, match and act, as the middle of a step or of a cycle."""
     struct = writer.symbols.struct
     yield f"static void ref_t{number}_body({struct} *s, ref_trace_t *r) {{"
     yield f"ref_t{number}_monitors(s, r); if (r->fault != 0) {{ return; }}"
     yield f"const int32_t line = ref_t{number}_line(s);"
     yield "if (line == -1) { r->fault = 2; } else if (line == -2) { r->fault = 3; } else {"
+    leaf = writer.program.line_leaves.get(table.name)
+    if leaf is not None:
+        yield f"{writer.place(leaf)} = ({writer.symbols.c_type(leaf)})(line + 1);"
     yield f"r->line = line; ref_refused(r, ref_t{number}_act(s, line)); }} }}"
 
 
@@ -219,21 +227,35 @@ def _runs(writer: Writer, names: Iterable[str]) -> Iterator[str]:
         yield f"if (r.fault == 0) {{ ref_refused(&r, ref_p{writer.number(name)}(s)); }}"
 
 
+def _chosen(writer: Writer, choice: TableChoice, run: Mapping[TableName, str]) -> Iterator[str]:
+    """Run the table of a choice."""
+    if isinstance(choice, OneTable):
+        yield run[choice.table]
+        return
+    yield f"switch ((int64_t){writer.expr(choice.selector)}) {{"
+    for value, name in choice.tables:
+        yield f"case {constant(choice.selector.type, value)}: {run[name]} break;"
+    yield "default: break; }"
+
+
 def _cycle(writer: Writer, number: int, level: Level) -> Iterator[str]:
     """One cycle of a level."""
     positions = {table.name: i for i, table in enumerate(writer.program.tables)}
     yield f"static ref_trace_t ref_l{number}_cycle({writer.symbols.struct} *s) {{"
     yield f"{FRESH} {REFUSED}"
     yield from _runs(writer, level.preprocess)
+    named = "if (r.fault == 2 || r.fault == 3) {{ r.fault_at = {at}; }}"
+    stages = {
+        name: f"ref_t{at}_body(s, &r); r.line = -1; {named.format(at=at)}" for name, at in positions.items()
+    }
+    for stage in level.stages:
+        yield "if (r.fault == 0) {"
+        yield from _chosen(writer, stage, stages)
+        yield "}"
     yield "if (r.fault == 0) {"
-    if isinstance(level.tables, OneTable):
-        yield f"ref_t{positions[level.tables.table]}_body(s, &r);"
-    else:
-        selector = level.tables.selector
-        yield f"switch ((int64_t){writer.expr(selector)}) {{"
-        for value, name in level.tables.tables:
-            yield f"case {constant(selector.type, value)}: ref_t{positions[name]}_body(s, &r); break;"
-        yield "default: break; }"
+    yield from _chosen(
+        writer, level.tables, {name: f"ref_t{at}_body(s, &r);" for name, at in positions.items()}
+    )
     yield "}"
     yield from _runs(writer, level.postprocess)
     yield f"{ENDED} }}"
@@ -270,7 +292,7 @@ def _rest(writer: Writer) -> Iterator[Iterable[str]]:
     for number, table in enumerate(writer.program.tables):
         for part in (line_function, _actions, _monitors, _safe):
             yield list(part(writer, number, table))
-        yield list(_body(writer, number))
+        yield list(_body(writer, number, table))
         yield list(_step(writer, number))
     for number, level in enumerate(writer.program.levels):
         yield list(_cycle(writer, number, level))

@@ -80,7 +80,7 @@ def _executor(program: Program, symbols: Symbols, target: ComparedFunction) -> I
     yield from call_of(symbols, target, "s")
     yield "out[0] = result; out[1] = result;"
     if target.kind in ("step", "cycle"):
-        yield f"out[2] = (out[1] == 1 || out[1] >= 4) ? (int64_t){trace.fault_at('(*s)')} : -1;"
+        yield f"out[2] = (out[1] != 0) ? (int64_t){trace.fault_at('(*s)')} : -1;"
         yield f"out[3] = {trace.line('(*s)')};"
         for at, _ in enumerate(monitored(program)):
             yield f"out[{TRACE_WORDS + at}] = {trace.failed('(*s)', at)} ? 1 : 0;"

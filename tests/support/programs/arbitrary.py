@@ -247,16 +247,21 @@ def _dispatches() -> SearchStrategy[tuple[tree.Dispatch, ...]]:
 
 
 @st.composite
+def _clauses(draw: st.DrawFn) -> tree.TableClause:
+    """A table of a level, or a choice."""
+    if draw(st.booleans()):
+        return tree.TableClause(None, draw(places()), draw(_dispatches()))
+    return tree.TableClause(draw(NAMES), None, ())
+
+
+@st.composite
 def levels(draw: st.DrawFn) -> tree.LevelDecl:
-    """A level of either kind."""
-    many = draw(st.booleans())
+    """A level of one table or several, of either kind."""
     return tree.LevelDecl(
         draw(NAMES),
         draw(st.none() | LITERALS),
         draw(FEW),
-        None if many else draw(NAMES),
-        draw(places()) if many else None,
-        draw(_dispatches()) if many else (),
+        tuple(draw(st.lists(_clauses(), min_size=1, max_size=3))),
         draw(FEW),
         comments=draw(WORDS),
         doc=draw(DOCS),
