@@ -85,9 +85,11 @@ def words_of(entry: Path) -> list[tuple[str, str, str, str]]:
 
 
 def size(path: Path) -> str:
-    """Return how many lines and columns of conditions a table has, as `8 x 1`."""
-    [published] = shipped(str(path), REPO).tables
-    return f"{len(published.lines)} x {len(published.columns)}"
+    """Return how many lines and columns of conditions a table has, as `8 x 1`; of several, how many lines they have."""
+    tables = shipped(str(path), REPO).tables
+    if len(tables) > 1:
+        return f"{sum(len(table.lines) for table in tables)} in {len(tables)} tables"
+    return f"{len(tables[0].lines)} x {len(tables[0].columns)}"
 
 
 def findings(path: Path) -> str:
