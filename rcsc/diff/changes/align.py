@@ -205,14 +205,21 @@ class _Rewriter:
 
 def _declarations(before: Program, after: Program) -> Iterable[Declaration]:
     """Enumerations and variables that are new, gone, or declared otherwise."""
-    enums = [{enum.name: ", ".join(enum.members) for enum in program.enums} for program in (before, after)]
+    hidden = {*before.line_leaves.values(), *after.line_leaves.values()}  # they follow from levels and tables
+    enums = [
+        {enum.name: ", ".join(enum.members) for enum in program.enums if enum.name not in hidden}
+        for program in (before, after)
+    ]
     yield from _changed(
         "enumeration",
         *({n: members for n, members in enum.items() if all(n in e for e in enums)} for enum in enums),
     )
     yield from _changed(
         "variable",
-        *({str(v.name): _declared(v) for v in p.variables if not _is_pending(v)} for p in (before, after)),
+        *(
+            {str(v.name): _declared(v) for v in p.variables if not _is_pending(v) and v.name not in hidden}
+            for p in (before, after)
+        ),
     )
 
 

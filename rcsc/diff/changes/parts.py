@@ -215,11 +215,17 @@ def unreported(versions: Versions, reported: Iterable[str]) -> Iterator[Compared
     """
     known = set(reported)
     before, after = versions.before, versions.after
+    hidden = {
+        *before.line_leaves.values(),
+        *after.line_leaves.values(),
+    }  # what lines they have shows in the tables
     for field in fields(Program):
         if field.name in _UNSEEN or field.name in _UNNAMED:
             continue
         what, compared = _COMPARED.get(field.name, (field.name, {}))
-        old, new = ({str(m.name): m for m in getattr(p, field.name)} for p in (before, after))
+        old, new = (
+            {str(m.name): m for m in getattr(p, field.name) if m.name not in hidden} for p in (before, after)
+        )
         for name in dict.fromkeys((*old, *new)):
             key = f"{what} `{name.removesuffix('.next')}"
             if any(told.startswith((f"{key}`", f"{key}.", f"{key}[")) for told in known):

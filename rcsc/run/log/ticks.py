@@ -102,6 +102,7 @@ class LevelTick:
     Attributes:
         ran: Whether it had a cycle; if not, everything else is empty.
         lines: What matched: one where all is well.
+        before: Table and line of each that ran before that table in the cycle.
         fault: What ended the cycle early; empty for nothing.
         wrong: What went wrong in it, in words.
         above: The order taken, and the report given upward, where there are such.
@@ -120,6 +121,7 @@ class LevelTick:
     below: tuple[tuple[Reported | None, Order | None], ...] = ()
     inputs: tuple[TickValue, ...] = ()
     states: tuple[ShownState, ...] = ()
+    before: tuple[tuple[str, str], ...] = ()
 
     @property
     def matched(self) -> str:
@@ -193,6 +195,7 @@ class _Cycle:
                 value for record in self._aside() for value in self._fields(record, only_changed=True)
             ),
             states=tuple(self._states()),
+            before=sign.lines_before(level, self.after),
         )
 
     # --- orders and reports ---
@@ -265,7 +268,8 @@ class _Cycle:
         for name in deferred:
             now, then = self._word(self.after, name), self._word(self.after, pending(name))
             yield ShownState(name, self._word(self.before, name), now, True, then if then != now else "")
-        shown = {*deferred, *nexts}
+        kept = (leaf for stage in self.logged.level.stages for leaf in stage.kept.values())
+        shown = {*deferred, *nexts, *kept}
         for leaf in leaves:
             aside = leaf.kind == "state" or (leaf.kind == "output" and not self._is_exchanged(leaf.name))
             if aside and leaf.name not in shown and self._changed(leaf):

@@ -71,7 +71,7 @@ class RunWitness:
         """After each cycle."""
         begun = time.perf_counter()
         for level in due:
-            self.matched[level.name, level.table, level.line] += 1
+            self.matched.update((level.name, table, line) for table, line in level.lines)
         self.look()
         if self.film:
             self._film(system)
@@ -211,7 +211,7 @@ def _lines(system: System, matched: Counter[tuple[str, str, str]]) -> list[tuple
     every = [
         (level.name, table, line)
         for level in system.levels
-        for table in (level.level.tables.values() or [level.level.table])
+        for table in level.level.every_table
         for line in level.sign.tables.get(table, ())
     ]
     return list(dict.fromkeys(chain(every, matched)))
