@@ -65,16 +65,25 @@ def findings_table() -> str:
 
 
 def findings_of(entry: Path) -> list[tuple[str, ...]]:
-    """Return the rows of an entry; each of its tables as published must be named in its page once."""
+    """Return the rows of an entry; each of its files as published is named in its page once, or each table of one."""
     described = words_of(entry)
-    published = {path.name for path in entry.glob("*published.rcs")}
-    assert sorted(file for file, *_ in described) == sorted(published), f"{entry}: {published}"
+    told = [name for name, *_ in described]
+    for path in entry.glob("*published.rcs"):
+        here = [name for name in told if name.partition(":")[0] == path.name]
+        assert here in ([path.name], names_of(path)), f"{path}: {here}"
     rows: list[tuple[str, ...]] = []
-    for file, source, theirs, matters in described:
-        short = file.removesuffix("published.rcs").strip("_")
+    for name, source, theirs, matters in described:
+        file, _, own = name.partition(":")
+        short = own or file.removesuffix("published.rcs").strip("_")
         link = f"[{entry.name}]({entry.name}/README.md) {short}".strip()
-        rows.append((link, source, theirs, size(entry / file), findings(entry / file), matters))
+        path = entry / file
+        rows.append((link, source, theirs, size(path, own), findings(path, own), matters))
     return rows
+
+
+def names_of(path: Path) -> list[str]:
+    """Return what an entry's page calls the tables of a file where it tells them one by one: `FILE:TABLE`."""
+    return [f"{path.name}:{published.name}" for published in shipped(str(path), REPO).tables]
 
 
 def words_of(entry: Path) -> list[tuple[str, str, str, str]]:
@@ -84,17 +93,19 @@ def words_of(entry: Path) -> list[tuple[str, str, str, str]]:
     return [(file, source, theirs, matters) for file, source, theirs, matters in rows]
 
 
-def size(path: Path) -> str:
+def size(path: Path, name: str) -> str:
     """Return how many lines and columns of conditions a table has, as `8 x 1`; of several, how many lines they have."""
-    tables = shipped(str(path), REPO).tables
+    tables = [table for table in shipped(str(path), REPO).tables if name in {"", table.name}]
     if len(tables) > 1:
         return f"{sum(len(table.lines) for table in tables)} in {len(tables)} tables"
     return f"{len(tables[0].lines)} x {len(tables[0].columns)}"
 
 
-def findings(path: Path) -> str:
-    """Return how many findings of each kind `rcsc check` has of a file, as `1 gap, 2 overlaps`; an overlap is a pair of lines."""
-    errors = [found for found in check(path).diagnostics if found.severity is Severity.ERROR]
+def findings(path: Path, name: str) -> str:
+    """Return how many findings of each kind `rcsc check` has of a table, as `1 gap, 2 overlaps`; an overlap is a pair of lines."""
+    every = [found for found in check(path).diagnostics if found.severity is Severity.ERROR]
+    assert all("table `" in found.message for found in every) or not name, path
+    errors = [found for found in every if not name or f"table `{name}`" in found.message]
     numbers = Counter(found.code.value for found in errors)
     assert numbers.keys() <= NAMES.keys(), f"{path}: {numbers}"
     numbers["RCS402"] = len(
