@@ -191,6 +191,9 @@ class _Check:
         for assumption in checker.assumptions:
             if assumption.standing is not Standing.PROVED:
                 self.rests[f"assumption `{assumption.name}` ({assumption.standing.value})"] = None
+        for assumption in self.program.assumptions if any(meeting.same for meeting in table.meetings) else ():
+            if assumption.name in table.assumptions and assumption.standing is not Standing.PROVED:
+                self.rests[f"assumption `{assumption.name}` ({assumption.standing.value})"] = None
         for name in table.stops:
             self.rests[f"table `{table.name}`: a cycle in which `{name}` fails is stopped"] = None
         if table.assumptions:
@@ -221,7 +224,7 @@ class _Check:
     def settle(self, debt: Debt) -> None:
         """Settle what one run owes, in the order of the run."""
         if debt.too_long:
-            name = f"{debt.too_long}: what it owes has too many steps to be followed"
+            name = f"{debt.too_long}: {debt.why}"
             self.unchecked[name] = Unchecked(name, debt.written or self.program.tables[0].span, "")
         shown: set[int] = set()
         paths: dict[Term, Known] = {}

@@ -12,7 +12,8 @@ line's actions and then postprocess; it may also end wherever an extern procedur
 - an assumption that is declared `proved` follows from ranges and invariants;
 - nothing overflows, leaves a range or an array, divides by zero or reads what is not assigned: in each line (with its conditions), in
   what levels run before and after their tables, and in procedures that nothing calls (for all parameters);
-- no two actions of a line write different values to one output.
+- no two actions of a line write different values to one output;
+- two lines that are said to do the same leave every variable the same, wherever both come through.
 
 The steps are those of `rcsc/lang/interpret.py`; the argument is induction over them.
 """
@@ -33,9 +34,11 @@ from rcsc.lang.model import (
     Kind,
     Level,
     Line,
+    Meeting,
     Procedure,
     Program,
     Standing,
+    Statement,
     Table,
     Value,
     Variable,
@@ -49,12 +52,14 @@ class Debt:
 
     Attributes:
         too_long: The name of what could not be followed to its end; then nothing of it is checked.
+        why: Why it could not.
     """
 
     hypotheses: tuple[Term, ...]
     owed: tuple[Owed, ...]
     too_long: str = ""
     written: Written | None = None
+    why: str = "what it owes has too many steps to be followed"
 
 
 class _Running(Run):
@@ -239,6 +244,53 @@ class Debts:
                     )
         for line in (*table.lines, *((table.default,) if table.default is not None else ())):
             yield self._line(table, line, stopping)
+        for meeting in table.meetings:
+            if meeting.same:
+                yield self._same(table, meeting)
+
+    def _same(self, table: Table, meeting: Meeting) -> Debt:
+        """Both lines are run from one state, and each variable that one of them writes is the same after both."""
+        lines = {line.name: line for line in table.lines}
+        pair = lines[meeting.first], lines[meeting.second]
+        where = f"lines `{meeting.first}` and `{meeting.second}` of table `{table.name}` do the same"
+        bodies = [[action.statement for action in line.actions] for line in pair]
+        if bodies[0] == bodies[1]:
+            run = Run(self.start, where, meeting.span)
+            run.owe("their actions are the same", self.terms.true)
+            return Debt((), tuple(run.owed))
+        if any(self._calls_extern(body) for body in bodies):
+            return Debt((), (), where, meeting.span, "they call extern procedures")
+        first, second = Run(self.start, where), Run(self.start, where, meeting.span)
+        try:
+            for run, body in zip((first, second), bodies, strict=True):
+                run.execute(body)
+        except (TooLongError, RecursionError):
+            return Debt((), (), where, meeting.span)
+        debts = tuple(self._alike(run, other) for run, other in ((first, second), (second, first)))
+        end = Run(self.start, where, meeting.span)
+        for debt in debts:
+            end.owe("one comes to its end where the other does", debt)
+        for name in sorted({*first.state.leaves, *second.state.leaves}):
+            after = (run.state.leaves.get(name, self.start.leaves[name]) for run in (first, second))
+            end.owe(f"`{name}` is the same", self.terms.make("=", *after))
+        return Debt((*self._assumed(table), self.start.condition(meeting.where)), tuple(end.owed))
+
+    def _alike(self, run: Run, other: Run) -> Term:
+        """That a run goes well where the other one does."""
+        paid = [self.terms.follows(owed.path, owed.good) for owed in run.owed]
+        given = [self.terms.follows(owed.path, owed.good) for owed in other.owed]
+        return self.terms.follows(self.terms.every(given), self.terms.every(paid))
+
+    def _calls_extern(self, body: Iterable[Statement]) -> bool:
+        """Whether statements call an extern procedure, or one that does."""
+        called = [statement for statement in everything(tuple(body)) if isinstance(statement, Call)]
+        procedures = [self.start.procedures[str(call.procedure)] for call in called]
+        return any(each.extern is not None or self._calls_extern(each.body) for each in procedures)
+
+    def _assumed(self, table: Table) -> tuple[Term, ...]:
+        """What a table relies on: invariants and its assumptions."""
+        known = (each.condition for each in self.program.assumptions if each.name in table.assumptions)
+        return (*self.holding, *map(self.start.condition, known))
 
     def _line(self, table: Table, line: Line | Default, stopping: tuple[Term, ...]) -> Debt:
         where = f"line `{line.name}` of table `{table.name}`"

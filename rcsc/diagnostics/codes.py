@@ -863,7 +863,8 @@ class Code(StrEnum):
 
     Exactly one line matches in every cycle; here is an input that two match, shown beside the cells of both. A note says what the two
     lines leave different where both match, or that both do the same: that is decided, whatever their text. The help proposes the
-    smallest change of a cell that parts them. If the input cannot occur, say why in an assumption.
+    smallest change of a cell that parts them. If the input cannot occur, say why in an assumption. If a source says which of the two
+    goes before, write that after its name: `open above held`; if both do the same, `held same open`, which is proved.
 
         input width_mm : int 0 .. 110
         output held : bool
@@ -1212,11 +1213,62 @@ class Code(StrEnum):
     `--certify` puts it to cvc5, which has no part in the proof; `--questions DIR` writes it as SMT-LIB for any other solver. It is a
     note where the program was proved in the same run, and an error with `--strict` and for a certificate from a file (`--against`).
     """
+    NOT_THE_SAME = """RCS422: lines that are said to do the same, and do not
+
+    Two lines of which one says that it does the `same` as the other may match together: the first of the table runs, and what they do is
+    proved equal for every such input. Here is one for which it is not, with what each of them leaves. Correct one of the
+    lines, part them, or say which one goes before (`above`).
+
+        input low : bool
+        input reset : bool
+        output speed : int 0 .. 9
+        table t {
+          | line             | low   | reset || speed |
+          | slow             | true  |       || 2     |
+          | resets same slow |       | true  || 0     |
+          | runs             | false | false || 9     |
+        }
+
+    error: lines `slow` and `resets` of table `t` are said to do the same, and do not
+
+        input low : bool
+        input reset : bool
+        output speed : int 0 .. 9
+        table t {
+          | line             | low   | reset || speed |
+          | slow             | true  |       || 0     |
+          | resets same slow |       | true  || 0     |
+          | runs             | false | false || 9     |
+        }
+    """
+    NEVER_MEET = """RCS423: what is said of two lines is of no input
+
+    `above` says which line runs, and `same` that it does not matter which, where two lines match together. These never do, under the
+    declared ranges, the invariants and what the table assumes: what their author meant is not what their conditions say.
+
+        input stop : bool
+        output go : bool
+        table t {
+          | line             | stop  || go    |
+          | stops above runs | true  || false |
+          | runs             | false || true  |
+        }
+
+    warning: lines `stops` and `runs` of table `t` are ordered, and never match together
+
+        input stop : bool
+        output go : bool
+        table t {
+          | line  | stop  || go    |
+          | stops | true  || false |
+          | runs  | false || true  |
+        }
+    """
     GIVES_WAY = """RCS424: lines that give way to others
 
-    A line below others (`above`) runs where it matches and none of them does. The proof and the executors see that as one condition more
-    of the line; the note shows it, and `rcsc fmt --expanded` prints the table with it. It says no more than it has to: what the line's
-    own cells exclude is left out.
+    A line below others (`above`) runs where it matches and none of them does, one that does the `same` as others where no earlier one of
+    them runs. The proof and the executors see that as one condition more of the line; the note shows it, and `rcsc fmt --expanded`
+    prints the table with it. It says no more than it has to: what the line's own cells exclude is left out.
 
         input stop : bool
         input ended : bool
@@ -1228,7 +1280,7 @@ class Code(StrEnum):
           | runs             | false | false || true  |
         }
 
-    note: 1 line of table `t` gives way to lines above
+    note: 1 line of table `t` gives way to others
 
         input stop : bool
         input ended : bool

@@ -99,7 +99,8 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
 
 def _below(line: Line) -> str:
     """Name the lines that run instead where both match, for a comment; empty where there are none."""
-    return f", where none above it matches: {', '.join(line.below)}" if line.below else ""
+    said = (("where none above it matches", line.below), ("the same as", line.same))
+    return "".join(f", {words}: {', '.join(names)}" for words, names in said if names)
 
 
 def _matcher(program: Program, table: Table) -> Matcher:

@@ -602,6 +602,7 @@ class Line:
         tests: One a condition column.
         bounds: Start and end offsets of each cell, flattened; see `cell_span`.
         below: The lines that run instead where both match: they stand `above`. Its tests say so.
+        same: Those earlier ones that do the same where both match, and run then. Its tests say so, too.
     """
 
     name: LineName
@@ -610,6 +611,7 @@ class Line:
     span: Span = at()
     bounds: tuple[int, ...] = field(default=(), compare=False, repr=False)
     below: tuple[LineName, ...] = field(default=(), compare=False)
+    same: tuple[LineName, ...] = field(default=(), compare=False)
 
     def cell_span(self, column: int) -> Span:
         """The span of the condition cell in `column` (the row's if unknown)."""
@@ -630,6 +632,22 @@ class Default:
 
 
 @dataclass(frozen=True, slots=True)
+class Meeting:
+    """Two lines that are said to match together: `first above second`, or both do the `same`.
+
+    Attributes:
+        where: Where both match as they are written, and, of two that do the same, no line above one of them does.
+        same: Whether they are said to do the same there, which is proved; the first of the table runs.
+    """
+
+    first: LineName
+    second: LineName
+    where: Expr
+    same: bool
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
 class Table:
     """What a level tries for one command: exactly one line must match in every cycle.
 
@@ -638,6 +656,7 @@ class Table:
         assumptions: Names of those that the table's proof may use.
         stops: Those of them on which the safety of the table's conditions and lines rests, in declared order; `prove` sets it.
             Where one fails the cycle ends before the table is matched; the others only tell.
+        meetings: What is said of pairs of its lines by name.
     """
 
     name: TableName
@@ -650,6 +669,7 @@ class Table:
     span: Span = at()  # the name in `table NAME`
     file: str = field(default="", compare=False)
     stops: tuple[AssumptionName, ...] = ()
+    meetings: tuple[Meeting, ...] = ()
 
 
 # --- owners, levels, programs --------------------------------------------------------

@@ -3,39 +3,77 @@
 In: a table and two of its lines. Out: `Effects`: that they do, or what they leave different for some such input. Both do the
 same where their actions come to their end alike, call the same extern procedures in the same states with the same values, and
 leave every variable the same: text plays no part. Z3 is asked under what the table may rely on, and of each variable by itself;
-what folds is not asked.
+what folds is not asked. Of two lines that are said to do the same, `disagreement` tells an input for which they do not, and
+`meets` whether there is one at all for which it is said.
 
 It costs a question a variable that the lines may leave different.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 from rcsc.diagnostics.diagnostic import Effects
-from rcsc.lang.model import Line, Program, Table
+from rcsc.lang.model import Expr, Line, Program, Table, Value, VariableName
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
-from rcsc.symbolic.effect import Effect, Meaning, Shared, differences
+from rcsc.symbolic.effect import Meaning, Shared, differences, value_after
+from rcsc.symbolic.encode import Frame, least_witness
 from rcsc.symbolic.evaluation import TooLongError
 from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node
 
 
-def alike(program: Program, table: Table, pair: tuple[int, int], options: Options) -> Effects:
-    """Compare two lines, by position, for every input that both match and the table's assumptions admit: there is one.
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """An input for which two lines do not do the same.
 
-    Invariants count where they are among these assumptions (`meaning.relying`).
+    Attributes:
+        witness: The least one: values of what the lines look at, in declared order.
+        results: What they leave different there: a variable, and its value after each line.
+    """
+
+    witness: Mapping[str, Value]
+    results: tuple[tuple[str, Value, Value], ...]
+
+
+def alike(
+    program: Program, table: Table, pair: tuple[int, int], options: Options, where: Expr | None = None
+) -> Effects:
+    """Compare two lines, by position, for every input that both match, or in `where`: there is one.
+
+    The table's assumptions hold there, and invariants where they are among these (`meaning.relying`).
     """
     first, second = (table.lines[at] for at in pair)
     if _spelled(first) == _spelled(second):
         return Effects(same=True)
     try:
-        return _compared(program, table, (first, second), options)
+        return _Comparison(program, table, (first, second), where).effects(options)
     except (TooLongError, RecursionError):
         return Effects(same=None)
     except smt.troubles():
         return Effects(same=None)
+
+
+def meets(program: Program, table: Table, where: Expr, options: Options) -> bool | None:
+    """Whether some input that the table's assumptions admit is in `where`; None where nobody could tell."""
+    try:
+        answer = _possible(list(_here(program, table, [where], _starting(program))), options)
+    except smt.troubles():
+        return None
+    return None if answer is Answer.UNKNOWN else answer is Answer.SATISFIABLE
+
+
+def disagreement(
+    program: Program, table: Table, pair: tuple[int, int], options: Options, where: Expr
+) -> Disagreement | None:
+    """Find the least input in `where` for which two lines, by position, do not do the same; None where none is found."""
+    lines = table.lines[pair[0]], table.lines[pair[1]]
+    try:
+        return _Comparison(program, table, lines, where).disagreement(options)
+    except smt.troubles():
+        return None
 
 
 def _spelled(line: Line) -> list[object]:
@@ -43,44 +81,81 @@ def _spelled(line: Line) -> list[object]:
     return [action.statement for action in line.actions]
 
 
-def _compared(program: Program, table: Table, pair: tuple[Line, Line], options: Options) -> Effects:
-    kinds = {str(variable.name): variable.type for variable in program.variables}
+def _starting(program: Program) -> Shared:
+    """The leaves that all runs begin with."""
     shared = Shared()
-    for name, kind in kinds.items():
-        shared.start[name] = shared.canonical(values.variable(name, kind))
-    meaning = Meaning(program, kinds, shared)
-    first, second = (meaning.effect(action.statement for action in line.actions) for line in pair)
-    changes = list(_changes(first, second, list(kinds), shared))
-    if not changes:
-        return Effects(same=True)
-    here = list(_here(program, table, pair, shared))
-    answers = {name: _possible([*here, change], options) for name, change in changes}
-    differ = tuple(name for name, answer in answers.items() if answer is Answer.SATISFIABLE)
-    open_ = Answer.UNKNOWN in answers.values()
-    return Effects(False if differ else None if open_ else True, differ)
+    for variable in program.variables:
+        shared.start[str(variable.name)] = shared.canonical(
+            values.variable(str(variable.name), variable.type)
+        )
+    return shared
 
 
-def _changes(first: Effect, second: Effect, leaves: list[str], shared: Shared) -> Iterator[tuple[str, Node]]:
-    """Yield what can differ afterwards, and where it does."""
-    for name, change in differences(first, second, leaves, shared):
-        if change is not values.FALSE:
-            yield name, change
+class _Comparison:
+    """Two lines of a table, and where they are compared.
+
+    Attributes:
+        changes: What they can leave different, by name, and where.
+        here: What holds where they are compared.
+    """
+
+    def __init__(self, program: Program, table: Table, lines: tuple[Line, Line], where: Expr | None) -> None:
+        self.program, self.shared = program, _starting(program)
+        kinds = {str(variable.name): variable.type for variable in program.variables}
+        meaning = Meaning(program, kinds, self.shared)
+        self.first, self.second = (
+            meaning.effect(action.statement for action in line.actions) for line in lines
+        )
+        self.changes = [
+            (name, change)
+            for name, change in differences(self.first, self.second, list(kinds), self.shared)
+            if change is not values.FALSE
+        ]
+        tests = [test.condition for line in lines for test in line.tests if test is not None]
+        self.here = list(_here(program, table, tests if where is None else [where], self.shared))
+
+    def effects(self, options: Options) -> Effects:
+        """Say what can be left different, each name for itself."""
+        answers = {
+            name: Answer.SATISFIABLE if change is values.TRUE else _possible([*self.here, change], options)
+            for name, change in self.changes
+        }
+        differ = tuple(name for name, answer in answers.items() if answer is Answer.SATISFIABLE)
+        open_ = Answer.UNKNOWN in answers.values()
+        return Effects(False if differ else None if open_ else True, differ)
+
+    def disagreement(self, options: Options) -> Disagreement | None:
+        """Find the least input for which something is left different, and what."""
+        nodes = [*self.here, values.any_of(change for _, change in self.changes)]
+        free = values.variables(nodes)
+        kinds = {variable.name: variable for variable in self.program.variables}
+        shown = [variable for variable in self.program.variables if str(variable.name) in free]
+        solver = Solver(options.limits)
+        solver.add(*values.domain(free.values()), *map(values.term_of, nodes))
+        frame = Frame({name: values.term_of(node) for name, node in free.items()})
+        witness = least_witness(solver, shown, frame)
+        if witness is None or solver.check() is not Answer.SATISFIABLE:
+            return None
+        results = []
+        for name, change in self.changes:
+            if name in kinds and solver.check(values.term_of(change)) is Answer.SATISFIABLE:
+                kind = kinds[VariableName(name)].type
+                after = (value_after(effect, name, self.shared) for effect in (self.first, self.second))
+                one, other = (solver.value(values.term_of(node), kind) for node in after)
+                results.append((name, one, other))
+        return Disagreement(witness, tuple(results))
 
 
-def _here(program: Program, table: Table, pair: Sequence[Line], shared: Shared) -> Iterator[Node]:
-    """Yield what holds where both lines match."""
+def _here(program: Program, table: Table, conditions: Iterable[Expr], shared: Shared) -> Iterator[Node]:
+    """Yield these conditions, and the table's assumptions."""
     run = Run({}, {str(variable.name): variable.type for variable in program.variables}, shared.start)
-    for line in pair:
-        yield from (run.evaluate(test.condition) for test in line.tests if test is not None)
+    yield from map(run.evaluate, conditions)
     for assumption in program.assumptions:
         if assumption.name in table.assumptions:
             yield run.evaluate(assumption.condition)
 
 
 def _possible(nodes: list[Node], options: Options) -> Answer:
-    *_, change = nodes
-    if change is values.TRUE:  # wherever both match
-        return Answer.SATISFIABLE
     solver = Solver(options.limits)
     solver.add(*values.domain(values.variables(nodes).values()), *map(values.term_of, nodes))
     return solver.check()

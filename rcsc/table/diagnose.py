@@ -5,9 +5,9 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
+from rcsc.diagnostics.diagnostic import Diagnostic, Effects, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.lang.interval_sets import size
-from rcsc.lang.model import Box, Enum, Program, Scalar, Table, key_bounds, spell
+from rcsc.lang.model import Box, Enum, Line, Program, Scalar, Table, key_bounds, spell
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.symbolic.alike import alike
@@ -100,21 +100,21 @@ def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) 
 
 
 def _lower(table: Table) -> list[Diagnostic]:
-    """Show what `above` comes to, line by line."""
-    lower = [line for line in table.lines if line.below]
+    """Show what `above` and `same` come to, line by line."""
+    lower = [line for line in table.lines if line.below or line.same]
     if not lower:
         return []
-    alike: dict[tuple[tuple[str, ...], str], list[str]] = {}
+    alike: dict[tuple[tuple[str, ...], tuple[str, ...], str], list[str]] = {}
     for line in lower:
         test = line.tests[-1]
         if test is not None:
-            alike.setdefault((line.below, test.text), []).append(line.name)
+            alike.setdefault((line.below, line.same, test.text), []).append(line.name)
     notes = [
-        f"below {_names(uppers)}, only where {text}: {_names(names)}"
-        for (uppers, text), names in list(alike.items())[:MOST_NAMED]
+        f"{_before(uppers, same)}, only where {text}: {_names(names)}"
+        for (uppers, same, text), names in list(alike.items())[:MOST_NAMED]
     ]
     if len(alike) > MOST_NAMED:
-        notes.append(f"and others: `rcsc fmt --expanded {table.file}` shows the table without `above`")
+        notes.append(f"and others: `rcsc fmt --expanded {table.file}` prints the table with what they add")
     many = (
         f"{len(lower)} lines of table `{table.name}` give"
         if len(lower) > 1
@@ -123,12 +123,17 @@ def _lower(table: Table) -> list[Diagnostic]:
     return [
         Diagnostic(
             Code.GIVES_WAY,
-            f"{many} way to lines above",
+            f"{many} way to others",
             Label(table.span),
             notes=tuple(notes),
             severity=Severity.NOTE,
         )
     ]
+
+
+def _before(uppers: Collection[str], same: Collection[str]) -> str:
+    said = (("below", uppers), ("the same as", same))
+    return ", ".join(f"{word} {_names(names)}" for word, names in said if names)
 
 
 def _names(names: Collection[str]) -> str:
@@ -140,9 +145,9 @@ def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Di
     name = f"line `{table.lines[line].name}` of table `{table.name}`"
     if not assuming:
         helps = ("delete the line, or correct its conditions",)
-        uppers = table.lines[line].below
+        uppers = (*table.lines[line].below, *table.lines[line].same)
         notes = (
-            (f"wherever its cells hold one of these runs, which stand above it: {_names(uppers)}",)
+            (f"wherever its cells hold one of these matches, which go before it: {_names(uppers)}",)
             if uppers
             else ()
         )
@@ -171,9 +176,18 @@ def _overlap(program: Program, table: Table, overlap: Overlap, options: Options)
         Label(second.cell_span(-1), "this line"),
         related=(Label(first.cell_span(-1), "and this one"),),
         notes=(str(effects),),
-        help=(repair,) if repair else (),
+        help=tuple(help_ for help_ in (repair, _as_same(first, second, effects)) if help_),
         witnesses=(column,),
         effects=effects,
+    )
+
+
+def _as_same(first: Line, second: Line, effects: Effects) -> str:
+    """Propose to say that two lines do the same, where they do; else empty."""
+    return (
+        f"or keep both, and say that they do the same: `{second.name} same {first.name}`"
+        if effects.same
+        else ""
     )
 
 

@@ -21,6 +21,7 @@ from rcsc.lang.model import (
 )
 from rcsc.procedures.discharge import Tally
 from rcsc.procedures.invariants import assumptions_satisfiable, at_first, properties_elsewhere
+from rcsc.procedures.meetings import met
 from rcsc.procedures.obligations import Obligations, defined_alone
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
@@ -75,14 +76,23 @@ def prove_program(
     known = {table.name for table in wanted}
     tables = [table for table in assuming.tables if table.name in known]
     decided = _verdicts(assuming, tables, options, owed.undefined)
-    verdicts = tuple(_with_invariants(program, verdict) for verdict in decided)
+    meetings = {
+        table.name: met(assuming, table, options)
+        for table in tables
+        if table.meetings and table.name not in owed.undefined
+    }
+    relied = {name: each.relied for name, each in meetings.items()}
+    verdicts = tuple(
+        _with_assumptions(assuming, _with_invariants(program, verdict), relied) for verdict in decided
+    )
     for verdict in verdicts:
         if verdict.table.name not in owed.undefined:
             findings += diagnostics(assuming, verdict, options, unproved)
+    findings += [finding for each in meetings.values() for finding in each.findings]
     reported = tuple(sorted(dict.fromkeys(findings), key=sort_key))
     wrong = any(finding.severity is Severity.ERROR for finding in reported)
     if wrong or only is not None:
-        unsafe = frozenset(owed.unsafe)
+        unsafe = frozenset((*owed.unsafe, *(str(name) for name, each in meetings.items() if each.wrong)))
         return ProgramVerdict(reported, None, verdicts, None, owed.tally, program, unproved, unsafe)
     proved = ProvedProgram(program, seal_of_proof())
     certificate = _certificate(program, verdicts)
@@ -115,6 +125,18 @@ def _with_invariants(program: Program, verdict: TableVerdict) -> TableVerdict:
     more = {AssumptionName(invariant.name): Standing.PROVED for invariant in program.invariants}
     backing = replace(verdict.backing, assumptions=tuple((named | more).items()))
     return replace(verdict, backing=backing)
+
+
+def _with_assumptions(
+    program: Program, verdict: TableVerdict, relied: Mapping[TableName, Collection[AssumptionName]]
+) -> TableVerdict:
+    """Rest the verdict on what is needed to show that lines do the same, too."""
+    needed = relied.get(verdict.table.name, ())
+    if not needed:
+        return verdict
+    named = dict(verdict.backing.assumptions)
+    more = {each.name: each.standing for each in program.assumptions if each.name in needed}
+    return replace(verdict, backing=replace(verdict.backing, assumptions=tuple((named | more).items())))
 
 
 def _verdicts(

@@ -23,7 +23,9 @@ def told(text: str) -> list[Diagnostic]:
 
 @pytest.mark.parametrize("code", [code for code in Code if code.explanation.wrong])
 def test_the_wrong_example_is_reported_as_the_entry_shows(code: Code) -> None:
-    diagnostics = told(code.explanation.wrong)
+    diagnostics = [
+        each for each in told(code.explanation.wrong) if each.code is code or each.code not in NOTES
+    ]
     assert {diagnostic.code for diagnostic in diagnostics} == {code}
     assert f"{diagnostics[0].severity.value}: {diagnostics[0].message}" == code.explanation.report
 

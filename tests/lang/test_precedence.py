@@ -1,9 +1,10 @@
-"""`above`: a line runs where it matches and none above it does; nothing else changes."""
+"""`above` and `same`: a line runs where it matches, none above it does, and no earlier one that does the same comes through."""
 
 from collections.abc import Iterator
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from random import Random
+from typing import TypeAlias
 
 import pytest
 
@@ -11,7 +12,7 @@ from rcsc.commands import run
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.source import Source
 from rcsc.driver.reformat import expand
-from rcsc.lang.interpret import matching_lines
+from rcsc.lang.interpret import evaluate, matching_lines
 from rcsc.lang.model import Bool, Enum, Int, Program, Value, key_bounds
 from rcsc.lang.resolve import compile_text
 from rcsc.lang.resolve.precedence import expanded
@@ -65,8 +66,12 @@ def snapshots(program: Program) -> Iterator[dict[str, Value]]:
         yield free | given
 
 
-def drawn(random: Random) -> tuple[str, list[str], dict[str, set[str]]]:
-    """A table, the names of its lines, and for each line those that stand above it."""
+Drawn: TypeAlias = tuple[str, list[str], dict[str, set[str]], dict[str, set[str]]]
+"""A table, the names of its lines, for each line those that stand above it, and those that do the same."""
+
+
+def drawn(random: Random) -> Drawn:
+    """Cells and marks by chance; no line of a class of those that do the same stands above another of it."""
     columns = random.sample(sorted(CELLS), random.randint(1, 3))
     names = [f"l{number}" for number in range(random.randint(2, 5))]
     order = random.sample(names, len(names))
@@ -76,22 +81,45 @@ def drawn(random: Random) -> tuple[str, list[str], dict[str, set[str]]]:
     whole = order[0] if random.random() < 0.3 else ""
     if whole:
         above[whole] = set(order[1:])
+    closed = {name: set(lower) for name, lower in above.items()}
+    for upper in reversed(order):
+        closed[upper] |= {more for lower in above[upper] for more in closed[lower]}
+    named: dict[str, list[str]] = {name: [] for name in names}
+    same = {name: {name} for name in names}
+    for one, other in combinations(names, 2):
+        both = same[one] | same[other]
+        if not any(closed[name] & both for name in both) and random.random() < 0.4:
+            first, second = random.sample((one, other), 2)
+            named[first].append(second)
+            same |= dict.fromkeys(both, both)
     rows = []
     for name in names:
         cells = [random.choice(["", *CELLS[column]]) for column in columns]
         if not any(cells):
             cells[0] = CELLS[columns[0]][0]
-        marks = "all" if name == whole else ", ".join(sorted(above[name]))
-        rows.append(f"| {name}{' above ' * bool(marks)}{marks} | {' | '.join(cells)} || now |")
+        lower = "all" if name == whole else ", ".join(sorted(above[name]))
+        marks = f"{' above ' * bool(lower)}{lower}{' same ' * bool(named[name])}{', '.join(named[name])}"
+        rows.append(f"| {name}{marks} | {' | '.join(cells)} || now |")
     text = "\n".join(["table t {", f"| line | {' | '.join(columns)} || now |", *rows, "}"])
-    for upper in reversed(order):  # closed from below
-        above[upper] |= {more for lower in above[upper] for more in above[lower]}
-    return HEAD + text, names, {name: {upper for upper in names if name in above[upper]} for name in names}
+    return (
+        HEAD + text,
+        names,
+        {name: {upper for upper in names if name in closed[upper]} for name in names},
+        same,
+    )
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_a_line_runs_where_it_matches_and_none_above_it_does(seed: int) -> None:
-    text, names, uppers = drawn(Random(seed))  # noqa: S311 - a draw that repeats
+def running(
+    names: list[str], raw: list[str], uppers: dict[str, set[str]], same: dict[str, set[str]]
+) -> list[str]:
+    """The lines that run, of those that match: what comes through, of those that do the same the first."""
+    through = [name for name in names if name in raw and not uppers[name].intersection(raw)]
+    return [name for at, name in enumerate(through) if not same[name].intersection(through[:at])]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_first_runs_of_what_does_the_same_and_has_none_above_it(seed: int) -> None:
+    text, names, uppers, same = drawn(Random(seed))  # noqa: S311 - a draw that repeats
     program = program_of(text)
     parsed = parse(Source("case.rcs", text))
     assert isinstance(parsed, tree.File)
@@ -109,11 +137,28 @@ def test_a_line_runs_where_it_matches_and_none_above_it_does(seed: int) -> None:
         assert set(codes(shown)) == {"RCS314"}
         shown = program
     for snapshot in snapshots(plain):
-        raw = matching_lines(plain.tables[0], snapshot)
-        runs = [name for name in names if name in raw and not uppers[name].intersection(raw)]
+        raw = [str(name) for name in matching_lines(plain.tables[0], snapshot)]
+        runs = running(names, raw, uppers, same)
         assert matching_lines(program.tables[0], snapshot) == runs
         assert matching_lines(shown.tables[0], snapshot) == runs
         assert bool(runs) == bool(raw)  # never a gap that was not there
+        for meeting in program.tables[0].meetings:
+            pair = {str(meeting.first), str(meeting.second)}
+            met = pair.issubset(raw) and not (
+                meeting.same and any(uppers[name].intersection(raw) for name in pair)
+            )
+            assert evaluate(meeting.where, snapshot) == met
+    meetings = {
+        frozenset((meeting.first, meeting.second)) for meeting in program.tables[0].meetings if meeting.same
+    }
+    assert meetings >= {
+        frozenset(pair)
+        for pair in combinations(names, 2)
+        if pair[1] in same[pair[0]]
+        and any(
+            set(pair).issubset(matching_lines(plain.tables[0], snapshot)) for snapshot in snapshots(plain)
+        )
+    }
 
 
 def test_what_it_comes_to_is_the_least_that_parts_the_lines_and_is_shown() -> None:
@@ -195,6 +240,9 @@ NO_NAME = "a line needs a name of letters, digits and `_`"
         ("ended above ended", "line `ended` stands above itself", ""),
         ("ended above hold", "lines stand above each other in a circle: `ended` above `hold` above `ended`", "take one of these out"),
         ("ended above odd", "lines stand above each other in a circle: `ended` above `odd` above `ended`", "take one of these out"),
+        ("ended same stops", "no line of table `unit` is called `stops`", "did you mean `stop`?"),
+        ("ended same ended", "line `ended` is said to do the same as itself", ""),
+        ("ended above rest same rest", "one of `ended` and `rest` stands above the other, and both are said to do the same", ""),
         ("ended above hold,", NO_NAME, MARKS),
         ("ended over hold", NO_NAME, MARKS),
     ],
@@ -213,8 +261,10 @@ def test_an_order_that_cannot_be_is_refused_at_its_place(cell: str, what: str, h
     [
         (["a above rest | stop", "rest | DEFAULT"], "`rest` is the DEFAULT line: every line stands above it"),
         (["a | stop", "rest above a | DEFAULT"], "the DEFAULT line `rest` runs where no other matches: it stands above none"),
+        (["a same rest | stop", "rest | DEFAULT"], "the DEFAULT line `rest` runs where no other matches: it does the same as none"),
+        (["a | ", "b same a | stop"], "line `a` matches every input: none that gives way to it could ever match"),
         (["a above all | stop", "all | hold"], "`all` means every other line, and there is a line of that name"),
-        (["a above b | ", "b | stop"], "line `a` matches every input: no line below it could ever match"),
+        (["a above b | ", "b | stop"], "line `a` matches every input: none that gives way to it could ever match"),
     ],
 )  # fmt: skip
 def test_default_and_lines_that_match_everything_stand_above_none(rows: list[str], what: str) -> None:
@@ -233,7 +283,7 @@ table t {{
 }}"""
     [dead] = [finding for finding in reported(text) if finding.severity is Severity.ERROR]
     assert (dead.code.value, dead.message) == ("RCS403", "line `low` of table `t` can never match")
-    assert dead.notes == ("wherever its cells hold one of these runs, which stand above it: `a`, `b`",)
+    assert dead.notes == ("wherever its cells hold one of these matches, which go before it: `a`, `b`",)
     whole = edited(
         text, ("| low           |              | true |", "| low           | stop         | true |")
     )

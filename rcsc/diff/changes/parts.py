@@ -191,7 +191,10 @@ _COMPARED: Mapping[str, tuple[str, Mapping[str, object]]] = {
     "assumptions": ("assumption", {"condition": None, "standing": None}),
     "invariants": ("invariant", {"condition": None}),
     "properties": ("property", {"condition": None}),
-    "tables": ("table", {"columns": (), "lines": (), "default": None, "variables": (), "assumptions": ()}),
+    "tables": (
+        "table",
+        {"columns": (), "lines": (), "default": None, "variables": (), "assumptions": (), "meetings": ()},
+    ),  # what meetings come to is in the lines
     "owners": ("owner", {}),
     "levels": ("level", {"preprocess": (), "postprocess": ()}),
 }

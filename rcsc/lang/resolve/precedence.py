@@ -1,17 +1,19 @@
-"""Which line runs where two match, where the table says it: `above`, resolved into conditions.
+"""Which line runs where two match, where the table says it: `above` and `same`, resolved into conditions.
 
-In: a table as written, and its lines. Out: the lines, each with one test more where others stand above it: that none of these matches.
+In: a table as written, and its lines. Out: the lines, each with one test more where others go before it: that none of these matches.
 So every later stage sees a table in which order plays no part. `above` is an order: what stands above a line stands above all that this
-line stands above, and nothing above itself. A line runs where it matches and none above it does; there is one wherever any
-matches, so nothing falls into a gap by it.
+line stands above, and nothing above itself. A line *comes through* where it matches and none above it does; there is one wherever any
+matches, so nothing falls into a gap by it. Lines that do the `same` are so in pairs, and through others: where several come through
+the first of the table runs, and what is said of each pair (`Meeting`) is proved later.
 
 The test says no more than it has to: of the upper line's conditions those that the lower one's do not imply, and nothing
 where the two never meet. Where `stop` (called = stop) stands above `ended` (now = starting, done = true), `ended` gets `called /= stop`.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
+from typing import TypeAlias
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Label
@@ -21,7 +23,22 @@ from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.expressions.words import Mask, mask_of
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.leaves import read_by
-from rcsc.lang.model import Apply, Bool, Box, Column, Expr, Line, LineName, Op, Real, Table, Test, key_bounds
+from rcsc.lang.model import (
+    Apply,
+    Bool,
+    Box,
+    Column,
+    Expr,
+    Line,
+    LineName,
+    Literal,
+    Meeting,
+    Op,
+    Real,
+    Table,
+    Test,
+    key_bounds,
+)
 from rcsc.lang.operator_table import NEGATION, OPPOSITE
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
@@ -33,36 +50,34 @@ ALL = "all"
 _OPPOSITE = {str(op.value): str(other.value) for op, other in OPPOSITE.items()}
 
 
+Resolved: TypeAlias = tuple[tuple[Column, ...], tuple[Line, ...], tuple[Meeting, ...]]
+"""Columns, lines, and what is said of pairs of lines."""
+
+
 def with_precedence(
     scope: Scope, written: tree.TableDecl, columns: tuple[Column, ...], lines: tuple[Line, ...]
-) -> tuple[tuple[Column, ...], tuple[Line, ...]]:
-    """The columns and lines, with a column for what the lines above a line add to it; what is wrong is reported."""
-    if not any(row.above for row in written.rows):
-        return columns, lines
-    below = _below(scope, written)
+) -> Resolved:
+    """The columns and lines, with a column for what goes before a line adds to it; what is wrong is reported."""
+    unchanged: Resolved = columns, lines, ()
+    if not any(row.above or row.same for row in written.rows):
+        return unchanged
+    order = _Order.of(scope, written)
     if scope.diagnostics:
-        return columns, lines
-    always = [
-        line
-        for line in lines
-        if not any(line.tests) and any(line.name in uppers for uppers in below.values())
-    ]
-    for line in always:
-        what = f"line `{line.name}` matches every input: no line below it could ever match"
-        scope.report(Code.LINE_ORDER, what, line.cell_span(-1))
-    if always:
-        return columns, lines
-    known = _Lines(scope, written, lines)
-    resolved = [known.given(at, below[line.name]) for at, line in enumerate(lines)]
-    if not any(line.below for line in resolved):
-        return columns, lines
+        return unchanged
+    known = _Lines(scope, written, lines, order)
+    if known.reports_endless():
+        return unchanged
+    resolved = tuple(known.given(at) for at in range(len(lines)))
+    meetings = tuple(known.meetings())
+    if not any(line.below or line.same for line in resolved):
+        return columns, lines, meetings
     column = Column("when", None, None, written.name.span, written=False)
-    return (*columns, column), tuple(resolved)
+    return (*columns, column), resolved, meetings
 
 
 def expanded(written: tree.TableDecl, table: Table) -> tree.TableDecl:
-    """The table as it is resolved: without `above`, and with a column for what it comes to."""
-    rows = tuple(replace(row, above=()) for row in written.rows)
+    """The table as it is resolved: without `above` and `same`, and with a column for what they come to."""
+    rows = tuple(replace(row, above=(), same=()) for row in written.rows)
     if all(column.written for column in table.columns):
         return replace(written, rows=rows)
     added = {line.name: line.tests[-1] for line in table.lines}
@@ -96,26 +111,86 @@ def _condition(test: Test | None) -> tree.Condition | None:
 # --- the order ---------------------------------------------------------------------------
 
 
-def _below(scope: Scope, written: tree.TableDecl) -> dict[str, set[str]]:
-    """For each line those that stand above it; what names no line, or goes in a circle, is reported."""
-    named = {row.name: list(_named(scope, written, row)) for row in written.rows}
-    circle = _circle(named)
-    if circle:
-        _report_circle(scope, written, circle)
-        return {}
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """How the lines of a table stand to each other, by name.
+
+    Attributes:
+        below: For each line those that stand above it.
+        same: For each line those that do the same, itself too.
+    """
+
+    below: Mapping[str, frozenset[str]]
+    same: Mapping[str, frozenset[str]]
+
+    @classmethod
+    def of(cls, scope: Scope, written: tree.TableDecl) -> "_Order":
+        """The order as written; what names no line, or goes in a circle, is reported."""
+        same = _same(scope, written)
+        above = _above(scope, written, same)
+        order = cls(
+            {name: frozenset(upper for upper, lower in above.items() if name in lower) for name in above},
+            same,
+        )
+        for row in written.rows:
+            for other in (*row.above, *row.same):
+                if other.text in order.same[row.name] and other.text in (
+                    *above[row.name],
+                    *order.below[row.name],
+                ):
+                    what = f"one of `{row.name}` and `{other.text}` stands above the other, and both are said to do the same"
+                    scope.report(Code.LINE_ORDER, what, other.span)
+        return order
+
+
+def _same(scope: Scope, written: tree.TableDecl) -> dict[str, frozenset[str]]:
+    """For each line those that do the same, directly or through others, itself too."""
+    named = {row.name: {other.text for other in _others(scope, written, row)} for row in written.rows}
+    both = {
+        name: {*others, *(other for other in named if name in named[other])} for name, others in named.items()
+    }
+    return {name: frozenset({name, *_reached(name, both)}) for name in both}
+
+
+def _above(scope: Scope, written: tree.TableDecl, same: Mapping[str, frozenset[str]]) -> dict[str, set[str]]:
+    """For each line those above which it stands, directly or through others."""
+    named = {row.name: {lower.text for lower in _named(scope, written, row)} for row in written.rows}
     above = {name: _reached(name, named) for name in named}
     whole = {row.name for row in written.rows if any(lower.text == ALL for lower in row.above)}
     for name in whole:
-        above[name] |= {other for other in named if other not in whole and name not in above[other]}
-    circle = _circle({name: sorted(lower) for name, lower in above.items()})
+        above[name] |= {
+            other
+            for other in named
+            if other not in whole and other not in same[name] and name not in above[other]
+        }
+    circle = _circle(named) or _circle(above)
     if circle:
         _report_circle(scope, written, circle)
-        return {}
-    closed = {name: _reached(name, above) for name in above}
-    return {name: {upper for upper, lower in closed.items() if name in lower} for name in closed}
+    return {name: _reached(name, above) for name in above}
 
 
-def _named(scope: Scope, written: tree.TableDecl, row: tree.Row) -> Iterator[str]:
+def _others(scope: Scope, written: tree.TableDecl, row: tree.Row) -> Iterator[tree.Name]:
+    """The lines that a row names after `same`."""
+    rows = {other.name: other for other in written.rows}
+    for name in row.same:
+        other = rows.get(name.text)
+        if other is None:
+            scope.unknown(_kind(written), name, [each for each in rows if each != row.name])
+        elif other is row:
+            scope.report(Code.LINE_ORDER, f"line `{row.name}` is said to do the same as itself", name.span)
+        elif row.default or other.default:
+            default = row.name if row.default else other.name
+            what = f"the DEFAULT line `{default}` runs where no other matches: it does the same as none"
+            scope.report(Code.LINE_ORDER, what, name.span)
+        else:
+            yield name
+
+
+def _kind(written: tree.TableDecl) -> str:
+    return f"line of table `{written.name.text}`"
+
+
+def _named(scope: Scope, written: tree.TableDecl, row: tree.Row) -> Iterator[tree.Name]:
     """The lines that a row names after `above`, without `all`."""
     rows = {other.name: other for other in written.rows}
     for lower in row.above:
@@ -129,19 +204,17 @@ def _named(scope: Scope, written: tree.TableDecl, row: tree.Row) -> Iterator[str
             what = f"`{ALL}` means every other line, and there is a line of that name"
             scope.report(Code.LINE_ORDER, what, lower.span, "call the line something else")
         elif other is None:
-            scope.unknown(
-                f"line of table `{written.name.text}`", lower, [name for name in rows if name != row.name]
-            )
+            scope.unknown(_kind(written), lower, [name for name in rows if name != row.name])
         elif other is row:
             scope.report(Code.LINE_ORDER, f"line `{row.name}` stands above itself", lower.span)
         elif other.default:
             what = f"`{other.name}` is the DEFAULT line: every line stands above it"
             scope.report(Code.LINE_ORDER, what, lower.span, f"leave `{other.name}` out")
         else:
-            yield lower.text
+            yield lower
 
 
-def _reached(name: str, edges: "dict[str, list[str]] | dict[str, set[str]]") -> set[str]:
+def _reached(name: str, edges: Mapping[str, Collection[str]]) -> set[str]:
     """What can be reached from a line."""
     reached: set[str] = set()
     waiting = [name]
@@ -153,18 +226,18 @@ def _reached(name: str, edges: "dict[str, list[str]] | dict[str, set[str]]") -> 
     return reached
 
 
-def _circle(edges: dict[str, list[str]]) -> list[str]:
+def _circle(edges: Mapping[str, Collection[str]]) -> list[str]:
     """A shortest circle, its first line at both ends; empty where there is none."""
     circles = [path for name in edges if (path := _back(name, edges))]
     return min(circles, key=len, default=[])
 
 
-def _back(name: str, edges: dict[str, list[str]]) -> list[str]:
+def _back(name: str, edges: Mapping[str, Collection[str]]) -> list[str]:
     """A shortest way from a line back to it; empty where there is none."""
     came: dict[str, str] = {}
     waiting = [name]
     for at in waiting:
-        for lower in edges[at]:
+        for lower in sorted(edges[at]):
             if lower == name:
                 path = [name, at]
                 while path[-1] != name:
@@ -192,6 +265,20 @@ def _marks(row: tree.Row) -> Span:
 # --- conditions --------------------------------------------------------------------------
 
 
+@dataclass(frozen=True, slots=True)
+class _Before:
+    """A line that goes before another where it comes through.
+
+    Attributes:
+        columns: Those of its conditions that count.
+        unless: Lines that go before it, and not before the other.
+    """
+
+    line: int
+    columns: tuple[int, ...]
+    unless: tuple[int, ...] = ()
+
+
 @dataclass(slots=True)
 class _Lines:
     """The lines of a table, to tell what those above a line add to it.
@@ -205,6 +292,7 @@ class _Lines:
     scope: Scope
     written: tree.TableDecl
     lines: tuple[Line, ...]
+    order: _Order
     boxes: list[dict[str, Box]] = field(init=False)
     masks: list[list[Mask]] = field(init=False)
     rows: dict[str, tree.Row] = field(init=False)
@@ -230,29 +318,99 @@ class _Lines:
                 boxes[test.variables[0]] = meet(boxes.get(test.variables[0], test.box), test.box)
         return boxes
 
-    def given(self, at: int, above: set[str]) -> Line:
-        """The line, with a test that none of these lines matches; its place is that of the line's name."""
+    def reports_endless(self) -> bool:
+        """Report lines without conditions that go before others; whether there is one."""
+        first = {line.name: at for at, line in enumerate(self.lines)}
+        for at, line in enumerate(self.lines):
+            if any(line.tests) or not any(
+                line.name in below or (line.name in self.order.same[name] and at < first[LineName(name)])
+                for name, below in self.order.below.items()
+                if name in first
+            ):
+                continue
+            what = f"line `{line.name}` matches every input: none that gives way to it could ever match"
+            self.scope.report(Code.LINE_ORDER, what, line.cell_span(-1))
+            return True
+        return False
+
+    def given(self, at: int) -> Line:
+        """The line, with a test that none which goes before it does; its place is that of the line's name."""
         line = self.lines[at]
-        left = dict(self._meeting(at, above))
+        uppers = [upper for upper in self._uppers(at) if not self._apart(at, upper)]
+        same = [earlier for earlier in self._same(at) if earlier < at]
+        before = [self._before(at, upper) for upper in uppers]
+        before += [
+            self._before(
+                at, earlier, [upper for upper in self._uppers(earlier) if upper not in self._uppers(at)]
+            )
+            for earlier in same
+        ]
         split = 2 * (1 + len(line.tests))
         return replace(
             line,
-            tests=(*line.tests, self._none_of(left) if left else None),
+            tests=(*line.tests, self._none_of(before) if before else None),
             bounds=(*line.bounds[:split], *line.bounds[:2], *line.bounds[split:]),
-            below=tuple(self.lines[upper].name for upper in left),
+            below=tuple(self.lines[upper].name for upper in uppers),
+            same=tuple(self.lines[earlier].name for earlier in same),
         )
 
-    def _meeting(self, at: int, above: set[str]) -> Iterator[tuple[int, tuple[int, ...]]]:
-        """Each of the lines above that can meet a line, with the columns of its tests that the line does not imply."""
-        for upper, other in enumerate(self.lines):
-            if other.name not in above or self._apart(at, upper):
-                continue
-            stated = [column for column, test in enumerate(other.tests) if test is not None]
-            yield (
-                upper,
-                tuple(column for column in stated if not self._implied(at, other.tests[column]))
-                or tuple(stated),
+    def meetings(self) -> Iterator[Meeting]:
+        """What is said of pairs of lines: by name, and of those that do the same through others."""
+        places = {line.name: at for at, line in enumerate(self.lines)}
+        for row in self.written.rows:
+            for lower in (lower for lower in row.above if lower.text in places):
+                pair = places[LineName(row.name)], places[LineName(lower.text)]
+                yield self._meeting(*pair, (), same=False, span=lower.span)
+        spans = {
+            frozenset((row.name, other.text)): other.span for row in self.written.rows for other in row.same
+        }
+        for second, line in enumerate(self.lines):
+            for first, other in enumerate(self.lines[:second]):
+                span = spans.get(frozenset((line.name, other.name)))
+                if span is None and (
+                    other.name not in self.order.same[line.name] or self._apart(first, second)
+                ):
+                    continue
+                uppers = dict.fromkeys((*self._uppers(first), *self._uppers(second)))
+                yield self._meeting(first, second, tuple(uppers), same=True, span=span or line.cell_span(-1))
+
+    def _meeting(
+        self, first: int, second: int, uppers: tuple[int, ...], *, same: bool, span: Span
+    ) -> Meeting:
+        tests = [test for at in (first, second) for test in self.lines[at].tests if test is not None]
+        none = [
+            Apply(
+                Op.NOT,
+                (_all_of([test.condition for test in self.lines[upper].tests if test is not None]),),
+                Bool(),
             )
+            for upper in uppers
+            if not self._apart(first, upper) and not self._apart(second, upper)
+        ]
+        where = _all_of([*(test.condition for test in tests), *none])
+        return Meeting(self.lines[first].name, self.lines[second].name, where, same, span)
+
+    def _uppers(self, at: int) -> list[int]:
+        """The lines above a line."""
+        above = self.order.below[self.lines[at].name]
+        return [upper for upper, line in enumerate(self.lines) if line.name in above]
+
+    def _same(self, at: int) -> list[int]:
+        """The other lines that do the same, and can match together with it."""
+        name = self.lines[at].name
+        return [
+            other
+            for other, line in enumerate(self.lines)
+            if other != at and line.name in self.order.same[name] and not self._apart(at, other)
+        ]
+
+    def _before(self, at: int, upper: int, unless: Sequence[int] = ()) -> _Before:
+        """A line that goes before another, with the columns of its tests that the other does not imply."""
+        tests = self.lines[upper].tests
+        stated = [column for column, test in enumerate(tests) if test is not None]
+        columns = tuple(column for column in stated if not self._implied(at, tests[column]))
+        less = (other for other in unless if not self._apart(at, other) and not self._apart(upper, other))
+        return _Before(upper, columns or tuple(stated), tuple(less))
 
     def _apart(self, at: int, upper: int) -> bool:
         """Whether two lines never match together, as far as it can be seen in cells."""
@@ -282,51 +440,54 @@ class _Lines:
         mine = self.boxes[at].get(leaf, (key_bounds(self.scope.leaves[leaf].type),))
         return meet(mine, test.box) == mine
 
-    def _none_of(self, uppers: dict[int, tuple[int, ...]]) -> Test:
-        """The test that none of these lines matches, of which these columns count."""
-        condition = _all_of(
-            [
-                Apply(Op.NOT, (_all_of([test.condition for test in self._tests(upper, columns)]),), Bool())
-                for upper, columns in uppers.items()
-            ]
-        )
+    def _none_of(self, before: Sequence[_Before]) -> Test:
+        """The test that none of these lines comes through."""
+        condition = _all_of([self._not(each) for each in before])
         if condition not in self.shared:
-            words = _merged(
-                [
-                    (self._words(upper, columns), self._of_one_leaf(upper, columns))
-                    for upper, columns in uppers.items()
-                ]
-            )
+            words = _merged([(self._words(each), self._of_one_leaf(each)) for each in before])
             text = " and ".join(dict.fromkeys(spell_expr(word, NEGATION) for word in words))
             names = tuple(sorted(set(read_by(condition)), key=self.scope.order))
             box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
             self.shared[condition] = Test(text, condition, names, box)
         return self.shared[condition]
 
-    def _tests(self, upper: int, columns: Sequence[int]) -> list[Test]:
-        tests = self.lines[upper].tests
-        return [test for column in columns if (test := tests[column]) is not None]
+    def _not(self, before: _Before) -> Expr:
+        """That a line does not match, in these columns, or one that goes before it does."""
+        less = [
+            self._not(_Before(other, tuple(range(len(self.lines[other].tests))))) for other in before.unless
+        ]
+        return Apply(Op.NOT, (_all_of([*(test.condition for test in self._tests(before)), *less]),), Bool())
 
-    def _of_one_leaf(self, upper: int, columns: Sequence[int]) -> bool:
+    def _tests(self, before: _Before) -> list[Test]:
+        tests = self.lines[before.line].tests
+        return [test for column in before.columns if (test := tests[column]) is not None]
+
+    def _of_one_leaf(self, before: _Before) -> bool:
         """Whether these columns compare one leaf with constants."""
-        return len(columns) == 1 and all(test.box is not None for test in self._tests(upper, columns))
+        one = len(before.columns) == 1 and not before.unless
+        return one and all(test.box is not None for test in self._tests(before))
 
-    def _words(self, upper: int, columns: Sequence[int]) -> tree.Expr:
+    def _words(self, before: _Before) -> tree.Expr:
         """That the cells of these columns do not hold, as it would be written."""
-        row = self.rows[self.lines[upper].name]
+        row = self.rows[self.lines[before.line].name]
         terms = [
             tree.term(self.written.conditions[column], cell)
-            for column in columns
+            for column in before.columns
             if (cell := row.conditions[column]) is not None
         ]
+        terms += [
+            self._words(_Before(other, tuple(range(len(self.lines[other].tests))))) for other in before.unless
+        ]
         if len(terms) == 1:
-            [test] = self._tests(upper, columns)
+            [test] = self._tests(before)
             kinds = [self.scope.leaves[name].type for name in test.variables]
             return _other(terms[0], ordered=not any(isinstance(kind, Real) for kind in kinds))
         return tree.Unary("not", reduce(lambda left, right: tree.Binary("and", left, right), terms))
 
 
 def _all_of(conditions: Sequence[Expr]) -> Expr:
+    if not conditions:
+        return Literal(value=True, type=Bool())
     return reduce(lambda left, right: Apply(Op.AND, (left, right), Bool()), conditions)
 
 

@@ -56,7 +56,7 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
             scope.report(Code.SEVERAL_DEFAULTS, "a table has at most one DEFAULT line", name_span)
         else:
             default = Default(LineName(row.name), cells.actions(row), row.unreachable, row.cells[1].span)
-    columns, resolved = with_precedence(scope, written, columns, tuple(lines))
+    columns, resolved, meetings = with_precedence(scope, written, columns, tuple(lines))
     read = {name for line in resolved for test in line.tests if test is not None for name in test.variables}
     return Table(
         TableName(written.name.text),
@@ -68,6 +68,7 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
         " ".join(written.doc),
         written.name.span,
         written.span.file,
+        meetings=meetings,
     )
 
 

@@ -41,8 +41,8 @@ from rcsc.lang.syntax.rows import (
     Cells,
     cut,
     joined,
-    marked,
     parts,
+    stub_of,
 )
 
 MOST_ERRORS = 20
@@ -270,12 +270,14 @@ class _Rows:
     def _across(self, read: list[list[_Line]], heads: list[Cells]) -> list[_Line]:
         """The lines, each with its cells of all parts; none where a part names others."""
         first = read[0]
-        names = [marked(line.cells.conditions[0])[0].text for line in first]
+        names = [stub_of(line.cells.conditions[0]).name.text for line in first]
         for head, part in zip(heads[1:], read[1:], strict=True):
-            given = [marked(line.cells.conditions[0])[0].text for line in part]
-            for stub in (line.cells.conditions[0] for line in part):
-                if marked(stub)[1]:
-                    self._report(Code.GOES_ON, "`above` stands in a further part of the table", stub, PLAIN)
+            given = [stub_of(line.cells.conditions[0]).name.text for line in part]
+            for cell in (line.cells.conditions[0] for line in part):
+                stub = stub_of(cell)
+                if stub.above or stub.same:
+                    word = "above" if stub.above else "same"
+                    self._report(Code.GOES_ON, f"`{word}` stands in a further part of the table", cell, PLAIN)
             if given != names and not self.diagnostics:
                 at = next(
                     (at for at, pair in enumerate(zip(given, names, strict=False)) if pair[0] != pair[1]),
@@ -312,8 +314,8 @@ class _Rows:
     def _row(
         self, line: _Line, conditions: tuple[tree.Heading, ...], actions: tuple[tree.Heading, ...]
     ) -> tree.Row:
-        stub, *tests = (cell.blank() for cell in line.cells.conditions)
-        name, above = marked(stub)
+        first, *tests = (cell.blank() for cell in line.cells.conditions)
+        stub = stub_of(first)
         default = bool(tests) and _says_default(tests[0])
         for cell in tests[1:]:
             if default and cell.text:
@@ -327,7 +329,7 @@ class _Rows:
             for cell, heading in zip(tests, conditions, strict=True)
         )
         return tree.Row(
-            name.text,
+            stub.name.text,
             parsed,
             tuple(
                 self._action(cell.blank(), heading)
@@ -336,9 +338,10 @@ class _Rows:
             default,
             default and tests[0].text.endswith("unreachable"),
             Span(self.source.name, line.start, line.end),
-            (name, *line.cells.all[1:]),
+            (stub.name, *line.cells.all[1:]),
             line.comments,
-            tuple(tree.Name(lower.text, lower.span) for lower in above),
+            tuple(tree.Name(lower.text, lower.span) for lower in stub.above),
+            tuple(tree.Name(other.text, other.span) for other in stub.same),
         )
 
     def _even(self, row: ParseLeaf, cells: Cells, other: Cells, called: str) -> bool:

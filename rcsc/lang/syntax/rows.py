@@ -17,9 +17,10 @@ ACTION_WORDS = frozenset({"procedures", "command_out", "status_out"})
 SEPARATOR = re.compile(r"\|[\s|:-]*-[\s|:-]*$")
 GOES_ON = re.compile(r"\|[ \t]*\|")
 AGAIN = re.compile(r"\|[ \t]*line[ \t]*\|")
-STUB = re.compile(r"(?P<name>\w+)(?P<marks>(\s+above\s+\w+(\s*,\s*\w+)*)?)$", re.ASCII)
-"""The first cell of a line: its name, and the lines above which it stands."""
-MARKS = "after a line's name may stand `above LINE, LINE`, or `above all`"
+STUB = re.compile(r"(?P<name>\w+)(\s+(above|same)\s+\w+(\s*,\s*\w+)*)*$", re.ASCII)
+"""The first cell of a line: its name, the lines above which it stands, and those that do the same."""
+_MARK = re.compile(r"\s+(above|same)\s+(\w+(?:\s*,\s*\w+)*)", re.ASCII)
+MARKS = "after a line's name may stand `above LINE, LINE`, or `above all`, and `same LINE`"
 CALL = re.compile(r"(?!(?:abs|min|max|int|real|not)\b)[A-Za-z_][A-Za-z0-9_]*\s*\(|[^=]*:=")
 """What looks like a call or an assignment, and stands perhaps where a value should."""
 CALL_UNDER = "a call or an assignment stands under `procedures`, `command_out` or `status_out`"
@@ -104,20 +105,30 @@ class Cell:
         return Cell(before + piece.text, self.file, self.start, (*self.further, (len(before), piece.start)))
 
 
-def marked(cell: Cell) -> tuple[Cell, tuple[Cell, ...]]:
-    """The name in the first cell of a line, and the lines above which it stands; the cell alone where it is no such thing.
+@dataclass(frozen=True, slots=True)
+class Stub:
+    """What the first cell of a line says: its name, the lines above which it stands, and those that do the same."""
 
-    >>> name, above = marked(Cell("halted above ready, idle", "a.rcs", 0))
-    >>> name.text, [(line.text, line.start) for line in above]
-    ('halted', [('ready', 13), ('idle', 20)])
+    name: Cell
+    above: tuple[Cell, ...] = ()
+    same: tuple[Cell, ...] = ()
+
+
+def stub_of(cell: Cell) -> Stub:
+    """The first cell of a line, taken apart; all of it is the name where it is no such thing.
+
+    >>> stub = stub_of(Cell("halted above ready, idle same off", "a.rcs", 0))
+    >>> stub.name.text, [(line.text, line.start) for line in stub.above], [line.text for line in stub.same]
+    ('halted', [('ready', 13), ('idle', 20)], ['off'])
     """
     stub = STUB.match(cell.text)
     if stub is None:
-        return cell, ()
-    words = [
-        cell.part(*word.span()) for word in re.finditer(r"\w+", cell.text) if word.start() >= stub.end("name")
-    ]
-    return cell.part(*stub.span("name")), tuple(words[1:])
+        return Stub(cell)
+    lines: dict[str, list[Cell]] = {"above": [], "same": []}
+    for mark in _MARK.finditer(cell.text, stub.end("name")):
+        words = re.compile(r"\w+").finditer(cell.text, *mark.span(2))
+        lines[mark[1]] += [cell.part(*word.span()) for word in words]
+    return Stub(cell.part(*stub.span("name")), tuple(lines["above"]), tuple(lines["same"]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -427,6 +427,7 @@ class Row:
         default: Whether this is the DEFAULT line; then all conditions are None.
         unreachable: `DEFAULT unreachable`.
         above: The lines before which it goes where both match; `all` is every other.
+        same: Those that do the same where both match.
     """
 
     name: str
@@ -438,12 +439,14 @@ class Row:
     cells: tuple[Cell, ...] = field(default=(), compare=False, repr=False)
     comments: tuple[str, ...] = ()
     above: tuple[Name, ...] = ()
+    same: tuple[Name, ...] = ()
 
     @property
     def stub(self) -> str:
         """The first cell: the name, and how the line stands to others."""
-        names = ", ".join(name.text for name in self.above)
-        return f"{self.name} above {names}" if names else self.name
+        marks = (("above", self.above), ("same", self.same))
+        said = (f"{word} {', '.join(name.text for name in names)}" for word, names in marks if names)
+        return " ".join((self.name, *said))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Arbitrary programs as trees: every kind of node, in the form that the parser gives."""
 
+from dataclasses import replace
 from functools import cache
 
 from hypothesis import strategies as st
@@ -213,10 +214,8 @@ def tables(draw: st.DrawFn) -> tree.TableDecl:
         )
         done = tuple(draw(_cells()) if h.subject is None else _value(draw) for h in actions)
         unreachable = default and draw(st.booleans())
-        above = draw(FEW)
-        rows.append(
-            tree.Row(f"l{number}", conditions_, done, default, unreachable, comments=draw(WORDS), above=above)
-        )
+        row = tree.Row(f"l{number}", conditions_, done, default, unreachable, comments=draw(WORDS))
+        rows.append(replace(row, above=draw(FEW), same=draw(FEW)))
     assuming = draw(FEW)
     return tree.TableDecl(
         draw(NAMES), assuming, headings, actions, tuple(rows), comments=draw(WORDS), doc=draw(DOCS)
