@@ -834,6 +834,34 @@ class Code(StrEnum):
         state n : int 0 .. 9
         property fine : n < 2
     """
+    NO_CYCLES = """RCS317: a time that is no number of cycles
+
+    `c for 2 [s]` counts cycles of the level that runs the table, so that a time is a whole number of them, 1 or more: with a period of
+    40 ms 2 s are 50 cycles, and 50 ms are none. A table that no level runs has no cycles to count, and levels of several periods in
+    one program have different ones.
+
+        input pressed : bool
+        state held : bool
+        table watches {
+          | line | pressed            || held  |
+          |------|--------------------||-------|
+          | long | true for 50 [ms]   || true  |
+          | else | DEFAULT            || false |
+        }
+        level watch { period 40 [ms] table watches }
+
+    error: `50 [ms]` is no whole number of cycles of 40 ms, 1 or more
+
+        input pressed : bool
+        state held : bool
+        table watches {
+          | line | pressed            || held  |
+          |------|--------------------||-------|
+          | long | true for 80 [ms]   || true  |
+          | else | DEFAULT            || false |
+        }
+        level watch { period 40 [ms] table watches }
+    """
     GAP = """RCS401: an input that no line matches
 
     Exactly one line matches in every cycle; here is an input that none matches: on the robot this is a STATE-TABLE error. The least

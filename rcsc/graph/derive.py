@@ -86,7 +86,11 @@ def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic
     fit = [
         v
         for v in program.variables
-        if v.kind is Kind.STATE and not v.name.endswith(".next") and v.previous_of is None and _few(v)
+        if v.kind is Kind.STATE
+        and not v.name.endswith(".next")
+        and v.previous_of is None
+        and not v.counts
+        and _few(v)
     ]
     if wanted:
         candidates = [v for v in fit if v.name == wanted]

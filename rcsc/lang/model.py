@@ -216,6 +216,7 @@ class Variable:
         safe: What an output shows after a cycle that ended in a fault; None where it stays as it is.
         previous_of: Of a hidden state, the leaf whose value after the cycle before it holds.
         line_of: Of a hidden state, the table whose line of this cycle it holds: 0 for none, else one more than the line's position.
+        counts: Whether it is a hidden state that counts the cycles for which a condition has held.
         restart: What it has when the level starts anew; None where it is then as it is initially, or as `Program.restart` says.
     """
 
@@ -231,6 +232,7 @@ class Variable:
     restart: Value | None = None
     previous_of: VariableName | None = field(default=None, compare=False)
     line_of: TableName | None = field(default=None, compare=False)
+    counts: bool = field(default=False, compare=False)
 
     @property
     def part(self) -> Part:

@@ -32,7 +32,7 @@ from rcsc.testing.executors.sessions import Seen
 from rcsc.testing.executors.symbols import symbols_of
 from rcsc.testing.executors.targets import is_matcher, targets
 from rcsc.testing.suite import SuiteOptions, run_suite
-from tests.support.programs.examples import EXTERN, FAULTED, LOOKING_BACK, RICH, SHIPPED, STOPS
+from tests.support.programs.examples import EXTERN, FAULTED, LASTING, LOOKING_BACK, RICH, SHIPPED, STOPS
 from tests.support.programs.stages import emitted, program_of, proved_of, shipped, verdict_of
 
 pytestmark = pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
@@ -123,6 +123,12 @@ def test_all_executors_look_back_alike() -> None:
     assert (found, sanitized) == ([], None)
     assert set(compared.lines["t"]) >= {"rise", "fall", "stay", "on_", "off"}
     assert min(compared.faults[fault] for fault in (Fault.OK, Fault.ADMIT, Fault.NO_LINE)) > 10
+
+
+def test_all_executors_count_alike_how_long_conditions_hold() -> None:
+    found, compared, sanitized = disagreements(program_of(LASTING))
+    assert (found, sanitized) == ([], None)
+    assert set(compared.lines["watch"]) >= {"long", "some", "short", "off"}
 
 
 def test_faults_of_every_kind_are_met(rich: Everything, extern: Everything) -> None:

@@ -7,6 +7,7 @@ a state; all of it is read from the model:
 - whether two leaves are equal that the level itself compares: an order and the last one, a number and the one seen;
 - whether what a cycle looks back at is the value that it was, and what cells and properties say of it;
 - whether a number is in a class of values that a cell of a table distinguishes;
+- whether a condition has held for a time;
 - whether a test variable still is what its module would compute now: a module that reads only inputs gives the same result
   while they stay, so that a line that matches again does the same again.
 """
@@ -143,6 +144,7 @@ def predicates(
         Predicate(leaf, Bool(), module=module, procedures=ts.procedures) for leaf, module in computed.items()
     ]
     selected += _cells(ts, {*inside, *computed})
+    selected += _durations(ts, inside)
     if closely:
         selected += _branches(ts, inside, {predicate.leaf for predicate in selected})
         selected += _cells_looked_back_at(ts, inside)
@@ -238,6 +240,31 @@ def _cells(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
                 if name not in seen and all(leaf in inside for leaf in test.variables):
                     seen.add(name)
                     yield Predicate(f"{column.heading} {test.text}", Bool(), condition=test.condition)
+
+
+def _durations(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
+    """Make predicates of whether conditions have held for the times that tables and procedures ask for."""
+    program, seen = ts.program, set()
+    counters = {v.name for v in program.variables if v.counts}
+    tests = (
+        test.condition for table in program.tables for line in table.lines for test in line.tests if test
+    )
+    bodies = (
+        expr
+        for procedure in program.procedures
+        for statement in everything(procedure.body)
+        for expr in expressions(statement)
+    )
+    for condition in (*tests, *bodies) if counters else ():
+        for part in parts(condition):
+            match part:
+                case Apply(op=Op.GE, args=(Read(name=leaf), Literal())) if (
+                    leaf in counters and leaf in inside
+                ):
+                    name = spelled(part)
+                    if name not in seen:
+                        seen.add(name)
+                        yield Predicate(name, Bool(), condition=part)
 
 
 def _cells_looked_back_at(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:

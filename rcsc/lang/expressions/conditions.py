@@ -8,7 +8,17 @@ from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.scope import Body, Scope
-from rcsc.lang.expressions.typed import among, between, boolean, masked, other_than, typed
+from rcsc.lang.expressions.typed import (
+    AT_ONCE,
+    among,
+    between,
+    boolean,
+    for_a_time,
+    masked,
+    other_than,
+    typed,
+    without_before,
+)
 from rcsc.lang.interval_sets import compared as keys_compared
 from rcsc.lang.interval_sets import complement, joined, meet, scaled
 from rcsc.lang.leaves import read_by
@@ -43,6 +53,7 @@ from rcsc.lang.operator_table import (
 )
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import Cell
+from rcsc.lang.syntax.spell import spell_condition
 
 _SMALL = 512
 
@@ -89,6 +100,17 @@ class Tests:
         return None if value is True else Test(text, placed(condition, cell), names, box)
 
     def _condition(self, column: int, written: tree.Condition) -> Expr | None:
+        if not isinstance(written, tree.Lasting):
+            return self._untimed(column, written)
+        with without_before(self.scope, AT_ONCE):
+            condition = self._untimed(column, written.condition)
+        if condition is None:
+            return None
+        text = f"{self.texts[column]} {spell_condition(written.condition, False)}"
+        held = for_a_time(self.scope, Body(), condition, text, written.time, written.span)
+        return None if held is None else held.expr
+
+    def _untimed(self, column: int, written: tree.Comparison | tree.OneOf | tree.Between) -> Expr | None:
         scope, body = self.scope, Body()
         if self.headings[column].subject is None:
             assert isinstance(written, tree.Comparison)

@@ -1,32 +1,47 @@
-"""What tables, assumptions and procedures look back at: hidden states that hold the values after the cycle before.
+"""What tables, assumptions and procedures look back at: hidden states that hold the values after the cycle before, or count cycles.
 
-In: a resolved expression of the present. Out: the same of the cycle before; and the procedure that keeps, as the last thing of a cycle,
-each leaf that something looks back at. So every stage sees a state as any other: free where one table is proved, exact where levels
-are, and in no program that does not ask for it.
+In: a resolved expression of the present. Out: the same of the cycle before, or that it has held for a time; and the procedure that
+keeps, as the last thing of a cycle, each leaf that something looks back at, and counts on. So every stage sees a state as any other:
+free where one table is proved, exact where levels are, and in no program that does not ask for it.
+
+`c for T` is that c holds, and held after each of the last T / period cycles. The counter goes up with each cycle after which c holds,
+as far as any `for` of this condition needs, and back to 0 with each other one.
 """
 
 from dataclasses import replace
+from fractions import Fraction
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
-from rcsc.lang.expressions.scope import MOST_LEAVES, Scope
+from rcsc.lang.expressions.placing import placed
+from rcsc.lang.expressions.scope import MOST_LEAVES, Held, Scope
 from rcsc.lang.leaves import one_earlier, read_by, renamed
+from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     Action,
     Admit,
+    Apply,
     Assign,
+    Bool,
     Call,
     Declared,
     Expr,
+    If,
+    Int,
     Kind,
     Level,
+    Literal,
+    Op,
     Procedure,
     ProcedureName,
     Read,
     Record,
+    Statement,
     Table,
     ToLeaf,
     Type,
+    Unit,
+    Value,
     Variable,
     VariableName,
 )
@@ -50,6 +65,114 @@ def before(scope: Scope, now: Expr, span: Span) -> Expr | None:
         scope.report(Code.TOO_MANY_LEAVES, message, span)
         return None
     return past
+
+
+MOST_CYCLES = 2**32 - 1
+_MS = {(("ms", 1),): 1, (("s", 1),): 1000}
+"""Milliseconds of each unit of time."""
+
+
+def cycles_of(scope: Scope, time: Value, unit: Unit, span: Span) -> int | None:
+    """How many cycles a constant time is, at least 1; None after an error, as where it is no whole number of them."""
+    period = _period(scope, span)
+    if period is None:
+        return None
+    if unit not in _MS or isinstance(time, bool):
+        scope.report(Code.UNIT, "what has to hold does so for a time in `ms` or `s`", span, "`for 2 [s]`")
+        return None
+    exact = Fraction(repr(time)) * _MS[unit] / period
+    cycles = round(exact)
+    if exact != cycles or not 1 <= cycles <= MOST_CYCLES:
+        below = min(max(exact.numerator // exact.denominator, 1), MOST_CYCLES - 1)
+        near = " or ".join(f"`{_in_ms(number * period)}`" for number in (below, below + 1))
+        message = f"`{time} [{unit[0][0]}]` is no whole number of cycles of {period} ms, 1 or more"
+        scope.report(Code.NO_CYCLES, message, span, f"write {near}")
+        return None
+    return cycles
+
+
+def _in_ms(number: int) -> str:
+    return f"{number // 1000} [s]" if number % 1000 == 0 else f"{number} [ms]"
+
+
+def _period(scope: Scope, span: Span) -> int | None:
+    """The period of the program's levels in ms; None (reported) where there is not one alone."""
+    if scope.periods is None:
+        message = "`for` stands in tables, assumptions, procedures and properties"
+    elif scope.untimed:
+        message = scope.untimed
+    elif len(scope.periods) > 1:
+        every = " and ".join(f"{period} ms" for period in scope.periods)
+        message = f"how many cycles a time is depends on the level: they have periods of {every}"
+    elif not scope.periods:
+        message = "no level says how long a cycle is, so that a time is no number of cycles"
+    else:
+        return scope.periods[0]
+    scope.report(Code.NO_CYCLES, message, span)
+    return None
+
+
+def lasting(scope: Scope, condition: Expr, text: str, cycles: int, span: Span) -> Expr | None:
+    """The condition that this one, written as `text`, holds, and held after each of the last so many cycles; None after an error."""
+    if next(read_by(condition), None) is None:
+        message = "`for` is about a variable; a constant, a local or a parameter has not held for a time"
+        scope.report(Code.NO_CYCLE_BEFORE, message, span)
+        return None
+    key = spelled(_plain(condition))
+    known = scope.held.get(key)
+    if scope.in_property and (known is None or known.limit < cycles):
+        message = "a property generates nothing, and no table counts so far how long this has held"
+        scope.report(Code.NO_CYCLE_BEFORE, message, span, "say it of a state that a table sets")
+        return None
+    scope.limits[key] = max(scope.limits.get(key, 0), cycles)
+    if known is None:
+        known = scope.held[key] = _counted(scope, condition, text, scope.limits[key], span)
+    counter: Expr = Read(known.counter, Int(0, known.limit), span)
+    counter = one_earlier(counter) if scope.in_property else counter
+    reached = Apply(Op.GE, (counter, _number(cycles, span)), Bool(), span)
+    return Apply(Op.AND, (condition, reached), Bool(), span)
+
+
+def _plain(condition: Expr) -> Expr:
+    """The same condition, however its truth is compared: `x = true` is `x`."""
+    match condition:
+        case Apply(op=Op.EQ | Op.NE as op, args=(inner, Literal(value=value, type=Bool()))):
+            holds = bool(value) is (op is Op.EQ)
+            return _plain(inner) if holds else _plain(Apply(Op.NOT, (inner,), Bool()))
+        case Apply(op=Op.NOT, args=(Apply(op=Op.NOT, args=(inner,)),)):
+            return _plain(inner)
+        case Apply(op=Op.NOT, args=(inner,)):
+            plain = _plain(inner)
+            return (
+                Apply(Op.NOT, (plain,), Bool()) if plain == inner else _plain(Apply(Op.NOT, (plain,), Bool()))
+            )
+        case _:
+            return condition
+
+
+def _counted(scope: Scope, condition: Expr, text: str, limit: int, span: Span) -> Held:
+    """The counter of a condition, made when it is first asked for."""
+    of = str(next(read_by(condition))).translate(str.maketrans(".[", "__", "]"))
+    name = VariableName(fresh(scope, f"held_{of}"))
+    doc = f"cycles for which {text} has held, up to {limit}"
+    kind = Int(0, limit)
+    scope.leaves[name] = Variable(name, Kind.STATE, kind, 0, doc=doc, span=scope.at(span), counts=True)
+    scope.kept.append(Declared(str(name), Kind.STATE, kind, (name,), doc, scope.at(span)))
+    return Held(condition if scope.cell is None else placed(condition, scope.cell), name, limit)
+
+
+def _number(value: int, span: Span) -> Expr:
+    return Literal(value, Int(value, value), span)
+
+
+def _count(held: Held) -> Statement:
+    """Count a cycle on in which the condition holds at the end, else begin anew."""
+    kind, span = Int(0, held.limit), held.condition.span
+    counter, place = Read(held.counter, kind, span), ToLeaf(held.counter, kind)
+    more = Apply(Op.ADD, (counter, _number(1, span)), Int(1, held.limit + 1), span)
+    room = Apply(Op.LT, (counter, _number(held.limit, span)), Bool(), span)
+    goes_on = If(room, (Assign(place, more, span),), (), span)
+    return If(held.condition, (goes_on,), (Assign(place, _number(0, span), span),), span)
 
 
 def _hidden(scope: Scope, name: VariableName) -> VariableName:
@@ -112,21 +235,26 @@ def keeping(scope: Scope, names: set[str], span: Span) -> Procedure | None:
         names: Names that the program gives to procedures and owners.
         span: Where a message about it points.
     """
-    if not scope.previous:
+    if not scope.previous and not scope.held:
         return None
     number, own = 2, KEEP
     while own in names:
         own, number = f"{KEEP}_{number}", number + 1
-    body = tuple(
-        Assign(ToLeaf(hidden, scope.leaves[name].type), Read(name, scope.leaves[name].type, span), span)
-        for name, hidden in scope.previous.items()
+    body = (
+        *(_count(held) for held in scope.held.values()),
+        *(
+            Assign(ToLeaf(hidden, scope.leaves[name].type), Read(name, scope.leaves[name].type, span), span)
+            for name, hidden in scope.previous.items()
+        ),
     )
+    counters = {held.counter for held in scope.held.values()}
+    read = {leaf for held in scope.held.values() for leaf in read_by(held.condition)}
     return Procedure(
         ProcedureName(own),
         (),
         body,
-        tuple(sorted(scope.previous, key=scope.order)),
-        tuple(sorted(scope.previous.values(), key=scope.order)),
+        tuple(sorted({*scope.previous, *read, *counters}, key=scope.order)),
+        tuple(sorted({*scope.previous.values(), *counters}, key=scope.order)),
         None,
         "Keeps what the next cycle looks back at.",
         span,

@@ -10,6 +10,7 @@ from rcsc.diagnostics.source import Span
 from rcsc.lang.model import (
     Declared,
     Enum,
+    Expr,
     Literal,
     Local,
     Parameter,
@@ -36,6 +37,15 @@ class Constant:
     bare: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A condition that has to hold for a time, and the state that counts the cycles for which it has."""
+
+    condition: Expr
+    counter: VariableName
+    limit: int
+
+
 @dataclass(slots=True)
 class Scope:
     """Everything declared so far, by name, and the diagnostics so far.
@@ -57,6 +67,10 @@ class Scope:
         numbers: Leaves that only the protocol writes: numbers, echoes, and what a subordinate said.
         previous: The hidden state of each leaf that something looks back at.
         kept: Those states as declared, which no text can name.
+        held: The counters of conditions that have to hold for a time, by what the condition says.
+        limits: How far each of these has to count at least, by the same; as far as is known.
+        periods: The periods of the program's levels in ms, each once; None before they are known.
+        untimed: Why `for` cannot stand in the table that is being resolved; empty where it can.
         in_property: Whether a property is being resolved, which has both cycles before it and needs no hidden state.
         no_before: Why `was` cannot stand in the expression that is being resolved; empty where it can.
     """
@@ -89,6 +103,10 @@ class Scope:
     numbers: frozenset[str] = frozenset()
     previous: dict[VariableName, VariableName] = field(default_factory=dict)
     kept: list[Declared] = field(default_factory=list)
+    held: dict[str, Held] = field(default_factory=dict)
+    limits: dict[str, int] = field(default_factory=dict)
+    periods: tuple[int, ...] | None = None
+    untimed: str = ""
     in_property: bool = False
     no_before: str = ""
 

@@ -22,7 +22,7 @@ from rcsc.lang.expressions.operators import (
     one_kind,
     scaled,
 )
-from rcsc.lang.expressions.previous import before
+from rcsc.lang.expressions.previous import before, cycles_of, lasting
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.model import (
     Among,
@@ -47,6 +47,7 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.operator_table import BITWISE, Op, Operator, is_comparison, is_logic
 from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.spell import spell_expr
 
 DEEPEST = 200
 
@@ -75,10 +76,8 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
             return _bits_of(scope, body, written)
         case tree.Unary():
             return _unary(scope, body, written)
-        case tree.Was(operand, span):
-            return _was(scope, body, operand, span, want)
-        case tree.Event():
-            return _event(scope, body, written)
+        case tree.Was() | tree.Event() | tree.Lasts():
+            return _of_cycles(scope, body, written, want)
         case tree.Binary():
             return _binary(scope, body, written)
         case tree.InSet():
@@ -92,6 +91,21 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
                 Code.KIND, f"`{command.text}(...)` is an order, and no value", written.span, ORDER_STANDS
             )
             return None
+
+
+def _of_cycles(
+    scope: Scope, body: Body, written: tree.Was | tree.Event | tree.Lasts, want: Scalar | None
+) -> Typed | None:
+    match written:
+        case tree.Was(operand, span):
+            return _was(scope, body, operand, span, want)
+        case tree.Event():
+            return _event(scope, body, written)
+        case tree.Lasts(condition, time, span):
+            with without_before(scope, AT_ONCE):
+                holding = boolean(scope, body, condition)
+            text = spell_expr(condition)
+            return None if holding is None else for_a_time(scope, body, holding, text, time, span)
 
 
 def _literal(
@@ -351,6 +365,29 @@ def _was(scope: Scope, body: Body, written: tree.Expr, span: Span, want: Scalar 
         operand = typed(scope, body, written, want)
     past = None if operand is None else before(scope, operand.expr, span)
     return None if operand is None or past is None else Typed(past, operand.bare)
+
+
+AT_ONCE = "what has to hold for a time is a condition of one cycle, without `was`, events and another `for`"
+
+
+def for_a_time(
+    scope: Scope, body: Body, condition: Expr, text: str, written: tree.Expr, span: Span
+) -> Typed | None:
+    """Resolve `c for 2 [s]`: c holds, and has since a time that long ago or longer."""
+    if scope.no_before:
+        scope.report(Code.NO_CYCLE_BEFORE, scope.no_before.replace("`was`", "`for`"), span)
+        return None
+    with without_before(scope, "a time is a constant"):
+        time = typed(scope, body, written)
+    value = None if time is None else fold(time.expr)
+    if time is None:
+        return None
+    if value is None:
+        scope.report(Code.NOT_CONSTANT, "a time is a constant", written.span)
+        return None
+    cycles = cycles_of(scope, value, time.unit(), written.span)
+    held = None if cycles is None else lasting(scope, condition, text, cycles, span)
+    return None if held is None else Typed(held)
 
 
 _EVENTS = {

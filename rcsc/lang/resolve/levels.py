@@ -23,7 +23,7 @@ each reads values of this cycle, and the order in which they are written means n
 ('watch', 'sound')
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 
@@ -97,6 +97,20 @@ def level(scope: Scope, written: tree.LevelDecl, known: Declarations) -> Level |
     *stages, last = ordered
     doc = " ".join(written.doc)
     return Level(written.name.text, period, before, last, after, doc, written.name.span, tuple(stages))
+
+
+def periods(scope: Scope, levels: Iterable[tree.LevelDecl]) -> tuple[tuple[int, ...], frozenset[str]]:
+    """The periods of levels in ms, each once, ascending; and the names of the tables that they run."""
+    every = list(levels)
+    named = (name for written in every for name in _named(written))
+    return tuple(sorted({_period(scope, written) for written in every})), frozenset(named)
+
+
+def _named(written: tree.LevelDecl) -> Iterator[str]:
+    for clause in written.tables:
+        if clause.table is not None:
+            yield clause.table.text
+        yield from (dispatch.table.text for dispatch in clause.dispatch)
 
 
 def _period(scope: Scope, written: tree.LevelDecl) -> int:

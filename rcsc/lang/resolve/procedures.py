@@ -121,6 +121,7 @@ def _procedure(
         declared_writes = _places(scope, written.writes, writing=True)
         if written.kind == "module":
             declared_reads |= {hidden for hidden, of in before.items() if of in declared_reads}
+            declared_reads |= {held.counter for held in scope.held.values()} & reads
             _check_declared(scope, body[1], known, declared_reads, declared_writes)
         reads, writes = declared_reads, declared_writes
     named = _extern(scope, written) if written.kind == "extern" else None

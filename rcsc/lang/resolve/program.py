@@ -1,7 +1,7 @@
 """One root file and all that it uses, to a `Program`."""
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ from rcsc.lang.project import Loaded, load
 from rcsc.lang.protocol import declared, expanded
 from rcsc.lang.resolve import procedures as calls
 from rcsc.lang.resolve.declarations import Names
-from rcsc.lang.resolve.levels import Declarations, level, lines_kept
+from rcsc.lang.resolve.levels import Declarations, level, lines_kept, periods
 from rcsc.lang.resolve.owners import Owners
 from rcsc.lang.resolve.properties import resolve_property
 from rcsc.lang.resolve.roles import offered, restart_of, roles_of
@@ -43,8 +43,15 @@ def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
     if wrong:
         return wrong
     declarations = [d for file in files for d in loaded.files[file].declarations]
+    limits: dict[str, int] = {}
     with _uncollected():
-        return _Resolver(root).program(declarations, loaded.files[root])
+        while True:
+            resolver = _Resolver(root, limits)
+            program = resolver.program(declarations, loaded.files[root])
+            limits = resolver.scope.limits
+            if all(held.limit == limits[key] for key, held in resolver.scope.held.items()):
+                return program
+            # a condition has to hold for several times, and not the longest came first: count as far from the beginning
 
 
 @contextmanager
@@ -83,9 +90,9 @@ def closure(root: str, loaded: Loaded) -> list[str]:
 class _Resolver:
     """Works through the declarations, kind by kind, so that their order in the text is free."""
 
-    def __init__(self, root: str) -> None:
+    def __init__(self, root: str, limits: Mapping[str, int]) -> None:
         self.root = root
-        self.scope = Scope()
+        self.scope = Scope(limits=dict(limits))
 
     def program(self, all_: list[tree.Declaration], root: tree.File) -> Program | tuple[Diagnostic, ...]:
         """The program, or what is wrong."""
@@ -103,6 +110,7 @@ class _Resolver:
         claimed = {d.name.text for d in all_ if isinstance(d, tree.PropertyDecl)}
         all_ = expanded(parties, all_)
         enums = Names(scope, all_).declare()
+        scope.periods, run = periods(scope, [d for d in all_ if isinstance(d, tree.LevelDecl)])
         written = [d for d in all_ if isinstance(d, tree.ProcedureDecl) and scope.claim(d.name, "call")]
         scope.procedures.update({d.name.text: d for d in written})
         procedures = calls.procedures(scope, written)
@@ -111,7 +119,7 @@ class _Resolver:
         )
         assumptions = self._assumptions(all_)
         invariants = self._invariants(all_)
-        tables = self._tables(all_, {a.name for a in assumptions})
+        tables = self._tables(all_, {a.name for a in assumptions}, run)
         if not scope.diagnostics:
             more, tables = offered(scope, parties, deferred, tables, procedures)
             assumptions += more
@@ -207,12 +215,18 @@ class _Resolver:
         levels = (level(self.scope, declaration, known) for declaration in written)
         return tuple(resolved for resolved in levels if resolved is not None)
 
-    def _tables(self, all_: list[tree.Declaration], assumptions: set[AssumptionName]) -> tuple[Table, ...]:
+    def _tables(
+        self, all_: list[tree.Declaration], assumptions: set[AssumptionName], run: Collection[str]
+    ) -> tuple[Table, ...]:
         tables = []
         for declaration in all_:
             if isinstance(declaration, tree.TableDecl) and self.scope.claim(declaration.name, "table"):
-                for name in declaration.assuming:
-                    if name.text not in assumptions:
-                        self.scope.unknown("assumption", name, list(assumptions))
+                for relied in declaration.assuming:
+                    if relied.text not in assumptions:
+                        self.scope.unknown("assumption", relied, list(assumptions))
+                name = declaration.name.text
+                missing = f"no level runs table `{name}`, so that a time is no number of cycles"
+                self.scope.untimed = "" if name in run else missing
                 tables.append(table(self.scope, declaration))
+        self.scope.untimed = ""
         return tuple(tables)

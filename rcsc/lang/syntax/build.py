@@ -329,6 +329,9 @@ class Build:
         word, condition = parts[0].children
         return tree.Event(self._name(word), self.expr(condition), self.expr(parts[-1]), span)
 
+    def _lasts(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Lasts(self.expr(parts[0]), self.expr(parts[-1]), span)
+
     def _in_set(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.InSet(self.expr(parts[0]), self._members(parts[-1].children), span, len(parts) > 2)
 
@@ -414,6 +417,17 @@ class Build:
                 return self.expr(part)
 
     def _condition(self, node: ParseNode) -> tree.Condition:
+        """A condition cell; `x for 2 [s]` says of the heading that it has been x for 2 s."""
+        span, parts = self._span(node), node.children
+        if node.data == "lasts":
+            return tree.Lasting(self._untimed(parts[0]), self.expr(parts[-1]), span)
+        if node.data == "equals" and parts[0].data == "lasts":
+            value, *_, time = parts[0].children
+            within = self._span(value)
+            return tree.Lasting(tree.Comparison("=", self.expr(value), within), self.expr(time), span)
+        return self._untimed(node)
+
+    def _untimed(self, node: ParseNode) -> tree.Comparison | tree.OneOf | tree.Between:
         span, parts = self._span(node), node.children
         match node.data:
             case "equals":

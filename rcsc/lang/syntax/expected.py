@@ -10,7 +10,7 @@ _DECLARATION = frozenset(
     + "EXTERN OWNER TABLE LEVEL".split()
 )
 _EXPRESSION = frozenset("TRUE FALSE REAL MASK LPAR FUNCTION NOT WAS EVENT".split())
-_OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL IN DOT LSQB".split()) | {op.upper() for op in LOGIC}
+_OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL IN DOT LSQB HELD".split()) | {op.upper() for op in LOGIC}
 _STATEMENT = frozenset("IF CASE FOR LOCAL NEXT".split())
 
 _WORDS = {
@@ -43,6 +43,7 @@ _WORDS = {
     "_DOTS": "`..`",
     "_BECOMES": "`:=`",
     "GROUPS": "bits",
+    "HELD": "`for`",
     "MASK": "bits",
     "_INT": "`int`",
     "_REAL": "`real`",
@@ -101,6 +102,7 @@ _HELPS = {
     "ORDER": "a field of a link stands in `order { NAME : TYPE }` or in `report { NAME : TYPE }`",
 }
 """What helps where a word of the protocol is missing, by the terminal."""
+_NOT_FOR = "parentheses say what has held: `not (c for 2 [s])`, or `(not c) for 2 [s]`"
 _FOR_WITHIN = {
     ",": "each subordinate has a declaration of its own: `commands NAME : LINK`",
     "else": "the reason is that of a time: `within 25 cycles else REASON`",
@@ -111,6 +113,8 @@ _FOR_WITHIN = {
 def missing_word(found: str, terminals: Iterable[str]) -> str:
     """What helps where one of these words is missing, and something else is found; empty where nothing is known."""
     names = set(terminals)
+    if found == "for":
+        return _NOT_FOR
     if "WITHIN" in names and found in _FOR_WITHIN:
         return _FOR_WITHIN[found]
     return next((text for name, text in _HELPS.items() if name in names), "")
@@ -129,5 +133,7 @@ def word_meant(word: str, terminals: Iterable[str]) -> str:
     """The word of the language that was meant, of those that could stand there; empty where none is much like it."""
     words = (one for name in set(terminals) - _SYMBOLS for one in _CLASSES.get(name, (name.lower(),)))
     known = {one for one in words if one.isalpha()}
+    if word in known:
+        return ""
     near = [word.lower()] if word.lower() in known else get_close_matches(word.lower(), sorted(known), 1, 0.8)
     return near[0] if near and word.isidentifier() else ""

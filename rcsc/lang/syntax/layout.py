@@ -24,7 +24,7 @@ _IN_NAMES = re.compile(r"(?<=[A-Za-z0-9]_)(?=[A-Za-z])|(?<=[A-Za-z0-9_\])]\.)(?=
 """Where a name in a heading may be broken: after `_` and `.`, so that no blank comes in."""
 _BLANK = re.compile(r"(?<=[^_.]) ")
 _OPERATORS = frozenset("= /= < <= > >= + - * / mod .. :=".split())
-_BEFORE = _OPERATORS | frozenset("in not was when next and or xor implies".split())
+_BEFORE = _OPERATORS | frozenset("in not was when for next and or xor implies".split())
 """Words that stay with what follows them. What follows an operator, or is one, stays with what is before it, too."""
 
 

@@ -31,13 +31,15 @@ def _expr(expr: tree.Expr) -> tuple[str, int]:
         case tree.Reference() | tree.FieldOf() | tree.IndexOf() | tree.BitsOf():
             return _place(expr), POSTFIX
         case tree.Unary("not", operand):
-            return f"not {spell_expr(operand, NEGATION)}", NEGATION
+            return f"not {spell_expr(operand, NEGATION + isinstance(operand, tree.Lasts))}", NEGATION
         case tree.Unary(_, operand):
             return f"-{spell_expr(operand, SIGN)}", SIGN
         case tree.Was() | tree.Event():
             return _of_two_cycles(expr)
         case tree.Binary(op, left, right):
             return _binary(op, left, right)
+        case tree.Lasts(condition, time):
+            return f"{spell_expr(condition, RELATION)} {_for(time)}", NEGATION
         case tree.InSet(subject, members):
             return f"{spell_expr(subject, SUM)} {_in(expr)} {spell_set(members)}", RELATION
         case tree.InRange(subject, low, high):
@@ -117,6 +119,10 @@ def spell_member(member: tree.Member) -> str:
     return spell_expr(member)
 
 
+def _for(time: tree.Expr) -> str:
+    return f"for {spell_expr(time, SUM)}"
+
+
 def _in(written: tree.InSet | tree.InRange | tree.OneOf) -> str:
     return "not in" if written.negated else "in"
 
@@ -155,10 +161,12 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
     match condition:
         case tree.Comparison(op, value):
             if whole:
-                return spell_expr(value) if _plain(value) else f"({spell_expr(value)})"
+                return f"({spell_expr(value)})" if _is_default(value) else spell_expr(value)
             if op == "=" and isinstance(value, tree.Mask) and "_" in value.text:
                 return value.text.replace("_", " ")
             return spell_expr(value, SUM) if op == "=" and _plain(value) else f"{op} {spell_expr(value, SUM)}"
+        case tree.Lasting(inner, time):
+            return f"{spell_condition(inner, whole)} {_for(time)}"
         case tree.OneOf(members):
             return f"{_in(condition)} {spell_set(members)}"
         case tree.Between(low, high):
@@ -168,8 +176,12 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
 
 
 def _plain(value: tree.Expr) -> bool:
-    """Whether `value` alone cannot be taken for DEFAULT."""
-    return not (isinstance(value, tree.Reference) and value.name.text == "DEFAULT")
+    """Whether `value` alone cannot be taken for DEFAULT, nor for what the heading has been for a time."""
+    return not (isinstance(value, tree.Lasts) or _is_default(value))
+
+
+def _is_default(value: tree.Expr) -> bool:
+    return isinstance(value, tree.Reference) and value.name.text == "DEFAULT"
 
 
 def spell_statement(statement: tree.Assign | tree.Call) -> str:

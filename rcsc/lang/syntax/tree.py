@@ -161,6 +161,15 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
+class Lasts:
+    """`a for 2 [s]`: a holds, and has held since a time that long ago or longer."""
+
+    condition: "Expr"
+    time: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
 class Binary:
     """`op` is the word of an operator of two operands (`operator_table`)."""
 
@@ -247,6 +256,7 @@ Expr: TypeAlias = (
     | Unary
     | Was
     | Event
+    | Lasts
     | Binary
     | InSet
     | InRange
@@ -409,7 +419,16 @@ class Between:
     negated: bool = False
 
 
-Condition: TypeAlias = Comparison | OneOf | Between
+@dataclass(frozen=True, slots=True)
+class Lasting:
+    """A condition cell `> 3 for 2 [s]`: one that has held since a time that long ago or longer."""
+
+    condition: Comparison | OneOf | Between
+    time: Expr
+    span: Span = at()
+
+
+Condition: TypeAlias = Comparison | OneOf | Between | Lasting
 
 
 @dataclass(frozen=True, slots=True)
@@ -772,6 +791,8 @@ def term(heading: Heading, cell: Condition) -> Expr:
     match cell:
         case Comparison(op, value):
             return Binary(op, heading.subject, value)
+        case Lasting(condition, time):
+            return Lasts(term(heading, condition), time)
         case OneOf(members):
             return InSet(heading.subject, members, negated=cell.negated)
         case Between(low, high):

@@ -240,3 +240,32 @@ table t assuming calm {
 level one { period 40 [ms] preprocess tick table t }
 """
 """Looks back at inputs, states, elements and fields; g = 2 ends the cycle with no line."""
+LASTING = """
+const delay = 0.3 [s]
+input x : int 0 .. 9
+input b : bool
+state seen : array[7] of bool
+state mode : int 0 .. 3
+state early : bool
+assume brief monitored : not (b for 1 [s])
+procedure note {
+  seen[0] := x > 3 for delay
+  seen[1] := (x > 3 or b) for 200 [ms]
+  seen[2] := not (b for 500 [ms])
+  seen[3] := (not b) for 0.1 [s]
+  seen[4] := x in {1, 2} for 200 [ms] and b
+  seen[5] := x in 2 .. 7 for 0.2 [s]
+  seen[6] := mode = 2 for 200 [ms]
+}
+module guess reads b writes early { early := b for 200 [ms] }
+table watch assuming brief {
+  | line  | b                | when                                   || mode | procedures |
+  |-------|------------------|----------------------------------------||------|------------|
+  | long  | true for 0.6 [s] |                                        || 3    | note       |
+  | some  | true             | b for 200 [ms] and not (b for 600 [ms]) || 2    | note       |
+  | short | true             | not (b for 200 [ms])                   || 1    | note       |
+  | off   | false            |                                        || 0    | note       |
+}
+level button { period 100 [ms] preprocess guess table watch }
+"""
+"""Conditions that have to hold for a time, of inputs and states."""

@@ -1,0 +1,170 @@
+"""`c for 2 [s]` in cells, headings, assumptions, procedures and properties, against an evaluator that keeps every cycle."""
+
+from random import Random
+
+import pytest
+
+from rcsc.compose.proof.level import Verdict, prove_level
+from rcsc.diagnostics.source import Source
+from rcsc.lang.interpret import Fault, cycle, initial
+from rcsc.lang.model import Value
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
+from tests.support.programs.examples import LASTING
+from tests.support.programs.stages import codes, program_of, refused, reported
+from tests.support.programs.systems import LITTLE, alone
+from tests.support.programs.texts import edited
+
+TEXT = LASTING
+PROGRAM = program_of(TEXT)
+Cycle = dict[str, Value]
+
+
+def lasted(past: list[Cycle], now: Cycle, cycles: int, holds: str) -> bool:
+    """Whether the Python condition holds now, and held after each of the last so many cycles."""
+    before = past[len(past) - cycles :] if len(past) >= cycles else None
+    return before is not None and all(eval(holds, {}, dict(each)) for each in [*before, now])  # noqa: S307 - of this file
+
+
+def wanted(past: list[Cycle], now: Cycle) -> tuple[str, list[bool]]:
+    """The line, and what `note` writes; `mode` is what the line wrote for it."""
+    line = "off"
+    if now["b"]:
+        line = "long" if lasted(past, now, 6, "b") else "some" if lasted(past, now, 2, "b") else "short"
+    then = {**now, "mode": {"long": 3, "some": 2, "short": 1, "off": 0}[line]}
+    return line, [
+        lasted(past, then, 3, "x > 3"),
+        lasted(past, then, 2, "x > 3 or b"),
+        not lasted(past, then, 5, "b"),
+        lasted(past, then, 1, "not b"),
+        lasted(past, then, 2, "x in (1, 2)") and bool(now["b"]),
+        lasted(past, then, 2, "2 <= x <= 7"),
+        lasted(past, then, 2, "mode == 2"),
+    ]
+
+
+def test_runs_are_as_an_evaluator_that_keeps_every_cycle_says() -> None:
+    drawn, lines = Random(5), set[str]()  # noqa: S311 - the same runs each time
+    for _ in range(30):
+        now, past = initial(PROGRAM), list[Cycle]()
+        for _ in range(40):
+            sticks = past and drawn.random() < 0.75
+            given = {"x": past[-1]["x"], "b": past[-1]["b"]} if sticks else {}
+            given = given or {"x": drawn.randrange(10), "b": drawn.random() < 0.6}
+            faulty = drawn.random() < 0.05
+            done = cycle(PROGRAM, PROGRAM.levels[0], {**now, **given, **({"x": 77} if faulty else {})})
+            if faulty:
+                assert done.fault is Fault.ADMIT  # neither counted nor broken: it is as if it had not been
+            else:
+                line, seen = wanted(past, {**done.snapshot, "mode": now["mode"]})
+                lines.add(line)
+                assert done.line == line
+                assert [done.snapshot[f"seen[{at}]"] for at in range(7)] == seen
+                assert done.snapshot["early"] == lasted(past, done.snapshot, 2, "b")
+                assert bool(done.failed_assumptions) == lasted(past, done.snapshot, 10, "b")
+                past.append(dict(done.snapshot))
+                now = done.snapshot
+    assert lines == {"long", "some", "short", "off"}
+
+
+def test_a_condition_has_one_counter_that_goes_as_far_as_the_longest_time() -> None:
+    counters = {str(v.name): v for v in PROGRAM.variables if v.counts}
+    assert {name: v.type.high for name, v in counters.items()} == {  # type: ignore[union-attr]
+        "held_b": 10, "held_x": 3, "held_x_2": 2, "held_b_2": 1, "held_x_3": 2, "held_x_4": 2, "held_mode": 2,
+    }  # fmt: skip
+    assert all(v.initial == 0 for v in counters.values())
+    short = program_of(edited(TEXT, ("not (b for 1 [s])", "not (b for 0.1 [s])")))
+    assert short.variable("held_b").type.high == 6  # type: ignore[union-attr]
+
+
+def test_nothing_is_counted_where_nothing_asks() -> None:
+    text = "input b : bool\ntable t {\n| line | b ||\n| a | true ||\n| c | false ||\n}\nlevel l { table t }"
+    assert not any(v.counts for v in program_of(text).variables)
+
+
+def test_times_of_one_condition_part_lines() -> None:
+    assert prove_program(PROGRAM, Options()).proved is not None
+    wrong = edited(
+        TEXT, ("b for 200 [ms] and not (b for 600 [ms])", "b for 200 [ms] and not (b for 500 [ms])")
+    )
+    assert "RCS401" in codes(reported(wrong))
+
+
+PROPERTIES = """
+property soon : (b for 600 [ms]) implies mode = 3
+property late : mode = 3 implies b for 600 [ms]
+property passes_two : mode = 3 implies was mode in {2, 3}
+property never_two : mode /= 2
+"""
+
+
+def test_properties_over_times_are_proved() -> None:
+    text = edited(TEXT, ("assume brief monitored : not (b for 1 [s])\n", ""), (" assuming brief", ""))
+    proof = prove_level(alone(text + PROPERTIES), LITTLE)
+    verdicts = {obligation.name: verdict for obligation, verdict in proof.verdicts}
+    assert all(verdicts[name] is Verdict.PROVED for name in ("soon", "late", "passes_two"))
+    assert verdicts["never_two"] is Verdict.NOT_PROVED
+
+
+def after(*edits: tuple[str, str]) -> str:
+    return edited(TEXT, *edits)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "message"),
+    [
+        (after(("for delay", "for 0.25 [s]")), "RCS317", "`0.25 [s]` is no whole number of cycles of 100 ms, 1 or more"),
+        (after(("for delay", "for 0 [s]")), "RCS317", "`0 [s]` is no whole number of cycles of 100 ms, 1 or more"),
+        (after(("for delay", "for 3")), "RCS302", "what has to hold does so for a time in `ms` or `s`"),
+        (after(("for delay", "for x")), "RCS305", "a time is a constant"),
+        (after(("level button { period 100 [ms] preprocess guess table watch }", "")), "RCS317",
+         "no level says how long a cycle is, so that a time is no number of cycles"),
+        (after(("level button", "level other { period 40 [ms] table watch }\nlevel button")), "RCS317",
+         "how many cycles a time is depends on the level: they have periods of 40 ms and 100 ms"),
+        (TEXT + "table idle {\n| line | b for 1 [s] ||\n| a | true ||\n| c | false ||\n}", "RCS317",
+         "no level runs table `idle`, so that a time is no number of cycles"),
+        (after(("x > 3 for delay", "was (x > 3 for delay)")), "RCS315", "`for` goes back one cycle, not two"),
+        (after(("x > 3 for delay", "@T(b) for delay")), "RCS315",
+         "what has to hold for a time is a condition of one cycle, without an event, events and another `for`"),
+        (after(("x > 3 for delay", "true for delay")), "RCS315",
+         "`for` is about a variable; a constant, a local or a parameter has not held for a time"),
+        (TEXT + "invariant i : mode = 3 for 1 [s]", "RCS315", "`for` is of two cycles, an invariant of one: write it as a property"),
+        (TEXT + "property i : mode = 3 for 1 [s]", "RCS315",
+         "a property generates nothing, and no table counts so far how long this has held"),
+        (after(("not (b for 500 [ms])", "not b for 500 [ms]")), "RCS101",
+         "expected a statement, an operator, `;` or `}`, found `for`"),
+        (TEXT + "state d : int 0 .. 3 deferred until b for 1 [s]", "RCS317",
+         "`for` stands in tables, assumptions, procedures and properties"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_time_is_said(text: str, code: str, message: str) -> None:
+    assert any(found.code.value == code and found.message.startswith(message) for found in refused(text)), [
+        (found.code, found.message, found.help) for found in refused(text)
+    ]
+
+
+def test_the_nearest_times_are_offered() -> None:
+    [found] = refused(after(("for delay", "for 1.95 [s]")))
+    assert found.help == ("write `1900 [ms]` or `2 [s]`",)
+
+
+@pytest.mark.parametrize(
+    "cell",
+    ["> 3 for 2 [s]", "4 for 500 [ms]", "in {1, 2} for 2 [s]", "not in 2 .. 5 for 1 [s]", "2 .. 5 for delay"],
+)
+def test_cells_are_laid_out_as_they_were_meant(cell: str) -> None:
+    text = f"table t {{\n  | line | x | when ||\n  | a | {cell} | (x > 3 or b) for 1 [s] and not (b for 1 [s]) ||\n}}\n"
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File)
+    laid = format_file(parsed)
+    assert cell in laid
+    again = parse(Source("case.rcs", laid))
+    assert isinstance(again, tree.File)
+    assert format_file(again) == laid
+    [old], [new] = (
+        [d for d in each.declarations if isinstance(d, tree.TableDecl)] for each in (parsed, again)
+    )
+    assert [row.conditions for row in old.rows] == [row.conditions for row in new.rows]
