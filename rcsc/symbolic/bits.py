@@ -1,7 +1,8 @@
 """Nodes of a symbolic run as clauses of propositional logic: the search is done on bits, the confirmation on integers.
 
 In: nodes (`symbolic.values`). Out: literals and clauses, for a SAT solver. What is exact and what is not is said in
-`keyed`, with which this agrees: booleans, members and integers exact, reals by their keys, the rest any value within its bounds.
+`keyed`, with which this agrees: booleans, members and integers exact, reals by their keys, the rest any value within its bounds,
+the same for what is built alike.
 Numbers are two's complement, lowest bit first, as wide as their bounds need; gates after Tseitin ("On the complexity of
 derivation in propositional calculus", 1968), each made once. Values that are only copied and compared for equality get as
 many bits as tell them apart (Pnueli, Rodeh, Shtrichman and Siegel, "Deciding equality formulas by small domains
@@ -15,7 +16,7 @@ from typing import Self
 
 from rcsc.lang.model import Bool, Enum, Real, Scalar, key_bounds, real_key
 from rcsc.lang.operator_table import COMPARISONS, Arithmetic, Conversion, Op, Ordering
-from rcsc.symbolic.values import Node, Shape, parts_first, takes_bits, wraps_once
+from rcsc.symbolic.values import Alike, Node, Shape, parts_first, takes_bits, wraps_once
 
 Literal = int
 """A variable, counted from 1, or its opposite, negative."""
@@ -39,6 +40,8 @@ class Bits:
     _words: dict[Node, Word] = field(default_factory=dict)
     _named: dict[str, Word] = field(default_factory=dict)
     _gates: dict[tuple[str, Literal, Literal], Literal] = field(default_factory=dict)
+    _open: dict[int, Word] = field(default_factory=dict)
+    _alike: Alike = field(default_factory=Alike)
 
     @classmethod
     def of(cls, nodes: Sequence[Node]) -> Self:
@@ -255,7 +258,13 @@ class Bits:
                 return self._any(node)
 
     def _any(self, node: Node) -> Word:
-        """Any value within the bounds of the node."""
+        """Any value within the bounds of the node; the same for nodes built alike."""
+        number = self._alike.number(node)
+        if number not in self._open:
+            self._open[number] = self._anything(node)
+        return self._open[number]
+
+    def _anything(self, node: Node) -> Word:
         if isinstance(node.kind, Bool):
             return (self.fresh(),)
         if not (math.isfinite(node.low) and math.isfinite(node.high)):

@@ -19,7 +19,7 @@ from rcsc.lang.operator_table import Arithmetic, Conversion, Op
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Term
 from rcsc.symbolic import values
-from rcsc.symbolic.values import Node, Shape, parts_first, takes_bits, wraps_once
+from rcsc.symbolic.values import Alike, Node, Shape, parts_first, takes_bits, wraps_once
 
 KEY = Int(-(2**63), 2**63)
 """The type in which every number stands."""
@@ -44,8 +44,7 @@ class Keyed:
     _terms: dict[Node, Term] = field(default_factory=dict)
     _variables: dict[str, Term] = field(default_factory=dict)
     _open: dict[tuple[str, Scalar, tuple[int, ...]], Term] = field(default_factory=dict)
-    _numbers: dict[tuple[object, ...], int] = field(default_factory=dict)
-    _number_of: dict[Node, int] = field(default_factory=dict)
+    _alike: Alike = field(default_factory=Alike)
 
     def term(self, node: Node) -> Term:
         """The term of a node; parts first, without recursion."""
@@ -147,7 +146,7 @@ class Keyed:
 
     def any(self, node: Node) -> Term:
         """Any value within the bounds of the node."""
-        key = node.op, node.kind, tuple(self._written(arg) for arg in node.args)
+        key = node.op, node.kind, tuple(map(self._alike.number, node.args))
         term = self._open.get(key)
         if term is None:
             self.guessed += 1
@@ -155,17 +154,6 @@ class Keyed:
         if not isinstance(node.kind, Bool) and math.isfinite(node.low) and math.isfinite(node.high):
             self.within(term, node.low, node.high, node.kind)
         return term
-
-    def _written(self, node: Node) -> int:
-        """Number the node; nodes built alike and with the same bounds get the same number.
-
-        Bounds hold only where the node is reached: one value for two places would carry them over.
-        """
-        for part in parts_first(node, known=self._number_of):
-            parts = tuple(self._number_of[arg] for arg in part.args)
-            key = part.op, part.kind, part.name, part.low, part.high, parts
-            self._number_of[part] = self._numbers.setdefault(key, len(self._numbers))
-        return self._number_of[node]
 
 
 def _key(kind: Scalar, key: int) -> Term:

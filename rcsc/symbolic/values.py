@@ -9,7 +9,7 @@ A node of type Real whose bounds are infinite may also be a NaN. Source of the b
 import math
 import sys
 from collections.abc import Container, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rcsc.lang.expressions import intervals
@@ -319,6 +319,25 @@ def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:
             seen.add(node)
             stack.append((node, True))
             stack.extend((part, False) for part in node.args if part not in seen)
+
+
+@dataclass(slots=True)
+class Alike:
+    """Numbers nodes; those built alike and with the same bounds get the same number.
+
+    Bounds hold only where the node is reached: one value for two places would carry them over.
+    """
+
+    _numbers: dict[tuple[object, ...], int] = field(default_factory=dict)
+    _number_of: dict[Node, int] = field(default_factory=dict)
+
+    def number(self, node: Node) -> int:
+        """The number of a node."""
+        for part in parts_first(node, known=self._number_of):
+            parts = tuple(self._number_of[arg] for arg in part.args)
+            key = part.op, part.kind, part.name, part.low, part.high, parts
+            self._number_of[part] = self._numbers.setdefault(key, len(self._numbers))
+        return self._number_of[node]
 
 
 # --- what a condition tells --------------------------------------------------------------

@@ -103,7 +103,21 @@ table t assuming step {
 }
 level l { table t }
 """
+REAL = """
+input y : real 0.0 .. 100.0
+state jumps : int 0 .. 9
+assume slow assumed : y - was y <= 0.5
+property shown : jumps = 0
+table t assuming slow {
+  | line | y - was y || jumps             |
+  |------|-----------||-------------------|
+  | slow | <= 0.5    ||                   |
+  | fast | > 0.5     || min(jumps + 1, 9) |
+}
+level l { table t }
+"""
 CASES = {
+    "real": (REAL, ("<= 0.5\nproperty", "<= 0.6\nproperty")),
     "thresholds": (THRESHOLDS, ("<= 20", "<= 21")),
     "drift up": (DRIFT, ("y - was y <= 2", "y - was y <= 3")),
     "drift down": (DRIFT, (">= -2", ">= -3")),
