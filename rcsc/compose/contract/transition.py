@@ -292,13 +292,15 @@ class TransitionSystem:
         run.settle(self.program)
         settled = {**before, **run.state.leaves}
         run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
-        stages, seen = list[TableAt](), list[Leaves]()
+        stages, seen, matched = list[TableAt](), list[Leaves](), TRUE
         for choice in self.level.stages:
             seen.append({**before, **run.state.leaves})
-            stages += self._run(run, choice)
+            here = self._run(run, choice, matched)
+            stages += here
+            matched = values.both(matched, values.all_of(values.follows(at.runs, at.one_line) for at in here))
         middle = {**before, **run.state.leaves}
-        unmatched = run.ended
-        tables = self._run(run, self.level.tables)
+        unmatched = values.either(run.ended, values.negation(matched))
+        tables = self._run(run, self.level.tables, matched)
         contract = values.both(contract, self._trusted((*stages, *tables)))
         acted, interrupted = {**before, **run.state.leaves}, run.ended
         run.execute(Call(self.procedures[name].name) for name in self.level.postprocess)
@@ -368,15 +370,15 @@ class TransitionSystem:
 
     # --- the level ---
 
-    def _run(self, run: Run, choice: TableChoice) -> tuple[TableAt, ...]:
-        """Run the chosen table, at its place in the cycle."""
-        tables = tuple(self._tables(run, choice))
+    def _run(self, run: Run, choice: TableChoice, matched: Node) -> tuple[TableAt, ...]:
+        """Run the chosen table, at its place in the cycle, if those before it `matched` one line each."""
+        tables = tuple(self._tables(run, choice, matched))
         run.ended = values.either(run.ended, values.any_of(at.stopped for at in tables))
         self._lines(run, tables)
         return tables
 
-    def _tables(self, run: Run, choice: TableChoice) -> Iterable[TableAt]:
-        goes_on = values.negation(run.ended)
+    def _tables(self, run: Run, choice: TableChoice, matched: Node = TRUE) -> Iterable[TableAt]:
+        goes_on = values.both(matched, values.negation(run.ended))
         for name, selected in run.chosen(choice).items():
             table = self.table(name)
             assumptions = {

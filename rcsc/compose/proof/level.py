@@ -208,7 +208,7 @@ def _believed(
     They fail if no later cycle, no first one, or none after a restart can fulfil them; for one table, if no cycle that runs it
     can, although one would run it without them.
     """
-    names = [str(at.table.name) for at in inference.cycle.tables]
+    names = [str(at.table.name) for at in inference.cycle.every]
     if not ts.trusted:
         return dict.fromkeys(names, Verdict.TRUSTED)
     whole = _of_possible({solver.check() for solver in solvers})
@@ -228,7 +228,7 @@ def _can_run(
     inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver], at: int
 ) -> Verdict:
     """Decide whether a table can run under its declared assumptions, if it can without them."""
-    chosen = [inference.keyed.term(each.tables[at].chosen) for each in (inference.cycle, *inference.firsts)]
+    chosen = [inference.keyed.term(each.every[at].chosen) for each in (inference.cycle, *inference.firsts)]
     answers = {answer(solver, term) for solver, term in zip(solvers, chosen, strict=True)}
     if Answer.SATISFIABLE in answers:
         return Verdict.TRUSTED

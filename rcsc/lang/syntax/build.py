@@ -256,13 +256,14 @@ class Build:
         )
 
     def _table_clause(self, node: ParseNode) -> tree.TableClause:
+        above = self._above(node)
         first, *rest = node.children
         if node.data == "one_table":
-            return tree.TableClause(self._name(first), None, (), self._span(node))
+            return tree.TableClause(self._name(first), None, (), **above)
         arms = (
             tree.Dispatch(self.expr(d.children[0]), self._name(d.children[1]), self._span(d)) for d in rest
         )
-        return tree.TableClause(None, self.expr(first), tuple(arms), self._span(node))
+        return tree.TableClause(None, self.expr(first), tuple(arms), **above)
 
     # --- types and units ---
 

@@ -236,6 +236,7 @@ def _level(level: tree.LevelDecl) -> Iterator[str]:
     if level.preprocess:
         yield f"  preprocess {', '.join(name.text for name in level.preprocess)}"
     for clause in level.tables:
+        yield from _above(clause.comments, (), "  ")
         if clause.table is not None:
             yield f"  table {clause.table.text}"
         elif clause.selector is not None:

@@ -723,13 +723,12 @@ class Dispatch:
 
 
 @dataclass(frozen=True, slots=True)
-class TableClause:
+class TableClause(Commented):
     """`table t`, or with one table a command: `table by input_command { acquire : acquire_table ... }`."""
 
     table: Name | None
     selector: Expr | None
     dispatch: tuple[Dispatch, ...]
-    span: Span = at()
 
 
 @dataclass(frozen=True, slots=True)

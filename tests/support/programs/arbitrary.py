@@ -249,8 +249,8 @@ def _dispatches() -> SearchStrategy[tuple[tree.Dispatch, ...]]:
 def _clauses(draw: st.DrawFn) -> tree.TableClause:
     """A table of a level, or a choice."""
     if draw(st.booleans()):
-        return tree.TableClause(None, draw(places()), draw(_dispatches()))
-    return tree.TableClause(draw(NAMES), None, ())
+        return tree.TableClause(None, draw(places()), draw(_dispatches()), comments=draw(WORDS))
+    return tree.TableClause(draw(NAMES), None, (), comments=draw(WORDS))
 
 
 @st.composite
