@@ -37,28 +37,6 @@ MOST_SHOWN = 3
 
 
 @dataclass(frozen=True, slots=True)
-class WitnessColumn:
-    """A witness as a column of the table, with the lines that match it.
-
-    Attributes:
-        table: Name of the table.
-        variables: The variables, in declared order.
-        values: The witness's value of each variable, in the table's words.
-        lines: The lines that match the witness; none for a gap.
-        region: The maximal region around the witness, one condition a variable in the
-            table's words; variables left out are free (`any other`).
-        inputs: How many inputs the region has; None where nobody counted.
-    """
-
-    table: str
-    variables: tuple[str, ...]
-    values: tuple[str, ...]
-    lines: tuple[MatchedLine, ...] = ()
-    region: tuple[str, ...] = ()
-    inputs: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Effects:
     """What two lines that overlap do where both match.
 
@@ -81,6 +59,30 @@ class Effects:
 
 
 @dataclass(frozen=True, slots=True)
+class WitnessColumn:
+    """A witness as a column of the table, with the lines that match it.
+
+    Attributes:
+        table: Name of the table.
+        variables: The variables, in declared order.
+        values: The witness's value of each variable, in the table's words.
+        lines: The lines that match the witness; none for a gap.
+        region: The maximal region around the witness, one condition a variable in the
+            table's words; variables left out are free (`any other`).
+        inputs: How many inputs the region has; None where nobody counted.
+        effects: Of two lines that overlap and have no diagnostic of their own; None for any other, and where nobody looked.
+    """
+
+    table: str
+    variables: tuple[str, ...]
+    values: tuple[str, ...]
+    lines: tuple[MatchedLine, ...] = ()
+    region: tuple[str, ...] = ()
+    inputs: int | None = None
+    effects: Effects | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnostic:
     """One problem, stated once; rendering lives in `render`.
 
@@ -99,6 +101,7 @@ class Diagnostic:
     severity: Severity = Severity.ERROR
     effects: Effects | None = None  # of an overlap; `notes` say it, too
     only_listed: bool = False  # witnesses stand in the JSON form alone
+    told_with: bool = False  # a note of another one tells it in a text
 
     @property
     def shown(self) -> tuple[WitnessColumn, ...]:

@@ -106,4 +106,5 @@ def _witness_to_json(witness: WitnessColumn, sources: Sources) -> Json:
         ],
         "region": list(witness.region),
         "inputs": witness.inputs,
+        "effects": None if witness.effects is None else _listed(witness.effects),
     }

@@ -1,11 +1,21 @@
 """What was found of a table, as diagnostics."""
 
+import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Effects, Label, MatchedLine, Severity, WitnessColumn
+from rcsc.diagnostics.diagnostic import (
+    Diagnostic,
+    Effects,
+    Label,
+    MatchedLine,
+    Severity,
+    WitnessColumn,
+    sort_key,
+)
 from rcsc.lang.interval_sets import size
 from rcsc.lang.model import Box, Enum, Line, Program, Scalar, Table, key_bounds, spell
 from rcsc.solvers import smt
@@ -29,6 +39,8 @@ from rcsc.table.verdict import (
 
 MOST_PAIRS = 20
 """Overlapping pairs shown of one table; then how many more."""
+MOST_COMPARED = 200
+"""Overlapping pairs of one table of which it is told whether the two lines do the same."""
 MOST_NAMED = 5
 """Lines that are named because they overlap with the most others."""
 MANY = 3
@@ -43,16 +55,27 @@ def diagnostics(
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
     with smt.together(options.together):
         shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
+        effects = [
+            alike(program, table, (each.first, each.second), options)
+            for each in overlaps[MOST_PAIRS:MOST_COMPARED]
+        ]
+    shown = _grouped(table, overlaps, shown)
     if shown and (together := _together(program, table, overlaps[:MOST_PAIRS])):
-        shown[-1] = replace(shown[-1], notes=(*shown[-1].notes, together))
+        last = max(
+            (at for at, each in enumerate(shown) if not each.told_with), key=lambda at: sort_key(shown[at])
+        )
+        shown[last] = replace(shown[last], notes=(*shown[last].notes, together))
     if len(overlaps) > MOST_PAIRS:
         least = "at least " if len(overlaps) == partition.MOST_PAIRS else ""
         message = (
             f"and {least}{len(overlaps) - MOST_PAIRS} more pairs of lines of table `{table.name}` overlap"
         )
         others = tuple(
-            _column(program, table, each.witness, (each.first, each.second), each.region)
-            for each in overlaps[MOST_PAIRS:]
+            replace(
+                _column(program, table, each.witness, (each.first, each.second), each.region),
+                effects=compared,
+            )
+            for each, compared in zip_longest(overlaps[MOST_PAIRS:], effects)
         )
         notes = (_most_overlapping(table, overlaps), "--json lists every pair with its witness")
         shown.append(
@@ -180,6 +203,59 @@ def _overlap(program: Program, table: Table, overlap: Overlap, options: Options)
         witnesses=(column,),
         effects=effects,
     )
+
+
+def _grouped(table: Table, overlaps: Sequence[Overlap], shown: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """The overlaps; of those that come of the same cells, to one end, the first tells the others in a note."""
+    groups: dict[object, list[int]] = {}
+    for at, (overlap, diagnostic) in enumerate(zip(overlaps, shown, strict=False)):
+        cells = _apart_in(table, overlap)
+        same = diagnostic.effects is not None and diagnostic.effects.same
+        groups.setdefault((cells, same) if cells else at, []).append(at)
+    told = list(shown)
+    for members in groups.values():
+        first, *others = sorted(members, key=lambda at: sort_key(shown[at]))
+        if others:
+            note = _alike_as(table, [overlaps[at] for at in members], overlaps[first])
+            told[first] = replace(shown[first], notes=(*shown[first].notes, note))
+        for at in others:
+            told[at] = replace(shown[at], told_with=True)
+    return told
+
+
+def _apart_in(table: Table, overlap: Overlap) -> frozenset[tuple[str, str]]:
+    """The cells of two lines in columns where just one of them says something: what brings them together."""
+    pair = table.lines[overlap.first], table.lines[overlap.second]
+    cells = zip(table.columns, *(line.tests for line in pair), strict=True)
+    return frozenset(
+        (column.heading, test.text)
+        for column, one, other in cells
+        for test in (one, other)
+        if test is not None and (one is None or other is None)
+    )
+
+
+def _alike_as(table: Table, overlaps: Sequence[Overlap], first: Overlap) -> str:
+    """Name the other pairs of a group, by the line that most of them share."""
+    pairs = [(each.first, each.second) for each in overlaps if each != first]
+    often = Counter(line for pair in [(first.first, first.second), *pairs] for line in pair)
+    by_line: dict[int, list[str]] = {}
+    for pair in pairs:
+        most = max(pair, key=lambda line: (often[line], -line))
+        other = pair[1] if most == pair[0] else pair[0]
+        by_line.setdefault(most, []).append(str(table.lines[other].name))
+    named = "; ".join(f"`{table.lines[most].name}` with {_names(others)}" for most, others in by_line.items())
+    cells = ", ".join(_said_under(heading, text) for heading, text in sorted(_apart_in(table, first)))
+    many = f"{len(pairs)} more pairs overlap" if len(pairs) > 1 else "1 more pair overlaps"
+    return f"{many} where {cells}: {named}; --json lists each"
+
+
+def _said_under(heading: str, text: str) -> str:
+    """A cell with its heading: `called = abort`, `now in cleared`."""
+    if heading == "when":
+        return text
+    plain = re.match(r"[\w.]+$|-\d", text) is not None
+    return f"{heading} = {text}" if plain else f"{heading} {text}"
 
 
 def _as_same(first: Line, second: Line, effects: Effects) -> str:

@@ -76,7 +76,7 @@ _OF_VERDICT = {
     Verdict.REFUTED: Style.ERROR,
     Verdict.UNDECIDED: Style.WARNING,
 }
-_REPEATED = {Code.DEFAULT_COVERS, Code.PROPERTY_ELSEWHERE}
+_REPEATED = {Code.DEFAULT_COVERS, Code.GIVES_WAY, Code.PROPERTY_ELSEWHERE}
 """What is right, and said again by every check."""
 _METHODS = {"boxes": "boxes", "tree": "a tree of regions", "z3": "Z3"}
 
@@ -162,7 +162,7 @@ def _text(report: Report, _command: str, output: Output, closing: str) -> str:
     coloured = wants_color(output.color, output.file)
     columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else 200
     rows: list[Row] = []
-    for diagnostic in _told(report, output):
+    for diagnostic in (each for each in _told(report, output) if not each.told_with):
         rows += (*full(diagnostic, report.sources, columns), ())
     if not output.quiet:
         rows += summary(report)
