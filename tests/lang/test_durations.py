@@ -168,3 +168,44 @@ def test_cells_are_laid_out_as_they_were_meant(cell: str) -> None:
         [d for d in each.declarations if isinstance(d, tree.TableDecl)] for each in (parsed, again)
     )
     assert [row.conditions for row in old.rows] == [row.conditions for row in new.rows]
+
+
+PANEL = """
+input pressed : bool
+state stable : bool
+output lamp : bool
+output siren : bool
+property shown : siren implies lamp
+table alarm {
+  | line | lamp              || siren |
+  |------|-------------------||-------|
+  | on   | true for 400 [ms] || true  |
+  | off  | DEFAULT           || false |
+}
+table show {
+  | line | stable || lamp  |
+  |------|--------||-------|
+  | on   | true   || true  |
+  | off  | false  || false |
+}
+table debounce {
+  | line | pressed            || stable |
+  |------|--------------------||--------|
+  | on   | true for 200 [ms]  || true   |
+  | off  | false for 200 [ms] || false  |
+  | keep | DEFAULT            ||        |
+}
+level panel { period 100 [ms] table alarm table show table debounce }
+"""
+
+
+def test_tables_of_one_cycle_count_what_earlier_ones_set() -> None:
+    program = program_of(PANEL)
+    now = initial(program)
+    shown = []
+    for pressed in [*[True] * 8, *[False] * 4]:
+        now = cycle(program, program.levels[0], {**now, "pressed": pressed}).snapshot
+        shown.append("".join("x" if now[name] else "." for name in ("stable", "lamp", "siren")))
+    assert shown == ["...", "...", *["xx."] * 4, "xxx", "xxx", "xxx", "xxx", "...", "..."]
+    proof = prove_level(alone(PANEL), LITTLE)
+    assert {obligation.name: verdict for obligation, verdict in proof.verdicts}["shown"] is Verdict.PROVED
