@@ -64,7 +64,7 @@ def derive(
     if isinstance(chosen, Diagnostic):
         return chosen
     written = next(
-        expanded(declaration, table)
+        expanded(declaration, table, apart=True)
         for declaration in file.declarations
         if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
     )

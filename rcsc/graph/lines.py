@@ -29,7 +29,7 @@ def derive_lines(program: Program, table: Table, file: tree.File, options: Optio
         message = f"which lines of table `{table.name}` can follow which is not decided within the limits"
         return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
     written = next(
-        expanded(declaration, table)
+        expanded(declaration, table, apart=True)
         for declaration in file.declarations
         if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
     )

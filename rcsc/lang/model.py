@@ -673,6 +673,11 @@ class Table:
     stops: tuple[AssumptionName, ...] = ()
     meetings: tuple[Meeting, ...] = ()
 
+    def added(self, line: Line) -> str:
+        """What `above` and `same` add to the conditions of one of its lines, in words; empty for nothing."""
+        tests = zip(line.tests, self.columns, strict=True)
+        return " and ".join(test.text for test, column in tests if test is not None and not column.written)
+
 
 # --- owners, levels, programs --------------------------------------------------------
 

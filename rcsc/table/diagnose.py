@@ -129,9 +129,7 @@ def _lower(table: Table) -> list[Diagnostic]:
         return []
     alike: dict[tuple[tuple[str, ...], tuple[str, ...], str], list[str]] = {}
     for line in lower:
-        test = line.tests[-1]
-        if test is not None:
-            alike.setdefault((line.below, line.same, test.text), []).append(line.name)
+        alike.setdefault((line.below, line.same, table.added(line)), []).append(line.name)
     notes = [
         f"{_before(uppers, same)}, only where {text}: {_names(names)}"
         for (uppers, same, text), names in list(alike.items())[:MOST_NAMED]

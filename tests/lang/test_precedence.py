@@ -20,7 +20,7 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import MARKS
-from tests.support.programs.stages import codes, program_of, refused, reported
+from tests.support.programs.stages import codes, program_of, refused, reported, verdict_of
 from tests.support.programs.texts import edited
 
 HEAD = """
@@ -163,16 +163,14 @@ def test_the_first_runs_of_what_does_the_same_and_has_none_above_it(seed: int) -
 
 def test_what_it_comes_to_is_the_least_that_parts_the_lines_and_is_shown() -> None:
     program = program_of(MACHINE)
-    lines = {
-        line.name: (line.tests[-1] and line.tests[-1].text, line.below) for line in program.tables[0].lines
-    }
+    lines = {line.name: (program.tables[0].added(line), line.below) for line in program.tables[0].lines}
     assert lines == {
         "ended": ("called not in {stop, hold} and near - far <= 1 and near + far /= 5", ("stop", "hold", "wide", "odd")),
-        "stop": (None, ()),
+        "stop": ("", ()),
         "hold": ("not (done = true and near - far > 1) and not (done = true and near + far = 5)", ("wide", "odd")),
         "wide": ("called /= stop and near + far /= 5", ("stop", "odd")),
         "odd": ("called /= stop", ("stop",)),
-        "rest": (None, ()),
+        "rest": ("", ()),
     }  # fmt: skip
     [note] = [found for found in reported(MACHINE) if found.code.value == "RCS424"]
     assert note.severity is Severity.NOTE
@@ -203,12 +201,31 @@ table t {{
     assert one.tests[-1] is two.tests[-1] is not None
 
 
+def test_lines_of_boxes_stay_boxes() -> None:
+    chain = f"""{HEAD}
+table t {{
+  | line         | called | done | near || now   |
+  | one above two | stop  |      |      || true  |
+  | two above six |       | true |      || false |
+  | six above ten |       |      | > 2  || true  |
+  | ten           |       |      |      || now   |
+}}"""
+    verdict = verdict_of(chain)
+    assert verdict.proved is not None
+    assert verdict.tables[0].backing.method == "boxes"
+    [table] = verdict.proved.program.tables
+    assert table.added(table.lines[3]) == "called /= stop and done = false and near <= 2"
+    assert [column.written for column in table.columns] == [True] * 3 + [False] * 3
+
+
 def test_the_cells_of_a_line_keep_their_places() -> None:
-    for line in program_of(MACHINE).tables[0].lines:
-        for column, test in enumerate(line.tests[:-1]):
+    [table] = program_of(MACHINE).tables
+    written = sum(column.written for column in table.columns)
+    for line in table.lines:
+        for column, test in enumerate(line.tests[:written]):
             span = line.cell_span(column)
             assert MACHINE[span.start : span.end] == ("" if test is None else test.text)
-        assert line.cell_span(-1) == line.cell_span(len(line.tests) - 1)
+        assert {line.cell_span(-1)} == {line.cell_span(at) for at in range(written, len(line.tests))}
         span = line.cell_span(-1)
         assert MACHINE[span.start : span.end] == line.name
 
@@ -398,10 +415,10 @@ table t {
   | d above c   | x1xx 0xxx |       | true || false |
   | e above d   |           | false |      || false |
 }""").tables
-    added = {line.name: line.tests[-1] and (line.tests[-1].text, line.below) for line in table.lines}
+    added = {line.name: (table.added(line), line.below) for line in table.lines}
     assert added == {
         "a": ("not (w[7..0] = 0bx0xx_xxxx and done = true)", ("b",)),  # it says so twice: it never matches
-        "b": None,
+        "b": ("", ()),
         "c": ("done = false", ("d",)),
         "d": ("w[15] = true", ("e",)),
         "e": ("not (w[7..0] = 0bx0xx_xxxx and done = true)", ("b",)),

@@ -67,41 +67,51 @@ def with_precedence(
     known = _Lines(scope, written, lines, order)
     if known.reports_endless():
         return unchanged
-    resolved = tuple(known.given(at) for at in range(len(lines)))
-    meetings = tuple(known.meetings())
-    if not any(line.below or line.same for line in resolved):
-        return columns, lines, meetings
-    column = Column("when", None, None, written.name.span, written=False)
-    return (*columns, column), resolved, meetings
+    added = [known.added(at) for at in range(len(lines))]
+    leaves = sorted(
+        {leaf for tests in added for leaf in tests}, key=lambda leaf: (not leaf, leaf and scope.order(leaf))
+    )
+    more = (Column("when", None, None, written.name.span, written=False),) * len(leaves)
+    resolved = tuple(known.given(at, [tests.get(leaf) for leaf in leaves]) for at, tests in enumerate(added))
+    return (*columns, *more), resolved, tuple(known.meetings())
 
 
-def expanded(written: tree.TableDecl, table: Table) -> tree.TableDecl:
-    """The table as it is resolved: without `above` and `same`, and with a column for what they come to."""
+def expanded(written: tree.TableDecl, table: Table, *, apart: bool = False) -> tree.TableDecl:
+    """The table as it is resolved: without `above` and `same`, and with a column for what they come to.
+
+    `apart` gives it the columns of the model, of which each looks at another variable.
+    """
     rows = tuple(replace(row, above=(), same=()) for row in written.rows)
-    if all(column.written for column in table.columns):
+    many = sum(not column.written for column in table.columns)
+    if not many:
         return replace(written, rows=rows)
-    added = {line.name: line.tests[-1] for line in table.lines}
-    nowhere = Cell("", "", 0)
+    texts = {
+        line.name: [test.text if test is not None else "" for test in line.tests[-many:]]
+        if apart
+        else [table.added(line)]
+        for line in table.lines
+    }
+    blank = [""] * (many if apart else 1)
     split = 1 + len(written.conditions)
     return replace(
         written,
-        conditions=(*written.conditions, tree.Heading(None, "when", Cell("when", "", 0))),
+        conditions=(*written.conditions, *(tree.Heading(None, "when", Cell("when", "", 0)) for _ in blank)),
         rows=tuple(
             replace(
                 row,
-                conditions=(*row.conditions, _condition(added.get(LineName(row.name)))),
-                cells=(*row.cells[:split], nowhere, *row.cells[split:]),
+                conditions=(*row.conditions, *map(_condition, texts.get(LineName(row.name), blank))),
+                cells=(*row.cells[:split], *(Cell("", "", 0) for _ in blank), *row.cells[split:]),
             )
             for row in rows
         ),
     )
 
 
-def _condition(test: Test | None) -> tree.Condition | None:
-    """A test as a cell under `when`."""
-    if test is None:
+def _condition(text: str) -> tree.Condition | None:
+    """A condition as a cell under `when`; None for an empty one."""
+    if not text:
         return None
-    parsed = parse(Source("", f"assume it : {test.text}"))
+    parsed = parse(Source("", f"assume it : {text}"))
     assert isinstance(parsed, tree.File)
     [claim] = parsed.declarations
     assert isinstance(claim, tree.AssumeDecl)
@@ -333,26 +343,39 @@ class _Lines:
             return True
         return False
 
-    def given(self, at: int) -> Line:
-        """The line, with a test that none which goes before it does; its place is that of the line's name."""
-        line = self.lines[at]
-        uppers = [upper for upper in self._uppers(at) if not self._apart(at, upper)]
-        same = [earlier for earlier in self._same(at) if earlier < at]
-        before = [self._before(at, upper) for upper in uppers]
+    def added(self, at: int) -> dict[str, Test]:
+        """The tests that none which goes before a line comes through: one a leaf, so that boxes stay boxes, and "" for the rest."""
+        above = self._uppers(at)
+        before = [self._before(at, upper) for upper in self._above(at)]
         before += [
-            self._before(
-                at, earlier, [upper for upper in self._uppers(earlier) if upper not in self._uppers(at)]
-            )
-            for earlier in same
+            self._before(at, earlier, [upper for upper in self._uppers(earlier) if upper not in above])
+            for earlier in self._earlier(at)
         ]
+        by_leaf: dict[str, list[_Before]] = {}
+        for each in before:
+            leaf = str(self._tests(each)[0].variables[0]) if self._of_one_leaf(each) else ""
+            by_leaf.setdefault(leaf, []).append(each)
+        return {leaf: self._none_of(each) for leaf, each in by_leaf.items()}
+
+    def given(self, at: int, tests: Sequence[Test | None]) -> Line:
+        """The line with these tests; their place is that of the line's name."""
+        line = self.lines[at]
         split = 2 * (1 + len(line.tests))
         return replace(
             line,
-            tests=(*line.tests, self._none_of(before) if before else None),
-            bounds=(*line.bounds[:split], *line.bounds[:2], *line.bounds[split:]),
-            below=tuple(self.lines[upper].name for upper in uppers),
-            same=tuple(self.lines[earlier].name for earlier in same),
+            tests=(*line.tests, *tests),
+            bounds=(*line.bounds[:split], *(line.bounds[:2] * len(tests)), *line.bounds[split:]),
+            below=tuple(self.lines[upper].name for upper in self._above(at)),
+            same=tuple(self.lines[earlier].name for earlier in self._earlier(at)),
         )
+
+    def _above(self, at: int) -> list[int]:
+        """The lines above a line that can match together with it."""
+        return [upper for upper in self._uppers(at) if not self._apart(at, upper)]
+
+    def _earlier(self, at: int) -> list[int]:
+        """The earlier lines that do the same, and can match together with it."""
+        return [earlier for earlier in self._same(at) if earlier < at]
 
     def meetings(self) -> Iterator[Meeting]:
         """What is said of pairs of lines: by name, and of those that do the same through others."""
