@@ -15,6 +15,7 @@ from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.counterexample.consequence import spelled_leaves, told
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain
 from rcsc.compose.counterexample.finding import TimeLineRow, beginnings, rows
+from rcsc.compose.counterexample.trace import usual_length
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, transition_systems
 from rcsc.diagnostics.report import Report
 from rcsc.driver import check as checking
@@ -177,7 +178,7 @@ def prove(
     system: PathLike,
     *,
     levels: Sequence[str] = (),
-    cycles: int = 8,
+    cycles: int | None = None,
     follow: int = 4,
     where: str = "",
     cache: bool = True,
@@ -188,7 +189,8 @@ def prove(
     Args:
         system: The description, `system.toml`.
         levels: Only these; all without any.
-        cycles: Longest run that is looked for where something is not proved; 0 looks for none. Runs need a C compiler.
+        cycles: Longest run that is looked for where something is not proved; 0 looks for none, and by default it is 8, or some more
+            than a time takes that a table asks for. Runs need a C compiler.
         follow: Most cycles that such a run is followed on; 0 follows none.
         where: Initial values that runs are searched from, `leaf = value, level.leaf = value`; no verdict depends on them.
         cache: Whether earlier proofs are believed, and new ones kept.
@@ -205,7 +207,8 @@ def prove(
     begins = starts(systems, where)
     kept = open_cache(path.parent) if cache else None
     proof = prove_transition_systems(systems, None, jobs, tuple(levels) or tuple(systems), cache=kept)
-    runs = explain(systems, proof, TraceSettings(description(path), cycles, further=follow, starts=begins))
+    most = usual_length(systems.values()) if cycles is None else cycles
+    runs = explain(systems, proof, TraceSettings(description(path), most, further=follow, starts=begins))
     left = [(level.level, unstated) for level in proof.levels for unstated in level.unstated]
     return Proof(
         proof.proved,

@@ -4,6 +4,7 @@ from random import Random
 
 import pytest
 
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces, usual_length
 from rcsc.compose.proof.level import Verdict, prove_level
 from rcsc.diagnostics.source import Source
 from rcsc.lang.interpret import Fault, cycle, initial
@@ -107,6 +108,17 @@ def test_properties_over_times_are_proved() -> None:
     verdicts = {obligation.name: verdict for obligation, verdict in proof.verdicts}
     assert all(verdicts[name] is Verdict.PROVED for name in ("soon", "late", "passes_two"))
     assert verdicts["never_two"] is Verdict.NOT_PROVED
+
+
+def test_a_run_that_takes_the_time_is_found_without_a_word() -> None:
+    text = edited(TEXT, ("assume brief monitored : not (b for 1 [s])\n", ""), (" assuming brief", ""))
+    ts = alone(text + "property never_three : mode /= 3\n")
+    assert usual_length([ts]) == 10
+    proof = prove_level(ts, LITTLE)
+    [broken] = [obligation for obligation, verdict in proof.verdicts if obligation.name == "never_three"]
+    [trace] = traces(ts, [broken], TraceSearch(usual_length([ts]))).values()
+    assert isinstance(trace, Trace)
+    assert [step.line for step in trace.steps] == ["short"] * 2 + ["some"] * 4 + ["long"]
 
 
 def after(*edits: tuple[str, str]) -> str:

@@ -37,6 +37,7 @@ from rcsc.compose.contract.variants import VARIANTS
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain, file_name
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
+from rcsc.compose.counterexample.trace import usual_length
 from rcsc.compose.invariant.cubes import shown
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import LevelProof, besides, certificate
@@ -74,9 +75,10 @@ Examples:
 @steps_option(80, " All questions about one level get 50 times as many together.")
 @click.option("--jobs", "-j", type=click.IntRange(min=1), default=None, show_default="2, or 1 for small levels",
               help="Levels proved at once.")  # fmt: skip
-@click.option("--trace", "cycles", type=click.IntRange(min=0, max=40), default=8, show_default=True, metavar="N",
+@click.option("--trace", "cycles", type=click.IntRange(min=0, max=1000), default=None, metavar="N",
+              show_default="8, or some more than a time takes that a table asks for, at most 100",
               help="For what is not proved, look for a trace of at most N cycles; 0 does not look.")  # fmt: skip
-@click.option("--follow", "further", type=click.IntRange(min=0, max=40), default=4, show_default=True, metavar="N",
+@click.option("--follow", "further", type=click.IntRange(min=0, max=1000), default=4, show_default=True, metavar="N",
               help="Follow each trace on for at most N cycles, up to what the superior takes; 0 does not.")  # fmt: skip
 @click.option("--where", "begins", multiple=True, metavar="VALUES",
               help='Search traces from these initial values: "leaf = value, level.leaf = value". No verdict depends on it.')  # fmt: skip
@@ -104,7 +106,7 @@ Examples:
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
 @click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
-    system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int,
+    system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int | None,
     further: int, begins: tuple[str, ...], logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
     certificate: Path | None, confirms: bool, no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
@@ -124,7 +126,9 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     unknown = [name for name in only if name not in systems]
     if unknown:
         raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(systems)}")
-    search = _Search(cycles, further, _starts(systems, begins))
+    search = _Search(
+        usual_length(systems.values()) if cycles is None else cycles, further, _starts(systems, begins)
+    )
     asked = {
         "without-deferral": without_deferral,
         "first-match": first_match,

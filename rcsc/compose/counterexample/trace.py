@@ -8,7 +8,7 @@ Of the shortest runs the same simple one is always returned: an input stays as i
 value that fits.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -87,6 +87,17 @@ class TraceSearch:
 
 
 TraceResult: TypeAlias = Trace | NotReproducedError
+
+
+USUAL, LONGEST = 8, 100
+"""Cycles of a run that are searched where nothing else is asked for; and where levels wait for a time."""
+
+
+def usual_length(systems: Iterable[TransitionSystem]) -> int:
+    """Return how many cycles a run is searched for: as many as the longest time that a table asks for needs, and some before and after."""
+    counters = (v.type for ts in systems for v in ts.program.variables if v.counts)
+    times = (kind.high for kind in counters if isinstance(kind, Int))
+    return max((USUAL, *(min(time + USUAL // 2, LONGEST) for time in times)))
 
 
 def traces(
