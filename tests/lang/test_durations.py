@@ -102,6 +102,14 @@ property never_two : mode /= 2
 """
 
 
+def test_a_list_has_held_as_a_whole() -> None:
+    text = "input x : int 0 .. 9\ntable t {{\n| line | x ||\n| a | {} ||\n| d | DEFAULT ||\n}}\nlevel l {{ table t }}"
+    one, other = map(program_of, map(text.format, ("1, 2 for 400 [ms]", "in {1, 2} for 400 [ms]")))
+    assert [line.tests[0].condition for line in one.tables[0].lines if line.tests[0]] == [
+        line.tests[0].condition for line in other.tables[0].lines if line.tests[0]
+    ]
+
+
 def test_properties_over_times_are_proved() -> None:
     text = edited(TEXT, ("assume brief monitored : not (b for 1 [s])\n", ""), (" assuming brief", ""))
     proof = prove_level(alone(text + PROPERTIES), LITTLE)

@@ -426,6 +426,11 @@ class Build:
             value, *_, time = parts[0].children
             within = self._span(value)
             return tree.Lasting(tree.Comparison("=", self.expr(value), within), self.expr(time), span)
+        last = parts[-1] if node.data == "listed" else None
+        if isinstance(last, ParseNode) and last.data == "lasts":  # of the whole list
+            value, *_, time = last.children
+            members = self._members([*parts[:-1], value])
+            return tree.Lasting(tree.OneOf(members, span), self.expr(time), span)
         return self._untimed(node)
 
     def _untimed(self, node: ParseNode) -> tree.Comparison | tree.OneOf | tree.Between:
