@@ -3,7 +3,8 @@
 What is proved of each level, alone in its environment (`proof.level`):
 
 - every assumption of its tables holds in every cycle in which the table runs; exactly one line matches; DEFAULT is
-  not reached if it is declared unreachable; no state is written directly while another is pending;
+  not reached if it is declared unreachable; no state is written directly while another is pending. Of several tables
+  in a cycle each owes this at its place, on what those before it left;
 - a command number is taken up once, and no other command replaces an order before its echo, but for a new command;
 - no new command is passed over by a line that does not look for one; a PAUSE is passed on in the cycle that takes it;
 - its program's invariants, and its properties over a cycle and the one before (`properties`);

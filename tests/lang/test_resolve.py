@@ -210,6 +210,10 @@ CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
         "input w : int 0 .. 900\ntable t {\n| line | when ||\n| x | w < 3 and w > 3 ||\n}",
         [(4, "RCS314", "w < 3 and w > 3")],
     ),
+    "time that is no number of cycles": (
+        "input a : bool\ntable t {\n| line | a ||\n| x | true for 50 [ms] ||\n| y | DEFAULT ||\n}\nlevel l { table t }",
+        [(4, "RCS317", "50 [ms]")],
+    ),
     "tables that wait for each other": (
         f"state a : bool state b : bool\ntable t {{\n| line | b || a |\n{TWO}}}\n{U}",
         [(12, "RCS215", "l")],

@@ -13,7 +13,16 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.proof.level import Verdict, prove_level
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Kind, Scalar, Value, key_bounds, value_of_key
-from tests.support.programs.systems import LITTLE, WAY, alone, lower_level, small_level
+from tests.support.programs.systems import (
+    LITTLE,
+    TICK,
+    TURNS,
+    WAY,
+    alone,
+    lower_level,
+    proved_level,
+    small_level,
+)
 from tests.support.programs.texts import edited
 from tests.support.proved import obligation_of, shortest
 
@@ -168,23 +177,59 @@ def test_an_assumption_about_what_another_table_wrote_is_proved_at_its_place_and
 
 
 LAMP = """output lamp : bool
-table shine {
-  | line | on    || lamp  |
+table shine {{
+  | line | {0}    || lamp  |
   | lit  | true  || true  |
   | dark | false || false |
+}}
+level lower {{"""
+SEES = """table sees {
+  | line | tick  || on    |
+  | yes  | true  || true  |
+  | no   | false || false |
 }
 level lower {"""
+TICKING = {
+    "ends": lower_level(*WAY, **TICK),
+    "turns": lower_level(*TURNS, **TICK),
+    "waits": lower_level(WAY[0], **TICK),
+}
 
 
-def test_a_level_that_takes_orders_is_not_called_whole(tmp_path: Path) -> None:
+def with_table(text: str, table: str, name: str) -> str:
+    return edited(
+        text, ("level lower {", table), ("  table by command", f"  table {name}\n  table by command")
+    )
+
+
+def verdicts(folder: Path, text: str) -> tuple[object, ...]:
+    """All that is shown of a level that takes orders, but for its further table and where the same is computed."""
+    ts, proof = proved_level(folder, "lower", lower=text)
+    owed = {
+        obligation.key: verdict
+        for obligation, verdict in proof.verdicts
+        if obligation.table not in {"sees", "shine"}
+    }
+    ends = [(ending.table, ending.proved) for ending in proof.endings]
+    return owed, ends, unstated(ts), proof.context is None
+
+
+@pytest.mark.parametrize("kind", TICKING)
+def test_a_table_before_those_of_the_commands_is_to_the_protocol_as_a_preprocess(
+    kind: str, tmp_path: Path
+) -> None:
+    text = TICKING[kind]
+    staged = with_table(edited(text, ("\n  on := tick", "")), SEES, "sees")
+    assert verdicts(tmp_path, staged) == verdicts(tmp_path, text)
+    assert verdicts(tmp_path, with_table(text, LAMP.format("on"), "shine")) == verdicts(tmp_path, text)
+
+
+def test_a_level_whose_last_table_is_not_of_its_commands_is_not_called_whole(tmp_path: Path) -> None:
     """Which of several tables answers a command is not known: nothing is claimed of it."""
-    text = lower_level(*WAY)
-    assert not any(
-        each.sort is Sort.PROTOCOL for each in unstated(small_level(tmp_path, "lower", lower=text))
-    )
-    several = edited(
-        text, ("level lower {", LAMP), ("  table by command", "  table shine\n  table by command")
-    )
-    every = [each for each in unstated(small_level(tmp_path, "lower", lower=several)) if each.applies]
-    [missing] = [each for each in every if each.sort is Sort.PROTOCOL]
+    text = with_table(lower_level(*WAY), LAMP.format("new_command"), "shine")
+    late = edited(text, ("| new_command    ||", "| status_report = done ||"))
+    ts = small_level(tmp_path, "lower", lower=late)
+    assert ts.level.staged == ("pause", "go")
+    [missing] = [each for each in unstated(ts) if each.sort is Sort.PROTOCOL]
+    assert missing.applies
     assert "`shine`" in missing.missing

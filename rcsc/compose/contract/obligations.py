@@ -270,9 +270,11 @@ def _unstated(ts: TransitionSystem) -> Iterator[Unstated]:
     links = ts.links
     for missing in links.unread:
         yield Unstated(Sort.PROTOCOL, "", missing)
-    if links.above is not None and ts.level.stages:
-        order = ", ".join(f"`{name}`" for name in ts.level.table_names)
-        missing = f"the level takes orders and runs several tables in a cycle ({order}): which of them answers is not known"
+    if links.above is not None and ts.level.stages and not _by_its_orders(ts):
+        last = ", ".join(f"`{name}`" for name in ts.level.tables.names)
+        missing = (
+            f"the level takes orders, and what runs last in its cycle, {last}, is not chosen by their command"
+        )
         yield Unstated(Sort.PROTOCOL, "", missing)
     if links.above is None:
         if links.below:
@@ -294,6 +296,13 @@ def _unstated(ts: TransitionSystem) -> Iterator[Unstated]:
         elif ts.program.roles is not None and not _keeps(ts, table):
             why = f"its lines look neither at `{FLAG}` nor at anything that the level keeps"
             yield Unstated(Sort.ANSWERED, str(table.name), why, applies=False)
+
+
+def _by_its_orders(ts: TransitionSystem) -> bool:
+    """Return whether the table that runs last is chosen by the superior's command: those before it are then like a preprocess."""
+    last, above = ts.level.tables, ts.links.above
+    assert above is not None
+    return not isinstance(last, OneTable) and list(read_by(last.selector)) == [above.command]
 
 
 def _keeps(ts: TransitionSystem, table: Table) -> bool:

@@ -206,9 +206,8 @@ class TransitionSystem:
         if not wanted:
             return frozenset()
         cycle = self.cycle(self.havoc())
-        known = Run(
-            self.procedures, self.kinds, dict(cycle.prepared)
-        )  # what stages compute is the level's own
+        # What tables before the last compute of inputs is the level's own: it is owed, not taken for granted.
+        known = Run(self.procedures, self.kinds, dict(cycle.prepared))
         return frozenset(
             str(assumption.name)
             for assumption in self.program.assumptions

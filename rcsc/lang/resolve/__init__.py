@@ -17,7 +17,7 @@ array's elements count.
 
 Modules, in the order the data flows: `program` takes the files of a root through the others: `declarations` (units,
 enumerations, constants), `variables`, `statements`, `procedures`, `tables` (with `precedence`, where lines go before others),
-`levels`, `owners`, `properties`, `roles`.
+`levels` (with the order of their tables), `owners`, `properties`, `roles`.
 """
 
 from rcsc.lang.resolve.program import closure, compile_text, resolve

@@ -245,14 +245,17 @@ class _Touched:
 def _in_order(
     scope: Scope, written: tree.LevelDecl, clauses: Sequence[TableChoice], known: Declarations
 ) -> list[TableChoice] | None:
-    """The clauses, each after those that write what it reads; where that leaves it free, as their tables are declared.
+    """The clauses, each after those that write what it reads; where that leaves it free, single tables as declared, then choices.
 
     None after an error: two that write one leaf, or that wait for each other.
     """
     if len(clauses) == 1:
         return list(clauses)
     place = {name: at for at, name in enumerate(known.tables)}
-    left = sorted(clauses, key=lambda choice: min(place[name] for name in choice.names))
+    left = sorted(
+        clauses,
+        key=lambda choice: (isinstance(choice, TableByCommand), min(place[name] for name in choice.names)),
+    )
     touched = [_touched(choice, known) for choice in left]
     sound = _one_writer(scope, written, touched)
     waits = {
