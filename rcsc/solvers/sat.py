@@ -62,7 +62,8 @@ class Sat:
             raise GaveUpError
         self._solver.conf_budget(min(BUDGET, left))
         try:
-            answer = self._solver.solve_limited(assumptions=list(assuming))
+            # each once: Glucose gives each a decision level, and writes beyond its memory where they are more than its variables
+            answer = self._solver.solve_limited(assumptions=list(dict.fromkeys(assuming)))
         except _interrupted() as error:  # it takes Ctrl-C for itself
             raise KeyboardInterrupt from error
         if answer is None:

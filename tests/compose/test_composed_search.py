@@ -254,6 +254,21 @@ def test_a_variable_that_no_clause_speaks_of_has_a_value() -> None:
     sat.close()
 
 
+def test_the_solver_is_given_each_assumption_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Glucose writes beyond its memory, and ends the process, where more are given than it has variables."""
+    sat, given_to_solver = Sat([[1, 2], [-1, 3]]), list[int]()
+    solve = sat._solver.solve_limited
+
+    def recorded(*, assumptions: list[int]) -> bool:
+        given_to_solver.extend(assumptions)
+        return bool(solve(assumptions=assumptions))
+
+    monkeypatch.setattr(sat._solver, "solve_limited", recorded)
+    assert not sat.holds([1, 2, 1, -3, *[2] * 40])
+    assert given_to_solver == [1, 2, -3]
+    assert {1, -3} >= sat.core() > frozenset()
+
+
 def test_known_states_answer_for_cubes() -> None:
     reached = Reached.of([(0, 1, 2), (1, 1, 0)], 3)
     assert reached.shows(((0, 0), (2, 2)))
