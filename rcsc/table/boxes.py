@@ -17,6 +17,9 @@ from rcsc.table.verdict import Gap, Overlap, Region, Witness
 MOST_GAPS, MOST_FALLS = 64, 3
 """Regions of what no line matches: as many are told, and as many of what falls to DEFAULT, which is no mistake."""
 
+MOST_PATTERNS = 1 << 20
+"""Patterns of bits up to which it is told how many of them a gap has."""
+
 
 def applies(table: Table) -> bool:
     """Whether every test of the table is a box."""
@@ -109,7 +112,9 @@ class TableBoxes(Boxes[str]):
             return None
         count = (missing, self.volume()) if search.exact else None
         idle = self._idle() if self.words else 1
-        patterns = (missing // idle, self.volume() // idle) if search.exact and idle > 1 else None
+        every = self.volume() // idle
+        told = search.exact and idle > 1 and every <= MOST_PATTERNS
+        patterns = (missing // idle, every) if told else None
         shown: list[dict[str, Box]] = []
         witnesses = []
         try:

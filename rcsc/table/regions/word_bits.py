@@ -14,6 +14,7 @@ from itertools import pairwise
 from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.words import Field, Mask, field_of, mask_of
 from rcsc.lang.interval_sets import joined, meet
+from rcsc.lang.leaves import parts as every_part
 from rcsc.lang.leaves import rebuilt
 from rcsc.lang.model import (
     Apply,
@@ -26,6 +27,7 @@ from rcsc.lang.model import (
     Program,
     Read,
     Scalar,
+    Select,
     Table,
     Test,
     Variable,
@@ -160,7 +162,7 @@ def _parts(leaf: str, kind: Scalar, tests: Sequence[Test]) -> tuple[Part, ...]:
     width = max(kind.high.bit_length(), 1)
     together = []
     for test in tests:
-        if len(test.variables) != 1:
+        if len(test.variables) != 1 or any(isinstance(part, Select) for part in every_part(test.condition)):
             return ()
         for condition in _conjuncts(test.condition):
             if _mask(condition) is None:
