@@ -231,6 +231,25 @@ def test_a_range_in_a_cell_may_be_written_as_in_an_expression() -> None:
     assert "| 2 .. 5 | x in 2 .. 5 ||" in plain
 
 
+@pytest.mark.parametrize(
+    ("cell", "kept"),
+    [
+        ("xx1x xxxx, 0000 0000", "xx1x xxxx, 0000 0000"),
+        ("0b10x0_0000, 0bxxxx1111, 8 .. 9", "10x0 0000, 0bxxxx1111, 8 .. 9"),
+        ("0100 0000 for 2 [s]", "0100 0000 for 2 [s]"),
+        ("not in {0b0xxx_xxxx, 0b0101_0000}", "not in {0b0xxx_xxxx, 0b0101_0000}"),
+        ("in {0b0101_0000, 3}", "in {0b0101_0000, 3}"),
+    ],
+)
+def test_bits_in_groups_stay_bits_in_lists(cell: str, kept: str) -> None:
+    """With `0b` those without an `x` would be a number."""
+    parsed = parse(Source("case.rcs", f"table t {{\n  | line | w ||\n  | a    | {cell} ||\n}}\n"))
+    assert isinstance(parsed, tree.File)
+    assert f"| a    | {kept} ||" in format_file(parsed)
+    for width in (110, 30, 1):
+        assert parse(Source("case.rcs", format_file(parsed, width))) == parsed
+
+
 CASES = [
     ("input x : = 3", [("RCS101", 1)]),
     ("enum a {", [("RCS101", 1)]),

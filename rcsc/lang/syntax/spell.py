@@ -162,17 +162,31 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
         case tree.Comparison(op, value):
             if whole:
                 return f"({spell_expr(value)})" if _is_default(value) else spell_expr(value)
-            if op == "=" and isinstance(value, tree.Mask) and "_" in value.text:
-                return value.text.replace("_", " ")
+            if op == "=" and _in_groups(value):
+                return _listed(value)
             return spell_expr(value, SUM) if op == "=" and _plain(value) else f"{op} {spell_expr(value, SUM)}"
         case tree.Lasting(inner, time):
             return f"{spell_condition(inner, whole)} {_for(time)}"
+        case tree.OneOf(members, negated=False) if len(members) > 1 and any(map(_in_groups, members)):
+            return ", ".join(map(_listed, members))
         case tree.OneOf(members):
             return f"{_in(condition)} {spell_set(members)}"
         case tree.Between(low, high):
             return f"{'not in ' if condition.negated else ''}{spell_member(tree.Range(low, high))}"
         case _:
             assert_never(condition)
+
+
+def _in_groups(member: tree.Member) -> bool:
+    """Whether it is a mask that a cell may have without `0b`; one of digits alone would be a number with it."""
+    return isinstance(member, tree.Mask) and "_" in member.text
+
+
+def _listed(member: tree.Member) -> str:
+    """A member of a list in a cell."""
+    if isinstance(member, tree.Mask) and _in_groups(member):
+        return member.text.replace("_", " ")
+    return spell_member(member)
 
 
 def _plain(value: tree.Expr) -> bool:
