@@ -13,8 +13,8 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, WitnessColu
 from rcsc.diagnostics.printable import clip, escape, pad, width
 from rcsc.diagnostics.source import Source, Sources
 
-WIDEST_LINE = 200
-"""Cells shown of a source line where the terminal's width is not known."""
+WIDEST_LINE = 110
+"""Cells shown of a source line where the terminal's width is not known: as wide as `rcsc fmt` makes tables."""
 
 
 class Style(StrEnum):
@@ -144,15 +144,27 @@ def _snippet(source: Source, marked: list[tuple[Label, Style]], gutter: int, col
         if before and number > before + 1:
             yield (TextPiece("...", Style.GUTTER),)
         before = number
-        labels = [(label, style) for _, label, style in group]
-        start = min(_cells_of(source, number, label)[0] for label, _ in labels)
-        text = escape(source.line(number))
-        room = max(20, columns - gutter - 3)
-        shift = 0 if width(text) <= room else max(0, min(start - room // 4, width(text) - room))
-        shown = clip(text, shift, room) + ("…" if width(text) > shift + room else "")
-        yield (TextPiece(f"{number:>{gutter}} | ", Style.GUTTER), TextPiece(shown))
-        for label, style in labels:
-            yield (edge, *_marks(source, number, label, style, shift, room))
+        text, room = escape(source.line(number)), max(20, columns - gutter - 4)
+        for shift, labels in _windows(source, number, [(label, style) for _, label, style in group], room):
+            shown = clip(text, shift, room) + ("…" if width(text) > shift + room else "")
+            yield (TextPiece(f"{number:>{gutter}} | ", Style.GUTTER), TextPiece(shown))
+            for label, style in labels:
+                yield (edge, *_marks(source, number, label, style, shift, room))
+
+
+def _windows(
+    source: Source, number: int, labels: list[tuple[Label, Style]], room: int
+) -> Iterator[tuple[int, list[tuple[Label, Style]]]]:
+    """Where each excerpt of a line begins, and the labels in it: one where all fit, else as many as show each label."""
+    long = width(escape(source.line(number)))
+    left = sorted(labels, key=lambda item: item[0].span)
+    while left:
+        start = _cells_of(source, number, left[0][0])[0]
+        shift = 0 if long <= room else max(0, min(start - room // 4, long - room))
+        inside = [label for label in left if sum(_cells_of(source, number, label[0])) <= shift + room]
+        shown = inside or left[:1]
+        yield shift, shown
+        left = [label for label in left if label not in shown]
 
 
 def _cells_of(source: Source, number: int, label: Label) -> tuple[int, int]:

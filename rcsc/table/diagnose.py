@@ -24,7 +24,7 @@ from rcsc.symbolic.alike import alike
 from rcsc.table import cells as words
 from rcsc.table.certificate import must_cover
 from rcsc.table.regions import partition
-from rcsc.table.repair import closing_line, left_by, parting_cell, parting_cells
+from rcsc.table.repair import PartingCell, closing_line, left_by, parting, parting_cells
 from rcsc.table.verdict import (
     ContradictoryAssumptions,
     DeadLine,
@@ -41,6 +41,8 @@ MOST_PAIRS = 20
 """Overlapping pairs shown of one table; then how many more."""
 MOST_COMPARED = 200
 """Overlapping pairs of one table of which it is told whether the two lines do the same."""
+FAR = 80
+"""Characters between a line's name and a cell of it from which on an excerpt points at both."""
 MOST_NAMED = 5
 """Lines that are named because they overlap with the most others."""
 MANY = 3
@@ -189,15 +191,18 @@ def _under(table: Table, unproved: Collection[str]) -> tuple[str, ...]:
 def _overlap(program: Program, table: Table, overlap: Overlap, options: Options) -> Diagnostic:
     first, second = table.lines[overlap.first], table.lines[overlap.second]
     column = _column(program, table, overlap.witness, (overlap.first, overlap.second), overlap.region)
-    repair = parting_cell(program, table, overlap)
+    repair = parting(program, table, overlap)
     effects = alike(program, table, (overlap.first, overlap.second), options)
     return Diagnostic(
         Code.OVERLAP,
         f"lines `{first.name}` and `{second.name}` of table `{table.name}` both match some input",
         Label(second.cell_span(-1), "this line"),
-        related=(Label(first.cell_span(-1), "and this one"),),
+        related=(
+            Label(first.cell_span(-1), "and this one"),
+            *_far(table, (first, second), repair),
+        ),
         notes=(str(effects),),
-        help=tuple(help_ for help_ in (repair, _as_same(first, second, effects)) if help_),
+        help=(*(() if repair is None else (repair.shown(table),)), *_as_same(first, second, effects)),
         witnesses=(column,),
         effects=effects,
     )
@@ -256,13 +261,19 @@ def _said_under(heading: str, text: str) -> str:
     return f"{heading} = {text}" if plain else f"{heading} {text}"
 
 
-def _as_same(first: Line, second: Line, effects: Effects) -> str:
-    """Propose to say that two lines do the same, where they do; else empty."""
-    return (
-        f"or keep both, and say that they do the same: `{second.name} same {first.name}`"
-        if effects.same
-        else ""
-    )
+def _far(table: Table, lines: Sequence[Line], repair: PartingCell | None) -> tuple[Label, ...]:
+    """Point at the cell that the help changes, where it stands far from the names of both lines."""
+    if repair is None:
+        return ()
+    cell = table.lines[repair.line].cell_span(repair.column)
+    near = any(0 <= cell.start - line.cell_span(-1).start < FAR for line in lines)
+    return () if near else (Label(cell, "the cell of the help"),)
+
+
+def _as_same(first: Line, second: Line, effects: Effects) -> tuple[str, ...]:
+    """Propose to say that two lines do the same, where they do."""
+    same = f"or keep both, and say that they do the same: `{second.name} same {first.name}`"
+    return (same,) if effects.same else ()
 
 
 def _most_overlapping(table: Table, overlaps: Sequence[Overlap]) -> str:

@@ -1,16 +1,17 @@
 """Repairs worth proposing: each is proved before it is shown, or not shown.
 
-In: a finding of a table. Out: a sentence, or nothing. What parts two lines is known of box tables only.
+In: a finding of a table. Out: a sentence, or nothing.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
+from math import gcd
 
 from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.folding import fold
-from rcsc.lang.interval_sets import complement, holds, meet, size
+from rcsc.lang.interval_sets import complement, holds, joined, meet, size
 from rcsc.lang.model import (
     Apply,
     Bool,
@@ -18,6 +19,7 @@ from rcsc.lang.model import (
     Column,
     Enum,
     Expr,
+    Int,
     Literal,
     Program,
     Read,
@@ -31,7 +33,16 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.operator_table import OPPOSITE, Op, is_comparison
 from rcsc.table import boxes, cells
-from rcsc.table.regions.atoms import Clauses, Formula, Universe, assumptions_of, clauses, lines_of
+from rcsc.table.regions.atoms import (
+    Atom,
+    Clauses,
+    Every,
+    Formula,
+    Universe,
+    assumptions_of,
+    clauses,
+    lines_of,
+)
 from rcsc.table.regions.least import find, negated, whole
 from rcsc.table.regions.partition import BudgetError, Gaps
 from rcsc.table.regions.region import NoWitness
@@ -82,9 +93,18 @@ class PartingCell:
 
 
 def parting_cell(program: Program, table: Table, overlap: Overlap) -> str | None:
-    """Return the smallest change of one cell that parts the two lines and leaves every input matched, in words."""
+    """Return the smallest change of one cell that parts the two lines and leaves every input matched, in words; of box tables."""
     cell = next(iter(parting_cells(program, table, overlap)), None)
     return None if cell is None or cell.falls else cell.shown(table)
+
+
+def parting(program: Program, table: Table, overlap: Overlap) -> PartingCell | None:
+    """Return the smallest change of one cell, under a variable or a sum of some, that parts the two lines so."""
+    if words_of(program, table) is None:
+        every = _parting_across(program, table, overlap)
+        return min(every, key=lambda cell: cell.lost, default=None)
+    cell = next(iter(parting_cells(program, table, overlap)), None)
+    return None if cell is None or cell.falls else cell
 
 
 def parting_cells(program: Program, table: Table, overlap: Overlap) -> tuple[PartingCell, ...]:
@@ -240,6 +260,41 @@ def _line_of_boxes(program: Program, table: Table, region: Region, words: Words)
 
 
 @dataclass(frozen=True, slots=True)
+class _Sum:
+    """A heading that is a variable, or a whole-numbered sum of some: `sign * form + constant`."""
+
+    kind: Scalar
+    form: int
+    sign: int
+    constant: int
+
+    @classmethod
+    def of(cls, universe: Universe, subject: Expr) -> "_Sum | None":
+        """What a heading is; None for anything else."""
+        if isinstance(subject, Read):
+            return cls(subject.type, universe.single[universe.column(subject)], 1, 0)
+        if not isinstance(subject.type, Int):
+            return None
+        coefficients, constant = universe.linear(subject)
+        terms = sorted((column, k) for column, k in coefficients.items() if k)
+        if not terms or gcd(*(k for _, k in terms)) != 1:
+            return None
+        sign = 1 if terms[0][1] > 0 else -1
+        return cls(
+            subject.type, universe.form(tuple((column, sign * k) for column, k in terms)), sign, constant
+        )
+
+    def cell(self, universe: Universe, box: Box) -> str:
+        """The cell under the heading for these values of the form; empty for all, and where no cell says it."""
+        if not isinstance(self.kind, Int):
+            return cells.cell(self.kind, box) or ""
+        ends = ((universe.low[self.form], universe.high[self.form]),)
+        pairs = [(self.sign * a + self.constant, self.sign * b + self.constant) for a, b in (*box, *ends)]
+        *shown, (least, most) = ((min(pair), max(pair)) for pair in pairs)
+        return cells.cell(replace(self.kind, low=least, high=most), joined(shown)) or ""
+
+
+@dataclass(frozen=True, slots=True)
 class _Cell:
     """A cell that the witness satisfies: its column, its text, what it says, and the lines that it excludes."""
 
@@ -313,6 +368,25 @@ class _Row:
             for test in every:
                 if name is None or name not in self.witness or test.box is None:
                     yield from ((at, *said) for said in self._of_condition(column, test))
+            if name is None and column.subject is not None:
+                yield from ((at, *said) for said in self._of_sum(column.subject, every))
+
+    def _of_sum(self, subject: Expr, tests: Iterable[Test]) -> Iterator[tuple[str, Formula]]:
+        """What all sides of a sum of variables that the lines compare with constants have in common, as the witness has it."""
+        value = fold(subject, self.witness)
+        heading = _Sum.of(self.universe, subject)
+        if heading is None or value is None:
+            return
+        low, high = self.universe.low[heading.form], self.universe.high[heading.form]
+        said = (_box_on(heading.form, self.universe.of(test.condition)) for test in tests)
+        at = heading.sign * (int(value) - heading.constant)
+        sides = [
+            each if holds(each, at) else complement(each, low, high) for each in said if each is not None
+        ]
+        box: Box = ((low, high),)
+        for side in sides:
+            box = meet(box, side)
+        yield heading.cell(self.universe, box), self.universe.atom(heading.form, box)
 
     def _boxes(self, name: str, boxes_: Sequence[Box]) -> Iterator[Box]:
         """What a cell under a variable may say: the region, each line's side, and what all of these have in common."""
@@ -357,9 +431,51 @@ class _Row:
         return " | ".join(["new", *(found.get(at, "") for at in range(len(_written(self.table))))])
 
 
+def _box_on(form: int, formula: Formula) -> Box | None:
+    """The values of one form for which a formula holds; None where it speaks of others, too."""
+    if isinstance(formula, Atom):
+        return formula.box if formula.form == form else None
+    boxes_ = [box for part in formula.parts if (box := _box_on(form, part)) is not None]
+    if not boxes_ or len(boxes_) < len(formula.parts):
+        return None
+    return (
+        reduce(meet, boxes_)
+        if isinstance(formula, Every)
+        else joined([part for box in boxes_ for part in box])
+    )
+
+
 def _written(table: Table) -> list[Column]:
     """The columns in which cells can be written; they stand before those that `above` adds."""
     return [column for column in table.columns if column.written]
+
+
+def _parting_across(program: Program, table: Table, overlap: Overlap) -> Iterator[PartingCell]:
+    """Yield changes of one cell, under a variable or a sum of some, that part two lines and leave every input matched."""
+    if len(table.columns) * len(table.lines) > MOST_ASKED:
+        return
+    universe = Universe()
+    lines, assumed = lines_of(universe, table), assumptions_of(universe, program, table)
+    for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second)):
+        for at, column in enumerate(_written(table)):
+            test, heading = table.lines[other].tests[at], None
+            if test is not None and column.subject is not None:
+                heading = _Sum.of(universe, column.subject)
+            theirs = (
+                None if heading is None or test is None else _box_on(heading.form, universe.of_test(test))
+            )
+            if heading is None or theirs is None:
+                continue
+            every = ((universe.low[heading.form], universe.high[heading.form]),)
+            own = table.lines[line].tests[at]
+            before = every if own is None else _box_on(heading.form, universe.of_test(own))
+            left = () if before is None else meet(before, complement(theirs, *every[0]))
+            text = heading.cell(universe, left) if left else ""
+            lost = [whole(lines[line]), universe.atom(heading.form, theirs), *map(whole, assumed)]
+            unmatched = [*lost, negated(universe, whole(lines[other]))]
+            if before is not None and text and find(universe, unmatched) is NoWitness.NONE:
+                less = size(before) - size(left)
+                yield PartingCell(line, other, at, "", text, left, less, falls=False)
 
 
 def _line_across(program: Program, table: Table, witness: Witness, region: Region) -> str | None:

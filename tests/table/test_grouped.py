@@ -7,6 +7,8 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from rcsc.commands import run
+from rcsc.diagnostics.render import full, plain
+from rcsc.diagnostics.source import Source
 from tests.support.programs.stages import reported
 
 SCHEMA = Path(__file__).parents[2] / "rcsc" / "diagnostics" / "schema" / "report.schema.json"
@@ -78,3 +80,73 @@ def test_pairs_past_the_twentieth_say_in_json_whether_they_do_the_same(
     for witness in rest["witnesses"]:
         first, second = (int(line["name"][1:]) for line in witness["lines"])
         assert witness["effects"]["same"] is ((first - second) % 2 == 0)
+
+
+def test_an_excerpt_of_a_wide_row_shows_the_name_and_the_cell_that_matters() -> None:
+    blank = " " * 120
+    text = f"""
+input a : bool
+input b : int 0 .. 9
+output x : int 0 .. 9
+table t {{
+  | line | a    {blank} | b    {blank} || x |
+  | one  | true {blank} | <= 4 {blank} || 1 |
+  | two  | true {blank} | >= 4 {blank} || 2 |
+  | six  | false{blank} |      {blank} || 3 |
+}}"""
+    [overlap] = [finding for finding in reported(text) if finding.code.value == "RCS402"]
+    source = Source(overlap.primary.span.file, text)
+    shown = plain(full(overlap, {source.name: source})).splitlines()
+    rows = [row for row in shown if row.startswith(("7 |", "8 |"))]
+    assert [any(word in row for row in rows) for word in ("one", "two", ">= 4")] == [True] * 3
+    assert max(map(len, rows)) <= 110
+    marks = [shown[shown.index(row) + 1] for row in rows]
+    assert [mark.split()[1] for mark in marks] == ["---", "^^^", "----"]
+    for row, mark, word in zip(rows, marks, ("one", "two", ">= 4"), strict=True):
+        assert mark.index("^" if "^" in mark else "-") == row.index(word)
+    narrow = plain(full(overlap, {source.name: source}, 400))
+    assert narrow.count("8 |") == 1  # one excerpt where all fits
+
+
+def test_a_heading_that_is_a_sum_gets_helps_that_mend_the_table() -> None:
+    text = """
+input a : int 0 .. 20
+input b : int 0 .. 20
+output x : int 0 .. 9
+table t {
+  | line | 3 + b - a || x |
+  | one  | < 3       || 1 |
+  | two  | 3 .. 6    || 2 |
+  | six  | 5 .. 11   || 6 |
+  | ten  | > 12      || 6 |
+}"""
+    gap, overlap = sorted((finding for finding in reported(text)), key=lambda finding: finding.code.value)
+    assert gap.help == (
+        "a line `| new | 12 || ... |` closes this part of the gap and overlaps no other: proved",
+    )
+    assert overlap.help[0].startswith(
+        "in line `six` write `7 .. 11` under `3 + b - a`: proved to part the two lines"
+    )
+    mended = text.replace("5 .. 11 ", "7 .. 11 ").replace("| ten  |", "| new | 12 || 0 |\n  | ten  |")
+    assert reported(mended) == ()
+
+
+def test_a_cell_beside_conditions_across_variables_is_narrowed_only_where_nothing_falls() -> None:
+    text = """
+enum mode { off, slow, fast }
+input wanted : mode
+input a : int 0 .. 20
+input b : int 0 .. 20
+output x : int 0 .. 9
+table t {
+  | line | wanted      | when  || x |
+  | off  | off         |       || 1 |
+  | any  | off, slow   | a < b || 2 |
+  | rest | slow        | a >= b|| 3 |
+  | fast | fast        |       || 4 |
+}"""
+    [overlap] = [finding for finding in reported(text) if finding.code.value == "RCS402"]
+    assert overlap.help[0].startswith(
+        "in line `any` write `slow` under `wanted`: proved to part the two lines"
+    )
+    assert reported(text.replace("| off, slow   |", "| slow        |")) == ()

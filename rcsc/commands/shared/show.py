@@ -18,7 +18,17 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.diagnostics.github import annotations
 from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.diagnostics.printable import escape, pad, width
-from rcsc.diagnostics.render import OF_SEVERITY, Row, Style, TextPiece, full, one_line, paint, plain
+from rcsc.diagnostics.render import (
+    OF_SEVERITY,
+    WIDEST_LINE,
+    Row,
+    Style,
+    TextPiece,
+    full,
+    one_line,
+    paint,
+    plain,
+)
 from rcsc.diagnostics.report import (
     NOT_PROVED,
     InSystem,
@@ -160,7 +170,7 @@ def _told(report: Report, output: Output) -> Iterator[Diagnostic]:
 
 def _text(report: Report, _command: str, output: Output, closing: str) -> str:
     coloured = wants_color(output.color, output.file)
-    columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else 200
+    columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else WIDEST_LINE
     rows: list[Row] = []
     for diagnostic in (each for each in _told(report, output) if not each.told_with):
         rows += (*full(diagnostic, report.sources, columns), ())
