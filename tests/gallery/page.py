@@ -2,6 +2,7 @@
 
 import re
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 from rcsc import check
@@ -59,9 +60,10 @@ def page() -> str:
 
 
 def findings_table() -> str:
-    """Return a row for each table as published, in the order of the entries."""
+    """Return a row for each table as published, in the order of the entries, and how many findings they have."""
     head = ("entry", "source", "theirs", "here", "findings", "the one that matters")
-    return table(head, [row for entry in ENTRIES for row in findings_of(entry)])
+    rows = table(head, [row for entry in ENTRIES for row in findings_of(entry)])
+    return f"{rows}\n{totals()}"
 
 
 def findings_of(entry: Path) -> list[tuple[str, ...]]:
@@ -102,22 +104,41 @@ def size(path: Path, name: str) -> str:
 
 
 def findings(path: Path, name: str) -> str:
-    """Return how many findings of each kind `rcsc check` has of a table, as `1 gap, 2 overlaps`; an overlap is a pair of lines."""
+    """Return how many findings of each kind `rcsc check` has of a table, or of all of a file, as `1 gap, 2 overlaps`."""
+    return in_words(numbers(path, name))
+
+
+def totals() -> str:
+    """Return a sentence on all tables as published together."""
+    files = [path for entry in ENTRIES for path in sorted(entry.glob("*published.rcs"))]
+    tables = sum(len(shipped(str(path), REPO).tables) for path in files)
+    every = sum((numbers(path, "") for path in files), Counter[str]())
+    return f"{len(ENTRIES)} entries, {tables} tables as published: {in_words(every)}.\n"
+
+
+@cache
+def numbers(path: Path, name: str) -> Counter[str]:
+    """Return how many errors of each code `rcsc check` has of a table, or of all of a file; an overlap is a pair of lines."""
     every = [found for found in check(path).diagnostics if found.severity is Severity.ERROR]
     assert all("table `" in found.message for found in every) or not name, path
     errors = [found for found in every if not name or f"table `{name}`" in found.message]
-    numbers = Counter(found.code.value for found in errors)
-    assert numbers.keys() <= NAMES.keys(), f"{path}: {numbers}"
-    numbers["RCS402"] = len(
+    of_code = Counter(found.code.value for found in errors)
+    assert of_code.keys() <= NAMES.keys(), f"{path}: {of_code}"
+    of_code["RCS402"] = len(
         {
-            tuple(line.name for line in witness.lines)
+            (witness.table, *(line.name for line in witness.lines))
             for found in errors
             if found.code.value == "RCS402"
             for witness in found.witnesses
         }
     )
+    return of_code
+
+
+def in_words(of_code: Counter[str]) -> str:
+    """Return numbers of findings in words; gaps and overlaps always."""
     return ", ".join(
-        counted(numbers[code], name) for code, name in NAMES.items() if numbers[code] or code in ALWAYS_TOLD
+        counted(of_code[code], name) for code, name in NAMES.items() if of_code[code] or code in ALWAYS_TOLD
     )
 
 
