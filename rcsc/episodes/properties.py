@@ -80,7 +80,7 @@ class AssumptionsHold:
             if level.fault in (0, STOPPED):
                 for name in level.sign.failures(level.values):
                     reads = self._reads.get((level.name, name), ())
-                    where = f"level `{level.name}`, table `{level.table}`, line `{level.line}`"
+                    where = f"level `{level.name}`, {level.ran}"
                     message = f"{where}: {shown(level.sign, level.values, reads)}"
                     yield Broken(f"{level.name}: assumption {name}", message, level.name, reads)
 
@@ -111,7 +111,8 @@ class LevelProperty:
         leaves = level.sign.leaves
         words = [f"`{name}` = {leaves[at].shown(values[at])}" for name, at in self.now.items()]
         words += [f"`{name}` = {leaves[at].shown(earlier[at])}" for name, at in self.before.items()]
-        text = f"`{self.property.text}` is false in line `{level.line}`: {what}{', '.join(words)}"
+        where = level.ran if level.level.stages else f"line `{level.line}`"
+        text = f"`{self.property.text}` is false in {where}: {what}{', '.join(words)}"
         yield Broken(f"{self.level}: {self.property.name}", text, self.level)
 
 

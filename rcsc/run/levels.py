@@ -177,6 +177,11 @@ class RunningLevel:
         return (*self.sign.lines_before(self.level, self.values), (self.table, self.line))
 
     @property
+    def ran(self) -> str:
+        """The same in words: `table `a`, line `x`; table `b`, line `y``."""
+        return "; ".join(f"table `{table}`, line `{line}`" for table, line in self.lines)
+
+    @property
     def table(self) -> str:
         """The table that the last cycle ran; of several the last, or the one that ended the cycle."""
         return self.sign.table_of(self.level, self.values)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import permutations, product
+from random import Random
 
 import pytest
 
@@ -12,6 +13,7 @@ from rcsc.lang.model import Enum, Kind, Program, Value
 from rcsc.testing.agree import AgreementCount, run_session
 from rcsc.testing.executors.sessions import Stimuli
 from tests.emit.test_agreement import executors_of, found_of
+from tests.stages.test_proof import drawn
 from tests.support.programs.stages import errors, program_of, proved_of, refused, verdict_of
 from tests.support.programs.texts import edited
 
@@ -246,8 +248,46 @@ def test_two_lines_of_one_before_the_last_end_the_cycle_by_its_name() -> None:
     assert (outcome.fault, outcome.fault_at) == (Fault.SEVERAL_LINES, "override")
 
 
+STOPPED = """input d : int -2 .. 2
+input more : bool
+state share : int -9 .. 9
+output many : bool safe false
+assume nonzero monitored : d /= 0
+table split assuming nonzero {
+  | line | more  || share |
+  | nine | true  || 9 / d |
+  | four | false || 4 / d |
+}
+table tell {
+  | line | share || many  |
+  | yes  | > 3   || true  |
+  | no   | <= 3  || false |
+}
+level l { table tell table split }
+"""
+
+
+def test_an_assumption_on_which_a_table_before_the_last_rests_ends_the_cycle_there() -> None:
+    program = proved_of(STOPPED)
+    assert program.tables[0].stops == ("nonzero",)
+    outcome = cycle(program, program.levels[0], initial(program) | {"d": 0, "share": 9, "many": True})
+    assert (outcome.fault, outcome.fault_at, outcome.line) == (Fault.ASSUMPTION, "nonzero", None)
+    assert lines_of(program, outcome.snapshot) == {}
+    assert (outcome.snapshot["share"], outcome.snapshot["many"]) == (9, False)
+
+
 @pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
-@pytest.mark.parametrize("text", [REACTOR, CHOICE], ids=["reactor", "choice"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_executors_agree_where_tables_have_gaps_and_overlaps(seed: int) -> None:
+    program = program_of(drawn(Random(seed)))  # noqa: S311  # by seed
+    compared = AgreementCount()
+    with executors_of(program) as executors:
+        assert list(found_of(executors, compared, 30, "cycle")) == []
+    assert compared.cycles > 30
+
+
+@pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
+@pytest.mark.parametrize("text", [REACTOR, CHOICE, STOPPED], ids=["reactor", "choice", "stopped"])
 def test_the_executors_run_the_tables_in_the_same_order(text: str) -> None:
     compared = AgreementCount()
     with executors_of(proved_of(text)) as executors:

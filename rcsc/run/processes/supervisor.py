@@ -220,7 +220,10 @@ class Supervisor:
         values = self.buffers.checkpoint(name)
         if isinstance(values, NotShared):
             return f"level `{name}`: a fault"
-        return f"level `{name}`: {self._signs[name].fault_text(values)}"
+        sign = self._signs[name]
+        level = next(level for level in sign.levels if level.name == name)
+        table = f", table `{sign.table_of(level, values)}`" if level.stages else ""
+        return f"level `{name}`{table}: {sign.fault_text(values)}"
 
 
 def run_processes(
