@@ -28,6 +28,7 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.operator_table import Comparison, Op, Operator, Signed, is_comparison, is_logic, truth_function
 from rcsc.solvers import smt
+from rcsc.solvers.options import Options
 from rcsc.solvers.search import lowest
 from rcsc.solvers.smt import Answer, Solver, Term
 
@@ -131,6 +132,19 @@ def declared(variables: Iterable[Variable]) -> tuple[Frame, list[Term]]:
         if not isinstance(variable.type, Bool):
             domain.append(within(frame.leaves[variable.name], variable.type))
     return frame, domain
+
+
+def least_where(
+    conditions: Iterable[Expr], variables: Iterable[Variable], shown: Iterable[Variable], options: Options
+) -> dict[str, Value] | None:
+    """The least values of the variables shown for which the conditions hold; None where there are none, or none is found."""
+    frame, domain = declared(variables)
+    solver = Solver(options.limits)
+    try:
+        solver.add(*domain, *(encode(condition, frame) for condition in conditions))
+        return least_witness(solver, shown, frame)
+    except smt.troubles():
+        return None
 
 
 def least_witness(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[str, Value] | None:

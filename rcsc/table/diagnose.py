@@ -1,6 +1,5 @@
 """What was found of a table, as diagnostics."""
 
-import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -17,12 +16,23 @@ from rcsc.diagnostics.diagnostic import (
     sort_key,
 )
 from rcsc.lang.interval_sets import size
-from rcsc.lang.model import Box, Enum, Line, Program, Scalar, Table, key_bounds, spell
+from rcsc.lang.model import (
+    Box,
+    Enum,
+    Line,
+    Program,
+    Scalar,
+    Table,
+    key_bounds,
+    spell,
+)
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.symbolic.alike import alike
 from rcsc.table import cells as words
 from rcsc.table.certificate import must_cover
+from rcsc.table.findings.groups import grouped, names_of
+from rcsc.table.findings.likely import likely
 from rcsc.table.regions import partition
 from rcsc.table.repair import PartingCell, closing_line, left_by, parting, parting_cells
 from rcsc.table.verdict import (
@@ -54,6 +64,8 @@ def diagnostics(
 ) -> list[Diagnostic]:
     """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
     table = verdict.table
+    with smt.together(options.together):
+        verdict = replace(verdict, findings=tuple(likely(program, table, verdict.findings, options)))
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
     with smt.together(options.together):
         shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
@@ -61,7 +73,7 @@ def diagnostics(
             alike(program, table, (each.first, each.second), options)
             for each in overlaps[MOST_PAIRS:MOST_COMPARED]
         ]
-    shown = _grouped(table, overlaps, shown)
+    shown = grouped(table, overlaps, shown)
     if shown and (together := _together(program, table, overlaps[:MOST_PAIRS])):
         last = max(
             (at for at, each in enumerate(shown) if not each.told_with), key=lambda at: sort_key(shown[at])
@@ -133,7 +145,7 @@ def _lower(table: Table) -> list[Diagnostic]:
     for line in lower:
         alike.setdefault((line.below, line.same, table.added(line)), []).append(line.name)
     notes = [
-        f"{_before(uppers, same)}, only where {text}: {_names(names)}"
+        f"{_before(uppers, same)}, only where {text}: {names_of(names)}"
         for (uppers, same, text), names in list(alike.items())[:MOST_NAMED]
     ]
     if len(alike) > MOST_NAMED:
@@ -156,11 +168,7 @@ def _lower(table: Table) -> list[Diagnostic]:
 
 def _before(uppers: Collection[str], same: Collection[str]) -> str:
     said = (("below", uppers), ("the same as", same))
-    return ", ".join(f"{word} {_names(names)}" for word, names in said if names)
-
-
-def _names(names: Collection[str]) -> str:
-    return ", ".join(f"`{name}`" for name in names)
+    return ", ".join(f"{word} {names_of(names)}" for word, names in said if names)
 
 
 def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Diagnostic:
@@ -170,7 +178,7 @@ def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Di
         helps = ("delete the line, or correct its conditions",)
         uppers = (*table.lines[line].below, *table.lines[line].same)
         notes = (
-            (f"wherever its cells hold one of these matches, which go before it: {_names(uppers)}",)
+            (f"wherever its cells hold one of these matches, which go before it: {names_of(uppers)}",)
             if uppers
             else ()
         )
@@ -206,59 +214,6 @@ def _overlap(program: Program, table: Table, overlap: Overlap, options: Options)
         witnesses=(column,),
         effects=effects,
     )
-
-
-def _grouped(table: Table, overlaps: Sequence[Overlap], shown: Sequence[Diagnostic]) -> list[Diagnostic]:
-    """The overlaps; of those that come of the same cells, to one end, the first tells the others in a note."""
-    groups: dict[object, list[int]] = {}
-    for at, (overlap, diagnostic) in enumerate(zip(overlaps, shown, strict=False)):
-        cells = _apart_in(table, overlap)
-        same = diagnostic.effects is not None and diagnostic.effects.same
-        groups.setdefault((cells, same) if cells else at, []).append(at)
-    told = list(shown)
-    for members in groups.values():
-        first, *others = sorted(members, key=lambda at: sort_key(shown[at]))
-        if others:
-            note = _alike_as(table, [overlaps[at] for at in members], overlaps[first])
-            told[first] = replace(shown[first], notes=(*shown[first].notes, note))
-        for at in others:
-            told[at] = replace(shown[at], told_with=True)
-    return told
-
-
-def _apart_in(table: Table, overlap: Overlap) -> frozenset[tuple[str, str]]:
-    """The cells of two lines in columns where just one of them says something: what brings them together."""
-    pair = table.lines[overlap.first], table.lines[overlap.second]
-    cells = zip(table.columns, *(line.tests for line in pair), strict=True)
-    return frozenset(
-        (column.heading, test.text)
-        for column, one, other in cells
-        for test in (one, other)
-        if test is not None and (one is None or other is None)
-    )
-
-
-def _alike_as(table: Table, overlaps: Sequence[Overlap], first: Overlap) -> str:
-    """Name the other pairs of a group, by the line that most of them share."""
-    pairs = [(each.first, each.second) for each in overlaps if each != first]
-    often = Counter(line for pair in [(first.first, first.second), *pairs] for line in pair)
-    by_line: dict[int, list[str]] = {}
-    for pair in pairs:
-        most = max(pair, key=lambda line: (often[line], -line))
-        other = pair[1] if most == pair[0] else pair[0]
-        by_line.setdefault(most, []).append(str(table.lines[other].name))
-    named = "; ".join(f"`{table.lines[most].name}` with {_names(others)}" for most, others in by_line.items())
-    cells = ", ".join(_said_under(heading, text) for heading, text in sorted(_apart_in(table, first)))
-    many = f"{len(pairs)} more pairs overlap" if len(pairs) > 1 else "1 more pair overlaps"
-    return f"{many} where {cells}: {named}; --json lists each"
-
-
-def _said_under(heading: str, text: str) -> str:
-    """A cell with its heading: `called = abort`, `now in cleared`."""
-    if heading == "when":
-        return text
-    plain = re.match(r"[\w.]+$|-\d", text) is not None
-    return f"{heading} = {text}" if plain else f"{heading} {text}"
 
 
 def _far(table: Table, lines: Sequence[Line], repair: PartingCell | None) -> tuple[Label, ...]:

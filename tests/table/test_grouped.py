@@ -150,3 +150,36 @@ table t {
         "in line `any` write `slow` under `wanted`: proved to part the two lines"
     )
     assert reported(text.replace("| off, slow   |", "| slow        |")) == ()
+
+
+def test_a_witness_is_one_that_the_declared_facts_allow_where_there_is_one() -> None:
+    text = """
+input gear : int 0 .. 5
+input fast : bool
+output x : int 0 .. 9
+assume steps assumed : abs(gear - was gear) <= 1 and was gear >= 3
+assume fast_above assumed : fast implies gear > 4
+table t {
+  | line | gear       | fast  || x |
+  | low  | in {1, 2}  |       || 1 |
+  | mid  | 0 .. 3     | false || 2 |
+  | top  | >= 3       | false || 3 |
+}"""
+    found = {
+        finding.message.split("`")[1]: finding for finding in reported(text) if finding.code.value == "RCS402"
+    }
+    assert {name: finding.witnesses[0].values for name, finding in found.items()} == {
+        "low": ("2", "false"),  # 1 is no gear that follows
+        "mid": ("3", "false"),
+    }
+    [gap] = [finding for finding in reported(text) if finding.code.value == "RCS401"]
+    assert gap.witnesses[0].values == ("5", "true")
+    free = text.replace("was gear >= 3", "was gear >= 0").replace(
+        "fast implies gear > 4", "fast implies gear > 9 - 4"
+    )
+    assert {each.witnesses[0].values[0] for each in reported(free) if each.code.value == "RCS402"} == {
+        "1",
+        "3",
+    }
+    [none] = [finding for finding in reported(free) if finding.code.value == "RCS401"]
+    assert none.witnesses[0].values == ("0", "true")  # no fact allows any: the least
