@@ -256,6 +256,9 @@ CASES = [
     ("table t {\n | line | x ||\n | a | 1 | 2 ||\n}", [("RCS102", 3)]),
     ("table t {\n | line | x |\n}", [("RCS102", 2)]),
     ("table t {\n | line | x || || y |\n}", [("RCS102", 2)]),
+    ("table t {\n | line | x || |\n | a | 1 || |\n}", [("RCS101", 2)]),  # no heading
+    ("table t {\n | line | x | ||\n | a | 1 | ||\n}", [("RCS101", 2)]),
+    ("table t {\n | line | x || y | |\n | a | 1 || 2 | go |\n}", [("RCS101", 2)]),
     ("table t {\n | line | x | y ||\n | a | DEFAULT | 3 ||\n}", [("RCS108", 3)]),
     ("table t {\n | line | x ||\n | a | < ||\n | b | = = ||\n}", [("RCS101", 3), ("RCS101", 4)]),
     ("table t {\n | name | x ||\n}", [("RCS101", 2)]),

@@ -29,6 +29,7 @@ from rcsc.lang.syntax.rows import (
     MARKS,
     NAMED_FIELDS,
     NEW_PART,
+    NO_HEADING,
     ONE_GROUP,
     ORDER,
     PARTED,
@@ -305,9 +306,9 @@ class _Rows:
         return cells
 
     def _heading(self, cell: Cell, whole: str) -> tree.Heading:
-        if cell.text == whole or (not whole and cell.text in ACTION_WORDS):
+        if cell.text in ({whole} if whole else ACTION_WORDS):
             return tree.Heading(None, cell.text, cell)
-        parsed = self._parse("heading", cell)
+        parsed = self._parse("heading", cell, "" if cell.text else NO_HEADING)
         subject = tree.Reference(tree.Name(cell.text)) if parsed is None else parsed
         return tree.Heading(subject, "", cell)
 

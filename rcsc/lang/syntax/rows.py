@@ -34,6 +34,9 @@ BITS = re.compile(r"(?=[01]*[xX])[01xX]+")
 """A mask of one group, which would be a name or a number elsewhere."""
 ONE_GROUP = "bits of one group are written with `0b`: `0b{}`"
 PARTED = "`|` parts cells: values and masks are listed with `,`, conditions joined by `or` under `when`, bits put together in a procedure"
+NO_HEADING = (
+    "each column has a heading: a variable or an expression, `when`, after `||` a variable or `procedures`"
+)
 NEW_PART = "a heading that begins another part of the table has a row `|---|` below it"
 PIECES = (
     "a row with an empty first cell goes on with the cells of the row above it; a line has its name there"
