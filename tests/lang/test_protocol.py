@@ -333,6 +333,14 @@ def test_what_is_done_has_not_failed() -> None:
     assert "cannot mean two things" in diagnostics[0].message
 
 
+def test_a_bound_is_a_number_as_any_other() -> None:
+    padded = program(LEVEL.replace("within 2 cycles", "within 0_2 cycles"))
+    assert [(v.name, v.type) for v in padded.variables] == [
+        (v.name, v.type) for v in program(LEVEL).variables
+    ]
+    assert isinstance(compile_text(LEVEL.replace("within 2 cycles", f"within {'9' * 5000} cycles")), tuple)
+
+
 def test_the_echo_may_be_bounded_after_the_answer() -> None:
     swapped = LEVEL.replace(
         "within 2 cycles else silent", "answered within 9 cycles else slow within 2 cycles else silent"

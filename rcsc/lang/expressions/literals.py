@@ -14,12 +14,21 @@ from rcsc.lang.syntax import tree
 LONGEST = 1_000
 
 
-def integer(scope: Scope, written: tree.IntLiteral) -> Typed | None:
-    """A whole number that fits in 64 bits."""
-    text = written.text.replace("_", "")
+def number_of(text: str) -> int:
+    """The whole number that a text spells; one of more than 80 digits comes back as its first 80, which 64 bits hold no more.
+
+    >>> number_of("05"), number_of("0x1_0"), number_of("0b101")
+    (5, 16, 5)
+    """
+    text = text.replace("_", "")
     base = {"0x": 16, "0b": 2}.get(text[:2].lower(), 10)
     digits = text if base == 10 else text[2:]
-    value = int(digits.lstrip("0")[:80] or "0", base)
+    return int(digits.lstrip("0")[:80] or "0", base)
+
+
+def integer(scope: Scope, written: tree.IntLiteral) -> Typed | None:
+    """A whole number that fits in 64 bits."""
+    value = number_of(written.text)
     if value > U64_MAX:
         message = "no 64-bit integer holds this number"
         scope.report(Code.TOO_WIDE, message, written.span, f"the greatest is {U64_MAX}")

@@ -6,6 +6,7 @@ from typing import Any
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.literals import number_of
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.syntax import tree
 
@@ -197,7 +198,7 @@ class _Types:
         """Return a number, or a constant that is one; None where it has to be reckoned."""
         if isinstance(written, tree.Reference):
             written = self._constants.get(written.name.text, written)
-        return int(written.text.replace("_", ""), 0) if isinstance(written, tree.IntLiteral) else None
+        return number_of(written.text) if isinstance(written, tree.IntLiteral) else None
 
     def unit(self, written: tree.Expr) -> bool:
         """Whether a number, or a constant that is one, has a unit."""
