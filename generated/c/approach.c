@@ -53,21 +53,15 @@ static inline int32_t approach_bit32(uint32_t m)
 #endif
 
 /* The lesser of two; the first where it is no number. */
-static inline int64_t approach_min_i64(int64_t a, int64_t b)
+static inline uint32_t approach_min_u32(uint32_t a, uint32_t b)
 {
     return (b < a) ? b : a;
 }
 
 /* A value that was proved to fit. */
-static inline uint16_t approach_u16_of_i64(int64_t a)
+static inline uint32_t approach_u32_of_i32(int32_t a)
 {
-    return (uint16_t)a;
-}
-
-/* A value that was proved to fit. */
-static inline uint8_t approach_u8_of_i64(int64_t a)
-{
-    return (uint8_t)a;
+    return (uint32_t)a;
 }
 
 /* Procedure smooth. */
@@ -79,81 +73,66 @@ static void approach_do_smooth(approach_t *s)
 /* Procedure full_speed. */
 static void approach_do_full_speed(approach_t *s)
 {
-    s->speed_mm_s = (uint16_t)INT64_C(1000);
-    s->settled = (uint8_t)INT64_C(0);
+    s->speed_mm_s = 1000u;
+    s->settled = 0u;
 }
 
 /* Slows down with the share of the braking distance that is left. */
 static void approach_do_slow_down(approach_t *s)
 {
-    int64_t v_left_mm = INT64_C(0);
-    v_left_mm = ((int64_t)s->distance_mm - (int64_t)s->tolerance_mm);
-    s->speed_mm_s = approach_u16_of_i64((INT64_C(50) + ((INT64_C(900) * v_left_mm) / (int64_t)s->braking_mm)));
-    s->settled = (uint8_t)INT64_C(0);
+    uint32_t v_left_mm = 0u;
+    v_left_mm = approach_u32_of_i32((int32_t)s->distance_mm - (int32_t)s->tolerance_mm);
+    s->speed_mm_s = (uint16_t)(50u + ((900u * v_left_mm) / (uint32_t)s->braking_mm));
+    s->settled = 0u;
 }
 
 /* Procedure settle. */
 static void approach_do_settle(approach_t *s)
 {
-    s->speed_mm_s = (uint16_t)INT64_C(0);
-    s->settled = approach_u8_of_i64(approach_min_i64(((int64_t)s->settled + INT64_C(1)), INT64_C(25)));
+    s->speed_mm_s = 0u;
+    s->settled = (uint8_t)approach_min_u32((uint32_t)s->settled + 1u, 25u);
 }
 
 /* Procedure stop. */
 static void approach_do_stop(approach_t *s)
 {
-    s->speed_mm_s = (uint16_t)INT64_C(0);
-    s->settled = (uint8_t)INT64_C(0);
+    s->speed_mm_s = 0u;
+    s->settled = 0u;
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
 static void approach_admit(approach_t *s)
 {
-    approach_t before = *s;
     s->line = -1;
-    s->fault = 0;
+    s->fault = APPROACH_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
     if (!approach_exact()) {
-        s->fault = 7;
-    }
-    if ((int64_t)s->distance_mm > INT64_C(2000)) {
-        s->distance_mm = (uint16_t)INT64_C(2000);
-    }
-    if (((int64_t)s->braking_mm > INT64_C(500))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 1;
-        }
-    }
-    if (((int64_t)s->tolerance_mm < INT64_C(1)) || ((int64_t)s->tolerance_mm > INT64_C(20))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 2;
-        }
-    }
-    if (!((s->force_n >= 0.0) && (s->force_n <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 3;
-        }
+        s->fault = APPROACH_FAULT_ARITHMETIC;
     } else {
-        s->force_n = s->force_n + 0.0;
-    }
-    if (!((s->limit_n >= 10.0) && (s->limit_n <= 400.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 4;
+        int32_t at = -1;
+        if ((at < 0) && (s->braking_mm > 500u)) {
+            at = APPROACH_LEAF_BRAKING_MM;
         }
-    } else {
-        s->limit_n = s->limit_n + 0.0;
-    }
-    if (s->fault != 0) {
-        before.line = -1;
-        before.fault = s->fault;
-        before.fault_at = s->fault_at;
-        before.assumptions_failed = 0;
-        *s = before;
+        if ((at < 0) && ((s->tolerance_mm < 1u) || (s->tolerance_mm > 20u))) {
+            at = APPROACH_LEAF_TOLERANCE_MM;
+        }
+        if ((at < 0) && (!((s->force_n >= 0.0) && (s->force_n <= 500.0)))) {
+            at = APPROACH_LEAF_FORCE_N;
+        }
+        if ((at < 0) && (!((s->limit_n >= 10.0) && (s->limit_n <= 400.0)))) {
+            at = APPROACH_LEAF_LIMIT_N;
+        }
+        if (at >= 0) {
+            s->fault = APPROACH_FAULT_ADMIT;
+            s->fault_at = at;
+        } else {
+            if (s->distance_mm > 2000u) {
+                s->distance_mm = 2000u;
+            }
+            s->force_n = s->force_n + 0.0;
+            s->limit_n = s->limit_n + 0.0;
+        }
     }
 }
 
@@ -168,32 +147,37 @@ static void approach_run_approach(approach_t *s)
 {
     s->line = approach_approach_line(s);
     switch (s->line) {
-    case 0: /* examples/approach.rcs line blocked */
+    case APPROACH_LINE_APPROACH_BLOCKED: /* examples/approach.rcs line blocked: force_n > limit_n */
         approach_do_smooth(s);
         approach_do_stop(s);
-        s->status_report = (uint8_t)INT64_C(2);
+        s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_FAILED;
         break;
-    case 1: /* examples/approach.rcs line arrived */
+    /* examples/approach.rcs line arrived: force_n <= limit_n; distance_mm - tolerance_mm <= 0 */
+    case APPROACH_LINE_APPROACH_ARRIVED:
         approach_do_smooth(s);
         approach_do_settle(s);
-        s->status_report = (uint8_t)INT64_C(1);
+        s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_DONE;
         break;
-    case 2: /* examples/approach.rcs line brake */
+    /* examples/approach.rcs line brake: force_n <= limit_n; distance_mm - tolerance_mm > 0; distance_mm <=
+       tolerance_mm + braking_mm */
+    case APPROACH_LINE_APPROACH_BRAKE:
         approach_do_smooth(s);
         approach_do_slow_down(s);
-        s->status_report = (uint8_t)INT64_C(0);
+        s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_EXECUTING;
         break;
-    case 3: /* examples/approach.rcs line cruise */
+    /* examples/approach.rcs line cruise: force_n <= limit_n; distance_mm - tolerance_mm > 0; distance_mm >
+       tolerance_mm + braking_mm */
+    case APPROACH_LINE_APPROACH_CRUISE:
         approach_do_smooth(s);
         approach_do_full_speed(s);
-        s->status_report = (uint8_t)INT64_C(0);
+        s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_EXECUTING;
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = APPROACH_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = APPROACH_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -202,35 +186,37 @@ static void approach_run_approach(approach_t *s)
 void approach_init(approach_t *s)
 {
     s->line = -1;
-    s->fault = 0;
+    s->fault = APPROACH_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->distance_mm = (uint16_t)INT64_C(0);
-    s->braking_mm = (uint16_t)INT64_C(0);
-    s->tolerance_mm = (uint8_t)INT64_C(1);
+    s->distance_mm = 0u;
+    s->braking_mm = 0u;
+    s->tolerance_mm = 1u;
     s->force_n = 0.0;
     s->limit_n = 100.0;
     s->smooth_n = 0.0;
-    s->settled = (uint8_t)INT64_C(0);
-    s->speed_mm_s = (uint16_t)INT64_C(0);
-    s->status_report = (uint8_t)INT64_C(1);
+    s->settled = 0u;
+    s->speed_mm_s = 0u;
+    s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_DONE;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t approach_check(const approach_t *s)
 {
     int32_t at = -1;
     if ((at < 0) && (!((s->smooth_n >= 0.0) && (s->smooth_n <= 500.0)))) {
-        at = 5;
+        at = APPROACH_LEAF_SMOOTH_N;
     }
-    if ((at < 0) && (((int64_t)s->settled > INT64_C(25)))) {
-        at = 6;
+    if ((at < 0) && (s->settled > 25u)) {
+        at = APPROACH_LEAF_SETTLED;
     }
-    if ((at < 0) && (((int64_t)s->speed_mm_s > INT64_C(1000)))) {
-        at = 7;
+    if ((at < 0) && (s->speed_mm_s > 1000u)) {
+        at = APPROACH_LEAF_SPEED_MM_S;
     }
-    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
-        at = 8;
+    if ((at < 0) && (s->status_report > EXAMPLES_WORDS_1984_LEVEL_STATUS_FAILED)) {
+        at = APPROACH_LEAF_STATUS_REPORT;
     }
     return at;
 }
@@ -247,26 +233,39 @@ int32_t approach_approach_line(const approach_t *s)
         uint8_t t4[2];
         uint8_t t5[2];
     } t = {
-        {
-            0xeu, 0xfu
+        { /* force_n > limit_n */
+            0xeu, /* false: lines arrived, brake, cruise */
+            0xfu /* true: every line */
         },
-        {
-            0x1u, 0xfu
+        { /* force_n <= limit_n */
+            0x1u, /* false: lines blocked */
+            0xfu /* true: every line */
         },
-        {
-            0xdu, 0xfu
+        { /* distance_mm - tolerance_mm <= 0 */
+            0xdu, /* false: lines blocked, brake, cruise */
+            0xfu /* true: every line */
         },
-        {
-            0x3u, 0xfu
+        { /* distance_mm - tolerance_mm > 0 */
+            0x3u, /* false: lines blocked, arrived */
+            0xfu /* true: every line */
         },
-        {
-            0xbu, 0xfu
+        { /* distance_mm <= tolerance_mm + braking_mm */
+            0xbu, /* false: lines blocked, arrived, cruise */
+            0xfu /* true: every line */
         },
-        {
-            0x7u, 0xfu
+        { /* distance_mm > tolerance_mm + braking_mm */
+            0x7u, /* false: lines blocked, arrived, brake */
+            0xfu /* true: every line */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[((s->force_n > s->limit_n) ? 1u : 0u)] & (uint32_t)t.t1[((s->force_n <= s->limit_n) ? 1u : 0u)] & (uint32_t)t.t2[((((int64_t)s->distance_mm - (int64_t)s->tolerance_mm) <= INT64_C(0)) ? 1u : 0u)] & (uint32_t)t.t3[((((int64_t)s->distance_mm - (int64_t)s->tolerance_mm) > INT64_C(0)) ? 1u : 0u)] & (uint32_t)t.t4[(((int64_t)s->distance_mm <= ((int64_t)s->tolerance_mm + (int64_t)s->braking_mm)) ? 1u : 0u)] & (uint32_t)t.t5[(((int64_t)s->distance_mm > ((int64_t)s->tolerance_mm + (int64_t)s->braking_mm)) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[((s->force_n > s->limit_n) ? 1u : 0u)] &
+            (uint32_t)t.t1[((s->force_n <= s->limit_n) ? 1u : 0u)] &
+            (uint32_t)t.t2[((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) <= 0) ? 1u : 0u)] &
+            (uint32_t)t.t3[((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) > 0) ? 1u : 0u)] &
+            (uint32_t)t.t4[((s->distance_mm <= ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u :
+                0u)] &
+            (uint32_t)t.t5[((s->distance_mm > ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u :
+                0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = approach_bit32(m | 0x10u);
     line = (m == 0x0u) ? (-1) : line;
@@ -287,7 +286,7 @@ void approach_approach_lines(const approach_t *in, int32_t *out, uint32_t n)
 int32_t approach_approach_step(approach_t *s)
 {
     approach_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == APPROACH_FAULT_NONE) {
         approach_settle(s);
         approach_run_approach(s);
     }

@@ -19,24 +19,50 @@ enum {
     APPROACH_LINE_APPROACH_CRUISE = 3
 };
 
+/* `fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants. */
+enum {
+    APPROACH_LEAF_DISTANCE_MM = 0,
+    APPROACH_LEAF_BRAKING_MM = 1,
+    APPROACH_LEAF_TOLERANCE_MM = 2,
+    APPROACH_LEAF_FORCE_N = 3,
+    APPROACH_LEAF_LIMIT_N = 4,
+    APPROACH_LEAF_SMOOTH_N = 5,
+    APPROACH_LEAF_SETTLED = 6,
+    APPROACH_LEAF_SPEED_MM_S = 7,
+    APPROACH_LEAF_STATUS_REPORT = 8
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     APPROACH_FAULT_NONE = 0,
     APPROACH_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
     APPROACH_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
     APPROACH_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
-    APPROACH_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
-    APPROACH_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
-    APPROACH_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    APPROACH_FAULT_EXTERN = 4,
+    /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    APPROACH_FAULT_ASSUMPTION = 5,
+    /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    APPROACH_FAULT_STATE = 6,
     APPROACH_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
-/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
+   positions of variables.
+   After APPROACH_FAULT_ADMIT nothing has changed but the trace below.
+   After another fault the state is as it was when the cycle ended. After any fault an output that has a safe
+   value shows it, and every other output keeps what it has.
+   No function waits, allocates, or keeps anything outside this block. None calls another library than the
+   compiler's own: memcpy and memset, operations on doubles, bit counting and division
+   where the processor has none. */
 typedef struct {
-    uint16_t distance_mm; /* 0: input; 0 .. 2000 mm; Distance left to the goal point; the controller overshoots, so it is clamped. */
+    /* 0: input; 0 .. 2000 mm; Distance left to the goal point; the controller overshoots, so it is
+       clamped. */
+    uint16_t distance_mm;
     uint16_t braking_mm; /* 1: input; 0 .. 500 mm; Distance needed to stop from the present speed. */
     uint8_t tolerance_mm; /* 2: input; 1 .. 20 mm; How near is near enough. */
-    double force_n; /* 3: input; 0.0 .. 500.0 N; Force on the wrist; a reading outside this range is refused. */
+    /* 3: input; 0.0 .. 500.0 N; Force on the wrist; a reading outside this range is refused. */
+    double force_n;
     double limit_n; /* 4: input; 10.0 .. 400.0 N; Force at which the move is given up. */
     double smooth_n; /* 5: state; 0.0 .. 500.0 N; Smoothed force. */
     uint8_t settled; /* 6: state; 0 .. 25; Cycles spent near the goal. */
@@ -44,14 +70,17 @@ typedef struct {
     examples_words_1984_level_status_t status_report; /* 8: output */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
-    int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    int32_t fault_at;
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } approach_t;
 
 /* Every variable's initial value. */
 void approach_init(approach_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t approach_check(const approach_t *s);
 
 /* The line of table approach that matches admitted inputs: its position; -1 none, -2 several. */

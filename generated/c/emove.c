@@ -65,39 +65,45 @@ static inline double emove_min_f64(double a, double b)
 }
 
 /* The lesser of two; the first where it is no number. */
-static inline int64_t emove_min_i64(int64_t a, int64_t b)
+static inline int32_t emove_min_i32(int32_t a, int32_t b)
+{
+    return (b < a) ? b : a;
+}
+
+/* The lesser of two; the first where it is no number. */
+static inline uint32_t emove_min_u32(uint32_t a, uint32_t b)
 {
     return (b < a) ? b : a;
 }
 
 /* A value that was proved to fit. */
-static inline uint16_t emove_u16_of_i64(int64_t a)
+static inline uint16_t emove_u16_of_i32(int32_t a)
 {
     return (uint16_t)a;
-}
-
-/* A value that was proved to fit. */
-static inline uint8_t emove_u8_of_i64(int64_t a)
-{
-    return (uint8_t)a;
 }
 
 /* Procedure look_below. */
 static void emove_do_look_below(emove_t *s)
 {
-    s->idle = (((s->primitive.resting && s->vision.resting) && ((int64_t)s->here == (int64_t)s->here_asked)) && ((int64_t)s->here_sector == (int64_t)s->here_sector_asked));
+    s->idle = (s->primitive.resting && s->vision.resting && (s->here == s->here_asked) &&
+            (s->here_sector == s->here_sector_asked));
 }
 
 /* How long the path would be that begins now; whether the part is still there. */
 static void emove_do_measure(emove_t *s)
 {
     if (s->new_command) {
-        s->path_length = emove_u8_of_i64(((int64_t)s->path.depart_count + (int64_t)s->path.approach_count));
+        s->path_length = (uint8_t)((uint32_t)s->path.depart_count + (uint32_t)s->path.approach_count);
     }
-    if (((!s->answered) || (((int64_t)s->last_primitive.input_command == INT64_C(1)) || ((int64_t)s->last_primitive.input_command == INT64_C(2))))) {
-        s->lost = ((((int64_t)s->task.gripped_obj_ptr == INT64_C(1)) || ((int64_t)s->task.gripped_obj_ptr == INT64_C(2)) || ((int64_t)s->task.gripped_obj_ptr == INT64_C(3)) || ((int64_t)s->task.gripped_obj_ptr == INT64_C(4))) && (!s->from_primitive.holds));
+    if ((!s->answered) || (s->last_primitive.input_command == VOCABULARY_PRIMITIVE_COMMAND_GOTO) ||
+            (s->last_primitive.input_command == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU)) {
+        s->lost = (((s->task.gripped_obj_ptr == VOCABULARY_OBJECT_TBOX) ||
+            (s->task.gripped_obj_ptr == VOCABULARY_OBJECT_BBOX) ||
+            (s->task.gripped_obj_ptr == VOCABULARY_OBJECT_FLAG) ||
+            (s->task.gripped_obj_ptr == VOCABULARY_OBJECT_HOUS)) &&
+                (!s->from_primitive.holds));
     }
-    if (((int64_t)s->task.input_command == INT64_C(2))) {
+    if (s->task.input_command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ) {
         s->lift_mm = s->object_data.lift_mm + 0.0;
     } else {
         s->lift_mm = s->held_data.lift_mm + 0.0;
@@ -107,100 +113,100 @@ static void emove_do_measure(emove_t *s)
 /* Behind the table: the next cycle's question. */
 static void emove_do_asked(emove_t *s)
 {
-    s->here_asked = (uint8_t)(int64_t)s->here;
-    s->here_sector_asked = (uint8_t)(int64_t)s->here_sector;
+    s->here_asked = s->here;
+    s->here_sector_asked = s->here_sector;
 }
 
 /* Procedure nextstate. */
-static void emove_do_nextstate(emove_t *s, int64_t v_value)
+static void emove_do_nextstate(emove_t *s, emove_common_emove_state_t v_value)
 {
-    s->cur_state_next = (uint8_t)v_value;
+    s->cur_state_next = v_value;
 }
 
 /* Procedure no_place. */
 static void emove_do_no_place(emove_t *s)
 {
-    s->to_task.failure = (uint8_t)INT64_C(7);
+    s->to_task.failure = VOCABULARY_REASON_NO_PLACE;
 }
 
 /* What PRIMITIVE says went wrong. */
 static void emove_do_primitive_failure(emove_t *s)
 {
-    s->to_task.failure = (uint8_t)(int64_t)s->primitive.failure;
+    s->to_task.failure = s->primitive.failure;
 }
 
 /* The fingers are not where the part would keep them. */
 static void emove_do_part_lost(emove_t *s)
 {
-    s->to_task.failure = (uint8_t)INT64_C(11);
+    s->to_task.failure = VOCABULARY_REASON_NOTHING_GRIPPED;
 }
 
 /* What vision says went wrong. */
 static void emove_do_vision_failure(emove_t *s)
 {
-    s->to_task.failure = (uint8_t)(int64_t)s->vision.failure;
+    s->to_task.failure = s->vision.failure;
 }
 
 /* Procedure pause. */
 static void emove_do_pause(emove_t *s)
 {
-    s->to_primitive.input_command = (uint8_t)INT64_C(0);
-    s->to_vision.input_command = (uint8_t)INT64_C(0);
+    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
 /* Procedure goto. */
 static void emove_do_goto_(emove_t *s)
 {
-    s->to_primitive.input_command = (uint8_t)INT64_C(1);
+    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_GOTO;
 }
 
 /* Procedure gothru. */
 static void emove_do_gothru(emove_t *s)
 {
-    s->to_primitive.input_command = (uint8_t)INT64_C(2);
+    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_GOTHRU;
 }
 
 /* Procedure approach_position_fingers. */
 static void emove_do_approach_position_fingers(emove_t *s)
 {
-    s->to_primitive.obj_ptr = (uint8_t)(int64_t)s->task.obj_ptr;
-    s->to_primitive.grasp = (uint8_t)(int64_t)s->task.grasp;
-    s->to_primitive.input_command = (uint8_t)INT64_C(3);
-    s->to_vision.input_command = (uint8_t)INT64_C(0);
+    s->to_primitive.obj_ptr = s->task.obj_ptr;
+    s->to_primitive.grasp = s->task.grasp;
+    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS;
+    s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
 /* Procedure departure_position_fingers. */
 static void emove_do_departure_position_fingers(emove_t *s)
 {
-    s->to_primitive.obj_ptr = (uint8_t)(int64_t)s->task.obj_ptr;
-    s->to_primitive.grasp = (uint8_t)(int64_t)s->task.grasp;
-    s->to_primitive.input_command = (uint8_t)INT64_C(4);
+    s->to_primitive.obj_ptr = s->task.obj_ptr;
+    s->to_primitive.grasp = s->task.grasp;
+    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS;
 }
 
 /* So that vision sees the whole scene (section 4.1). */
 static void emove_do_open_fully(emove_t *s)
 {
-    s->to_primitive.obj_ptr = (uint8_t)INT64_C(7);
-    s->to_primitive.grasp = (uint8_t)INT64_C(0);
-    s->to_primitive.input_command = (uint8_t)INT64_C(4);
-    s->to_vision.input_command = (uint8_t)INT64_C(0);
+    s->to_primitive.obj_ptr = VOCABULARY_OBJECT_OPEN_GRIP;
+    s->to_primitive.grasp = 0u;
+    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS;
+    s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
 /* Procedure immed_grasp. */
 static void emove_do_immed_grasp(emove_t *s)
 {
-    s->to_primitive.obj_ptr = (uint8_t)(int64_t)s->task.obj_ptr;
-    s->to_primitive.grasp = (uint8_t)(int64_t)s->task.grasp;
-    s->to_primitive.input_command = (uint8_t)INT64_C(5);
+    s->to_primitive.obj_ptr = s->task.obj_ptr;
+    s->to_primitive.grasp = s->task.grasp;
+    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP;
 }
 
 /* Procedure flood_flash. */
 static void emove_do_flood_flash(emove_t *s)
 {
     emove_do_pause(s);
-    s->to_vision.obj_ptr = (uint8_t)(int64_t)s->task.obj_ptr;
+    s->to_vision.obj_ptr = s->task.obj_ptr;
     s->to_vision.expected_range_mm = s->object_data.expected_range_mm + 0.0;
-    s->to_vision.input_command = (uint8_t)INT64_C(1);
+    s->to_vision.input_command = VOCABULARY_VISION_COMMAND_FLOOD_FLASH;
 }
 
 /* Procedure line_flash. */
@@ -210,16 +216,16 @@ static void emove_do_line_flash(emove_t *s)
     s->to_vision.expected_normal.x = s->object_data.normal.x + 0.0;
     s->to_vision.expected_normal.y = s->object_data.normal.y + 0.0;
     s->to_vision.expected_normal.z = s->object_data.normal.z + 0.0;
-    s->to_vision.input_command = (uint8_t)INT64_C(2);
+    s->to_vision.input_command = VOCABULARY_VISION_COMMAND_LINE_FLASH;
 }
 
 /* The path is kept, and the robot is nowhere until it arrives. */
 static void emove_do_depart(emove_t *s)
 {
-    s->depart_first = (uint16_t)(int64_t)s->path.depart_first;
-    s->depart_count = (uint8_t)(int64_t)s->path.depart_count;
-    s->approach_first = (uint16_t)(int64_t)s->path.approach_first;
-    s->here_next = (uint8_t)INT64_C(0);
+    s->depart_first = s->path.depart_first;
+    s->depart_count = s->path.depart_count;
+    s->approach_first = s->path.approach_first;
+    s->here_next = 0u;
 }
 
 /* Procedure no_displacement. */
@@ -233,15 +239,17 @@ static void emove_do_no_displacement(emove_t *s)
 }
 
 /* Point `at` of the path: first the departure, displaced as the part was, then the approach. */
-static void emove_do_aim(emove_t *s, int64_t v_at)
+static void emove_do_aim(emove_t *s, uint32_t v_at)
 {
     emove_do_no_displacement(s);
-    if ((v_at < (int64_t)s->depart_count)) {
-        s->to_primitive.pose_ptr = emove_u16_of_i64(emove_min_i64(((int64_t)s->depart_first + v_at), INT64_C(9999)));
+    if (v_at < s->depart_count) {
+        s->to_primitive.pose_ptr = (uint16_t)emove_min_u32((uint32_t)s->depart_first + v_at, 9999u);
         s->to_primitive.displaced.x = s->displaced_here.x + 0.0;
         s->to_primitive.displaced.y = s->displaced_here.y + 0.0;
     } else {
-        s->to_primitive.pose_ptr = emove_u16_of_i64(emove_min_i64((((int64_t)s->approach_first + v_at) - (int64_t)s->depart_count), INT64_C(9999)));
+        s->to_primitive.pose_ptr = emove_u16_of_i32(emove_min_i32(((int32_t)s->approach_first +
+            (int32_t)v_at) - (int32_t)s->depart_count,
+                9999));
         s->to_primitive.displaced.z = s->lift_mm + 0.0;
     }
 }
@@ -250,28 +258,29 @@ static void emove_do_aim(emove_t *s, int64_t v_at)
 static void emove_do_aim_first(emove_t *s)
 {
     emove_do_depart(s);
-    emove_do_aim(s, INT64_C(0));
-    s->path_at_next = (uint8_t)INT64_C(0);
+    emove_do_aim(s, 0u);
+    s->path_at_next = 0u;
 }
 
-/* The next one; `path_at` counts on when PRIMITIVE has echoed the order, so that a line that matches again asks for the same. */
+/* The next one; `path_at` counts on when PRIMITIVE has echoed the order, so that a line that matches again
+   asks for the same. */
 static void emove_do_aim_next(emove_t *s)
 {
-    emove_do_aim(s, ((int64_t)s->path_at + INT64_C(1)));
-    s->path_at_next = emove_u8_of_i64(emove_min_i64(((int64_t)s->path_at + INT64_C(1)), INT64_C(62)));
+    emove_do_aim(s, (uint32_t)s->path_at + 1u);
+    s->path_at_next = (uint8_t)emove_min_u32((uint32_t)s->path_at + 1u, 62u);
 }
 
 /* The last one. */
 static void emove_do_aim_last(emove_t *s)
 {
-    emove_do_aim(s, emove_min_i64(((int64_t)s->path_at + INT64_C(1)), INT64_C(62)));
+    emove_do_aim(s, emove_min_u32((uint32_t)s->path_at + 1u, 62u));
 }
 
 /* The robot is at the location of the task. */
 static void emove_do_arrived(emove_t *s)
 {
-    s->here_next = (uint8_t)(int64_t)s->task.locpt_ptr;
-    s->here_sector = (uint8_t)(int64_t)s->task.sector;
+    s->here_next = s->task.locpt_ptr;
+    s->here_sector = s->task.sector;
     s->displaced_here.x = 0.0 + 0.0;
     s->displaced_here.y = 0.0 + 0.0;
 }
@@ -279,38 +288,41 @@ static void emove_do_arrived(emove_t *s)
 /* The camera above the part: the two lines of the second picture are to fall on it. */
 static void emove_do_aim_view(emove_t *s)
 {
-    s->to_vision.input_command = (uint8_t)INT64_C(0);
+    s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
     emove_do_no_displacement(s);
-    s->to_primitive.pose_ptr = (uint16_t)(int64_t)s->target.view_point;
+    s->to_primitive.pose_ptr = s->target.view_point;
     s->to_primitive.displaced.x = s->from_vision.x_mm + 0.0;
     s->to_primitive.displaced.y = s->from_vision.y_mm + 0.0;
-    s->here_next = (uint8_t)INT64_C(0);
+    s->here_next = 0u;
 }
 
 /* Above the part, turned with it. */
 static void emove_do_aim_above(emove_t *s)
 {
-    s->to_primitive.pose_ptr = (uint16_t)(int64_t)s->target.hover_point;
+    s->to_primitive.pose_ptr = s->target.hover_point;
     s->to_primitive.displaced.x = s->from_vision.x_mm + 0.0;
     s->to_primitive.displaced.y = s->from_vision.y_mm + 0.0;
     s->to_primitive.displaced.z = 0.0 + 0.0;
     s->to_primitive.displaced.c = s->from_vision.c + 0.0;
     s->to_primitive.displaced.s = s->from_vision.s + 0.0;
-    s->here_next = (uint8_t)INT64_C(0);
+    s->here_next = 0u;
 }
 
-/* Around the part; the pads go as much lower as its top is farther away than one that they would take without. */
+/* Around the part; the pads go as much lower as its top is farther away than one that they would take
+   without. */
 static void emove_do_aim_at_part(emove_t *s)
 {
-    s->to_primitive.pose_ptr = (uint16_t)(int64_t)s->target.grasp_point;
-    s->to_primitive.displaced.z = emove_max_f64((-500.0), emove_min_f64(500.0, (s->object_data.grip_range_mm - s->from_vision.range_mm))) + 0.0;
+    s->to_primitive.pose_ptr = s->target.grasp_point;
+    s->to_primitive.displaced.z = emove_max_f64((-500.0),
+        emove_min_f64(500.0, s->object_data.grip_range_mm - s->from_vision.range_mm)) +
+            0.0;
 }
 
 /* Procedure located. */
 static void emove_do_located(emove_t *s)
 {
-    s->here_next = (uint8_t)(int64_t)s->task.locpt_ptr;
-    s->here_sector = (uint8_t)(int64_t)s->task.sector;
+    s->here_next = s->task.locpt_ptr;
+    s->here_sector = s->task.sector;
     s->displaced_here.x = s->to_primitive.displaced.x + 0.0;
     s->displaced_here.y = s->to_primitive.displaced.y + 0.0;
 }
@@ -318,354 +330,248 @@ static void emove_do_located(emove_t *s)
 /* Procedure take_orders. */
 static void emove_do_take_orders(emove_t *s)
 {
-    s->echoed = (((int64_t)s->from_primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->from_vision.inc_command_echo == (int64_t)s->to_vision.inc_command));
-    if (((int64_t)s->task.inc_command != (int64_t)s->inc_command_seen)) {
-        s->inc_command_seen = (uint16_t)(int64_t)s->task.inc_command;
+    s->echoed = ((s->from_primitive.inc_command_echo == s->to_primitive.inc_command) &&
+            (s->from_vision.inc_command_echo == s->to_vision.inc_command));
+    if (s->task.inc_command != s->inc_command_seen) {
+        s->inc_command_seen = s->task.inc_command;
         s->new_command = true;
         s->answered = false;
-        s->to_task.status_report = (uint8_t)INT64_C(1);
-        s->to_task.failure = (uint8_t)INT64_C(0);
+        s->to_task.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
+        s->to_task.failure = VOCABULARY_REASON_NONE;
     } else {
-        if ((s->answered && s->echoed)) {
+        if (s->answered && s->echoed) {
             s->new_command = false;
         }
     }
     s->settling = false;
     if (s->echoed) {
-        s->primitive.command = (uint8_t)(int64_t)s->from_primitive.ref_command_echo;
-        s->primitive.status = (uint8_t)(int64_t)s->from_primitive.status_report;
-        s->primitive.failure = (uint8_t)(int64_t)s->from_primitive.failure;
-        s->vision.command = (uint8_t)(int64_t)s->from_vision.ref_command_echo;
-        s->vision.status = (uint8_t)(int64_t)s->from_vision.status_report;
-        s->vision.failure = (uint8_t)(int64_t)s->from_vision.failure;
+        s->primitive.command = s->from_primitive.ref_command_echo;
+        s->primitive.status = s->from_primitive.status_report;
+        s->primitive.failure = s->from_primitive.failure;
+        s->vision.command = s->from_vision.ref_command_echo;
+        s->vision.status = s->from_vision.status_report;
+        s->vision.failure = s->from_vision.failure;
     }
-    s->primitive.resting = ((((int64_t)s->primitive.command == INT64_C(0)) && ((int64_t)s->primitive.status == INT64_C(0))) && (s->answered || s->echoed));
-    s->vision.resting = ((((int64_t)s->vision.command == INT64_C(0)) && ((int64_t)s->vision.status == INT64_C(0))) && (s->answered || s->echoed));
+    s->primitive.resting = ((s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) &&
+            (s->primitive.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
+    s->vision.resting = ((s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE) &&
+            (s->vision.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
 /* Procedure give_orders. */
 static void emove_do_give_orders(emove_t *s)
 {
-    if ((s->new_command && (!s->settling))) {
+    if (s->new_command && (!s->settling)) {
         s->answered = true;
     }
-    s->to_task.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->to_task.ref_command_echo = (uint8_t)(int64_t)s->task.input_command;
-    if (((((((((((int64_t)s->to_primitive.input_command != (int64_t)s->last_primitive.input_command) || ((int64_t)s->to_primitive.obj_ptr != (int64_t)s->last_primitive.obj_ptr)) || ((int64_t)s->to_primitive.grasp != (int64_t)s->last_primitive.grasp)) || ((int64_t)s->to_primitive.pose_ptr != (int64_t)s->last_primitive.pose_ptr)) || (s->to_primitive.displaced.x != s->last_primitive.displaced.x)) || (s->to_primitive.displaced.y != s->last_primitive.displaced.y)) || (s->to_primitive.displaced.z != s->last_primitive.displaced.z)) || (s->to_primitive.displaced.c != s->last_primitive.displaced.c)) || (s->to_primitive.displaced.s != s->last_primitive.displaced.s))) {
-        s->to_primitive.inc_command = emove_u16_of_i64((((int64_t)s->to_primitive.inc_command + INT64_C(1)) % INT64_C(65536)));
+    s->to_task.inc_command_echo = s->inc_command_seen;
+    s->to_task.ref_command_echo = s->task.input_command;
+    if ((s->to_primitive.input_command != s->last_primitive.input_command) ||
+            (s->to_primitive.obj_ptr != s->last_primitive.obj_ptr) ||
+            (s->to_primitive.grasp != s->last_primitive.grasp) ||
+            (s->to_primitive.pose_ptr != s->last_primitive.pose_ptr) ||
+            (s->to_primitive.displaced.x != s->last_primitive.displaced.x) ||
+            (s->to_primitive.displaced.y != s->last_primitive.displaced.y) ||
+            (s->to_primitive.displaced.z != s->last_primitive.displaced.z) ||
+            (s->to_primitive.displaced.c != s->last_primitive.displaced.c) ||
+            (s->to_primitive.displaced.s != s->last_primitive.displaced.s)) {
+        s->to_primitive.inc_command = (uint16_t)(((uint32_t)s->to_primitive.inc_command + 1u) % 65536u);
     }
-    s->last_primitive.input_command = (uint8_t)(int64_t)s->to_primitive.input_command;
-    s->last_primitive.obj_ptr = (uint8_t)(int64_t)s->to_primitive.obj_ptr;
-    s->last_primitive.grasp = (uint8_t)(int64_t)s->to_primitive.grasp;
-    s->last_primitive.pose_ptr = (uint16_t)(int64_t)s->to_primitive.pose_ptr;
+    s->last_primitive.input_command = s->to_primitive.input_command;
+    s->last_primitive.obj_ptr = s->to_primitive.obj_ptr;
+    s->last_primitive.grasp = s->to_primitive.grasp;
+    s->last_primitive.pose_ptr = s->to_primitive.pose_ptr;
     s->last_primitive.displaced.x = s->to_primitive.displaced.x + 0.0;
     s->last_primitive.displaced.y = s->to_primitive.displaced.y + 0.0;
     s->last_primitive.displaced.z = s->to_primitive.displaced.z + 0.0;
     s->last_primitive.displaced.c = s->to_primitive.displaced.c + 0.0;
     s->last_primitive.displaced.s = s->to_primitive.displaced.s + 0.0;
-    if ((((int64_t)s->to_vision.input_command != (int64_t)s->last_vision.input_command) || ((int64_t)s->to_vision.obj_ptr != (int64_t)s->last_vision.obj_ptr))) {
-        s->to_vision.inc_command = emove_u16_of_i64((((int64_t)s->to_vision.inc_command + INT64_C(1)) % INT64_C(65536)));
+    if ((s->to_vision.input_command != s->last_vision.input_command) ||
+            (s->to_vision.obj_ptr != s->last_vision.obj_ptr)) {
+        s->to_vision.inc_command = (uint16_t)(((uint32_t)s->to_vision.inc_command + 1u) % 65536u);
     }
-    s->last_vision.input_command = (uint8_t)(int64_t)s->to_vision.input_command;
-    s->last_vision.obj_ptr = (uint8_t)(int64_t)s->to_vision.obj_ptr;
+    s->last_vision.input_command = s->to_vision.input_command;
+    s->last_vision.obj_ptr = s->to_vision.obj_ptr;
 }
 
 /* A new command finds a level below at work: let it rest first. */
 static void emove_do_settle(emove_t *s)
 {
     s->settling = true;
-    s->to_primitive.input_command = (uint8_t)INT64_C(0);
-    s->to_vision.input_command = (uint8_t)INT64_C(0);
+    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
 /* Procedure done. */
 static void emove_do_done(emove_t *s)
 {
-    s->to_task.status_report = (uint8_t)INT64_C(0);
+    s->to_task.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
 /* Procedure executing. */
 static void emove_do_executing(emove_t *s)
 {
-    s->to_task.status_report = (uint8_t)INT64_C(1);
+    s->to_task.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
 /* Procedure failed. */
 static void emove_do_failed(emove_t *s)
 {
-    s->to_task.status_report = (uint8_t)INT64_C(2);
+    s->to_task.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
 static void emove_admit(emove_t *s)
 {
-    emove_t before = *s;
     s->line = -1;
-    s->fault = 0;
+    s->fault = EMOVE_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
     if (!emove_exact()) {
-        s->fault = 7;
-    }
-    if (((int64_t)s->task.input_command > INT64_C(5))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 1;
-        }
-    }
-    if (((int64_t)s->task.obj_ptr > INT64_C(7))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 2;
-        }
-    }
-    if (((int64_t)s->task.grasp > INT64_C(9))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 3;
-        }
-    }
-    if (((int64_t)s->task.sector > INT64_C(99))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 5;
-        }
-    }
-    if (((int64_t)s->task.gripped_obj_ptr > INT64_C(7))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 7;
-        }
-    }
-    if (((int64_t)s->from_primitive.ref_command_echo > INT64_C(5))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 17;
-        }
-    }
-    if (((int64_t)s->from_primitive.status_report > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 18;
-        }
-    }
-    if (((int64_t)s->from_primitive.failure > INT64_C(17))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 19;
-        }
-    }
-    if (((int64_t)s->from_vision.ref_command_echo > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 45;
-        }
-    }
-    if (((int64_t)s->from_vision.status_report > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 46;
-        }
-    }
-    if (((int64_t)s->from_vision.failure > INT64_C(17))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 47;
-        }
-    }
-    if (!((s->from_vision.x_mm >= (-500.0)) && (s->from_vision.x_mm <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 48;
-        }
+        s->fault = EMOVE_FAULT_ARITHMETIC;
     } else {
-        s->from_vision.x_mm = s->from_vision.x_mm + 0.0;
-    }
-    if (!((s->from_vision.y_mm >= (-500.0)) && (s->from_vision.y_mm <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 49;
+        int32_t at = -1;
+        if ((at < 0) && (s->task.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+            at = EMOVE_LEAF_TASK_INPUT_COMMAND;
         }
-    } else {
-        s->from_vision.y_mm = s->from_vision.y_mm + 0.0;
-    }
-    if (!((s->from_vision.c >= (-1.0)) && (s->from_vision.c <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 50;
+        if ((at < 0) && (s->task.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+            at = EMOVE_LEAF_TASK_OBJ_PTR;
         }
-    } else {
-        s->from_vision.c = s->from_vision.c + 0.0;
-    }
-    if (!((s->from_vision.s >= (-1.0)) && (s->from_vision.s <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 51;
+        if ((at < 0) && (s->task.grasp > 9u)) {
+            at = EMOVE_LEAF_TASK_GRASP;
         }
-    } else {
-        s->from_vision.s = s->from_vision.s + 0.0;
-    }
-    if (!((s->from_vision.range_mm >= 0.0) && (s->from_vision.range_mm <= 2000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 52;
+        if ((at < 0) && (s->task.sector > 99u)) {
+            at = EMOVE_LEAF_TASK_SECTOR;
         }
-    } else {
-        s->from_vision.range_mm = s->from_vision.range_mm + 0.0;
-    }
-    if (((int64_t)s->path.depart_first > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 67;
+        if ((at < 0) && (s->task.gripped_obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+            at = EMOVE_LEAF_TASK_GRIPPED_OBJ_PTR;
         }
-    }
-    if (((int64_t)s->path.depart_count > INT64_C(31))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 68;
+        if ((at < 0) && (s->from_primitive.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+            at = EMOVE_LEAF_FROM_PRIMITIVE_REF_COMMAND_ECHO;
         }
-    }
-    if (((int64_t)s->path.approach_first > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 69;
+        if ((at < 0) && (s->from_primitive.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+            at = EMOVE_LEAF_FROM_PRIMITIVE_STATUS_REPORT;
         }
-    }
-    if (((int64_t)s->path.approach_count > INT64_C(31))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 70;
+        if ((at < 0) && (s->from_primitive.failure > VOCABULARY_REASON_NO_PICTURE)) {
+            at = EMOVE_LEAF_FROM_PRIMITIVE_FAILURE;
         }
-    }
-    if (((int64_t)s->target.hover_point > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 72;
+        if ((at < 0) && (s->from_vision.ref_command_echo > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+            at = EMOVE_LEAF_FROM_VISION_REF_COMMAND_ECHO;
         }
-    }
-    if (((int64_t)s->target.grasp_point > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 73;
+        if ((at < 0) && (s->from_vision.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+            at = EMOVE_LEAF_FROM_VISION_STATUS_REPORT;
         }
-    }
-    if (((int64_t)s->target.view_point > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 74;
+        if ((at < 0) && (s->from_vision.failure > VOCABULARY_REASON_NO_PICTURE)) {
+            at = EMOVE_LEAF_FROM_VISION_FAILURE;
         }
-    }
-    if (!((s->object_data.expected_range_mm >= 0.0) && (s->object_data.expected_range_mm <= 2000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 76;
+        if ((at < 0) && (!((s->from_vision.x_mm >= (-500.0)) && (s->from_vision.x_mm <= 500.0)))) {
+            at = EMOVE_LEAF_FROM_VISION_X_MM;
         }
-    } else {
-        s->object_data.expected_range_mm = s->object_data.expected_range_mm + 0.0;
-    }
-    if (!((s->object_data.grip_range_mm >= 0.0) && (s->object_data.grip_range_mm <= 2000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 77;
+        if ((at < 0) && (!((s->from_vision.y_mm >= (-500.0)) && (s->from_vision.y_mm <= 500.0)))) {
+            at = EMOVE_LEAF_FROM_VISION_Y_MM;
         }
-    } else {
-        s->object_data.grip_range_mm = s->object_data.grip_range_mm + 0.0;
-    }
-    if (!((s->object_data.lift_mm >= (-500.0)) && (s->object_data.lift_mm <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 78;
+        if ((at < 0) && (!((s->from_vision.c >= (-1.0)) && (s->from_vision.c <= 1.0)))) {
+            at = EMOVE_LEAF_FROM_VISION_C;
         }
-    } else {
-        s->object_data.lift_mm = s->object_data.lift_mm + 0.0;
-    }
-    if (!((s->object_data.normal.x >= (-1.0)) && (s->object_data.normal.x <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 79;
+        if ((at < 0) && (!((s->from_vision.s >= (-1.0)) && (s->from_vision.s <= 1.0)))) {
+            at = EMOVE_LEAF_FROM_VISION_S;
         }
-    } else {
-        s->object_data.normal.x = s->object_data.normal.x + 0.0;
-    }
-    if (!((s->object_data.normal.y >= (-1.0)) && (s->object_data.normal.y <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 80;
+        if ((at < 0) && (!((s->from_vision.range_mm >= 0.0) && (s->from_vision.range_mm <= 2000.0)))) {
+            at = EMOVE_LEAF_FROM_VISION_RANGE_MM;
         }
-    } else {
-        s->object_data.normal.y = s->object_data.normal.y + 0.0;
-    }
-    if (!((s->object_data.normal.z >= (-1.0)) && (s->object_data.normal.z <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 81;
+        if ((at < 0) && (s->path.depart_first > 9999u)) {
+            at = EMOVE_LEAF_PATH_DEPART_FIRST;
         }
-    } else {
-        s->object_data.normal.z = s->object_data.normal.z + 0.0;
-    }
-    if (!((s->held_data.expected_range_mm >= 0.0) && (s->held_data.expected_range_mm <= 2000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 83;
+        if ((at < 0) && (s->path.depart_count > 31u)) {
+            at = EMOVE_LEAF_PATH_DEPART_COUNT;
         }
-    } else {
-        s->held_data.expected_range_mm = s->held_data.expected_range_mm + 0.0;
-    }
-    if (!((s->held_data.grip_range_mm >= 0.0) && (s->held_data.grip_range_mm <= 2000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 84;
+        if ((at < 0) && (s->path.approach_first > 9999u)) {
+            at = EMOVE_LEAF_PATH_APPROACH_FIRST;
         }
-    } else {
-        s->held_data.grip_range_mm = s->held_data.grip_range_mm + 0.0;
-    }
-    if (!((s->held_data.lift_mm >= (-500.0)) && (s->held_data.lift_mm <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 85;
+        if ((at < 0) && (s->path.approach_count > 31u)) {
+            at = EMOVE_LEAF_PATH_APPROACH_COUNT;
         }
-    } else {
-        s->held_data.lift_mm = s->held_data.lift_mm + 0.0;
-    }
-    if (!((s->held_data.normal.x >= (-1.0)) && (s->held_data.normal.x <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 86;
+        if ((at < 0) && (s->target.hover_point > 9999u)) {
+            at = EMOVE_LEAF_TARGET_HOVER_POINT;
         }
-    } else {
-        s->held_data.normal.x = s->held_data.normal.x + 0.0;
-    }
-    if (!((s->held_data.normal.y >= (-1.0)) && (s->held_data.normal.y <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 87;
+        if ((at < 0) && (s->target.grasp_point > 9999u)) {
+            at = EMOVE_LEAF_TARGET_GRASP_POINT;
         }
-    } else {
-        s->held_data.normal.y = s->held_data.normal.y + 0.0;
-    }
-    if (!((s->held_data.normal.z >= (-1.0)) && (s->held_data.normal.z <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 88;
+        if ((at < 0) && (s->target.view_point > 9999u)) {
+            at = EMOVE_LEAF_TARGET_VIEW_POINT;
         }
-    } else {
-        s->held_data.normal.z = s->held_data.normal.z + 0.0;
-    }
-    if (s->fault != 0) {
-        before.line = -1;
-        before.fault = s->fault;
-        before.fault_at = s->fault_at;
-        before.assumptions_failed = 0;
-        *s = before;
+        if ((at < 0) &&
+                (!((s->object_data.expected_range_mm >= 0.0) &&
+                    (s->object_data.expected_range_mm <= 2000.0)))) {
+            at = EMOVE_LEAF_OBJECT_DATA_EXPECTED_RANGE_MM;
+        }
+        if ((at < 0) &&
+                (!((s->object_data.grip_range_mm >= 0.0) && (s->object_data.grip_range_mm <= 2000.0)))) {
+            at = EMOVE_LEAF_OBJECT_DATA_GRIP_RANGE_MM;
+        }
+        if ((at < 0) && (!((s->object_data.lift_mm >= (-500.0)) && (s->object_data.lift_mm <= 500.0)))) {
+            at = EMOVE_LEAF_OBJECT_DATA_LIFT_MM;
+        }
+        if ((at < 0) && (!((s->object_data.normal.x >= (-1.0)) && (s->object_data.normal.x <= 1.0)))) {
+            at = EMOVE_LEAF_OBJECT_DATA_NORMAL_X;
+        }
+        if ((at < 0) && (!((s->object_data.normal.y >= (-1.0)) && (s->object_data.normal.y <= 1.0)))) {
+            at = EMOVE_LEAF_OBJECT_DATA_NORMAL_Y;
+        }
+        if ((at < 0) && (!((s->object_data.normal.z >= (-1.0)) && (s->object_data.normal.z <= 1.0)))) {
+            at = EMOVE_LEAF_OBJECT_DATA_NORMAL_Z;
+        }
+        if ((at < 0) &&
+                (!((s->held_data.expected_range_mm >= 0.0) && (s->held_data.expected_range_mm <= 2000.0)))) {
+            at = EMOVE_LEAF_HELD_DATA_EXPECTED_RANGE_MM;
+        }
+        if ((at < 0) && (!((s->held_data.grip_range_mm >= 0.0) && (s->held_data.grip_range_mm <= 2000.0)))) {
+            at = EMOVE_LEAF_HELD_DATA_GRIP_RANGE_MM;
+        }
+        if ((at < 0) && (!((s->held_data.lift_mm >= (-500.0)) && (s->held_data.lift_mm <= 500.0)))) {
+            at = EMOVE_LEAF_HELD_DATA_LIFT_MM;
+        }
+        if ((at < 0) && (!((s->held_data.normal.x >= (-1.0)) && (s->held_data.normal.x <= 1.0)))) {
+            at = EMOVE_LEAF_HELD_DATA_NORMAL_X;
+        }
+        if ((at < 0) && (!((s->held_data.normal.y >= (-1.0)) && (s->held_data.normal.y <= 1.0)))) {
+            at = EMOVE_LEAF_HELD_DATA_NORMAL_Y;
+        }
+        if ((at < 0) && (!((s->held_data.normal.z >= (-1.0)) && (s->held_data.normal.z <= 1.0)))) {
+            at = EMOVE_LEAF_HELD_DATA_NORMAL_Z;
+        }
+        if (at >= 0) {
+            s->fault = EMOVE_FAULT_ADMIT;
+            s->fault_at = at;
+        } else {
+            s->from_vision.x_mm = s->from_vision.x_mm + 0.0;
+            s->from_vision.y_mm = s->from_vision.y_mm + 0.0;
+            s->from_vision.c = s->from_vision.c + 0.0;
+            s->from_vision.s = s->from_vision.s + 0.0;
+            s->from_vision.range_mm = s->from_vision.range_mm + 0.0;
+            s->object_data.expected_range_mm = s->object_data.expected_range_mm + 0.0;
+            s->object_data.grip_range_mm = s->object_data.grip_range_mm + 0.0;
+            s->object_data.lift_mm = s->object_data.lift_mm + 0.0;
+            s->object_data.normal.x = s->object_data.normal.x + 0.0;
+            s->object_data.normal.y = s->object_data.normal.y + 0.0;
+            s->object_data.normal.z = s->object_data.normal.z + 0.0;
+            s->held_data.expected_range_mm = s->held_data.expected_range_mm + 0.0;
+            s->held_data.grip_range_mm = s->held_data.grip_range_mm + 0.0;
+            s->held_data.lift_mm = s->held_data.lift_mm + 0.0;
+            s->held_data.normal.x = s->held_data.normal.x + 0.0;
+            s->held_data.normal.y = s->held_data.normal.y + 0.0;
+            s->held_data.normal.z = s->held_data.normal.z + 0.0;
+        }
     }
 }
 
 /* Deferred variables take their next values, all at once. */
 static void emove_settle(emove_t *s)
 {
-    const bool ready0 = (((int64_t)s->from_primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->from_vision.inc_command_echo == (int64_t)s->to_vision.inc_command));
-    const bool ready1 = ((int64_t)s->from_primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command);
-    const bool ready2 = ((int64_t)s->from_primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command);
+    const bool ready0 = (s->from_primitive.inc_command_echo == s->to_primitive.inc_command) &&
+            (s->from_vision.inc_command_echo == s->to_vision.inc_command);
+    const bool ready1 = s->from_primitive.inc_command_echo == s->to_primitive.inc_command;
+    const bool ready2 = s->from_primitive.inc_command_echo == s->to_primitive.inc_command;
     if (ready0) {
         s->cur_state = s->cur_state_next;
     }
@@ -677,107 +583,206 @@ static void emove_settle(emove_t *s)
     }
 }
 
+/* Assumption locate_in_step: A state goes with the orders that it waits for (section 9). */
+static bool emove_holds_locate_in_step(const emove_t *s)
+{
+    return s->new_command ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) &&
+                (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE)) ||
+            (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LOOKING) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS) &&
+                (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE)) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_FLOODING) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) &&
+                (s->vision.command == VOCABULARY_VISION_COMMAND_FLOOD_FLASH)) ||
+            (((s->cur_state == EMOVE_COMMON_EMOVE_STATE_CENTERING) ||
+                (s->cur_state == EMOVE_COMMON_EMOVE_STATE_HOVERING) ||
+                (s->cur_state == EMOVE_COMMON_EMOVE_STATE_LOWERING)) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTO) &&
+                (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE)) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LINING) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) &&
+                (s->vision.command == VOCABULARY_VISION_COMMAND_LINE_FLASH)) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_CLOSING) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS) &&
+                (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE));
+}
+
+/* Assumption move_to_in_step: A state goes with the orders that it waits for (section 9). */
+static bool emove_holds_move_to_in_step(const emove_t *s)
+{
+    return s->new_command ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
+            (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_THROUGH) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU)) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LAST) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTO));
+}
+
+/* Assumption move_to_obj_in_step: A state goes with the orders that it waits for (section 9). */
+static bool emove_holds_move_to_obj_in_step(const emove_t *s)
+{
+    return s->new_command ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
+            (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_THROUGH) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU)) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LAST) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTO)) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_OPENING) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS));
+}
+
+/* Assumption pickup_in_step: A state goes with the orders that it waits for (section 9). */
+static bool emove_holds_pickup_in_step(const emove_t *s)
+{
+    return s->new_command ||
+            (((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) ||
+                (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE)) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_GRASPING) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP));
+}
+
+/* Assumption release_part_in_step: A state goes with the orders that it waits for (section 9). */
+static bool emove_holds_release_part_in_step(const emove_t *s)
+{
+    return s->new_command ||
+            (((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) ||
+                (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE)) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
+            ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_RELEASING) &&
+                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS));
+}
+
 /* Matches table locate and runs the line. */
 static void emove_run_locate(emove_t *s)
 {
-    /* locate_in_step */
-    if (!(((!(!s->new_command)) || ((((((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(0))) || ((int64_t)s->cur_state == INT64_C(1))) || ((((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->primitive.command == INT64_C(4))) && ((int64_t)s->vision.command == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(1)))) || (((((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->primitive.command == INT64_C(1))) && ((int64_t)s->vision.command == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->primitive.command == INT64_C(0))) && ((int64_t)s->vision.command == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(9)) && ((int64_t)s->primitive.command == INT64_C(3))) && ((int64_t)s->vision.command == INT64_C(0))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
+    if (!emove_holds_locate_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_LOCATE_IN_STEP);
     }
     s->line = emove_locate_line(s);
     switch (s->line) {
-    case 0: /* emove/locate.rcs line 0 */
+    case EMOVE_LINE_LOCATE_0: /* emove/locate.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
         emove_do_pause(s);
         emove_do_executing(s);
         break;
-    case 1: /* emove/locate.rcs line 1 */
+    case EMOVE_LINE_LOCATE_1: /* emove/locate.rcs line 1: new_command true; idle true; target.known false */
         emove_do_no_place(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_failed(s);
         break;
-    case 2: /* emove/locate.rcs line 2 */
-        emove_do_nextstate(s, INT64_C(5));
+    case EMOVE_LINE_LOCATE_2: /* emove/locate.rcs line 2: new_command true; idle true; target.known true */
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_LOOKING);
         emove_do_open_fully(s);
         emove_do_executing(s);
         break;
-    case 3: /* emove/locate.rcs line 3 */
-        emove_do_nextstate(s, INT64_C(6));
+    /* emove/locate.rcs line 3: new_command false; primitive.command departure_position_fingers;
+       primitive.status done; cur_state looking */
+    case EMOVE_LINE_LOCATE_3:
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_FLOODING);
         emove_do_flood_flash(s);
         emove_do_executing(s);
         break;
-    case 4: /* emove/locate.rcs line 4 */
+    /* emove/locate.rcs line 4: new_command false; primitive.status /= failed; vision.command flood_flash;
+       vision.status done; cur_state flooding */
+    case EMOVE_LINE_LOCATE_4:
         emove_do_aim_view(s);
-        emove_do_nextstate(s, INT64_C(7));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_CENTERING);
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
-    case 5: /* emove/locate.rcs line 4a */
-        emove_do_nextstate(s, INT64_C(8));
+    /* emove/locate.rcs line 4a: new_command false; primitive.command goto; primitive.status done;
+       cur_state centering */
+    case EMOVE_LINE_LOCATE_4A:
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_LINING);
         emove_do_line_flash(s);
         emove_do_executing(s);
         break;
-    case 6: /* emove/locate.rcs line 5 */
+    /* emove/locate.rcs line 5: new_command false; primitive.status /= failed; vision.command line_flash;
+       vision.status done; cur_state lining */
+    case EMOVE_LINE_LOCATE_5:
         emove_do_aim_above(s);
-        emove_do_nextstate(s, INT64_C(9));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_CLOSING);
         emove_do_approach_position_fingers(s);
         emove_do_executing(s);
         break;
-    case 7: /* emove/locate.rcs line 6 */
-        emove_do_nextstate(s, INT64_C(10));
+    /* emove/locate.rcs line 6: new_command false; primitive.command approach_position_fingers;
+       primitive.status done; cur_state closing */
+    case EMOVE_LINE_LOCATE_6:
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_HOVERING);
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
-    case 8: /* emove/locate.rcs line 7 */
+    /* emove/locate.rcs line 7: new_command false; primitive.command goto; primitive.status done; cur_state
+       hovering */
+    case EMOVE_LINE_LOCATE_7:
         emove_do_aim_at_part(s);
-        emove_do_nextstate(s, INT64_C(11));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_LOWERING);
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
-    case 9: /* emove/locate.rcs line 8 */
+    /* emove/locate.rcs line 8: new_command false; primitive.command goto; primitive.status done; cur_state
+       lowering */
+    case EMOVE_LINE_LOCATE_8:
         emove_do_located(s);
-        emove_do_nextstate(s, INT64_C(0));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_D_STATE);
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 10: /* emove/locate.rcs line 9 */
+    case EMOVE_LINE_LOCATE_9: /* emove/locate.rcs line 9: new_command false; cur_state d_state */
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 11: /* emove/locate.rcs line 10 */
+    /* emove/locate.rcs line 10: new_command false; primitive.status failed; cur_state in {looking,
+       flooding, centering, lining, closing, hovering, lowering} */
+    case EMOVE_LINE_LOCATE_10:
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 12: /* emove/locate.rcs line 11 */
+    /* emove/locate.rcs line 11: new_command false; primitive.status /= failed; vision.status failed;
+       cur_state in {flooding, lining} */
+    case EMOVE_LINE_LOCATE_11:
         emove_do_vision_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 13: /* emove/locate.rcs line 12 */
+    case EMOVE_LINE_LOCATE_12: /* emove/locate.rcs line 12: new_command false; cur_state f_state */
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 14: /* emove/locate.rcs line 13 */
+    /* emove/locate.rcs line 13: new_command false; primitive.status executing; cur_state in {looking,
+       centering, closing, hovering, lowering} */
+    case EMOVE_LINE_LOCATE_13:
         emove_do_executing(s);
         break;
-    case 15: /* emove/locate.rcs line 14 */
+    /* emove/locate.rcs line 14: new_command false; primitive.status /= failed; vision.status executing;
+       cur_state in {flooding, lining} */
+    case EMOVE_LINE_LOCATE_14:
         emove_do_executing(s);
         break;
-    case 16: /* emove/locate.rcs line 15 */
+    case EMOVE_LINE_LOCATE_15: /* emove/locate.rcs line 15: no other line matches */
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = EMOVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -785,92 +790,107 @@ static void emove_run_locate(emove_t *s)
 /* Matches table move_to and runs the line. */
 static void emove_run_move_to(emove_t *s)
 {
-    /* move_to_in_step */
-    if (!(((!(!s->new_command)) || ((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->primitive.command == INT64_C(0))) || ((int64_t)s->cur_state == INT64_C(1))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->primitive.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->primitive.command == INT64_C(1))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
+    if (!emove_holds_move_to_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_IN_STEP);
     }
     s->line = emove_move_to_line(s);
     switch (s->line) {
-    case 0: /* emove/move_to.rcs line 0 */
+    case EMOVE_LINE_MOVE_TO_0: /* emove/move_to.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
         emove_do_pause(s);
         emove_do_executing(s);
         break;
-    case 1: /* emove/move_to.rcs line 1 */
+    case EMOVE_LINE_MOVE_TO_1: /* emove/move_to.rcs line 1: new_command true; idle true; target.known false */
         emove_do_no_place(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_failed(s);
         break;
-    case 2: /* emove/move_to.rcs line 2 */
+    /* emove/move_to.rcs line 2: new_command true; idle true; target.known true; path_length 0 */
+    case EMOVE_LINE_MOVE_TO_2:
         emove_do_no_place(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_failed(s);
         break;
-    case 3: /* emove/move_to.rcs line 3 */
+    /* emove/move_to.rcs line 3: new_command true; idle true; target.known true; path_length 1 */
+    case EMOVE_LINE_MOVE_TO_3:
         emove_do_aim_first(s);
-        emove_do_nextstate(s, INT64_C(3));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_LAST);
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
-    case 4: /* emove/move_to.rcs line 4 */
+    /* emove/move_to.rcs line 4: new_command true; idle true; target.known true; path_length > 1 */
+    case EMOVE_LINE_MOVE_TO_4:
         emove_do_aim_first(s);
-        emove_do_nextstate(s, INT64_C(2));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_THROUGH);
         emove_do_gothru(s);
         emove_do_executing(s);
         break;
-    case 5: /* emove/move_to.rcs line 5 */
+    /* emove/move_to.rcs line 5: new_command false; primitive.command gothru; primitive.status done;
+       cur_state through; path_length - path_at > 2 */
+    case EMOVE_LINE_MOVE_TO_5:
         emove_do_aim_next(s);
-        emove_do_nextstate(s, INT64_C(2));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_THROUGH);
         emove_do_gothru(s);
         emove_do_executing(s);
         break;
-    case 6: /* emove/move_to.rcs line 6 */
+    /* emove/move_to.rcs line 6: new_command false; primitive.command gothru; primitive.status done;
+       cur_state through; path_length - path_at <= 2 */
+    case EMOVE_LINE_MOVE_TO_6:
         emove_do_aim_last(s);
-        emove_do_nextstate(s, INT64_C(3));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_LAST);
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
-    case 7: /* emove/move_to.rcs line 7 */
+    /* emove/move_to.rcs line 7: new_command false; primitive.command goto; primitive.status done;
+       cur_state last; lost false */
+    case EMOVE_LINE_MOVE_TO_7:
         emove_do_arrived(s);
-        emove_do_nextstate(s, INT64_C(0));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_D_STATE);
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 8: /* emove/move_to.rcs line 7a */
+    /* emove/move_to.rcs line 7a: new_command false; primitive.command goto; primitive.status done;
+       cur_state last; lost true */
+    case EMOVE_LINE_MOVE_TO_7A:
         emove_do_part_lost(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 9: /* emove/move_to.rcs line 8 */
+    case EMOVE_LINE_MOVE_TO_8: /* emove/move_to.rcs line 8: new_command false; cur_state d_state */
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 10: /* emove/move_to.rcs line 9 */
+    /* emove/move_to.rcs line 9: new_command false; primitive.command in {goto, gothru}; primitive.status
+       failed; cur_state /= f_state */
+    case EMOVE_LINE_MOVE_TO_9:
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 11: /* emove/move_to.rcs line 10 */
+    case EMOVE_LINE_MOVE_TO_10: /* emove/move_to.rcs line 10: new_command false; cur_state f_state */
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 12: /* emove/move_to.rcs line 11 */
+    /* emove/move_to.rcs line 11: new_command false; primitive.status executing; cur_state in {through,
+       last} */
+    case EMOVE_LINE_MOVE_TO_11:
         emove_do_executing(s);
         break;
-    case 13: /* emove/move_to.rcs line 12 */
+    case EMOVE_LINE_MOVE_TO_12: /* emove/move_to.rcs line 12: no other line matches */
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = EMOVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -878,91 +898,108 @@ static void emove_run_move_to(emove_t *s)
 /* Matches table move_to_obj and runs the line. */
 static void emove_run_move_to_obj(emove_t *s)
 {
-    /* move_to_obj_in_step */
-    if (!(((!(!s->new_command)) || (((((((int64_t)s->cur_state == INT64_C(0)) && ((int64_t)s->primitive.command == INT64_C(0))) || ((int64_t)s->cur_state == INT64_C(1))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->primitive.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->primitive.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->primitive.command == INT64_C(3))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 2u);
+    if (!emove_holds_move_to_obj_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_OBJ_IN_STEP);
     }
     s->line = emove_move_to_obj_line(s);
     switch (s->line) {
-    case 0: /* emove/move_to_obj.rcs line 0 */
+    case EMOVE_LINE_MOVE_TO_OBJ_0: /* emove/move_to_obj.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
         emove_do_pause(s);
         emove_do_executing(s);
         break;
-    case 1: /* emove/move_to_obj.rcs line 1 */
+    /* emove/move_to_obj.rcs line 1: new_command true; idle true; target.known false */
+    case EMOVE_LINE_MOVE_TO_OBJ_1:
         emove_do_no_place(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_failed(s);
         break;
-    case 2: /* emove/move_to_obj.rcs line 2 */
+    /* emove/move_to_obj.rcs line 2: new_command true; idle true; target.known true; path_length 0 */
+    case EMOVE_LINE_MOVE_TO_OBJ_2:
         emove_do_no_place(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_failed(s);
         break;
-    case 3: /* emove/move_to_obj.rcs line 3 */
-        emove_do_nextstate(s, INT64_C(4));
+    /* emove/move_to_obj.rcs line 3: new_command true; idle true; target.known true; path_length > 0 */
+    case EMOVE_LINE_MOVE_TO_OBJ_3:
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_OPENING);
         emove_do_approach_position_fingers(s);
         emove_do_executing(s);
         break;
-    case 4: /* emove/move_to_obj.rcs line 4 */
+    /* emove/move_to_obj.rcs line 4: new_command false; primitive.command approach_position_fingers;
+       primitive.status done; cur_state opening; path_length <= 1 */
+    case EMOVE_LINE_MOVE_TO_OBJ_4:
         emove_do_aim_first(s);
-        emove_do_nextstate(s, INT64_C(3));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_LAST);
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
-    case 5: /* emove/move_to_obj.rcs line 5 */
+    /* emove/move_to_obj.rcs line 5: new_command false; primitive.command approach_position_fingers;
+       primitive.status done; cur_state opening; path_length > 1 */
+    case EMOVE_LINE_MOVE_TO_OBJ_5:
         emove_do_aim_first(s);
-        emove_do_nextstate(s, INT64_C(2));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_THROUGH);
         emove_do_gothru(s);
         emove_do_executing(s);
         break;
-    case 6: /* emove/move_to_obj.rcs line 6 */
+    /* emove/move_to_obj.rcs line 6: new_command false; primitive.command gothru; primitive.status done;
+       cur_state through; path_length - path_at > 2 */
+    case EMOVE_LINE_MOVE_TO_OBJ_6:
         emove_do_aim_next(s);
-        emove_do_nextstate(s, INT64_C(2));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_THROUGH);
         emove_do_gothru(s);
         emove_do_executing(s);
         break;
-    case 7: /* emove/move_to_obj.rcs line 7 */
+    /* emove/move_to_obj.rcs line 7: new_command false; primitive.command gothru; primitive.status done;
+       cur_state through; path_length - path_at <= 2 */
+    case EMOVE_LINE_MOVE_TO_OBJ_7:
         emove_do_aim_last(s);
-        emove_do_nextstate(s, INT64_C(3));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_LAST);
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
-    case 8: /* emove/move_to_obj.rcs line 8 */
+    /* emove/move_to_obj.rcs line 8: new_command false; primitive.command goto; primitive.status done;
+       cur_state last */
+    case EMOVE_LINE_MOVE_TO_OBJ_8:
         emove_do_arrived(s);
-        emove_do_nextstate(s, INT64_C(0));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_D_STATE);
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 9: /* emove/move_to_obj.rcs line 9 */
+    case EMOVE_LINE_MOVE_TO_OBJ_9: /* emove/move_to_obj.rcs line 9: new_command false; cur_state d_state */
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 10: /* emove/move_to_obj.rcs line 10 */
+    /* emove/move_to_obj.rcs line 10: new_command false; primitive.command in {goto, gothru,
+       approach_position_fingers}; primitive.status failed; cur_state /= f_state */
+    case EMOVE_LINE_MOVE_TO_OBJ_10:
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 11: /* emove/move_to_obj.rcs line 11 */
+    case EMOVE_LINE_MOVE_TO_OBJ_11: /* emove/move_to_obj.rcs line 11: new_command false; cur_state f_state */
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 12: /* emove/move_to_obj.rcs line 12 */
+    /* emove/move_to_obj.rcs line 12: new_command false; primitive.status executing; cur_state in {opening,
+       through, last} */
+    case EMOVE_LINE_MOVE_TO_OBJ_12:
         emove_do_executing(s);
         break;
-    case 13: /* emove/move_to_obj.rcs line 13 */
+    case EMOVE_LINE_MOVE_TO_OBJ_13: /* emove/move_to_obj.rcs line 13: no other line matches */
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = EMOVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -972,23 +1009,23 @@ static void emove_run_pause_emove(emove_t *s)
 {
     s->line = emove_pause_emove_line(s);
     switch (s->line) {
-    case 0: /* emove/pause.rcs line 1 */
-        emove_do_nextstate(s, INT64_C(0));
+    case EMOVE_LINE_PAUSE_EMOVE_1: /* emove/pause.rcs line 1: idle true */
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_D_STATE);
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 1: /* emove/pause.rcs line 2 */
+    case EMOVE_LINE_PAUSE_EMOVE_2: /* emove/pause.rcs line 2: idle false */
         emove_do_settle(s);
-        emove_do_nextstate(s, INT64_C(0));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_D_STATE);
         emove_do_pause(s);
         emove_do_executing(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = EMOVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -996,56 +1033,61 @@ static void emove_run_pause_emove(emove_t *s)
 /* Matches table pickup and runs the line. */
 static void emove_run_pickup(emove_t *s)
 {
-    /* pickup_in_step */
-    if (!(((!(!s->new_command)) || (((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->primitive.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->primitive.command == INT64_C(5))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 3u);
+    if (!emove_holds_pickup_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_PICKUP_IN_STEP);
     }
     s->line = emove_pickup_line(s);
     switch (s->line) {
-    case 0: /* emove/pickup.rcs line 0 */
+    case EMOVE_LINE_PICKUP_0: /* emove/pickup.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
         emove_do_pause(s);
         emove_do_executing(s);
         break;
-    case 1: /* emove/pickup.rcs line 1 */
-        emove_do_nextstate(s, INT64_C(12));
+    case EMOVE_LINE_PICKUP_1: /* emove/pickup.rcs line 1: new_command true; idle true */
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_GRASPING);
         emove_do_immed_grasp(s);
         emove_do_executing(s);
         break;
-    case 2: /* emove/pickup.rcs line 2 */
-        emove_do_nextstate(s, INT64_C(0));
+    /* emove/pickup.rcs line 2: new_command false; primitive.command immed_grasp; primitive.status done;
+       cur_state grasping */
+    case EMOVE_LINE_PICKUP_2:
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_D_STATE);
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 3: /* emove/pickup.rcs line 3 */
+    case EMOVE_LINE_PICKUP_3: /* emove/pickup.rcs line 3: new_command false; cur_state d_state */
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 4: /* emove/pickup.rcs line 4 */
+    /* emove/pickup.rcs line 4: new_command false; primitive.command immed_grasp; primitive.status failed;
+       cur_state grasping */
+    case EMOVE_LINE_PICKUP_4:
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 5: /* emove/pickup.rcs line 5 */
+    case EMOVE_LINE_PICKUP_5: /* emove/pickup.rcs line 5: new_command false; cur_state f_state */
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 6: /* emove/pickup.rcs line 6 */
+    /* emove/pickup.rcs line 6: new_command false; primitive.status executing; cur_state grasping */
+    case EMOVE_LINE_PICKUP_6:
         emove_do_executing(s);
         break;
-    case 7: /* emove/pickup.rcs line 7 */
+    case EMOVE_LINE_PICKUP_7: /* emove/pickup.rcs line 7: no other line matches */
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = EMOVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -1053,62 +1095,67 @@ static void emove_run_pickup(emove_t *s)
 /* Matches table release_part and runs the line. */
 static void emove_run_release_part(emove_t *s)
 {
-    /* release_part_in_step */
-    if (!(((!(!s->new_command)) || (((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->primitive.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(13)) && ((int64_t)s->primitive.command == INT64_C(4))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 4u);
+    if (!emove_holds_release_part_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_RELEASE_PART_IN_STEP);
     }
     s->line = emove_release_part_line(s);
     switch (s->line) {
-    case 0: /* emove/release.rcs line 0 */
+    case EMOVE_LINE_RELEASE_PART_0: /* emove/release.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
         emove_do_pause(s);
         emove_do_executing(s);
         break;
-    case 1: /* emove/release.rcs line 1 */
-        emove_do_nextstate(s, INT64_C(13));
+    case EMOVE_LINE_RELEASE_PART_1: /* emove/release.rcs line 1: new_command true; idle true; lost false */
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_RELEASING);
         emove_do_departure_position_fingers(s);
         emove_do_executing(s);
         break;
-    case 2: /* emove/release.rcs line 1a */
+    case EMOVE_LINE_RELEASE_PART_1A: /* emove/release.rcs line 1a: new_command true; idle true; lost true */
         emove_do_part_lost(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 3: /* emove/release.rcs line 2 */
-        emove_do_nextstate(s, INT64_C(0));
+    /* emove/release.rcs line 2: new_command false; primitive.command departure_position_fingers;
+       primitive.status done; cur_state releasing */
+    case EMOVE_LINE_RELEASE_PART_2:
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_D_STATE);
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 4: /* emove/release.rcs line 3 */
+    case EMOVE_LINE_RELEASE_PART_3: /* emove/release.rcs line 3: new_command false; cur_state d_state */
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 5: /* emove/release.rcs line 4 */
+    /* emove/release.rcs line 4: new_command false; primitive.command departure_position_fingers;
+       primitive.status failed; cur_state releasing */
+    case EMOVE_LINE_RELEASE_PART_4:
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 6: /* emove/release.rcs line 5 */
+    case EMOVE_LINE_RELEASE_PART_5: /* emove/release.rcs line 5: new_command false; cur_state f_state */
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case 7: /* emove/release.rcs line 6 */
+    /* emove/release.rcs line 6: new_command false; primitive.status executing; cur_state releasing */
+    case EMOVE_LINE_RELEASE_PART_6:
         emove_do_executing(s);
         break;
-    case 8: /* emove/release.rcs line 7 */
+    case EMOVE_LINE_RELEASE_PART_7: /* emove/release.rcs line 7: no other line matches */
         emove_do_primitive_failure(s);
-        emove_do_nextstate(s, INT64_C(1));
+        emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_F_STATE);
         emove_do_pause(s);
         emove_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = EMOVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -1117,84 +1164,84 @@ static void emove_run_release_part(emove_t *s)
 void emove_init(emove_t *s)
 {
     s->line = -1;
-    s->fault = 0;
+    s->fault = EMOVE_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->task.inc_command = (uint16_t)INT64_C(0);
-    s->task.input_command = (uint8_t)INT64_C(0);
-    s->task.obj_ptr = (uint8_t)INT64_C(0);
-    s->task.grasp = (uint8_t)INT64_C(0);
-    s->task.locpt_ptr = (uint8_t)INT64_C(0);
-    s->task.sector = (uint8_t)INT64_C(0);
+    s->task.inc_command = 0u;
+    s->task.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->task.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
+    s->task.grasp = 0u;
+    s->task.locpt_ptr = 0u;
+    s->task.sector = 0u;
     s->task.apoint_pos_flag = false;
-    s->task.gripped_obj_ptr = (uint8_t)INT64_C(0);
-    s->to_task.inc_command_echo = (uint16_t)INT64_C(0);
-    s->to_task.ref_command_echo = (uint8_t)INT64_C(0);
-    s->to_task.status_report = (uint8_t)INT64_C(0);
-    s->to_task.failure = (uint8_t)INT64_C(0);
+    s->task.gripped_obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
+    s->to_task.inc_command_echo = 0u;
+    s->to_task.ref_command_echo = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->to_task.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->to_task.failure = VOCABULARY_REASON_NONE;
     s->new_command = false;
     s->answered = false;
     s->settling = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
-    s->from_primitive.inc_command_echo = (uint16_t)INT64_C(0);
-    s->from_primitive.ref_command_echo = (uint8_t)INT64_C(0);
-    s->from_primitive.status_report = (uint8_t)INT64_C(0);
-    s->from_primitive.failure = (uint8_t)INT64_C(0);
+    s->inc_command_seen = 0u;
+    s->from_primitive.inc_command_echo = 0u;
+    s->from_primitive.ref_command_echo = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->from_primitive.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->from_primitive.failure = VOCABULARY_REASON_NONE;
     s->from_primitive.holds = false;
-    s->to_primitive.inc_command = (uint16_t)INT64_C(0);
-    s->to_primitive.input_command = (uint8_t)INT64_C(0);
-    s->to_primitive.obj_ptr = (uint8_t)INT64_C(0);
-    s->to_primitive.grasp = (uint8_t)INT64_C(0);
-    s->to_primitive.pose_ptr = (uint16_t)INT64_C(0);
+    s->to_primitive.inc_command = 0u;
+    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->to_primitive.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
+    s->to_primitive.grasp = 0u;
+    s->to_primitive.pose_ptr = 0u;
     s->to_primitive.displaced.x = (-500.0);
     s->to_primitive.displaced.y = (-500.0);
     s->to_primitive.displaced.z = (-500.0);
     s->to_primitive.displaced.c = (-1.0);
     s->to_primitive.displaced.s = (-1.0);
-    s->primitive.command = (uint8_t)INT64_C(0);
-    s->primitive.status = (uint8_t)INT64_C(0);
+    s->primitive.command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->primitive.status = VOCABULARY_LEVEL_STATUS_DONE;
     s->primitive.resting = false;
-    s->primitive.failure = (uint8_t)INT64_C(0);
-    s->last_primitive.input_command = (uint8_t)INT64_C(0);
-    s->last_primitive.obj_ptr = (uint8_t)INT64_C(0);
-    s->last_primitive.grasp = (uint8_t)INT64_C(0);
-    s->last_primitive.pose_ptr = (uint16_t)INT64_C(0);
+    s->primitive.failure = VOCABULARY_REASON_NONE;
+    s->last_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->last_primitive.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
+    s->last_primitive.grasp = 0u;
+    s->last_primitive.pose_ptr = 0u;
     s->last_primitive.displaced.x = (-500.0);
     s->last_primitive.displaced.y = (-500.0);
     s->last_primitive.displaced.z = (-500.0);
     s->last_primitive.displaced.c = (-1.0);
     s->last_primitive.displaced.s = (-1.0);
-    s->from_vision.inc_command_echo = (uint16_t)INT64_C(0);
-    s->from_vision.ref_command_echo = (uint8_t)INT64_C(0);
-    s->from_vision.status_report = (uint8_t)INT64_C(0);
-    s->from_vision.failure = (uint8_t)INT64_C(0);
+    s->from_vision.inc_command_echo = 0u;
+    s->from_vision.ref_command_echo = VOCABULARY_VISION_COMMAND_PAUSE;
+    s->from_vision.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->from_vision.failure = VOCABULARY_REASON_NONE;
     s->from_vision.x_mm = (-500.0);
     s->from_vision.y_mm = (-500.0);
     s->from_vision.c = (-1.0);
     s->from_vision.s = (-1.0);
     s->from_vision.range_mm = 0.0;
-    s->to_vision.inc_command = (uint16_t)INT64_C(0);
-    s->to_vision.input_command = (uint8_t)INT64_C(0);
-    s->to_vision.obj_ptr = (uint8_t)INT64_C(0);
+    s->to_vision.inc_command = 0u;
+    s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
+    s->to_vision.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->to_vision.expected_range_mm = 0.0;
     s->to_vision.expected_normal.x = (-1.0);
     s->to_vision.expected_normal.y = (-1.0);
     s->to_vision.expected_normal.z = (-1.0);
-    s->vision.command = (uint8_t)INT64_C(0);
-    s->vision.status = (uint8_t)INT64_C(0);
+    s->vision.command = VOCABULARY_VISION_COMMAND_PAUSE;
+    s->vision.status = VOCABULARY_LEVEL_STATUS_DONE;
     s->vision.resting = false;
-    s->vision.failure = (uint8_t)INT64_C(0);
-    s->last_vision.input_command = (uint8_t)INT64_C(0);
-    s->last_vision.obj_ptr = (uint8_t)INT64_C(0);
+    s->vision.failure = VOCABULARY_REASON_NONE;
+    s->last_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
+    s->last_vision.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->path.known = false;
-    s->path.depart_first = (uint16_t)INT64_C(0);
-    s->path.depart_count = (uint8_t)INT64_C(0);
-    s->path.approach_first = (uint16_t)INT64_C(0);
-    s->path.approach_count = (uint8_t)INT64_C(0);
+    s->path.depart_first = 0u;
+    s->path.depart_count = 0u;
+    s->path.approach_first = 0u;
+    s->path.approach_count = 0u;
     s->target.known = false;
-    s->target.hover_point = (uint16_t)INT64_C(0);
-    s->target.grasp_point = (uint16_t)INT64_C(0);
-    s->target.view_point = (uint16_t)INT64_C(0);
+    s->target.hover_point = 0u;
+    s->target.grasp_point = 0u;
+    s->target.view_point = 0u;
     s->object_data.known = false;
     s->object_data.expected_range_mm = 0.0;
     s->object_data.grip_range_mm = 0.0;
@@ -1210,19 +1257,19 @@ void emove_init(emove_t *s)
     s->held_data.normal.y = (-1.0);
     s->held_data.normal.z = (-1.0);
     s->idle = true;
-    s->cur_state = (uint8_t)INT64_C(0);
-    s->cur_state_next = (uint8_t)INT64_C(0);
-    s->path_at = (uint8_t)INT64_C(0);
-    s->path_at_next = (uint8_t)INT64_C(0);
-    s->here = (uint8_t)INT64_C(0);
-    s->here_next = (uint8_t)INT64_C(0);
-    s->here_sector = (uint8_t)INT64_C(0);
-    s->here_asked = (uint8_t)INT64_C(0);
-    s->here_sector_asked = (uint8_t)INT64_C(0);
-    s->depart_first = (uint16_t)INT64_C(0);
-    s->depart_count = (uint8_t)INT64_C(0);
-    s->approach_first = (uint16_t)INT64_C(0);
-    s->path_length = (uint8_t)INT64_C(0);
+    s->cur_state = EMOVE_COMMON_EMOVE_STATE_D_STATE;
+    s->cur_state_next = EMOVE_COMMON_EMOVE_STATE_D_STATE;
+    s->path_at = 0u;
+    s->path_at_next = 0u;
+    s->here = 0u;
+    s->here_next = 0u;
+    s->here_sector = 0u;
+    s->here_asked = 0u;
+    s->here_sector_asked = 0u;
+    s->depart_first = 0u;
+    s->depart_count = 0u;
+    s->approach_first = 0u;
+    s->path_length = 0u;
     s->displaced_here.x = (-500.0);
     s->displaced_here.y = (-500.0);
     s->displaced_here.z = (-500.0);
@@ -1233,204 +1280,218 @@ void emove_init(emove_t *s)
     s->echoed = false;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t emove_check(const emove_t *s)
 {
     int32_t at = -1;
     if ((at < 0) && ((*(const uint8_t *)&s->task.apoint_pos_flag) > 1u)) {
-        at = 6;
+        at = EMOVE_LEAF_TASK_APOINT_POS_FLAG;
     }
-    if ((at < 0) && (((int64_t)s->to_task.ref_command_echo > INT64_C(5)))) {
-        at = 9;
+    if ((at < 0) && (s->to_task.ref_command_echo > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+        at = EMOVE_LEAF_TO_TASK_REF_COMMAND_ECHO;
     }
-    if ((at < 0) && (((int64_t)s->to_task.status_report > INT64_C(2)))) {
-        at = 10;
+    if ((at < 0) && (s->to_task.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = EMOVE_LEAF_TO_TASK_STATUS_REPORT;
     }
-    if ((at < 0) && (((int64_t)s->to_task.failure > INT64_C(17)))) {
-        at = 11;
+    if ((at < 0) && (s->to_task.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = EMOVE_LEAF_TO_TASK_FAILURE;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
-        at = 12;
+        at = EMOVE_LEAF_NEW_COMMAND;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
-        at = 13;
+        at = EMOVE_LEAF_ANSWERED;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
-        at = 14;
+        at = EMOVE_LEAF_SETTLING;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->from_primitive.holds) > 1u)) {
-        at = 20;
+        at = EMOVE_LEAF_FROM_PRIMITIVE_HOLDS;
     }
-    if ((at < 0) && (((int64_t)s->to_primitive.input_command > INT64_C(5)))) {
-        at = 22;
+    if ((at < 0) && (s->to_primitive.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+        at = EMOVE_LEAF_TO_PRIMITIVE_INPUT_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->to_primitive.obj_ptr > INT64_C(7)))) {
-        at = 23;
+    if ((at < 0) && (s->to_primitive.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = EMOVE_LEAF_TO_PRIMITIVE_OBJ_PTR;
     }
-    if ((at < 0) && (((int64_t)s->to_primitive.grasp > INT64_C(9)))) {
-        at = 24;
+    if ((at < 0) && (s->to_primitive.grasp > 9u)) {
+        at = EMOVE_LEAF_TO_PRIMITIVE_GRASP;
     }
-    if ((at < 0) && (((int64_t)s->to_primitive.pose_ptr > INT64_C(9999)))) {
-        at = 25;
+    if ((at < 0) && (s->to_primitive.pose_ptr > 9999u)) {
+        at = EMOVE_LEAF_TO_PRIMITIVE_POSE_PTR;
     }
-    if ((at < 0) && (!((s->to_primitive.displaced.x >= (-500.0)) && (s->to_primitive.displaced.x <= 500.0)))) {
-        at = 26;
+    if ((at < 0) &&
+            (!((s->to_primitive.displaced.x >= (-500.0)) && (s->to_primitive.displaced.x <= 500.0)))) {
+        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_X;
     }
-    if ((at < 0) && (!((s->to_primitive.displaced.y >= (-500.0)) && (s->to_primitive.displaced.y <= 500.0)))) {
-        at = 27;
+    if ((at < 0) &&
+            (!((s->to_primitive.displaced.y >= (-500.0)) && (s->to_primitive.displaced.y <= 500.0)))) {
+        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_Y;
     }
-    if ((at < 0) && (!((s->to_primitive.displaced.z >= (-500.0)) && (s->to_primitive.displaced.z <= 500.0)))) {
-        at = 28;
+    if ((at < 0) &&
+            (!((s->to_primitive.displaced.z >= (-500.0)) && (s->to_primitive.displaced.z <= 500.0)))) {
+        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_Z;
     }
     if ((at < 0) && (!((s->to_primitive.displaced.c >= (-1.0)) && (s->to_primitive.displaced.c <= 1.0)))) {
-        at = 29;
+        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_C;
     }
     if ((at < 0) && (!((s->to_primitive.displaced.s >= (-1.0)) && (s->to_primitive.displaced.s <= 1.0)))) {
-        at = 30;
+        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_S;
     }
-    if ((at < 0) && (((int64_t)s->primitive.command > INT64_C(5)))) {
-        at = 31;
+    if ((at < 0) && (s->primitive.command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+        at = EMOVE_LEAF_PRIMITIVE_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->primitive.status > INT64_C(2)))) {
-        at = 32;
+    if ((at < 0) && (s->primitive.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = EMOVE_LEAF_PRIMITIVE_STATUS;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->primitive.resting) > 1u)) {
-        at = 33;
+        at = EMOVE_LEAF_PRIMITIVE_RESTING;
     }
-    if ((at < 0) && (((int64_t)s->primitive.failure > INT64_C(17)))) {
-        at = 34;
+    if ((at < 0) && (s->primitive.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = EMOVE_LEAF_PRIMITIVE_FAILURE;
     }
-    if ((at < 0) && (((int64_t)s->last_primitive.input_command > INT64_C(5)))) {
-        at = 35;
+    if ((at < 0) && (s->last_primitive.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+        at = EMOVE_LEAF_LAST_PRIMITIVE_INPUT_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->last_primitive.obj_ptr > INT64_C(7)))) {
-        at = 36;
+    if ((at < 0) && (s->last_primitive.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = EMOVE_LEAF_LAST_PRIMITIVE_OBJ_PTR;
     }
-    if ((at < 0) && (((int64_t)s->last_primitive.grasp > INT64_C(9)))) {
-        at = 37;
+    if ((at < 0) && (s->last_primitive.grasp > 9u)) {
+        at = EMOVE_LEAF_LAST_PRIMITIVE_GRASP;
     }
-    if ((at < 0) && (((int64_t)s->last_primitive.pose_ptr > INT64_C(9999)))) {
-        at = 38;
+    if ((at < 0) && (s->last_primitive.pose_ptr > 9999u)) {
+        at = EMOVE_LEAF_LAST_PRIMITIVE_POSE_PTR;
     }
-    if ((at < 0) && (!((s->last_primitive.displaced.x >= (-500.0)) && (s->last_primitive.displaced.x <= 500.0)))) {
-        at = 39;
+    if ((at < 0) &&
+            (!((s->last_primitive.displaced.x >= (-500.0)) && (s->last_primitive.displaced.x <= 500.0)))) {
+        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_X;
     }
-    if ((at < 0) && (!((s->last_primitive.displaced.y >= (-500.0)) && (s->last_primitive.displaced.y <= 500.0)))) {
-        at = 40;
+    if ((at < 0) &&
+            (!((s->last_primitive.displaced.y >= (-500.0)) && (s->last_primitive.displaced.y <= 500.0)))) {
+        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_Y;
     }
-    if ((at < 0) && (!((s->last_primitive.displaced.z >= (-500.0)) && (s->last_primitive.displaced.z <= 500.0)))) {
-        at = 41;
+    if ((at < 0) &&
+            (!((s->last_primitive.displaced.z >= (-500.0)) && (s->last_primitive.displaced.z <= 500.0)))) {
+        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_Z;
     }
-    if ((at < 0) && (!((s->last_primitive.displaced.c >= (-1.0)) && (s->last_primitive.displaced.c <= 1.0)))) {
-        at = 42;
+    if ((at < 0) &&
+            (!((s->last_primitive.displaced.c >= (-1.0)) && (s->last_primitive.displaced.c <= 1.0)))) {
+        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_C;
     }
-    if ((at < 0) && (!((s->last_primitive.displaced.s >= (-1.0)) && (s->last_primitive.displaced.s <= 1.0)))) {
-        at = 43;
+    if ((at < 0) &&
+            (!((s->last_primitive.displaced.s >= (-1.0)) && (s->last_primitive.displaced.s <= 1.0)))) {
+        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_S;
     }
-    if ((at < 0) && (((int64_t)s->to_vision.input_command > INT64_C(2)))) {
-        at = 54;
+    if ((at < 0) && (s->to_vision.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+        at = EMOVE_LEAF_TO_VISION_INPUT_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->to_vision.obj_ptr > INT64_C(7)))) {
-        at = 55;
+    if ((at < 0) && (s->to_vision.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = EMOVE_LEAF_TO_VISION_OBJ_PTR;
     }
-    if ((at < 0) && (!((s->to_vision.expected_range_mm >= 0.0) && (s->to_vision.expected_range_mm <= 2000.0)))) {
-        at = 56;
+    if ((at < 0) &&
+            (!((s->to_vision.expected_range_mm >= 0.0) && (s->to_vision.expected_range_mm <= 2000.0)))) {
+        at = EMOVE_LEAF_TO_VISION_EXPECTED_RANGE_MM;
     }
-    if ((at < 0) && (!((s->to_vision.expected_normal.x >= (-1.0)) && (s->to_vision.expected_normal.x <= 1.0)))) {
-        at = 57;
+    if ((at < 0) &&
+            (!((s->to_vision.expected_normal.x >= (-1.0)) && (s->to_vision.expected_normal.x <= 1.0)))) {
+        at = EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_X;
     }
-    if ((at < 0) && (!((s->to_vision.expected_normal.y >= (-1.0)) && (s->to_vision.expected_normal.y <= 1.0)))) {
-        at = 58;
+    if ((at < 0) &&
+            (!((s->to_vision.expected_normal.y >= (-1.0)) && (s->to_vision.expected_normal.y <= 1.0)))) {
+        at = EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_Y;
     }
-    if ((at < 0) && (!((s->to_vision.expected_normal.z >= (-1.0)) && (s->to_vision.expected_normal.z <= 1.0)))) {
-        at = 59;
+    if ((at < 0) &&
+            (!((s->to_vision.expected_normal.z >= (-1.0)) && (s->to_vision.expected_normal.z <= 1.0)))) {
+        at = EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_Z;
     }
-    if ((at < 0) && (((int64_t)s->vision.command > INT64_C(2)))) {
-        at = 60;
+    if ((at < 0) && (s->vision.command > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+        at = EMOVE_LEAF_VISION_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->vision.status > INT64_C(2)))) {
-        at = 61;
+    if ((at < 0) && (s->vision.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = EMOVE_LEAF_VISION_STATUS;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->vision.resting) > 1u)) {
-        at = 62;
+        at = EMOVE_LEAF_VISION_RESTING;
     }
-    if ((at < 0) && (((int64_t)s->vision.failure > INT64_C(17)))) {
-        at = 63;
+    if ((at < 0) && (s->vision.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = EMOVE_LEAF_VISION_FAILURE;
     }
-    if ((at < 0) && (((int64_t)s->last_vision.input_command > INT64_C(2)))) {
-        at = 64;
+    if ((at < 0) && (s->last_vision.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+        at = EMOVE_LEAF_LAST_VISION_INPUT_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->last_vision.obj_ptr > INT64_C(7)))) {
-        at = 65;
+    if ((at < 0) && (s->last_vision.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = EMOVE_LEAF_LAST_VISION_OBJ_PTR;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->path.known) > 1u)) {
-        at = 66;
+        at = EMOVE_LEAF_PATH_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->target.known) > 1u)) {
-        at = 71;
+        at = EMOVE_LEAF_TARGET_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->object_data.known) > 1u)) {
-        at = 75;
+        at = EMOVE_LEAF_OBJECT_DATA_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->held_data.known) > 1u)) {
-        at = 82;
+        at = EMOVE_LEAF_HELD_DATA_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
-        at = 89;
+        at = EMOVE_LEAF_IDLE;
     }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(13)))) {
-        at = 90;
+    if ((at < 0) && (s->cur_state > EMOVE_COMMON_EMOVE_STATE_RELEASING)) {
+        at = EMOVE_LEAF_CUR_STATE;
     }
-    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(13)))) {
-        at = 91;
+    if ((at < 0) && (s->cur_state_next > EMOVE_COMMON_EMOVE_STATE_RELEASING)) {
+        at = EMOVE_LEAF_CUR_STATE_NEXT;
     }
-    if ((at < 0) && (((int64_t)s->path_at > INT64_C(62)))) {
-        at = 92;
+    if ((at < 0) && (s->path_at > 62u)) {
+        at = EMOVE_LEAF_PATH_AT;
     }
-    if ((at < 0) && (((int64_t)s->path_at_next > INT64_C(62)))) {
-        at = 93;
+    if ((at < 0) && (s->path_at_next > 62u)) {
+        at = EMOVE_LEAF_PATH_AT_NEXT;
     }
-    if ((at < 0) && (((int64_t)s->here_sector > INT64_C(99)))) {
-        at = 96;
+    if ((at < 0) && (s->here_sector > 99u)) {
+        at = EMOVE_LEAF_HERE_SECTOR;
     }
-    if ((at < 0) && (((int64_t)s->here_sector_asked > INT64_C(99)))) {
-        at = 98;
+    if ((at < 0) && (s->here_sector_asked > 99u)) {
+        at = EMOVE_LEAF_HERE_SECTOR_ASKED;
     }
-    if ((at < 0) && (((int64_t)s->depart_first > INT64_C(9999)))) {
-        at = 99;
+    if ((at < 0) && (s->depart_first > 9999u)) {
+        at = EMOVE_LEAF_DEPART_FIRST;
     }
-    if ((at < 0) && (((int64_t)s->depart_count > INT64_C(31)))) {
-        at = 100;
+    if ((at < 0) && (s->depart_count > 31u)) {
+        at = EMOVE_LEAF_DEPART_COUNT;
     }
-    if ((at < 0) && (((int64_t)s->approach_first > INT64_C(9999)))) {
-        at = 101;
+    if ((at < 0) && (s->approach_first > 9999u)) {
+        at = EMOVE_LEAF_APPROACH_FIRST;
     }
-    if ((at < 0) && (((int64_t)s->path_length > INT64_C(62)))) {
-        at = 102;
+    if ((at < 0) && (s->path_length > 62u)) {
+        at = EMOVE_LEAF_PATH_LENGTH;
     }
     if ((at < 0) && (!((s->displaced_here.x >= (-500.0)) && (s->displaced_here.x <= 500.0)))) {
-        at = 103;
+        at = EMOVE_LEAF_DISPLACED_HERE_X;
     }
     if ((at < 0) && (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0)))) {
-        at = 104;
+        at = EMOVE_LEAF_DISPLACED_HERE_Y;
     }
     if ((at < 0) && (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0)))) {
-        at = 105;
+        at = EMOVE_LEAF_DISPLACED_HERE_Z;
     }
     if ((at < 0) && (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0)))) {
-        at = 106;
+        at = EMOVE_LEAF_DISPLACED_HERE_C;
     }
     if ((at < 0) && (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0)))) {
-        at = 107;
+        at = EMOVE_LEAF_DISPLACED_HERE_S;
     }
     if ((at < 0) && (!((s->lift_mm >= (-500.0)) && (s->lift_mm <= 500.0)))) {
-        at = 108;
+        at = EMOVE_LEAF_LIFT_MM;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->lost) > 1u)) {
-        at = 109;
+        at = EMOVE_LEAF_LOST;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
-        at = 110;
+        at = EMOVE_LEAF_ECHOED;
     }
     return at;
 }
@@ -1449,33 +1510,62 @@ int32_t emove_locate_line(const emove_t *s)
         uint32_t t6[2];
         uint32_t t7[14];
     } t = {
-        {
-            0xfff8u, 0x7u
+        { /* new_command */
+            0xfff8u, /* false: lines 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0x7u /* true: lines 0, 1, 2 */
         },
-        {
-            0xfc57u, 0xff77u, 0xfc57u, 0xfcd7u, 0xfc5fu, 0xfc57u
+        { /* primitive.command */
+            0xfc57u, /* pause: lines 0, 1, 2, 4, 5, 9, 10, 11, 12, 13, 14 */
+            0xff77u, /* goto: lines 0, 1, 2, 4, 4a, 5, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0xfc57u, /* gothru: lines 0, 1, 2, 4, 5, 9, 10, 11, 12, 13, 14 */
+            0xfcd7u, /* approach_position_fingers: lines 0, 1, 2, 4, 5, 6, 9, 10, 11, 12, 13, 14 */
+            0xfc5fu, /* departure_position_fingers: lines 0, 1, 2, 3, 4, 5, 9, 10, 11, 12, 13, 14 */
+            0xfc57u /* immed_grasp: lines 0, 1, 2, 4, 5, 9, 10, 11, 12, 13, 14 */
         },
-        {
-            0xb7ffu, 0xf457u, 0x2c07u
+        { /* primitive.status */
+            0xb7ffu, /* done: lines 0, 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 11, 12, 14 */
+            0xf457u, /* executing: lines 0, 1, 2, 4, 5, 9, 11, 12, 13, 14 */
+            0x2c07u /* failed: lines 0, 1, 2, 9, 10, 12 */
         },
-        {
-            0xffafu, 0xffbfu, 0xffefu
+        { /* vision.command */
+            0xffafu, /* pause: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0xffbfu, /* flood_flash: lines 0, 1, 2, 3, 4, 4a, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0xffefu /* line_flash: lines 0, 1, 2, 3, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
         },
-        {
-            0x6fffu, 0xefafu, 0x7fafu
+        { /* vision.status */
+            0x6fffu, /* done: lines 0, 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 12, 13 */
+            0xefafu, /* executing: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 12, 13, 14 */
+            0x7fafu /* failed: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 11, 12, 13 */
         },
-        {
-            0xfffbu, 0xfffdu
+        { /* target.known */
+            0xfffbu, /* false: lines 0, 1, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0xfffdu /* true: lines 0, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
         },
-        {
-            0xfff9u, 0xfffeu
+        { /* idle */
+            0xfff9u, /* false: lines 0, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0xfffeu /* true: lines 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
         },
-        {
-            0x407u, 0x2007u, 0x7u, 0x7u, 0x7u, 0x480fu, 0x9817u, 0x4827u, 0x9847u, 0x4887u,
-            0x4907u, 0x4a07u, 0x7u, 0x7u
+        { /* cur_state */
+            0x407u, /* d_state: lines 0, 1, 2, 9 */
+            0x2007u, /* f_state: lines 0, 1, 2, 12 */
+            0x7u, /* through: lines 0, 1, 2 */
+            0x7u, /* last: lines 0, 1, 2 */
+            0x7u, /* opening: lines 0, 1, 2 */
+            0x480fu, /* looking: lines 0, 1, 2, 3, 10, 13 */
+            0x9817u, /* flooding: lines 0, 1, 2, 4, 10, 11, 14 */
+            0x4827u, /* centering: lines 0, 1, 2, 4a, 10, 13 */
+            0x9847u, /* lining: lines 0, 1, 2, 5, 10, 11, 14 */
+            0x4887u, /* closing: lines 0, 1, 2, 6, 10, 13 */
+            0x4907u, /* hovering: lines 0, 1, 2, 7, 10, 13 */
+            0x4a07u, /* lowering: lines 0, 1, 2, 8, 10, 13 */
+            0x7u, /* grasping: lines 0, 1, 2 */
+            0x7u /* releasing: lines 0, 1, 2 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[s->vision.command] & (uint32_t)t.t4[s->vision.status] & (uint32_t)t.t5[(s->target.known ? 1u : 0u)] & (uint32_t)t.t6[(s->idle ? 1u : 0u)] & (uint32_t)t.t7[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
+            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[s->vision.command] &
+            (uint32_t)t.t4[s->vision.status] & (uint32_t)t.t5[(s->target.known ? 1u : 0u)] &
+            (uint32_t)t.t6[(s->idle ? 1u : 0u)] & (uint32_t)t.t7[s->cur_state];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x10000u);
     line = several ? (-2) : line;
@@ -1507,26 +1597,48 @@ int32_t emove_move_to_line(const emove_t *s)
         uint16_t t8[2];
         uint16_t t9[2];
     } t = {
-        {
-            0x1fe0u, 0x1fu
+        { /* new_command */
+            0x1fe0u, /* false: lines 5, 6, 7, 7a, 8, 9, 10, 11 */
+            0x1fu /* true: lines 0, 1, 2, 3, 4 */
         },
-        {
-            0x1a1fu, 0x1f9fu, 0x1e7fu, 0x1a1fu, 0x1a1fu, 0x1a1fu
+        { /* primitive.command */
+            0x1a1fu, /* pause: lines 0, 1, 2, 3, 4, 8, 10, 11 */
+            0x1f9fu, /* goto: lines 0, 1, 2, 3, 4, 7, 7a, 8, 9, 10, 11 */
+            0x1e7fu, /* gothru: lines 0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 11 */
+            0x1a1fu, /* approach_position_fingers: lines 0, 1, 2, 3, 4, 8, 10, 11 */
+            0x1a1fu, /* departure_position_fingers: lines 0, 1, 2, 3, 4, 8, 10, 11 */
+            0x1a1fu /* immed_grasp: lines 0, 1, 2, 3, 4, 8, 10, 11 */
         },
-        {
-            0xbffu, 0x1a1fu, 0xe1fu
+        { /* primitive.status */
+            0xbffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 10 */
+            0x1a1fu, /* executing: lines 0, 1, 2, 3, 4, 8, 10, 11 */
+            0xe1fu /* failed: lines 0, 1, 2, 3, 4, 8, 9, 10 */
         },
-        {
-            0x1fe3u, 0x1ffdu
+        { /* target.known */
+            0x1fe3u, /* false: lines 0, 1, 5, 6, 7, 7a, 8, 9, 10, 11 */
+            0x1ffdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11 */
         },
-        {
-            0x1fe1u, 0x1ffeu
+        { /* idle */
+            0x1fe1u, /* false: lines 0, 5, 6, 7, 7a, 8, 9, 10, 11 */
+            0x1ffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11 */
         },
-        {
-            0x61fu, 0x81fu, 0x147fu, 0x159fu, 0x41fu, 0x41fu, 0x41fu, 0x41fu, 0x41fu, 0x41fu,
-            0x41fu, 0x41fu, 0x41fu, 0x41fu
+        { /* cur_state */
+            0x61fu, /* d_state: lines 0, 1, 2, 3, 4, 8, 9 */
+            0x81fu, /* f_state: lines 0, 1, 2, 3, 4, 10 */
+            0x147fu, /* through: lines 0, 1, 2, 3, 4, 5, 6, 9, 11 */
+            0x159fu, /* last: lines 0, 1, 2, 3, 4, 7, 7a, 9, 11 */
+            0x41fu, /* opening: lines 0, 1, 2, 3, 4, 9 */
+            0x41fu, /* looking: lines 0, 1, 2, 3, 4, 9 */
+            0x41fu, /* flooding: lines 0, 1, 2, 3, 4, 9 */
+            0x41fu, /* centering: lines 0, 1, 2, 3, 4, 9 */
+            0x41fu, /* lining: lines 0, 1, 2, 3, 4, 9 */
+            0x41fu, /* closing: lines 0, 1, 2, 3, 4, 9 */
+            0x41fu, /* hovering: lines 0, 1, 2, 3, 4, 9 */
+            0x41fu, /* lowering: lines 0, 1, 2, 3, 4, 9 */
+            0x41fu, /* grasping: lines 0, 1, 2, 3, 4, 9 */
+            0x41fu /* releasing: lines 0, 1, 2, 3, 4, 9 */
         },
-        {
+        { /* path_length */
             0x1fe7u, 0x1febu, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
@@ -1535,17 +1647,25 @@ int32_t emove_move_to_line(const emove_t *s)
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u
         },
-        {
-            0x1effu, 0x1f7fu
+        { /* lost */
+            0x1effu, /* false: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 */
+            0x1f7fu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7a, 8, 9, 10, 11 */
         },
-        {
-            0x1fdfu, 0x1fffu
+        { /* path_length - path_at > 2 */
+            0x1fdfu, /* false: lines 0, 1, 2, 3, 4, 6, 7, 7a, 8, 9, 10, 11 */
+            0x1fffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11 */
         },
-        {
-            0x1fbfu, 0x1fffu
+        { /* path_length - path_at <= 2 */
+            0x1fbfu, /* false: lines 0, 1, 2, 3, 4, 5, 7, 7a, 8, 9, 10, 11 */
+            0x1fffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->target.known ? 1u : 0u)] & (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[(s->lost ? 1u : 0u)] & (uint32_t)t.t8[((((int64_t)s->path_length - (int64_t)s->path_at) > INT64_C(2)) ? 1u : 0u)] & (uint32_t)t.t9[((((int64_t)s->path_length - (int64_t)s->path_at) <= INT64_C(2)) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
+            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->target.known ? 1u : 0u)] &
+            (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] &
+            (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[(s->lost ? 1u : 0u)] &
+            (uint32_t)t.t8[((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)] &
+            (uint32_t)t.t9[((((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x2000u);
     line = several ? (-2) : line;
@@ -1576,26 +1696,48 @@ int32_t emove_move_to_obj_line(const emove_t *s)
         uint16_t t7[2];
         uint16_t t8[2];
     } t = {
-        {
-            0x1ff0u, 0xfu
+        { /* new_command */
+            0x1ff0u, /* false: lines 4, 5, 6, 7, 8, 9, 10, 11, 12 */
+            0xfu /* true: lines 0, 1, 2, 3 */
         },
-        {
-            0x1a0fu, 0x1f0fu, 0x1ecfu, 0x1e3fu, 0x1a0fu, 0x1a0fu
+        { /* primitive.command */
+            0x1a0fu, /* pause: lines 0, 1, 2, 3, 9, 11, 12 */
+            0x1f0fu, /* goto: lines 0, 1, 2, 3, 8, 9, 10, 11, 12 */
+            0x1ecfu, /* gothru: lines 0, 1, 2, 3, 6, 7, 9, 10, 11, 12 */
+            0x1e3fu, /* approach_position_fingers: lines 0, 1, 2, 3, 4, 5, 9, 10, 11, 12 */
+            0x1a0fu, /* departure_position_fingers: lines 0, 1, 2, 3, 9, 11, 12 */
+            0x1a0fu /* immed_grasp: lines 0, 1, 2, 3, 9, 11, 12 */
         },
-        {
-            0xbffu, 0x1a0fu, 0xe0fu
+        { /* primitive.status */
+            0xbffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 11 */
+            0x1a0fu, /* executing: lines 0, 1, 2, 3, 9, 11, 12 */
+            0xe0fu /* failed: lines 0, 1, 2, 3, 9, 10, 11 */
         },
-        {
-            0x1ff3u, 0x1ffdu
+        { /* target.known */
+            0x1ff3u, /* false: lines 0, 1, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
+            0x1ffdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
         },
-        {
-            0x1ff1u, 0x1ffeu
+        { /* idle */
+            0x1ff1u, /* false: lines 0, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
+            0x1ffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
         },
-        {
-            0x60fu, 0x80fu, 0x14cfu, 0x150fu, 0x143fu, 0x40fu, 0x40fu, 0x40fu, 0x40fu, 0x40fu,
-            0x40fu, 0x40fu, 0x40fu, 0x40fu
+        { /* cur_state */
+            0x60fu, /* d_state: lines 0, 1, 2, 3, 9, 10 */
+            0x80fu, /* f_state: lines 0, 1, 2, 3, 11 */
+            0x14cfu, /* through: lines 0, 1, 2, 3, 6, 7, 10, 12 */
+            0x150fu, /* last: lines 0, 1, 2, 3, 8, 10, 12 */
+            0x143fu, /* opening: lines 0, 1, 2, 3, 4, 5, 10, 12 */
+            0x40fu, /* looking: lines 0, 1, 2, 3, 10 */
+            0x40fu, /* flooding: lines 0, 1, 2, 3, 10 */
+            0x40fu, /* centering: lines 0, 1, 2, 3, 10 */
+            0x40fu, /* lining: lines 0, 1, 2, 3, 10 */
+            0x40fu, /* closing: lines 0, 1, 2, 3, 10 */
+            0x40fu, /* hovering: lines 0, 1, 2, 3, 10 */
+            0x40fu, /* lowering: lines 0, 1, 2, 3, 10 */
+            0x40fu, /* grasping: lines 0, 1, 2, 3, 10 */
+            0x40fu /* releasing: lines 0, 1, 2, 3, 10 */
         },
-        {
+        { /* path_length */
             0x1fd7u, 0x1fdbu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
@@ -1604,14 +1746,21 @@ int32_t emove_move_to_obj_line(const emove_t *s)
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu
         },
-        {
-            0x1fbfu, 0x1fffu
+        { /* path_length - path_at > 2 */
+            0x1fbfu, /* false: lines 0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12 */
+            0x1fffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
         },
-        {
-            0x1f7fu, 0x1fffu
+        { /* path_length - path_at <= 2 */
+            0x1f7fu, /* false: lines 0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12 */
+            0x1fffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->target.known ? 1u : 0u)] & (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[((((int64_t)s->path_length - (int64_t)s->path_at) > INT64_C(2)) ? 1u : 0u)] & (uint32_t)t.t8[((((int64_t)s->path_length - (int64_t)s->path_at) <= INT64_C(2)) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
+            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->target.known ? 1u : 0u)] &
+            (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] &
+            (uint32_t)t.t6[s->path_length] &
+            (uint32_t)t.t7[((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)] &
+            (uint32_t)t.t8[((((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x2000u);
     line = several ? (-2) : line;
@@ -1634,8 +1783,9 @@ int32_t emove_pause_emove_line(const emove_t *s)
     static const struct {
         uint8_t t0[2];
     } t = {
-        {
-            0x2u, 0x1u
+        { /* idle */
+            0x2u, /* false: lines 2 */
+            0x1u /* true: lines 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->idle ? 1u : 0u)];
@@ -1666,23 +1816,47 @@ int32_t emove_pickup_line(const emove_t *s)
         uint8_t t3[2];
         uint8_t t4[14];
     } t = {
-        {
-            0x7cu, 0x3u
+        { /* new_command */
+            0x7cu, /* false: lines 2, 3, 4, 5, 6 */
+            0x3u /* true: lines 0, 1 */
         },
-        {
-            0x6bu, 0x6bu, 0x6bu, 0x6bu, 0x6bu, 0x7fu
+        { /* primitive.command */
+            0x6bu, /* pause: lines 0, 1, 3, 5, 6 */
+            0x6bu, /* goto: lines 0, 1, 3, 5, 6 */
+            0x6bu, /* gothru: lines 0, 1, 3, 5, 6 */
+            0x6bu, /* approach_position_fingers: lines 0, 1, 3, 5, 6 */
+            0x6bu, /* departure_position_fingers: lines 0, 1, 3, 5, 6 */
+            0x7fu /* immed_grasp: lines 0, 1, 2, 3, 4, 5, 6 */
         },
-        {
-            0x2fu, 0x6bu, 0x3bu
+        { /* primitive.status */
+            0x2fu, /* done: lines 0, 1, 2, 3, 5 */
+            0x6bu, /* executing: lines 0, 1, 3, 5, 6 */
+            0x3bu /* failed: lines 0, 1, 3, 4, 5 */
         },
-        {
-            0x7du, 0x7eu
+        { /* idle */
+            0x7du, /* false: lines 0, 2, 3, 4, 5, 6 */
+            0x7eu /* true: lines 1, 2, 3, 4, 5, 6 */
         },
-        {
-            0xbu, 0x23u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x57u, 0x3u
+        { /* cur_state */
+            0xbu, /* d_state: lines 0, 1, 3 */
+            0x23u, /* f_state: lines 0, 1, 5 */
+            0x3u, /* through: lines 0, 1 */
+            0x3u, /* last: lines 0, 1 */
+            0x3u, /* opening: lines 0, 1 */
+            0x3u, /* looking: lines 0, 1 */
+            0x3u, /* flooding: lines 0, 1 */
+            0x3u, /* centering: lines 0, 1 */
+            0x3u, /* lining: lines 0, 1 */
+            0x3u, /* closing: lines 0, 1 */
+            0x3u, /* hovering: lines 0, 1 */
+            0x3u, /* lowering: lines 0, 1 */
+            0x57u, /* grasping: lines 0, 1, 2, 4, 6 */
+            0x3u /* releasing: lines 0, 1 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
+            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] &
+            (uint32_t)t.t4[s->cur_state];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1710,27 +1884,51 @@ int32_t emove_release_part_line(const emove_t *s)
         uint16_t t4[14];
         uint16_t t5[2];
     } t = {
-        {
-            0xf8u, 0x7u
+        { /* new_command */
+            0xf8u, /* false: lines 2, 3, 4, 5, 6 */
+            0x7u /* true: lines 0, 1, 1a */
         },
-        {
-            0xd7u, 0xd7u, 0xd7u, 0xd7u, 0xffu, 0xd7u
+        { /* primitive.command */
+            0xd7u, /* pause: lines 0, 1, 1a, 3, 5, 6 */
+            0xd7u, /* goto: lines 0, 1, 1a, 3, 5, 6 */
+            0xd7u, /* gothru: lines 0, 1, 1a, 3, 5, 6 */
+            0xd7u, /* approach_position_fingers: lines 0, 1, 1a, 3, 5, 6 */
+            0xffu, /* departure_position_fingers: lines 0, 1, 1a, 2, 3, 4, 5, 6 */
+            0xd7u /* immed_grasp: lines 0, 1, 1a, 3, 5, 6 */
         },
-        {
-            0x5fu, 0xd7u, 0x77u
+        { /* primitive.status */
+            0x5fu, /* done: lines 0, 1, 1a, 2, 3, 5 */
+            0xd7u, /* executing: lines 0, 1, 1a, 3, 5, 6 */
+            0x77u /* failed: lines 0, 1, 1a, 3, 4, 5 */
         },
-        {
-            0xf9u, 0xfeu
+        { /* idle */
+            0xf9u, /* false: lines 0, 2, 3, 4, 5, 6 */
+            0xfeu /* true: lines 1, 1a, 2, 3, 4, 5, 6 */
         },
-        {
-            0x17u, 0x47u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u,
-            0xafu
+        { /* cur_state */
+            0x17u, /* d_state: lines 0, 1, 1a, 3 */
+            0x47u, /* f_state: lines 0, 1, 1a, 5 */
+            0x7u, /* through: lines 0, 1, 1a */
+            0x7u, /* last: lines 0, 1, 1a */
+            0x7u, /* opening: lines 0, 1, 1a */
+            0x7u, /* looking: lines 0, 1, 1a */
+            0x7u, /* flooding: lines 0, 1, 1a */
+            0x7u, /* centering: lines 0, 1, 1a */
+            0x7u, /* lining: lines 0, 1, 1a */
+            0x7u, /* closing: lines 0, 1, 1a */
+            0x7u, /* hovering: lines 0, 1, 1a */
+            0x7u, /* lowering: lines 0, 1, 1a */
+            0x7u, /* grasping: lines 0, 1, 1a */
+            0xafu /* releasing: lines 0, 1, 1a, 2, 4, 6 */
         },
-        {
-            0xfbu, 0xfdu
+        { /* lost */
+            0xfbu, /* false: lines 0, 1, 2, 3, 4, 5, 6 */
+            0xfdu /* true: lines 0, 1a, 2, 3, 4, 5, 6 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] & (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->lost ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
+            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] &
+            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->lost ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x100u);
     line = several ? (-2) : line;
@@ -1750,7 +1948,7 @@ void emove_release_part_lines(const emove_t *in, int32_t *out, uint32_t n)
 int32_t emove_locate_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == EMOVE_FAULT_NONE) {
         emove_settle(s);
         emove_run_locate(s);
     }
@@ -1761,7 +1959,7 @@ int32_t emove_locate_step(emove_t *s)
 int32_t emove_move_to_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == EMOVE_FAULT_NONE) {
         emove_settle(s);
         emove_run_move_to(s);
     }
@@ -1772,7 +1970,7 @@ int32_t emove_move_to_step(emove_t *s)
 int32_t emove_move_to_obj_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == EMOVE_FAULT_NONE) {
         emove_settle(s);
         emove_run_move_to_obj(s);
     }
@@ -1783,7 +1981,7 @@ int32_t emove_move_to_obj_step(emove_t *s)
 int32_t emove_pause_emove_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == EMOVE_FAULT_NONE) {
         emove_settle(s);
         emove_run_pause_emove(s);
     }
@@ -1794,7 +1992,7 @@ int32_t emove_pause_emove_step(emove_t *s)
 int32_t emove_pickup_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == EMOVE_FAULT_NONE) {
         emove_settle(s);
         emove_run_pickup(s);
     }
@@ -1805,7 +2003,7 @@ int32_t emove_pickup_step(emove_t *s)
 int32_t emove_release_part_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == EMOVE_FAULT_NONE) {
         emove_settle(s);
         emove_run_release_part(s);
     }
@@ -1816,39 +2014,39 @@ int32_t emove_release_part_step(emove_t *s)
 int32_t emove_emove_cycle(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == EMOVE_FAULT_NONE) {
         emove_settle(s);
-        if (s->fault == 0) {
+        if (s->fault == EMOVE_FAULT_NONE) {
             emove_do_take_orders(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == EMOVE_FAULT_NONE) {
             emove_do_look_below(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == EMOVE_FAULT_NONE) {
             emove_do_measure(s);
         }
-        if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->task.input_command;
-            if (chosen == INT64_C(0)) {
+        if (s->fault == EMOVE_FAULT_NONE) {
+            const uint8_t chosen = s->task.input_command;
+            if (chosen == VOCABULARY_EMOVE_COMMAND_PAUSE) {
                 emove_run_pause_emove(s);
-            } else if (chosen == INT64_C(1)) {
+            } else if (chosen == VOCABULARY_EMOVE_COMMAND_MOVE_TO) {
                 emove_run_move_to(s);
-            } else if (chosen == INT64_C(2)) {
+            } else if (chosen == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ) {
                 emove_run_move_to_obj(s);
-            } else if (chosen == INT64_C(3)) {
+            } else if (chosen == VOCABULARY_EMOVE_COMMAND_LOCATE) {
                 emove_run_locate(s);
-            } else if (chosen == INT64_C(4)) {
+            } else if (chosen == VOCABULARY_EMOVE_COMMAND_PICKUP) {
                 emove_run_pickup(s);
-            } else if (chosen == INT64_C(5)) {
+            } else if (chosen == VOCABULARY_EMOVE_COMMAND_RELEASE) {
                 emove_run_release_part(s);
             } else {
-                s->fault = 2; /* no table for it: proved impossible */
+                s->fault = EMOVE_FAULT_NO_LINE; /* no table for it: proved impossible */
             }
         }
-        if (s->fault == 0) {
+        if (s->fault == EMOVE_FAULT_NONE) {
             emove_do_asked(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == EMOVE_FAULT_NONE) {
             emove_do_give_orders(s);
         }
     }

@@ -109,66 +109,212 @@ enum {
     EMOVE_ASSUMPTION_RELEASE_PART_IN_STEP = 4 /* release_part_in_step: only told in release_part */
 };
 
+/* `fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants. */
+enum {
+    EMOVE_LEAF_TASK_INC_COMMAND = 0,
+    EMOVE_LEAF_TASK_INPUT_COMMAND = 1,
+    EMOVE_LEAF_TASK_OBJ_PTR = 2,
+    EMOVE_LEAF_TASK_GRASP = 3,
+    EMOVE_LEAF_TASK_LOCPT_PTR = 4,
+    EMOVE_LEAF_TASK_SECTOR = 5,
+    EMOVE_LEAF_TASK_APOINT_POS_FLAG = 6,
+    EMOVE_LEAF_TASK_GRIPPED_OBJ_PTR = 7,
+    EMOVE_LEAF_TO_TASK_INC_COMMAND_ECHO = 8,
+    EMOVE_LEAF_TO_TASK_REF_COMMAND_ECHO = 9,
+    EMOVE_LEAF_TO_TASK_STATUS_REPORT = 10,
+    EMOVE_LEAF_TO_TASK_FAILURE = 11,
+    EMOVE_LEAF_NEW_COMMAND = 12,
+    EMOVE_LEAF_ANSWERED = 13,
+    EMOVE_LEAF_SETTLING = 14,
+    EMOVE_LEAF_INC_COMMAND_SEEN = 15,
+    EMOVE_LEAF_FROM_PRIMITIVE_INC_COMMAND_ECHO = 16,
+    EMOVE_LEAF_FROM_PRIMITIVE_REF_COMMAND_ECHO = 17,
+    EMOVE_LEAF_FROM_PRIMITIVE_STATUS_REPORT = 18,
+    EMOVE_LEAF_FROM_PRIMITIVE_FAILURE = 19,
+    EMOVE_LEAF_FROM_PRIMITIVE_HOLDS = 20,
+    EMOVE_LEAF_TO_PRIMITIVE_INC_COMMAND = 21,
+    EMOVE_LEAF_TO_PRIMITIVE_INPUT_COMMAND = 22,
+    EMOVE_LEAF_TO_PRIMITIVE_OBJ_PTR = 23,
+    EMOVE_LEAF_TO_PRIMITIVE_GRASP = 24,
+    EMOVE_LEAF_TO_PRIMITIVE_POSE_PTR = 25,
+    EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_X = 26,
+    EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_Y = 27,
+    EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_Z = 28,
+    EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_C = 29,
+    EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_S = 30,
+    EMOVE_LEAF_PRIMITIVE_COMMAND = 31,
+    EMOVE_LEAF_PRIMITIVE_STATUS = 32,
+    EMOVE_LEAF_PRIMITIVE_RESTING = 33,
+    EMOVE_LEAF_PRIMITIVE_FAILURE = 34,
+    EMOVE_LEAF_LAST_PRIMITIVE_INPUT_COMMAND = 35,
+    EMOVE_LEAF_LAST_PRIMITIVE_OBJ_PTR = 36,
+    EMOVE_LEAF_LAST_PRIMITIVE_GRASP = 37,
+    EMOVE_LEAF_LAST_PRIMITIVE_POSE_PTR = 38,
+    EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_X = 39,
+    EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_Y = 40,
+    EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_Z = 41,
+    EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_C = 42,
+    EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_S = 43,
+    EMOVE_LEAF_FROM_VISION_INC_COMMAND_ECHO = 44,
+    EMOVE_LEAF_FROM_VISION_REF_COMMAND_ECHO = 45,
+    EMOVE_LEAF_FROM_VISION_STATUS_REPORT = 46,
+    EMOVE_LEAF_FROM_VISION_FAILURE = 47,
+    EMOVE_LEAF_FROM_VISION_X_MM = 48,
+    EMOVE_LEAF_FROM_VISION_Y_MM = 49,
+    EMOVE_LEAF_FROM_VISION_C = 50,
+    EMOVE_LEAF_FROM_VISION_S = 51,
+    EMOVE_LEAF_FROM_VISION_RANGE_MM = 52,
+    EMOVE_LEAF_TO_VISION_INC_COMMAND = 53,
+    EMOVE_LEAF_TO_VISION_INPUT_COMMAND = 54,
+    EMOVE_LEAF_TO_VISION_OBJ_PTR = 55,
+    EMOVE_LEAF_TO_VISION_EXPECTED_RANGE_MM = 56,
+    EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_X = 57,
+    EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_Y = 58,
+    EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_Z = 59,
+    EMOVE_LEAF_VISION_COMMAND = 60,
+    EMOVE_LEAF_VISION_STATUS = 61,
+    EMOVE_LEAF_VISION_RESTING = 62,
+    EMOVE_LEAF_VISION_FAILURE = 63,
+    EMOVE_LEAF_LAST_VISION_INPUT_COMMAND = 64,
+    EMOVE_LEAF_LAST_VISION_OBJ_PTR = 65,
+    EMOVE_LEAF_PATH_KNOWN = 66,
+    EMOVE_LEAF_PATH_DEPART_FIRST = 67,
+    EMOVE_LEAF_PATH_DEPART_COUNT = 68,
+    EMOVE_LEAF_PATH_APPROACH_FIRST = 69,
+    EMOVE_LEAF_PATH_APPROACH_COUNT = 70,
+    EMOVE_LEAF_TARGET_KNOWN = 71,
+    EMOVE_LEAF_TARGET_HOVER_POINT = 72,
+    EMOVE_LEAF_TARGET_GRASP_POINT = 73,
+    EMOVE_LEAF_TARGET_VIEW_POINT = 74,
+    EMOVE_LEAF_OBJECT_DATA_KNOWN = 75,
+    EMOVE_LEAF_OBJECT_DATA_EXPECTED_RANGE_MM = 76,
+    EMOVE_LEAF_OBJECT_DATA_GRIP_RANGE_MM = 77,
+    EMOVE_LEAF_OBJECT_DATA_LIFT_MM = 78,
+    EMOVE_LEAF_OBJECT_DATA_NORMAL_X = 79,
+    EMOVE_LEAF_OBJECT_DATA_NORMAL_Y = 80,
+    EMOVE_LEAF_OBJECT_DATA_NORMAL_Z = 81,
+    EMOVE_LEAF_HELD_DATA_KNOWN = 82,
+    EMOVE_LEAF_HELD_DATA_EXPECTED_RANGE_MM = 83,
+    EMOVE_LEAF_HELD_DATA_GRIP_RANGE_MM = 84,
+    EMOVE_LEAF_HELD_DATA_LIFT_MM = 85,
+    EMOVE_LEAF_HELD_DATA_NORMAL_X = 86,
+    EMOVE_LEAF_HELD_DATA_NORMAL_Y = 87,
+    EMOVE_LEAF_HELD_DATA_NORMAL_Z = 88,
+    EMOVE_LEAF_IDLE = 89,
+    EMOVE_LEAF_CUR_STATE = 90,
+    EMOVE_LEAF_CUR_STATE_NEXT = 91,
+    EMOVE_LEAF_PATH_AT = 92,
+    EMOVE_LEAF_PATH_AT_NEXT = 93,
+    EMOVE_LEAF_HERE = 94,
+    EMOVE_LEAF_HERE_NEXT = 95,
+    EMOVE_LEAF_HERE_SECTOR = 96,
+    EMOVE_LEAF_HERE_ASKED = 97,
+    EMOVE_LEAF_HERE_SECTOR_ASKED = 98,
+    EMOVE_LEAF_DEPART_FIRST = 99,
+    EMOVE_LEAF_DEPART_COUNT = 100,
+    EMOVE_LEAF_APPROACH_FIRST = 101,
+    EMOVE_LEAF_PATH_LENGTH = 102,
+    EMOVE_LEAF_DISPLACED_HERE_X = 103,
+    EMOVE_LEAF_DISPLACED_HERE_Y = 104,
+    EMOVE_LEAF_DISPLACED_HERE_Z = 105,
+    EMOVE_LEAF_DISPLACED_HERE_C = 106,
+    EMOVE_LEAF_DISPLACED_HERE_S = 107,
+    EMOVE_LEAF_LIFT_MM = 108,
+    EMOVE_LEAF_LOST = 109,
+    EMOVE_LEAF_ECHOED = 110
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     EMOVE_FAULT_NONE = 0,
     EMOVE_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
     EMOVE_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
     EMOVE_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
-    EMOVE_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
-    EMOVE_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
-    EMOVE_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    EMOVE_FAULT_EXTERN = 4,
+    /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    EMOVE_FAULT_ASSUMPTION = 5,
+    /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    EMOVE_FAULT_STATE = 6,
     EMOVE_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
-/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
+   positions of variables.
+   After EMOVE_FAULT_ADMIT nothing has changed but the trace below.
+   After another fault the state is as it was when the cycle ended. After any fault an output that has a safe
+   value shows it, and every other output keeps what it has.
+   No function waits, allocates, or keeps anything outside this block. None calls another library than the
+   compiler's own: memcpy and memset, operations on doubles, bit counting and division
+   where the processor has none. */
 typedef struct {
     vocabulary_emove_order_t task; /* 0 to 7: input; Orders of task. */
     vocabulary_emove_report_t to_task; /* 8 to 11: output; Reports to task. */
-    bool new_command; /* 12: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    /* 12: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool new_command;
     bool answered; /* 13: state; A line has answered the new command. */
-    bool settling; /* 14: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    /* 14: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    bool settling;
     uint16_t inc_command_seen; /* 15: state; 0 .. 65535; Number of the order that was taken last. */
     vocabulary_primitive_report_t from_primitive; /* 16 to 20: input; Reports of primitive, as they come. */
     vocabulary_primitive_order_t to_primitive; /* 21 to 30: output; Orders to primitive. */
-    emove_common_primitive_held_t primitive; /* 31 to 34: state; What primitive says of the last orders, held until they are echoed. */
-    emove_common_primitive_last_t last_primitive; /* 35 to 43: state; The order to primitive that was numbered last. */
+    /* 31 to 34: state; What primitive says of the last orders, held until they are echoed. */
+    emove_common_primitive_held_t primitive;
+    /* 35 to 43: state; The order to primitive that was numbered last. */
+    emove_common_primitive_last_t last_primitive;
     vocabulary_vision_report_t from_vision; /* 44 to 52: input; Reports of vision, as they come. */
     vocabulary_vision_order_t to_vision; /* 53 to 59: output; Orders to vision. */
-    emove_common_vision_held_t vision; /* 60 to 63: state; What vision says of the last orders, held until they are echoed. */
+    /* 60 to 63: state; What vision says of the last orders, held until they are echoed. */
+    emove_common_vision_held_t vision;
     emove_common_vision_last_t last_vision; /* 64 to 65: state; The order to vision that was numbered last. */
-    emove_common_path_t path; /* 66 to 70: input; From the database: the way from where the robot is to the location of the task. */
+    /* 66 to 70: input; From the database: the way from where the robot is to the location of the task. */
+    emove_common_path_t path;
     emove_common_spot_t target; /* 71 to 74: input; From the database: the location of the task. */
     emove_common_part_t object_data; /* 75 to 81: input; From the database: the part of the task. */
     emove_common_part_t held_data; /* 82 to 88: input; From the database: the part in the gripper. */
     bool idle; /* 89: state; Both levels below rest, and what they say answers this level's last orders. */
-    emove_common_emove_state_t cur_state; /* 90: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
+    /* 90: state; Where the table is in its sequence; both echoes must match before it moves on (section
+       9). */
+    emove_common_emove_state_t cur_state;
     emove_common_emove_state_t cur_state_next; /* 91: state; the deferred next value of cur_state */
     uint8_t path_at; /* 92: state; 0 .. 62; Which point of the path is under way. */
     uint8_t path_at_next; /* 93: state; the deferred next value of path_at */
     uint8_t here; /* 94: state; 0 .. 255; Where the robot is; 0 while it moves. */
     uint8_t here_next; /* 95: state; the deferred next value of here */
     uint8_t here_sector; /* 96: state; 0 .. 99 */
-    uint8_t here_asked; /* 97: state; 0 .. 255; What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before. */
+    /* 97: state; 0 .. 255; What the database was asked in this cycle: the answer to a new place comes a
+       cycle after it, and a path is not planned before. */
+    uint8_t here_asked;
     uint8_t here_sector_asked; /* 98: state; 0 .. 99 */
-    uint16_t depart_first; /* 99: state; 0 .. 9999; The path under way, kept because `here` is forgotten as soon as the robot moves. */
+    /* 99: state; 0 .. 9999; The path under way, kept because `here` is forgotten as soon as the robot
+       moves. */
+    uint16_t depart_first;
     uint8_t depart_count; /* 100: state; 0 .. 31 */
     uint16_t approach_first; /* 101: state; 0 .. 9999 */
     uint8_t path_length; /* 102: state; 0 .. 62; How many points the path has. */
-    vocabulary_shift_t displaced_here; /* 103 to 107: state; How far the part that was located here was displaced: the departure is displaced as far. */
-    double lift_mm; /* 108: state; -500.0 .. 500.0 mm; How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height. */
-    bool lost; /* 109: state; A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed. */
+    /* 103 to 107: state; How far the part that was located here was displaced: the departure is displaced
+       as far. */
+    vocabulary_shift_t displaced_here;
+    /* 108: state; -500.0 .. 500.0 mm; How much higher than the location has it the pads are to be: a part
+       is taken, or put down, by its own height. */
+    double lift_mm;
+    /* 109: state; A part was gripped and is not between the fingers any more; looked at until a line has
+       decided by it, since that line may match again before its order is echoed. */
+    bool lost;
     bool echoed; /* 110: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
-    int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    int32_t fault_at;
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } emove_t;
 
 /* Every variable's initial value. */
 void emove_init(emove_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t emove_check(const emove_t *s);
 
 /* The line of table locate that matches admitted inputs: its position; -1 none, -2 several. */

@@ -58,19 +58,21 @@ static inline double gripper_abs_f64(double a)
     return (a <= 0.0) ? (0.0 - a) : a;
 }
 
-/* A value that was proved to fit. */
-static inline uint8_t gripper_u8_of_i64(int64_t a)
+/* Whether it is a number: what is none satisfies no comparison. */
+static inline bool gripper_number_f64(double a)
 {
-    return (uint8_t)a;
+    const bool positive = a > 0.0;
+    return positive || (a <= 0.0);
 }
 
-/* Within half a millimetre; the force met but for a twentieth: fingers come to rest a little before they push all of it. */
+/* Within half a millimetre; the force met but for a twentieth: fingers come to rest a little before they
+   push all of it. */
 static void gripper_do_measure(gripper_t *s)
 {
     if (s->new_command) {
-        s->waited = (uint8_t)INT64_C(0);
+        s->waited = 0u;
     }
-    s->at_opening = (gripper_abs_f64((s->hand.opening_mm - s->primitive.opening_mm)) <= 0.5);
+    s->at_opening = (gripper_abs_f64(s->hand.opening_mm - s->primitive.opening_mm) <= 0.5);
     s->forced = (s->hand.force_n >= (0.95 * s->primitive.force_n));
     s->closing = (s->primitive.opening_mm < s->hand.opening_mm);
 }
@@ -97,36 +99,36 @@ static void gripper_do_drive(gripper_t *s)
 }
 
 /* Procedure state. */
-static void gripper_do_state(gripper_t *s, int64_t v_value)
+static void gripper_do_state(gripper_t *s, gripper_gripper_state_t v_value)
 {
-    s->cur_state = (uint8_t)v_value;
+    s->cur_state = v_value;
 }
 
 /* Procedure grip_failure. */
 static void gripper_do_grip_failure(gripper_t *s)
 {
-    s->to_primitive.failure = (uint8_t)INT64_C(10);
+    s->to_primitive.failure = VOCABULARY_REASON_GRIP;
 }
 
 /* Procedure wait. */
 static void gripper_do_wait(gripper_t *s)
 {
-    if (((int64_t)s->waited < INT64_C(150))) {
-        s->waited = gripper_u8_of_i64(((int64_t)s->waited + INT64_C(1)));
+    if (s->waited < 150u) {
+        s->waited = (uint8_t)((uint32_t)s->waited + 1u);
     }
 }
 
 /* Procedure take_orders. */
 static void gripper_do_take_orders(gripper_t *s)
 {
-    if (((int64_t)s->primitive.inc_command != (int64_t)s->inc_command_seen)) {
-        s->inc_command_seen = (uint16_t)(int64_t)s->primitive.inc_command;
+    if (s->primitive.inc_command != s->inc_command_seen) {
+        s->inc_command_seen = s->primitive.inc_command;
         s->new_command = true;
         s->answered = false;
-        s->to_primitive.status_report = (uint8_t)INT64_C(1);
-        s->to_primitive.failure = (uint8_t)INT64_C(0);
+        s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
+        s->to_primitive.failure = VOCABULARY_REASON_NONE;
     } else {
-        if ((s->answered && true)) {
+        if (s->answered && true) {
             s->new_command = false;
         }
     }
@@ -136,108 +138,82 @@ static void gripper_do_take_orders(gripper_t *s)
 /* Procedure give_orders. */
 static void gripper_do_give_orders(gripper_t *s)
 {
-    if ((s->new_command && (!s->settling))) {
+    if (s->new_command && (!s->settling)) {
         s->answered = true;
     }
-    s->to_primitive.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->to_primitive.ref_command_echo = (uint8_t)(int64_t)s->primitive.input_command;
+    s->to_primitive.inc_command_echo = s->inc_command_seen;
+    s->to_primitive.ref_command_echo = s->primitive.input_command;
 }
 
 /* Procedure done. */
 static void gripper_do_done(gripper_t *s)
 {
-    s->to_primitive.status_report = (uint8_t)INT64_C(0);
+    s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
 /* Procedure executing. */
 static void gripper_do_executing(gripper_t *s)
 {
-    s->to_primitive.status_report = (uint8_t)INT64_C(1);
+    s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
 /* Procedure failed. */
 static void gripper_do_failed(gripper_t *s)
 {
-    s->to_primitive.status_report = (uint8_t)INT64_C(2);
+    s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
 static void gripper_admit(gripper_t *s)
 {
-    gripper_t before = *s;
     s->line = -1;
-    s->fault = 0;
+    s->fault = GRIPPER_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
     if (!gripper_exact()) {
-        s->fault = 7;
-    }
-    if (((int64_t)s->primitive.input_command > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 1;
+        s->fault = GRIPPER_FAULT_ARITHMETIC;
+    } else {
+        int32_t at = -1;
+        if ((at < 0) && (s->primitive.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+            at = GRIPPER_LEAF_PRIMITIVE_INPUT_COMMAND;
         }
-    }
-    if (!((s->primitive.opening_mm >= 0.0) && (s->primitive.opening_mm <= 200.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 2;
+        if ((at < 0) && (!((s->primitive.opening_mm >= 0.0) && (s->primitive.opening_mm <= 200.0)))) {
+            at = GRIPPER_LEAF_PRIMITIVE_OPENING_MM;
         }
-    } else {
-        s->primitive.opening_mm = s->primitive.opening_mm + 0.0;
-    }
-    if (!((s->primitive.force_n >= 0.0) && (s->primitive.force_n <= 1000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 3;
+        if ((at < 0) && (!((s->primitive.force_n >= 0.0) && (s->primitive.force_n <= 1000.0)))) {
+            at = GRIPPER_LEAF_PRIMITIVE_FORCE_N;
         }
-    } else {
-        s->primitive.force_n = s->primitive.force_n + 0.0;
-    }
-    if (!((s->primitive.speed_mm_s >= 0.0) && (s->primitive.speed_mm_s <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 4;
+        if ((at < 0) && (!((s->primitive.speed_mm_s >= 0.0) && (s->primitive.speed_mm_s <= 500.0)))) {
+            at = GRIPPER_LEAF_PRIMITIVE_SPEED_MM_S;
         }
-    } else {
-        s->primitive.speed_mm_s = s->primitive.speed_mm_s + 0.0;
-    }
-    if (s->hand.opening_mm < 0.0) {
-        s->hand.opening_mm = 0.0;
-    } else if (s->hand.opening_mm > 200.0) {
-        s->hand.opening_mm = 200.0;
-    } else {
-        /* in range, or not a number */
-    }
-    if (!((s->hand.opening_mm >= 0.0) && (s->hand.opening_mm <= 200.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 14;
+        if ((at < 0) && (!gripper_number_f64(s->hand.opening_mm))) {
+            at = GRIPPER_LEAF_HAND_OPENING_MM;
         }
-    } else {
-        s->hand.opening_mm = s->hand.opening_mm + 0.0;
-    }
-    if (s->hand.force_n < 0.0) {
-        s->hand.force_n = 0.0;
-    } else if (s->hand.force_n > 1000.0) {
-        s->hand.force_n = 1000.0;
-    } else {
-        /* in range, or not a number */
-    }
-    if (!((s->hand.force_n >= 0.0) && (s->hand.force_n <= 1000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 15;
+        if ((at < 0) && (!gripper_number_f64(s->hand.force_n))) {
+            at = GRIPPER_LEAF_HAND_FORCE_N;
         }
-    } else {
-        s->hand.force_n = s->hand.force_n + 0.0;
-    }
-    if (s->fault != 0) {
-        before.line = -1;
-        before.fault = s->fault;
-        before.fault_at = s->fault_at;
-        before.assumptions_failed = 0;
-        *s = before;
+        if (at >= 0) {
+            s->fault = GRIPPER_FAULT_ADMIT;
+            s->fault_at = at;
+        } else {
+            s->primitive.opening_mm = s->primitive.opening_mm + 0.0;
+            s->primitive.force_n = s->primitive.force_n + 0.0;
+            s->primitive.speed_mm_s = s->primitive.speed_mm_s + 0.0;
+            if (s->hand.opening_mm < 0.0) {
+                s->hand.opening_mm = 0.0;
+            }
+            if (s->hand.opening_mm > 200.0) {
+                s->hand.opening_mm = 200.0;
+            }
+            s->hand.opening_mm = s->hand.opening_mm + 0.0;
+            if (s->hand.force_n < 0.0) {
+                s->hand.force_n = 0.0;
+            }
+            if (s->hand.force_n > 1000.0) {
+                s->hand.force_n = 1000.0;
+            }
+            s->hand.force_n = s->hand.force_n + 0.0;
+        }
     }
 }
 
@@ -252,47 +228,54 @@ static void gripper_run_position(gripper_t *s)
 {
     s->line = gripper_position_line(s);
     switch (s->line) {
-    case 0: /* gripper/gripper.rcs line 1 */
-        gripper_do_state(s, INT64_C(2));
+    case GRIPPER_LINE_POSITION_1: /* gripper/gripper.rcs line 1: new_command true */
+        gripper_do_state(s, GRIPPER_GRIPPER_STATE_MOVING);
         gripper_do_drive(s);
         gripper_do_executing(s);
         break;
-    case 1: /* gripper/gripper.rcs line 2 */
-        gripper_do_state(s, INT64_C(0));
+    /* gripper/gripper.rcs line 2: new_command false; cur_state moving; at_opening true */
+    case GRIPPER_LINE_POSITION_2:
+        gripper_do_state(s, GRIPPER_GRIPPER_STATE_D_STATE);
         gripper_do_hold(s);
         gripper_do_done(s);
         break;
-    case 2: /* gripper/gripper.rcs line 3 */
+    /* gripper/gripper.rcs line 3: new_command false; cur_state moving; at_opening false; closing and
+       forced */
+    case GRIPPER_LINE_POSITION_3:
         gripper_do_grip_failure(s);
-        gripper_do_state(s, INT64_C(1));
+        gripper_do_state(s, GRIPPER_GRIPPER_STATE_F_STATE);
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
-    case 3: /* gripper/gripper.rcs line 4 */
+    /* gripper/gripper.rcs line 4: new_command false; cur_state moving; at_opening false; not (closing and
+       forced); waited < most_waited */
+    case GRIPPER_LINE_POSITION_4:
         gripper_do_wait(s);
         gripper_do_drive(s);
         gripper_do_executing(s);
         break;
-    case 4: /* gripper/gripper.rcs line 5 */
+    /* gripper/gripper.rcs line 5: new_command false; cur_state moving; at_opening false; not (closing and
+       forced); waited most_waited */
+    case GRIPPER_LINE_POSITION_5:
         gripper_do_grip_failure(s);
-        gripper_do_state(s, INT64_C(1));
+        gripper_do_state(s, GRIPPER_GRIPPER_STATE_F_STATE);
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
-    case 5: /* gripper/gripper.rcs line 6 */
+    case GRIPPER_LINE_POSITION_6: /* gripper/gripper.rcs line 6: new_command false; cur_state d_state */
         gripper_do_hold(s);
         gripper_do_done(s);
         break;
-    case 6: /* gripper/gripper.rcs line 7 */
+    case GRIPPER_LINE_POSITION_7: /* gripper/gripper.rcs line 7: new_command false; cur_state f_state */
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = GRIPPER_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = GRIPPER_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -302,41 +285,44 @@ static void gripper_run_grasp(gripper_t *s)
 {
     s->line = gripper_grasp_line(s);
     switch (s->line) {
-    case 0: /* gripper/gripper.rcs line 1 */
-        gripper_do_state(s, INT64_C(2));
+    case GRIPPER_LINE_GRASP_1: /* gripper/gripper.rcs line 1: new_command true */
+        gripper_do_state(s, GRIPPER_GRIPPER_STATE_MOVING);
         gripper_do_drive(s);
         gripper_do_executing(s);
         break;
-    case 1: /* gripper/gripper.rcs line 2 */
-        gripper_do_state(s, INT64_C(0));
+    /* gripper/gripper.rcs line 2: new_command false; cur_state moving; forced true */
+    case GRIPPER_LINE_GRASP_2:
+        gripper_do_state(s, GRIPPER_GRIPPER_STATE_D_STATE);
         gripper_do_drive(s);
         gripper_do_done(s);
         break;
-    case 2: /* gripper/gripper.rcs line 3 */
+    /* gripper/gripper.rcs line 3: new_command false; cur_state moving; forced false; waited < most_waited */
+    case GRIPPER_LINE_GRASP_3:
         gripper_do_wait(s);
         gripper_do_drive(s);
         gripper_do_executing(s);
         break;
-    case 3: /* gripper/gripper.rcs line 4 */
+    /* gripper/gripper.rcs line 4: new_command false; cur_state moving; forced false; waited most_waited */
+    case GRIPPER_LINE_GRASP_4:
         gripper_do_grip_failure(s);
-        gripper_do_state(s, INT64_C(1));
+        gripper_do_state(s, GRIPPER_GRIPPER_STATE_F_STATE);
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
-    case 4: /* gripper/gripper.rcs line 5 */
+    case GRIPPER_LINE_GRASP_5: /* gripper/gripper.rcs line 5: new_command false; cur_state d_state */
         gripper_do_drive(s);
         gripper_do_done(s);
         break;
-    case 5: /* gripper/gripper.rcs line 6 */
+    case GRIPPER_LINE_GRASP_6: /* gripper/gripper.rcs line 6: new_command false; cur_state f_state */
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = GRIPPER_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = GRIPPER_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -346,17 +332,17 @@ static void gripper_run_pause_gripper(gripper_t *s)
 {
     s->line = gripper_pause_gripper_line(s);
     switch (s->line) {
-    case 0: /* gripper/gripper.rcs line 1 */
-        gripper_do_state(s, INT64_C(0));
+    case GRIPPER_LINE_PAUSE_GRIPPER_1: /* gripper/gripper.rcs line 1 */
+        gripper_do_state(s, GRIPPER_GRIPPER_STATE_D_STATE);
         gripper_do_hold(s);
         gripper_do_done(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = GRIPPER_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = GRIPPER_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -365,87 +351,89 @@ static void gripper_run_pause_gripper(gripper_t *s)
 void gripper_init(gripper_t *s)
 {
     s->line = -1;
-    s->fault = 0;
+    s->fault = GRIPPER_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->primitive.inc_command = (uint16_t)INT64_C(0);
-    s->primitive.input_command = (uint8_t)INT64_C(0);
+    s->primitive.inc_command = 0u;
+    s->primitive.input_command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
     s->primitive.opening_mm = 0.0;
     s->primitive.force_n = 0.0;
     s->primitive.speed_mm_s = 0.0;
-    s->to_primitive.inc_command_echo = (uint16_t)INT64_C(0);
-    s->to_primitive.ref_command_echo = (uint8_t)INT64_C(0);
-    s->to_primitive.status_report = (uint8_t)INT64_C(0);
-    s->to_primitive.failure = (uint8_t)INT64_C(0);
+    s->to_primitive.inc_command_echo = 0u;
+    s->to_primitive.ref_command_echo = VOCABULARY_GRIPPER_COMMAND_PAUSE;
+    s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->to_primitive.failure = VOCABULARY_REASON_NONE;
     s->to_primitive.opening_mm = 0.0;
     s->new_command = false;
     s->answered = false;
     s->settling = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
+    s->inc_command_seen = 0u;
     s->hand.opening_mm = 0.0;
     s->hand.force_n = 0.0;
-    s->cur_state = (uint8_t)INT64_C(0);
+    s->cur_state = GRIPPER_GRIPPER_STATE_D_STATE;
     s->at_opening = false;
     s->forced = false;
     s->closing = false;
-    s->waited = (uint8_t)INT64_C(0);
+    s->waited = 0u;
     s->to_hand.drive = false;
     s->to_hand.opening_mm = 0.0;
     s->to_hand.force_n = 0.0;
     s->to_hand.speed_mm_s = 0.0;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t gripper_check(const gripper_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && (((int64_t)s->to_primitive.ref_command_echo > INT64_C(2)))) {
-        at = 6;
+    if ((at < 0) && (s->to_primitive.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+        at = GRIPPER_LEAF_TO_PRIMITIVE_REF_COMMAND_ECHO;
     }
-    if ((at < 0) && (((int64_t)s->to_primitive.status_report > INT64_C(2)))) {
-        at = 7;
+    if ((at < 0) && (s->to_primitive.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = GRIPPER_LEAF_TO_PRIMITIVE_STATUS_REPORT;
     }
-    if ((at < 0) && (((int64_t)s->to_primitive.failure > INT64_C(17)))) {
-        at = 8;
+    if ((at < 0) && (s->to_primitive.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = GRIPPER_LEAF_TO_PRIMITIVE_FAILURE;
     }
     if ((at < 0) && (!((s->to_primitive.opening_mm >= 0.0) && (s->to_primitive.opening_mm <= 200.0)))) {
-        at = 9;
+        at = GRIPPER_LEAF_TO_PRIMITIVE_OPENING_MM;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
-        at = 10;
+        at = GRIPPER_LEAF_NEW_COMMAND;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
-        at = 11;
+        at = GRIPPER_LEAF_ANSWERED;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
-        at = 12;
+        at = GRIPPER_LEAF_SETTLING;
     }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(2)))) {
-        at = 16;
+    if ((at < 0) && (s->cur_state > GRIPPER_GRIPPER_STATE_MOVING)) {
+        at = GRIPPER_LEAF_CUR_STATE;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->at_opening) > 1u)) {
-        at = 17;
+        at = GRIPPER_LEAF_AT_OPENING;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->forced) > 1u)) {
-        at = 18;
+        at = GRIPPER_LEAF_FORCED;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->closing) > 1u)) {
-        at = 19;
+        at = GRIPPER_LEAF_CLOSING;
     }
-    if ((at < 0) && (((int64_t)s->waited > INT64_C(150)))) {
-        at = 20;
+    if ((at < 0) && (s->waited > 150u)) {
+        at = GRIPPER_LEAF_WAITED;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->to_hand.drive) > 1u)) {
-        at = 21;
+        at = GRIPPER_LEAF_TO_HAND_DRIVE;
     }
     if ((at < 0) && (!((s->to_hand.opening_mm >= 0.0) && (s->to_hand.opening_mm <= 200.0)))) {
-        at = 22;
+        at = GRIPPER_LEAF_TO_HAND_OPENING_MM;
     }
     if ((at < 0) && (!((s->to_hand.force_n >= 0.0) && (s->to_hand.force_n <= 1000.0)))) {
-        at = 23;
+        at = GRIPPER_LEAF_TO_HAND_FORCE_N;
     }
     if ((at < 0) && (!((s->to_hand.speed_mm_s >= 0.0) && (s->to_hand.speed_mm_s <= 500.0)))) {
-        at = 24;
+        at = GRIPPER_LEAF_TO_HAND_SPEED_MM_S;
     }
     return at;
 }
@@ -462,16 +450,20 @@ int32_t gripper_position_line(const gripper_t *s)
         uint8_t t4[2];
         uint8_t t5[2];
     } t = {
-        {
-            0x7eu, 0x1u
+        { /* new_command */
+            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
+            0x1u /* true: lines 1 */
         },
-        {
-            0x21u, 0x41u, 0x1fu
+        { /* cur_state */
+            0x21u, /* d_state: lines 1, 6 */
+            0x41u, /* f_state: lines 1, 7 */
+            0x1fu /* moving: lines 1, 2, 3, 4, 5 */
         },
-        {
-            0x7du, 0x63u
+        { /* at_opening */
+            0x7du, /* false: lines 1, 3, 4, 5, 6, 7 */
+            0x63u /* true: lines 1, 2, 6, 7 */
         },
-        {
+        { /* waited */
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
@@ -486,14 +478,19 @@ int32_t gripper_position_line(const gripper_t *s)
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x77u
         },
-        {
-            0x7bu, 0x7fu
+        { /* closing and forced */
+            0x7bu, /* false: lines 1, 2, 4, 5, 6, 7 */
+            0x7fu /* true: every line */
         },
-        {
-            0x67u, 0x7fu
+        { /* not (closing and forced) */
+            0x67u, /* false: lines 1, 2, 3, 6, 7 */
+            0x7fu /* true: every line */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] & (uint32_t)t.t2[(s->at_opening ? 1u : 0u)] & (uint32_t)t.t3[s->waited] & (uint32_t)t.t4[((s->closing && s->forced) ? 1u : 0u)] & (uint32_t)t.t5[((!(s->closing && s->forced)) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] &
+            (uint32_t)t.t2[(s->at_opening ? 1u : 0u)] & (uint32_t)t.t3[s->waited] &
+            (uint32_t)t.t4[((s->closing && s->forced) ? 1u : 0u)] &
+            (uint32_t)t.t5[((!(s->closing && s->forced)) ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = gripper_bit32(m | 0x80u);
     line = (m == 0x0u) ? (-1) : line;
@@ -520,16 +517,20 @@ int32_t gripper_grasp_line(const gripper_t *s)
         uint8_t t2[2];
         uint8_t t3[151];
     } t = {
-        {
-            0x3eu, 0x1u
+        { /* new_command */
+            0x3eu, /* false: lines 2, 3, 4, 5, 6 */
+            0x1u /* true: lines 1 */
         },
-        {
-            0x11u, 0x21u, 0xfu
+        { /* cur_state */
+            0x11u, /* d_state: lines 1, 5 */
+            0x21u, /* f_state: lines 1, 6 */
+            0xfu /* moving: lines 1, 2, 3, 4 */
         },
-        {
-            0x3du, 0x33u
+        { /* forced */
+            0x3du, /* false: lines 1, 3, 4, 5, 6 */
+            0x33u /* true: lines 1, 2, 5, 6 */
         },
-        {
+        { /* waited */
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
@@ -545,7 +546,8 @@ int32_t gripper_grasp_line(const gripper_t *s)
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x3bu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] & (uint32_t)t.t2[(s->forced ? 1u : 0u)] & (uint32_t)t.t3[s->waited];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] &
+            (uint32_t)t.t2[(s->forced ? 1u : 0u)] & (uint32_t)t.t3[s->waited];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = gripper_bit32(m | 0x40u);
     line = (m == 0x0u) ? (-1) : line;
@@ -587,7 +589,7 @@ void gripper_pause_gripper_lines(const gripper_t *in, int32_t *out, uint32_t n)
 int32_t gripper_position_step(gripper_t *s)
 {
     gripper_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == GRIPPER_FAULT_NONE) {
         gripper_settle(s);
         gripper_run_position(s);
     }
@@ -598,7 +600,7 @@ int32_t gripper_position_step(gripper_t *s)
 int32_t gripper_grasp_step(gripper_t *s)
 {
     gripper_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == GRIPPER_FAULT_NONE) {
         gripper_settle(s);
         gripper_run_grasp(s);
     }
@@ -609,7 +611,7 @@ int32_t gripper_grasp_step(gripper_t *s)
 int32_t gripper_pause_gripper_step(gripper_t *s)
 {
     gripper_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == GRIPPER_FAULT_NONE) {
         gripper_settle(s);
         gripper_run_pause_gripper(s);
     }
@@ -620,30 +622,30 @@ int32_t gripper_pause_gripper_step(gripper_t *s)
 int32_t gripper_gripper_cycle(gripper_t *s)
 {
     gripper_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == GRIPPER_FAULT_NONE) {
         gripper_settle(s);
-        if (s->fault == 0) {
+        if (s->fault == GRIPPER_FAULT_NONE) {
             gripper_do_take_orders(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == GRIPPER_FAULT_NONE) {
             gripper_do_measure(s);
         }
-        if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->primitive.input_command;
-            if (chosen == INT64_C(0)) {
+        if (s->fault == GRIPPER_FAULT_NONE) {
+            const uint8_t chosen = s->primitive.input_command;
+            if (chosen == VOCABULARY_GRIPPER_COMMAND_PAUSE) {
                 gripper_run_pause_gripper(s);
-            } else if (chosen == INT64_C(1)) {
+            } else if (chosen == VOCABULARY_GRIPPER_COMMAND_POSITION) {
                 gripper_run_position(s);
-            } else if (chosen == INT64_C(2)) {
+            } else if (chosen == VOCABULARY_GRIPPER_COMMAND_GRASP) {
                 gripper_run_grasp(s);
             } else {
-                s->fault = 2; /* no table for it: proved impossible */
+                s->fault = GRIPPER_FAULT_NO_LINE; /* no table for it: proved impossible */
             }
         }
-        if (s->fault == 0) {
+        if (s->fault == GRIPPER_FAULT_NONE) {
             gripper_do_show_opening(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == GRIPPER_FAULT_NONE) {
             gripper_do_give_orders(s);
         }
     }

@@ -38,43 +38,90 @@ enum {
     GRIPPER_LINE_PAUSE_GRIPPER_1 = 0
 };
 
+/* `fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants. */
+enum {
+    GRIPPER_LEAF_PRIMITIVE_INC_COMMAND = 0,
+    GRIPPER_LEAF_PRIMITIVE_INPUT_COMMAND = 1,
+    GRIPPER_LEAF_PRIMITIVE_OPENING_MM = 2,
+    GRIPPER_LEAF_PRIMITIVE_FORCE_N = 3,
+    GRIPPER_LEAF_PRIMITIVE_SPEED_MM_S = 4,
+    GRIPPER_LEAF_TO_PRIMITIVE_INC_COMMAND_ECHO = 5,
+    GRIPPER_LEAF_TO_PRIMITIVE_REF_COMMAND_ECHO = 6,
+    GRIPPER_LEAF_TO_PRIMITIVE_STATUS_REPORT = 7,
+    GRIPPER_LEAF_TO_PRIMITIVE_FAILURE = 8,
+    GRIPPER_LEAF_TO_PRIMITIVE_OPENING_MM = 9,
+    GRIPPER_LEAF_NEW_COMMAND = 10,
+    GRIPPER_LEAF_ANSWERED = 11,
+    GRIPPER_LEAF_SETTLING = 12,
+    GRIPPER_LEAF_INC_COMMAND_SEEN = 13,
+    GRIPPER_LEAF_HAND_OPENING_MM = 14,
+    GRIPPER_LEAF_HAND_FORCE_N = 15,
+    GRIPPER_LEAF_CUR_STATE = 16,
+    GRIPPER_LEAF_AT_OPENING = 17,
+    GRIPPER_LEAF_FORCED = 18,
+    GRIPPER_LEAF_CLOSING = 19,
+    GRIPPER_LEAF_WAITED = 20,
+    GRIPPER_LEAF_TO_HAND_DRIVE = 21,
+    GRIPPER_LEAF_TO_HAND_OPENING_MM = 22,
+    GRIPPER_LEAF_TO_HAND_FORCE_N = 23,
+    GRIPPER_LEAF_TO_HAND_SPEED_MM_S = 24
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     GRIPPER_FAULT_NONE = 0,
     GRIPPER_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
     GRIPPER_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
     GRIPPER_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
-    GRIPPER_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
-    GRIPPER_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
-    GRIPPER_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    GRIPPER_FAULT_EXTERN = 4,
+    /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    GRIPPER_FAULT_ASSUMPTION = 5,
+    /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    GRIPPER_FAULT_STATE = 6,
     GRIPPER_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
-/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
+   positions of variables.
+   After GRIPPER_FAULT_ADMIT nothing has changed but the trace below.
+   After another fault the state is as it was when the cycle ended. After any fault an output that has a safe
+   value shows it, and every other output keeps what it has.
+   No function waits, allocates, or keeps anything outside this block. None calls another library than the
+   compiler's own: memcpy and memset, operations on doubles, bit counting and division
+   where the processor has none. */
 typedef struct {
     vocabulary_gripper_order_t primitive; /* 0 to 4: input; Orders of primitive. */
     vocabulary_gripper_report_t to_primitive; /* 5 to 9: output; Reports to primitive. */
-    bool new_command; /* 10: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    /* 10: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool new_command;
     bool answered; /* 11: state; A line has answered the new command. */
-    bool settling; /* 12: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    /* 12: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    bool settling;
     uint16_t inc_command_seen; /* 13: state; 0 .. 65535; Number of the order that was taken last. */
-    gripper_hand_report_t hand; /* 14 to 15: input; From the hand; a reading beyond the range is pulled to it. */
+    /* 14 to 15: input; From the hand; a reading beyond the range is pulled to it. */
+    gripper_hand_report_t hand;
     gripper_gripper_state_t cur_state; /* 16: state */
-    bool at_opening; /* 17: state; The fingers are at the commanded opening; the force on them is met; they are to close, so that a force is one against them: fingers that let go of a part still feel it for some cycles. */
+    /* 17: state; The fingers are at the commanded opening; the force on them is met; they are to close, so
+       that a force is one against them: fingers that let go of a part still feel it for some cycles. */
+    bool at_opening;
     bool forced; /* 18: state */
     bool closing; /* 19: state */
     uint8_t waited; /* 20: state; 0 .. 150 */
     gripper_hand_order_t to_hand; /* 21 to 24: output; To the hand. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
-    int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    int32_t fault_at;
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } gripper_t;
 
 /* Every variable's initial value. */
 void gripper_init(gripper_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t gripper_check(const gripper_t *s);
 
 /* The line of table position that matches admitted inputs: its position; -1 none, -2 several. */

@@ -365,7 +365,9 @@ void nbs_robot_init(nbs_robot_t *s)
     s->tick = UINT64_C(0);
 }
 
-/* One step, every 40 ms: the levels that are due take their inputs as the step before left them, run from the top down, and give their outputs. Returns the first that faulted, whose `fault` says why; the others have run. */
+/* One step, every 40 ms: the levels that are due take their inputs as the step before left them, run from
+   the top down, and give their outputs. Returns the first that faulted, whose `fault` says why; the others
+   have run. */
 nbs_robot_level_t nbs_robot_step(nbs_robot_t *s)
 {
     nbs_robot_level_t faulted = NBS_ROBOT_LEVEL_NONE;
@@ -408,7 +410,9 @@ nbs_robot_level_t nbs_robot_step(nbs_robot_t *s)
     return faulted;
 }
 
-/* Between two steps, a level starts again with everything lost: the order that it has counts as seen and failed, and the levels below it are told to rest. Returns -1, or what its check says of the state that it would start with; then it is as at first. -2: there is no such level. */
+/* Between two steps, a level starts again with everything lost: the order that it has counts as seen and
+   failed, and the levels below it are told to rest. Returns -1, or what its check says of the state that
+   it would start with; then it is as at first. -2: there is no such level. */
 int32_t nbs_robot_restart(nbs_robot_t *s, nbs_robot_level_t level)
 {
     int32_t at;
@@ -435,7 +439,8 @@ int32_t nbs_robot_restart(nbs_robot_t *s, nbs_robot_level_t level)
     return at;
 }
 
-/* Between two steps, a level goes on from the state that it has in a copy of the system. Returns -1, or what its check says of that state; then it has kept its own. -2: there is no such level. */
+/* Between two steps, a level goes on from the state that it has in a copy of the system. Returns -1, or
+   what its check says of that state; then it has kept its own. -2: there is no such level. */
 int32_t nbs_robot_resume(nbs_robot_t *s, nbs_robot_level_t level, const nbs_robot_t *from)
 {
     int32_t at;

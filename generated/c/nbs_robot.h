@@ -112,34 +112,48 @@ typedef struct {
     uint64_t tick; /* steps done */
 } nbs_robot_t;
 
-/* yours: task.source of workstation.source_locpt; task.dest of workstation.dest_locpt; task.end_at of workstation.end_at_locpt; task.here of current_loc; asked in every cycle, so that the same keys must always get the same answer */
+/* yours: task.source of workstation.source_locpt; task.dest of workstation.dest_locpt; task.end_at of
+   workstation.end_at_locpt; task.here of current_loc; asked in every cycle, so that the same keys must
+   always get the same answer */
 extern void nbs_robot_place(uint8_t key_0, task_common_place_t *answer);
 
-/* yours: emove.path of here, here_sector, task.locpt_ptr, task.sector; asked in every cycle, so that the same keys must always get the same answer */
-extern void nbs_robot_path(uint8_t key_0, uint8_t key_1, uint8_t key_2, uint8_t key_3, emove_common_path_t *answer);
+/* yours: emove.path of here, here_sector, task.locpt_ptr, task.sector; asked in every cycle, so that the
+   same keys must always get the same answer */
+extern void nbs_robot_path(uint8_t key_0, uint8_t key_1, uint8_t key_2, uint8_t key_3,
+        emove_common_path_t *answer);
 
-/* yours: emove.target of task.locpt_ptr, task.sector; asked in every cycle, so that the same keys must always get the same answer */
+/* yours: emove.target of task.locpt_ptr, task.sector; asked in every cycle, so that the same keys must
+   always get the same answer */
 extern void nbs_robot_target(uint8_t key_0, uint8_t key_1, emove_common_spot_t *answer);
 
-/* yours: emove.object_data of task.obj_ptr; emove.held_data of task.gripped_obj_ptr; asked in every cycle, so that the same keys must always get the same answer */
+/* yours: emove.object_data of task.obj_ptr; emove.held_data of task.gripped_obj_ptr; asked in every cycle,
+   so that the same keys must always get the same answer */
 extern void nbs_robot_part(vocabulary_object_t key_0, emove_common_part_t *answer);
 
-/* yours: primitive.goal of emove.pose_ptr; asked in every cycle, so that the same keys must always get the same answer */
+/* yours: primitive.goal of emove.pose_ptr; asked in every cycle, so that the same keys must always get the
+   same answer */
 extern void nbs_robot_point(uint16_t key_0, primitive_common_goal_point_t *answer);
 
-/* yours: primitive.fingers of emove.obj_ptr, emove.grasp; asked in every cycle, so that the same keys must always get the same answer */
-extern void nbs_robot_fingers(vocabulary_object_t key_0, uint8_t key_1, primitive_common_end_effector_t *answer);
+/* yours: primitive.fingers of emove.obj_ptr, emove.grasp; asked in every cycle, so that the same keys must
+   always get the same answer */
+extern void nbs_robot_fingers(vocabulary_object_t key_0, uint8_t key_1,
+        primitive_common_end_effector_t *answer);
 
 /* Every level's initial state; each buffer holds what its reader begins with. */
 void nbs_robot_init(nbs_robot_t *s);
 
-/* One step, every 40 ms: the levels that are due take their inputs as the step before left them, run from the top down, and give their outputs. Returns the first that faulted, whose `fault` says why; the others have run. */
+/* One step, every 40 ms: the levels that are due take their inputs as the step before left them, run from
+   the top down, and give their outputs. Returns the first that faulted, whose `fault` says why; the others
+   have run. */
 nbs_robot_level_t nbs_robot_step(nbs_robot_t *s);
 
-/* Between two steps, a level starts again with everything lost: the order that it has counts as seen and failed, and the levels below it are told to rest. Returns -1, or what its check says of the state that it would start with; then it is as at first. -2: there is no such level. */
+/* Between two steps, a level starts again with everything lost: the order that it has counts as seen and
+   failed, and the levels below it are told to rest. Returns -1, or what its check says of the state that
+   it would start with; then it is as at first. -2: there is no such level. */
 int32_t nbs_robot_restart(nbs_robot_t *s, nbs_robot_level_t level);
 
-/* Between two steps, a level goes on from the state that it has in a copy of the system. Returns -1, or what its check says of that state; then it has kept its own. -2: there is no such level. */
+/* Between two steps, a level goes on from the state that it has in a copy of the system. Returns -1, or
+   what its check says of that state; then it has kept its own. -2: there is no such level. */
 int32_t nbs_robot_resume(nbs_robot_t *s, nbs_robot_level_t level, const nbs_robot_t *from);
 
 #ifdef __cplusplus

@@ -70,41 +70,29 @@ static inline double primitive_min_f64(double a, double b)
     return (b < a) ? b : a;
 }
 
-/* A value that was proved to fit. */
-static inline uint16_t primitive_u16_of_i64(int64_t a)
-{
-    return (uint16_t)a;
-}
-
-/* A value that was proved to fit. */
-static inline uint8_t primitive_u8_of_i64(int64_t a)
-{
-    return (uint8_t)a;
-}
-
 /* Procedure start_waiting. */
 static void primitive_do_start_waiting(primitive_t *s)
 {
-    if ((s->new_command && (!s->answered))) {
-        s->waited = (uint8_t)INT64_C(0);
+    if (s->new_command && (!s->answered)) {
+        s->waited = 0u;
     }
-    s->idle = ((s->robot.resting && s->gripper.resting) && s->echoed);
+    s->idle = (s->robot.resting && s->gripper.resting && s->echoed);
 }
 
 /* Procedure measure. */
 static void primitive_do_measure(primitive_t *s)
 {
-    int64_t v_i = INT64_C(0);
     s->near_ = ((s->length_mm - s->travelled_mm) <= s->goal.breakpoint_mm);
     s->there = (s->travelled_mm >= s->length_mm);
-    if (((int64_t)s->last_robot.input_command == INT64_C(1))) {
+    if (s->last_robot.input_command == VOCABULARY_ROBOT_COMMAND_FOLLOW) {
         s->settled = true;
-        for (v_i = INT64_C(0); (v_i <= INT64_C(8)); v_i = v_i + INT64_C(1)) {
-            s->settled = (s->settled && (primitive_abs_f64((s->from_robot.plate[v_i] - s->to[v_i])) <= 1.5));
+        for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) {
+            s->settled = (s->settled && (primitive_abs_f64(s->from_robot.plate[v_i] - s->to[v_i]) <= 1.5));
         }
     }
     if (s->echoed) {
-        s->fits = (primitive_abs_f64((s->from_gripper.opening_mm - s->fingers.grip_mm)) <= s->fingers.tolerance_mm);
+        s->fits = (primitive_abs_f64(s->from_gripper.opening_mm - s->fingers.grip_mm) <=
+                s->fingers.tolerance_mm);
         s->closed = (s->from_gripper.opening_mm < 1.0);
     }
 }
@@ -116,147 +104,157 @@ static void primitive_do_hold_part(primitive_t *s)
 }
 
 /* Procedure nextstate. */
-static void primitive_do_nextstate(primitive_t *s, int64_t v_value)
+static void primitive_do_nextstate(primitive_t *s, primitive_common_primitive_state_t v_value)
 {
-    s->cur_state_next = (uint8_t)v_value;
+    s->cur_state_next = v_value;
 }
 
 /* Procedure no_pose. */
 static void primitive_do_no_pose(primitive_t *s)
 {
-    s->to_emove.failure = (uint8_t)INT64_C(8);
+    s->to_emove.failure = VOCABULARY_REASON_NO_POSE;
 }
 
 /* Procedure robot_failure. */
 static void primitive_do_robot_failure(primitive_t *s)
 {
-    s->to_emove.failure = (uint8_t)INT64_C(9);
+    s->to_emove.failure = VOCABULARY_REASON_ROBOT;
 }
 
 /* Procedure grip_failure. */
 static void primitive_do_grip_failure(primitive_t *s)
 {
-    s->to_emove.failure = (uint8_t)INT64_C(10);
+    s->to_emove.failure = VOCABULARY_REASON_GRIP;
 }
 
 /* The spacing is not that of the part. */
 static void primitive_do_misfit_failure(primitive_t *s)
 {
     if (s->closed) {
-        s->to_emove.failure = (uint8_t)INT64_C(11);
+        s->to_emove.failure = VOCABULARY_REASON_NOTHING_GRIPPED;
     } else {
-        s->to_emove.failure = (uint8_t)INT64_C(12);
+        s->to_emove.failure = VOCABULARY_REASON_WRONG_SIZE;
     }
 }
 
 /* Procedure wait. */
 static void primitive_do_wait(primitive_t *s)
 {
-    if (((int64_t)s->waited < INT64_C(250))) {
-        s->waited = primitive_u8_of_i64(((int64_t)s->waited + INT64_C(1)));
+    if (s->waited < 250u) {
+        s->waited = (uint8_t)((uint32_t)s->waited + 1u);
     }
 }
 
 /* Procedure pause. */
 static void primitive_do_pause(primitive_t *s)
 {
-    s->to_robot.input_command = (uint8_t)INT64_C(0);
-    s->to_gripper.input_command = (uint8_t)INT64_C(0);
+    s->to_robot.input_command = VOCABULARY_ROBOT_COMMAND_HOLD;
+    s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
     s->speed_mm_s = 0.0 + 0.0;
 }
 
 /* Procedure follow. */
 static void primitive_do_follow(primitive_t *s)
 {
-    s->display = (uint8_t)INT64_C(0);
-    s->to_robot.input_command = (uint8_t)INT64_C(1);
-    s->to_gripper.input_command = (uint8_t)INT64_C(0);
+    s->display = PRIMITIVE_COMMON_DISPLAY_PATH;
+    s->to_robot.input_command = VOCABULARY_ROBOT_COMMAND_FOLLOW;
+    s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
 }
 
 /* To an opening; fails if the force is met first. */
 static void primitive_do_position(primitive_t *s, double v_opening_mm)
 {
     primitive_do_pause(s);
-    s->display = (uint8_t)INT64_C(1);
+    s->display = PRIMITIVE_COMMON_DISPLAY_FINGERS;
     s->to_gripper.opening_mm = v_opening_mm + 0.0;
     s->to_gripper.force_n = s->fingers.force_n + 0.0;
     s->to_gripper.speed_mm_s = s->fingers.speed_mm_s + 0.0;
-    s->to_gripper.input_command = (uint8_t)INT64_C(1);
+    s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_POSITION;
 }
 
 /* Until the force is met (section 6.5: 100 lb, from the database). */
 static void primitive_do_grasp(primitive_t *s)
 {
     primitive_do_pause(s);
-    s->display = (uint8_t)INT64_C(1);
+    s->display = PRIMITIVE_COMMON_DISPLAY_FINGERS;
     s->to_gripper.opening_mm = 0.0 + 0.0;
     s->to_gripper.force_n = s->fingers.force_n + 0.0;
     s->to_gripper.speed_mm_s = s->fingers.speed_mm_s + 0.0;
-    s->to_gripper.input_command = (uint8_t)INT64_C(2);
+    s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_GRASP;
 }
 
 /* Procedure within. */
-static void primitive_do_within(primitive_t *s, int64_t v_at, double v_value)
+static void primitive_do_within(primitive_t *s, uint32_t v_at, double v_value)
 {
     s->to[v_at] = primitive_max_f64((-4000.0), primitive_min_f64(4000.0, v_value)) + 0.0;
 }
 
-/* The length of the centre's path by four steps of Newton's square root, from at most the third root of three above it; never less than the farthest that a coordinate goes, so that a turn on the spot takes its time too. */
+/* The length of the centre's path by four steps of Newton's square root, from at most the third root of
+   three above it; never less than the farthest that a coordinate goes, so that a turn on the spot takes
+   its time too. */
 static void primitive_do_measure_length(primitive_t *s)
 {
     double v_square = 0.0;
     double v_most = 0.0;
     double v_root = 0.0;
-    int64_t v_i = INT64_C(0);
-    int64_t v_i_2 = INT64_C(0);
     v_square = 0.0 + 0.0;
     v_most = 1.0 + 0.0;
     v_root = 1.0 + 0.0;
-    v_square = primitive_max_f64(0.0, primitive_min_f64(200000000.0, ((((s->to[0] - s->from[0]) * (s->to[0] - s->from[0])) + ((s->to[1] - s->from[1]) * (s->to[1] - s->from[1]))) + ((s->to[2] - s->from[2]) * (s->to[2] - s->from[2]))))) + 0.0;
-    for (v_i = INT64_C(0); (v_i <= INT64_C(8)); v_i = v_i + INT64_C(1)) {
-        v_most = primitive_max_f64(v_most, primitive_abs_f64((s->to[v_i] - s->from[v_i]))) + 0.0;
+    v_square = primitive_max_f64(0.0,
+        primitive_min_f64(200000000.0,
+            (((s->to[0] - s->from[0]) * (s->to[0] - s->from[0])) +
+                ((s->to[1] - s->from[1]) * (s->to[1] - s->from[1]))) +
+            ((s->to[2] - s->from[2]) * (s->to[2] - s->from[2])))) +
+            0.0;
+    for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) {
+        v_most = primitive_max_f64(v_most, primitive_abs_f64(s->to[v_i] - s->from[v_i])) + 0.0;
     }
     v_root = (v_most * 1.4) + 0.0;
-    for (v_i_2 = INT64_C(1); (v_i_2 <= INT64_C(4)); v_i_2 = v_i_2 + INT64_C(1)) {
-        v_root = primitive_max_f64(1.0, primitive_min_f64(30000.0, (0.5 * (v_root + (v_square / v_root))))) + 0.0;
+    for (uint32_t v_i_2 = 1u; v_i_2 <= 4u; v_i_2 = v_i_2 + 1u) {
+        v_root = primitive_max_f64(1.0, primitive_min_f64(30000.0, 0.5 * (v_root + (v_square / v_root)))) +
+                0.0;
     }
     s->length_mm = primitive_max_f64(v_root, v_most) + 0.0;
 }
 
-/* From where the robot is, or was last told to be, to the point displaced: the centre by `x` along the plate's x axis, by `y` to the left of it, and by `z` upward; the two other points of the plate turned about the vertical through it. */
+/* From where the robot is, or was last told to be, to the point displaced: the centre by `x` along the
+   plate's x axis, by `y` to the left of it, and by `z` upward; the two other points of the plate turned
+   about the vertical through it. */
 static void primitive_do_start(primitive_t *s)
 {
     double v_u = 0.0;
     double v_v = 0.0;
     double v_east = 0.0;
     double v_north = 0.0;
-    int64_t v_i = INT64_C(0);
-    int64_t v_i_2 = INT64_C(0);
-    int64_t v_k = INT64_C(0);
     v_u = 0.0;
     v_v = 0.0;
     v_east = 0.0;
     v_north = 0.0;
-    if (((int64_t)s->last_robot.input_command != INT64_C(1))) {
-        for (v_i = INT64_C(0); (v_i <= INT64_C(8)); v_i = v_i + INT64_C(1)) {
+    if (s->last_robot.input_command != VOCABULARY_ROBOT_COMMAND_FOLLOW) {
+        for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) {
             s->to_robot.plate[v_i] = s->from_robot.plate[v_i] + 0.0;
         }
         s->speed_mm_s = 0.0 + 0.0;
     }
-    for (v_i_2 = INT64_C(0); (v_i_2 <= INT64_C(8)); v_i_2 = v_i_2 + INT64_C(1)) {
+    for (uint32_t v_i_2 = 0u; v_i_2 <= 8u; v_i_2 = v_i_2 + 1u) {
         s->from[v_i_2] = s->to_robot.plate[v_i_2] + 0.0;
     }
     v_east = ((s->goal.plate[6] - s->goal.plate[0]) / 100.0) + 0.0;
     v_north = ((s->goal.plate[7] - s->goal.plate[1]) / 100.0) + 0.0;
-    primitive_do_within(s, INT64_C(0), ((s->goal.plate[0] + (s->emove.displaced.x * v_east)) - (s->emove.displaced.y * v_north)) + 0.0);
-    primitive_do_within(s, INT64_C(1), ((s->goal.plate[1] + (s->emove.displaced.x * v_north)) + (s->emove.displaced.y * v_east)) + 0.0);
-    primitive_do_within(s, INT64_C(2), (s->goal.plate[2] + s->emove.displaced.z) + 0.0);
-    for (v_k = INT64_C(1); (v_k <= INT64_C(2)); v_k = v_k + INT64_C(1)) {
-        v_u = (s->goal.plate[(INT64_C(3) * v_k)] - s->goal.plate[0]) + 0.0;
-        v_v = (s->goal.plate[((INT64_C(3) * v_k) + INT64_C(1))] - s->goal.plate[1]) + 0.0;
-        primitive_do_within(s, (INT64_C(3) * v_k), ((s->to[0] + (s->emove.displaced.c * v_u)) - (s->emove.displaced.s * v_v)) + 0.0);
-        primitive_do_within(s, ((INT64_C(3) * v_k) + INT64_C(1)), ((s->to[1] + (s->emove.displaced.s * v_u)) + (s->emove.displaced.c * v_v)) + 0.0);
-        primitive_do_within(s, ((INT64_C(3) * v_k) + INT64_C(2)), (s->goal.plate[((INT64_C(3) * v_k) + INT64_C(2))] + s->emove.displaced.z) + 0.0);
+    primitive_do_within(s, 0u,
+            ((s->goal.plate[0] + (s->emove.displaced.x * v_east)) - (s->emove.displaced.y * v_north)) + 0.0);
+    primitive_do_within(s, 1u,
+            ((s->goal.plate[1] + (s->emove.displaced.x * v_north)) + (s->emove.displaced.y * v_east)) + 0.0);
+    primitive_do_within(s, 2u, (s->goal.plate[2] + s->emove.displaced.z) + 0.0);
+    for (uint32_t v_k = 1u; v_k <= 2u; v_k = v_k + 1u) {
+        v_u = (s->goal.plate[3u * v_k] - s->goal.plate[0]) + 0.0;
+        v_v = (s->goal.plate[(3u * v_k) + 1u] - s->goal.plate[1]) + 0.0;
+        primitive_do_within(s, 3u * v_k,
+                ((s->to[0] + (s->emove.displaced.c * v_u)) - (s->emove.displaced.s * v_v)) + 0.0);
+        primitive_do_within(s, (3u * v_k) + 1u,
+                ((s->to[1] + (s->emove.displaced.s * v_u)) + (s->emove.displaced.c * v_v)) + 0.0);
+        primitive_do_within(s, (3u * v_k) + 2u, (s->goal.plate[(3u * v_k) + 2u] + s->emove.displaced.z) +
+                0.0);
     }
     s->travelled_mm = 0.0 + 0.0;
     primitive_do_measure_length(s);
@@ -266,27 +264,33 @@ static void primitive_do_start(primitive_t *s)
 static void primitive_do_advance_at(primitive_t *s, double v_v)
 {
     double v_share = 0.0;
-    int64_t v_i = INT64_C(0);
     v_share = 0.0;
     s->speed_mm_s = v_v + 0.0;
-    s->travelled_mm = primitive_min_f64(s->length_mm, (s->travelled_mm + (v_v * 0.04))) + 0.0;
-    v_share = primitive_max_f64(0.0, primitive_min_f64(1.0, (s->travelled_mm / s->length_mm))) + 0.0;
-    for (v_i = INT64_C(0); (v_i <= INT64_C(8)); v_i = v_i + INT64_C(1)) {
-        s->to_robot.plate[v_i] = primitive_max_f64((-4000.0), primitive_min_f64(4000.0, (s->from[v_i] + ((s->to[v_i] - s->from[v_i]) * v_share)))) + 0.0;
+    s->travelled_mm = primitive_min_f64(s->length_mm, s->travelled_mm + (v_v * 0.04)) + 0.0;
+    v_share = primitive_max_f64(0.0, primitive_min_f64(1.0, s->travelled_mm / s->length_mm)) + 0.0;
+    for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) {
+        s->to_robot.plate[v_i] = primitive_max_f64((-4000.0),
+            primitive_min_f64(4000.0, s->from[v_i] + ((s->to[v_i] - s->from[v_i]) * v_share))) +
+                0.0;
     }
 }
 
 /* Faster, up to the point's speed. */
 static void primitive_do_advance_thru(primitive_t *s)
 {
-    primitive_do_advance_at(s, primitive_max_f64(0.0, primitive_min_f64(s->goal.speed_mm_s, (s->speed_mm_s + (s->goal.accel_mm_s2 * 0.04)))) + 0.0);
+    primitive_do_advance_at(s,
+            primitive_max_f64(0.0,
+                primitive_min_f64(s->goal.speed_mm_s, s->speed_mm_s + (s->goal.accel_mm_s2 * 0.04))) +
+            0.0);
 }
 
 /* The same, but slower where what is left is needed to stop. */
 static void primitive_do_advance(primitive_t *s)
 {
-    if (((s->speed_mm_s * s->speed_mm_s) >= ((2.0 * s->goal.decel_mm_s2) * primitive_max_f64(0.0, (s->length_mm - s->travelled_mm))))) {
-        primitive_do_advance_at(s, primitive_max_f64(20.0, (s->speed_mm_s - (s->goal.decel_mm_s2 * 0.04))) + 0.0);
+    if ((s->speed_mm_s * s->speed_mm_s) >=
+            ((2.0 * s->goal.decel_mm_s2) * primitive_max_f64(0.0, s->length_mm - s->travelled_mm))) {
+        primitive_do_advance_at(s, primitive_max_f64(20.0, s->speed_mm_s - (s->goal.decel_mm_s2 * 0.04)) +
+                0.0);
     } else {
         primitive_do_advance_thru(s);
     }
@@ -301,47 +305,53 @@ static void primitive_do_stop(primitive_t *s)
 /* Procedure take_orders. */
 static void primitive_do_take_orders(primitive_t *s)
 {
-    s->echoed = (((int64_t)s->from_robot.inc_command_echo == (int64_t)s->to_robot.inc_command) && ((int64_t)s->from_gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command));
-    if (((int64_t)s->emove.inc_command != (int64_t)s->inc_command_seen)) {
-        s->inc_command_seen = (uint16_t)(int64_t)s->emove.inc_command;
+    s->echoed = ((s->from_robot.inc_command_echo == s->to_robot.inc_command) &&
+            (s->from_gripper.inc_command_echo == s->to_gripper.inc_command));
+    if (s->emove.inc_command != s->inc_command_seen) {
+        s->inc_command_seen = s->emove.inc_command;
         s->new_command = true;
         s->answered = false;
-        s->to_emove.status_report = (uint8_t)INT64_C(1);
-        s->to_emove.failure = (uint8_t)INT64_C(0);
+        s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
+        s->to_emove.failure = VOCABULARY_REASON_NONE;
     } else {
-        if ((s->answered && s->echoed)) {
+        if (s->answered && s->echoed) {
             s->new_command = false;
         }
     }
     s->settling = false;
     if (s->echoed) {
-        s->robot.command = (uint8_t)(int64_t)s->from_robot.ref_command_echo;
-        s->robot.status = (uint8_t)(int64_t)s->from_robot.status_report;
-        s->robot.failure = (uint8_t)(int64_t)s->from_robot.failure;
-        s->gripper.command = (uint8_t)(int64_t)s->from_gripper.ref_command_echo;
-        s->gripper.status = (uint8_t)(int64_t)s->from_gripper.status_report;
-        s->gripper.failure = (uint8_t)(int64_t)s->from_gripper.failure;
+        s->robot.command = s->from_robot.ref_command_echo;
+        s->robot.status = s->from_robot.status_report;
+        s->robot.failure = s->from_robot.failure;
+        s->gripper.command = s->from_gripper.ref_command_echo;
+        s->gripper.status = s->from_gripper.status_report;
+        s->gripper.failure = s->from_gripper.failure;
     }
-    s->robot.resting = ((((int64_t)s->robot.command == INT64_C(0)) && ((int64_t)s->robot.status == INT64_C(0))) && (s->answered || s->echoed));
-    s->gripper.resting = ((((int64_t)s->gripper.command == INT64_C(0)) && ((int64_t)s->gripper.status == INT64_C(0))) && (s->answered || s->echoed));
+    s->robot.resting = ((s->robot.command == VOCABULARY_ROBOT_COMMAND_HOLD) &&
+            (s->robot.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
+    s->gripper.resting = ((s->gripper.command == VOCABULARY_GRIPPER_COMMAND_PAUSE) &&
+            (s->gripper.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
 /* Procedure give_orders. */
 static void primitive_do_give_orders(primitive_t *s)
 {
-    if ((s->new_command && (!s->settling))) {
+    if (s->new_command && (!s->settling)) {
         s->answered = true;
     }
-    s->to_emove.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->to_emove.ref_command_echo = (uint8_t)(int64_t)s->emove.input_command;
-    if (((int64_t)s->to_robot.input_command != (int64_t)s->last_robot.input_command)) {
-        s->to_robot.inc_command = primitive_u16_of_i64((((int64_t)s->to_robot.inc_command + INT64_C(1)) % INT64_C(65536)));
+    s->to_emove.inc_command_echo = s->inc_command_seen;
+    s->to_emove.ref_command_echo = s->emove.input_command;
+    if (s->to_robot.input_command != s->last_robot.input_command) {
+        s->to_robot.inc_command = (uint16_t)(((uint32_t)s->to_robot.inc_command + 1u) % 65536u);
     }
-    s->last_robot.input_command = (uint8_t)(int64_t)s->to_robot.input_command;
-    if ((((((int64_t)s->to_gripper.input_command != (int64_t)s->last_gripper.input_command) || (s->to_gripper.opening_mm != s->last_gripper.opening_mm)) || (s->to_gripper.force_n != s->last_gripper.force_n)) || (s->to_gripper.speed_mm_s != s->last_gripper.speed_mm_s))) {
-        s->to_gripper.inc_command = primitive_u16_of_i64((((int64_t)s->to_gripper.inc_command + INT64_C(1)) % INT64_C(65536)));
+    s->last_robot.input_command = s->to_robot.input_command;
+    if ((s->to_gripper.input_command != s->last_gripper.input_command) ||
+            (s->to_gripper.opening_mm != s->last_gripper.opening_mm) ||
+            (s->to_gripper.force_n != s->last_gripper.force_n) ||
+            (s->to_gripper.speed_mm_s != s->last_gripper.speed_mm_s)) {
+        s->to_gripper.inc_command = (uint16_t)(((uint32_t)s->to_gripper.inc_command + 1u) % 65536u);
     }
-    s->last_gripper.input_command = (uint8_t)(int64_t)s->to_gripper.input_command;
+    s->last_gripper.input_command = s->to_gripper.input_command;
     s->last_gripper.opening_mm = s->to_gripper.opening_mm + 0.0;
     s->last_gripper.force_n = s->to_gripper.force_n + 0.0;
     s->last_gripper.speed_mm_s = s->to_gripper.speed_mm_s + 0.0;
@@ -351,441 +361,328 @@ static void primitive_do_give_orders(primitive_t *s)
 static void primitive_do_settle(primitive_t *s)
 {
     s->settling = true;
-    s->to_robot.input_command = (uint8_t)INT64_C(0);
-    s->to_gripper.input_command = (uint8_t)INT64_C(0);
+    s->to_robot.input_command = VOCABULARY_ROBOT_COMMAND_HOLD;
+    s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
 }
 
 /* Procedure done. */
 static void primitive_do_done(primitive_t *s)
 {
-    s->to_emove.status_report = (uint8_t)INT64_C(0);
+    s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
 /* Procedure executing. */
 static void primitive_do_executing(primitive_t *s)
 {
-    s->to_emove.status_report = (uint8_t)INT64_C(1);
+    s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
 /* Procedure failed. */
 static void primitive_do_failed(primitive_t *s)
 {
-    s->to_emove.status_report = (uint8_t)INT64_C(2);
+    s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
 static void primitive_admit(primitive_t *s)
 {
-    primitive_t before = *s;
     s->line = -1;
-    s->fault = 0;
+    s->fault = PRIMITIVE_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
     if (!primitive_exact()) {
-        s->fault = 7;
-    }
-    if (((int64_t)s->emove.input_command > INT64_C(5))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 1;
-        }
-    }
-    if (((int64_t)s->emove.obj_ptr > INT64_C(7))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 2;
-        }
-    }
-    if (((int64_t)s->emove.grasp > INT64_C(9))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 3;
-        }
-    }
-    if (((int64_t)s->emove.pose_ptr > INT64_C(9999))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 4;
-        }
-    }
-    if (!((s->emove.displaced.x >= (-500.0)) && (s->emove.displaced.x <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 5;
-        }
+        s->fault = PRIMITIVE_FAULT_ARITHMETIC;
     } else {
-        s->emove.displaced.x = s->emove.displaced.x + 0.0;
-    }
-    if (!((s->emove.displaced.y >= (-500.0)) && (s->emove.displaced.y <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 6;
+        int32_t at = -1;
+        if ((at < 0) && (s->emove.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+            at = PRIMITIVE_LEAF_EMOVE_INPUT_COMMAND;
         }
-    } else {
-        s->emove.displaced.y = s->emove.displaced.y + 0.0;
-    }
-    if (!((s->emove.displaced.z >= (-500.0)) && (s->emove.displaced.z <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 7;
+        if ((at < 0) && (s->emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+            at = PRIMITIVE_LEAF_EMOVE_OBJ_PTR;
         }
-    } else {
-        s->emove.displaced.z = s->emove.displaced.z + 0.0;
-    }
-    if (!((s->emove.displaced.c >= (-1.0)) && (s->emove.displaced.c <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 8;
+        if ((at < 0) && (s->emove.grasp > 9u)) {
+            at = PRIMITIVE_LEAF_EMOVE_GRASP;
         }
-    } else {
-        s->emove.displaced.c = s->emove.displaced.c + 0.0;
-    }
-    if (!((s->emove.displaced.s >= (-1.0)) && (s->emove.displaced.s <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 9;
+        if ((at < 0) && (s->emove.pose_ptr > 9999u)) {
+            at = PRIMITIVE_LEAF_EMOVE_POSE_PTR;
         }
-    } else {
-        s->emove.displaced.s = s->emove.displaced.s + 0.0;
-    }
-    if (((int64_t)s->from_robot.ref_command_echo > INT64_C(1))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 20;
+        if ((at < 0) && (!((s->emove.displaced.x >= (-500.0)) && (s->emove.displaced.x <= 500.0)))) {
+            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_X;
         }
-    }
-    if (((int64_t)s->from_robot.status_report > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 21;
+        if ((at < 0) && (!((s->emove.displaced.y >= (-500.0)) && (s->emove.displaced.y <= 500.0)))) {
+            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_Y;
         }
-    }
-    if (((int64_t)s->from_robot.failure > INT64_C(17))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 22;
+        if ((at < 0) && (!((s->emove.displaced.z >= (-500.0)) && (s->emove.displaced.z <= 500.0)))) {
+            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_Z;
         }
-    }
-    if (!((s->from_robot.plate[0] >= (-4000.0)) && (s->from_robot.plate[0] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 23;
+        if ((at < 0) && (!((s->emove.displaced.c >= (-1.0)) && (s->emove.displaced.c <= 1.0)))) {
+            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_C;
         }
-    } else {
-        s->from_robot.plate[0] = s->from_robot.plate[0] + 0.0;
-    }
-    if (!((s->from_robot.plate[1] >= (-4000.0)) && (s->from_robot.plate[1] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 24;
+        if ((at < 0) && (!((s->emove.displaced.s >= (-1.0)) && (s->emove.displaced.s <= 1.0)))) {
+            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_S;
         }
-    } else {
-        s->from_robot.plate[1] = s->from_robot.plate[1] + 0.0;
-    }
-    if (!((s->from_robot.plate[2] >= (-4000.0)) && (s->from_robot.plate[2] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 25;
+        if ((at < 0) && (s->from_robot.ref_command_echo > VOCABULARY_ROBOT_COMMAND_FOLLOW)) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_REF_COMMAND_ECHO;
         }
-    } else {
-        s->from_robot.plate[2] = s->from_robot.plate[2] + 0.0;
-    }
-    if (!((s->from_robot.plate[3] >= (-4000.0)) && (s->from_robot.plate[3] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 26;
+        if ((at < 0) && (s->from_robot.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_STATUS_REPORT;
         }
-    } else {
-        s->from_robot.plate[3] = s->from_robot.plate[3] + 0.0;
-    }
-    if (!((s->from_robot.plate[4] >= (-4000.0)) && (s->from_robot.plate[4] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 27;
+        if ((at < 0) && (s->from_robot.failure > VOCABULARY_REASON_NO_PICTURE)) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_FAILURE;
         }
-    } else {
-        s->from_robot.plate[4] = s->from_robot.plate[4] + 0.0;
-    }
-    if (!((s->from_robot.plate[5] >= (-4000.0)) && (s->from_robot.plate[5] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 28;
+        if ((at < 0) && (!((s->from_robot.plate[0] >= (-4000.0)) && (s->from_robot.plate[0] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_0;
         }
-    } else {
-        s->from_robot.plate[5] = s->from_robot.plate[5] + 0.0;
-    }
-    if (!((s->from_robot.plate[6] >= (-4000.0)) && (s->from_robot.plate[6] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 29;
+        if ((at < 0) && (!((s->from_robot.plate[1] >= (-4000.0)) && (s->from_robot.plate[1] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_1;
         }
-    } else {
-        s->from_robot.plate[6] = s->from_robot.plate[6] + 0.0;
-    }
-    if (!((s->from_robot.plate[7] >= (-4000.0)) && (s->from_robot.plate[7] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 30;
+        if ((at < 0) && (!((s->from_robot.plate[2] >= (-4000.0)) && (s->from_robot.plate[2] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_2;
         }
-    } else {
-        s->from_robot.plate[7] = s->from_robot.plate[7] + 0.0;
-    }
-    if (!((s->from_robot.plate[8] >= (-4000.0)) && (s->from_robot.plate[8] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 31;
+        if ((at < 0) && (!((s->from_robot.plate[3] >= (-4000.0)) && (s->from_robot.plate[3] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_3;
         }
-    } else {
-        s->from_robot.plate[8] = s->from_robot.plate[8] + 0.0;
-    }
-    if (((int64_t)s->from_gripper.ref_command_echo > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 49;
+        if ((at < 0) && (!((s->from_robot.plate[4] >= (-4000.0)) && (s->from_robot.plate[4] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_4;
         }
-    }
-    if (((int64_t)s->from_gripper.status_report > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 50;
+        if ((at < 0) && (!((s->from_robot.plate[5] >= (-4000.0)) && (s->from_robot.plate[5] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_5;
         }
-    }
-    if (((int64_t)s->from_gripper.failure > INT64_C(17))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 51;
+        if ((at < 0) && (!((s->from_robot.plate[6] >= (-4000.0)) && (s->from_robot.plate[6] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_6;
         }
-    }
-    if (!((s->from_gripper.opening_mm >= 0.0) && (s->from_gripper.opening_mm <= 200.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 52;
+        if ((at < 0) && (!((s->from_robot.plate[7] >= (-4000.0)) && (s->from_robot.plate[7] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_7;
         }
-    } else {
-        s->from_gripper.opening_mm = s->from_gripper.opening_mm + 0.0;
-    }
-    if (!((s->goal.plate[0] >= (-4000.0)) && (s->goal.plate[0] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 67;
+        if ((at < 0) && (!((s->from_robot.plate[8] >= (-4000.0)) && (s->from_robot.plate[8] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_8;
         }
-    } else {
-        s->goal.plate[0] = s->goal.plate[0] + 0.0;
-    }
-    if (!((s->goal.plate[1] >= (-4000.0)) && (s->goal.plate[1] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 68;
+        if ((at < 0) && (s->from_gripper.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+            at = PRIMITIVE_LEAF_FROM_GRIPPER_REF_COMMAND_ECHO;
         }
-    } else {
-        s->goal.plate[1] = s->goal.plate[1] + 0.0;
-    }
-    if (!((s->goal.plate[2] >= (-4000.0)) && (s->goal.plate[2] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 69;
+        if ((at < 0) && (s->from_gripper.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+            at = PRIMITIVE_LEAF_FROM_GRIPPER_STATUS_REPORT;
         }
-    } else {
-        s->goal.plate[2] = s->goal.plate[2] + 0.0;
-    }
-    if (!((s->goal.plate[3] >= (-4000.0)) && (s->goal.plate[3] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 70;
+        if ((at < 0) && (s->from_gripper.failure > VOCABULARY_REASON_NO_PICTURE)) {
+            at = PRIMITIVE_LEAF_FROM_GRIPPER_FAILURE;
         }
-    } else {
-        s->goal.plate[3] = s->goal.plate[3] + 0.0;
-    }
-    if (!((s->goal.plate[4] >= (-4000.0)) && (s->goal.plate[4] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 71;
+        if ((at < 0) && (!((s->from_gripper.opening_mm >= 0.0) && (s->from_gripper.opening_mm <= 200.0)))) {
+            at = PRIMITIVE_LEAF_FROM_GRIPPER_OPENING_MM;
         }
-    } else {
-        s->goal.plate[4] = s->goal.plate[4] + 0.0;
-    }
-    if (!((s->goal.plate[5] >= (-4000.0)) && (s->goal.plate[5] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 72;
+        if ((at < 0) && (!((s->goal.plate[0] >= (-4000.0)) && (s->goal.plate[0] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_PLATE_0;
         }
-    } else {
-        s->goal.plate[5] = s->goal.plate[5] + 0.0;
-    }
-    if (!((s->goal.plate[6] >= (-4000.0)) && (s->goal.plate[6] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 73;
+        if ((at < 0) && (!((s->goal.plate[1] >= (-4000.0)) && (s->goal.plate[1] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_PLATE_1;
         }
-    } else {
-        s->goal.plate[6] = s->goal.plate[6] + 0.0;
-    }
-    if (!((s->goal.plate[7] >= (-4000.0)) && (s->goal.plate[7] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 74;
+        if ((at < 0) && (!((s->goal.plate[2] >= (-4000.0)) && (s->goal.plate[2] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_PLATE_2;
         }
-    } else {
-        s->goal.plate[7] = s->goal.plate[7] + 0.0;
-    }
-    if (!((s->goal.plate[8] >= (-4000.0)) && (s->goal.plate[8] <= 4000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 75;
+        if ((at < 0) && (!((s->goal.plate[3] >= (-4000.0)) && (s->goal.plate[3] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_PLATE_3;
         }
-    } else {
-        s->goal.plate[8] = s->goal.plate[8] + 0.0;
-    }
-    if (!((s->goal.speed_mm_s >= 1.0) && (s->goal.speed_mm_s <= 2000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 76;
+        if ((at < 0) && (!((s->goal.plate[4] >= (-4000.0)) && (s->goal.plate[4] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_PLATE_4;
         }
-    } else {
-        s->goal.speed_mm_s = s->goal.speed_mm_s + 0.0;
-    }
-    if (!((s->goal.accel_mm_s2 >= 10.0) && (s->goal.accel_mm_s2 <= 10000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 77;
+        if ((at < 0) && (!((s->goal.plate[5] >= (-4000.0)) && (s->goal.plate[5] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_PLATE_5;
         }
-    } else {
-        s->goal.accel_mm_s2 = s->goal.accel_mm_s2 + 0.0;
-    }
-    if (!((s->goal.decel_mm_s2 >= 10.0) && (s->goal.decel_mm_s2 <= 10000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 78;
+        if ((at < 0) && (!((s->goal.plate[6] >= (-4000.0)) && (s->goal.plate[6] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_PLATE_6;
         }
-    } else {
-        s->goal.decel_mm_s2 = s->goal.decel_mm_s2 + 0.0;
-    }
-    if (!((s->goal.breakpoint_mm >= 0.0) && (s->goal.breakpoint_mm <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 79;
+        if ((at < 0) && (!((s->goal.plate[7] >= (-4000.0)) && (s->goal.plate[7] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_PLATE_7;
         }
-    } else {
-        s->goal.breakpoint_mm = s->goal.breakpoint_mm + 0.0;
-    }
-    if (!((s->fingers.approach_mm >= 0.0) && (s->fingers.approach_mm <= 200.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 81;
+        if ((at < 0) && (!((s->goal.plate[8] >= (-4000.0)) && (s->goal.plate[8] <= 4000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_PLATE_8;
         }
-    } else {
-        s->fingers.approach_mm = s->fingers.approach_mm + 0.0;
-    }
-    if (!((s->fingers.departure_mm >= 0.0) && (s->fingers.departure_mm <= 200.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 82;
+        if ((at < 0) && (!((s->goal.speed_mm_s >= 1.0) && (s->goal.speed_mm_s <= 2000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_SPEED_MM_S;
         }
-    } else {
-        s->fingers.departure_mm = s->fingers.departure_mm + 0.0;
-    }
-    if (!((s->fingers.grip_mm >= 0.0) && (s->fingers.grip_mm <= 200.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 83;
+        if ((at < 0) && (!((s->goal.accel_mm_s2 >= 10.0) && (s->goal.accel_mm_s2 <= 10000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_ACCEL_MM_S2;
         }
-    } else {
-        s->fingers.grip_mm = s->fingers.grip_mm + 0.0;
-    }
-    if (!((s->fingers.tolerance_mm >= 0.0) && (s->fingers.tolerance_mm <= 50.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 84;
+        if ((at < 0) && (!((s->goal.decel_mm_s2 >= 10.0) && (s->goal.decel_mm_s2 <= 10000.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_DECEL_MM_S2;
         }
-    } else {
-        s->fingers.tolerance_mm = s->fingers.tolerance_mm + 0.0;
-    }
-    if (!((s->fingers.force_n >= 0.0) && (s->fingers.force_n <= 1000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 85;
+        if ((at < 0) && (!((s->goal.breakpoint_mm >= 0.0) && (s->goal.breakpoint_mm <= 500.0)))) {
+            at = PRIMITIVE_LEAF_GOAL_BREAKPOINT_MM;
         }
-    } else {
-        s->fingers.force_n = s->fingers.force_n + 0.0;
-    }
-    if (!((s->fingers.speed_mm_s >= 0.0) && (s->fingers.speed_mm_s <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 86;
+        if ((at < 0) && (!((s->fingers.approach_mm >= 0.0) && (s->fingers.approach_mm <= 200.0)))) {
+            at = PRIMITIVE_LEAF_FINGERS_APPROACH_MM;
         }
-    } else {
-        s->fingers.speed_mm_s = s->fingers.speed_mm_s + 0.0;
-    }
-    if (s->fault != 0) {
-        before.line = -1;
-        before.fault = s->fault;
-        before.fault_at = s->fault_at;
-        before.assumptions_failed = 0;
-        *s = before;
+        if ((at < 0) && (!((s->fingers.departure_mm >= 0.0) && (s->fingers.departure_mm <= 200.0)))) {
+            at = PRIMITIVE_LEAF_FINGERS_DEPARTURE_MM;
+        }
+        if ((at < 0) && (!((s->fingers.grip_mm >= 0.0) && (s->fingers.grip_mm <= 200.0)))) {
+            at = PRIMITIVE_LEAF_FINGERS_GRIP_MM;
+        }
+        if ((at < 0) && (!((s->fingers.tolerance_mm >= 0.0) && (s->fingers.tolerance_mm <= 50.0)))) {
+            at = PRIMITIVE_LEAF_FINGERS_TOLERANCE_MM;
+        }
+        if ((at < 0) && (!((s->fingers.force_n >= 0.0) && (s->fingers.force_n <= 1000.0)))) {
+            at = PRIMITIVE_LEAF_FINGERS_FORCE_N;
+        }
+        if ((at < 0) && (!((s->fingers.speed_mm_s >= 0.0) && (s->fingers.speed_mm_s <= 500.0)))) {
+            at = PRIMITIVE_LEAF_FINGERS_SPEED_MM_S;
+        }
+        if (at >= 0) {
+            s->fault = PRIMITIVE_FAULT_ADMIT;
+            s->fault_at = at;
+        } else {
+            s->emove.displaced.x = s->emove.displaced.x + 0.0;
+            s->emove.displaced.y = s->emove.displaced.y + 0.0;
+            s->emove.displaced.z = s->emove.displaced.z + 0.0;
+            s->emove.displaced.c = s->emove.displaced.c + 0.0;
+            s->emove.displaced.s = s->emove.displaced.s + 0.0;
+            s->from_robot.plate[0] = s->from_robot.plate[0] + 0.0;
+            s->from_robot.plate[1] = s->from_robot.plate[1] + 0.0;
+            s->from_robot.plate[2] = s->from_robot.plate[2] + 0.0;
+            s->from_robot.plate[3] = s->from_robot.plate[3] + 0.0;
+            s->from_robot.plate[4] = s->from_robot.plate[4] + 0.0;
+            s->from_robot.plate[5] = s->from_robot.plate[5] + 0.0;
+            s->from_robot.plate[6] = s->from_robot.plate[6] + 0.0;
+            s->from_robot.plate[7] = s->from_robot.plate[7] + 0.0;
+            s->from_robot.plate[8] = s->from_robot.plate[8] + 0.0;
+            s->from_gripper.opening_mm = s->from_gripper.opening_mm + 0.0;
+            s->goal.plate[0] = s->goal.plate[0] + 0.0;
+            s->goal.plate[1] = s->goal.plate[1] + 0.0;
+            s->goal.plate[2] = s->goal.plate[2] + 0.0;
+            s->goal.plate[3] = s->goal.plate[3] + 0.0;
+            s->goal.plate[4] = s->goal.plate[4] + 0.0;
+            s->goal.plate[5] = s->goal.plate[5] + 0.0;
+            s->goal.plate[6] = s->goal.plate[6] + 0.0;
+            s->goal.plate[7] = s->goal.plate[7] + 0.0;
+            s->goal.plate[8] = s->goal.plate[8] + 0.0;
+            s->goal.speed_mm_s = s->goal.speed_mm_s + 0.0;
+            s->goal.accel_mm_s2 = s->goal.accel_mm_s2 + 0.0;
+            s->goal.decel_mm_s2 = s->goal.decel_mm_s2 + 0.0;
+            s->goal.breakpoint_mm = s->goal.breakpoint_mm + 0.0;
+            s->fingers.approach_mm = s->fingers.approach_mm + 0.0;
+            s->fingers.departure_mm = s->fingers.departure_mm + 0.0;
+            s->fingers.grip_mm = s->fingers.grip_mm + 0.0;
+            s->fingers.tolerance_mm = s->fingers.tolerance_mm + 0.0;
+            s->fingers.force_n = s->fingers.force_n + 0.0;
+            s->fingers.speed_mm_s = s->fingers.speed_mm_s + 0.0;
+        }
     }
 }
 
 /* Deferred variables take their next values, all at once. */
 static void primitive_settle(primitive_t *s)
 {
-    const bool ready0 = (((int64_t)s->from_robot.inc_command_echo == (int64_t)s->to_robot.inc_command) && ((int64_t)s->from_gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command));
+    const bool ready0 = (s->from_robot.inc_command_echo == s->to_robot.inc_command) &&
+            (s->from_gripper.inc_command_echo == s->to_gripper.inc_command);
     if (ready0) {
         s->cur_state = s->cur_state_next;
     }
 }
 
+/* Assumption approach_position_fingers_in_step: A state goes with the orders that it waits for (section
+   9). */
+static bool primitive_holds_approach_position_fingers_in_step(const primitive_t *s)
+{
+    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
+}
+
+/* Assumption departure_position_fingers_in_step: A state goes with the orders that it waits for (section
+   9). */
+static bool primitive_holds_departure_position_fingers_in_step(const primitive_t *s)
+{
+    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
+}
+
+/* Assumption goto_in_step: A state goes with the orders that it waits for (section 9). */
+static bool primitive_holds_goto_in_step(const primitive_t *s)
+{
+    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_MOVING);
+}
+
+/* Assumption gothru_in_step: A state goes with the orders that it waits for (section 9). */
+static bool primitive_holds_gothru_in_step(const primitive_t *s)
+{
+    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_MOVING);
+}
+
+/* Assumption immed_grasp_in_step: A state goes with the orders that it waits for (section 9). */
+static bool primitive_holds_immed_grasp_in_step(const primitive_t *s)
+{
+    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
+            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
+}
+
 /* Matches table approach_position_fingers and runs the line. */
 static void primitive_run_approach_position_fingers(primitive_t *s)
 {
-    /* approach_position_fingers_in_step */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(3)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
+    if (!primitive_holds_approach_position_fingers_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP);
     }
     s->line = primitive_approach_position_fingers_line(s);
     switch (s->line) {
-    case 0: /* primitive/approach_position_fingers.rcs line 1 */
-        primitive_do_nextstate(s, INT64_C(3));
+    /* primitive/approach_position_fingers.rcs line 1: new_command true; fingers.known true */
+    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_1:
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
         primitive_do_position(s, s->fingers.approach_mm + 0.0);
         primitive_do_executing(s);
         break;
-    case 1: /* primitive/approach_position_fingers.rcs line 2 */
+    /* primitive/approach_position_fingers.rcs line 2: new_command true; fingers.known false */
+    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_2:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 2: /* primitive/approach_position_fingers.rcs line 3 */
+    /* primitive/approach_position_fingers.rcs line 3: new_command false; cur_state fingering;
+       gripper.status executing */
+    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_3:
         primitive_do_executing(s);
         break;
-    case 3: /* primitive/approach_position_fingers.rcs line 4 */
-        primitive_do_nextstate(s, INT64_C(0));
+    /* primitive/approach_position_fingers.rcs line 4: new_command false; cur_state fingering;
+       gripper.status done */
+    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_4:
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
         primitive_do_done(s);
         break;
-    case 4: /* primitive/approach_position_fingers.rcs line 5 */
+    /* primitive/approach_position_fingers.rcs line 5: new_command false; cur_state fingering;
+       gripper.status failed */
+    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_5:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 5: /* primitive/approach_position_fingers.rcs line 6 */
+    /* primitive/approach_position_fingers.rcs line 6: new_command false; cur_state d_state */
+    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_6:
         primitive_do_done(s);
         break;
-    case 6: /* primitive/approach_position_fingers.rcs line 7 */
+    /* primitive/approach_position_fingers.rcs line 7: new_command false; cur_state f_state */
+    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_7:
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 7: /* primitive/approach_position_fingers.rcs line 8 */
+    /* primitive/approach_position_fingers.rcs line 8: no other line matches */
+    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_8:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = PRIMITIVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -793,55 +690,66 @@ static void primitive_run_approach_position_fingers(primitive_t *s)
 /* Matches table departure_position_fingers and runs the line. */
 static void primitive_run_departure_position_fingers(primitive_t *s)
 {
-    /* departure_position_fingers_in_step */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(3)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
+    if (!primitive_holds_departure_position_fingers_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP);
     }
     s->line = primitive_departure_position_fingers_line(s);
     switch (s->line) {
-    case 0: /* primitive/departure_position_fingers.rcs line 1 */
-        primitive_do_nextstate(s, INT64_C(3));
+    /* primitive/departure_position_fingers.rcs line 1: new_command true; fingers.known true */
+    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_1:
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
         primitive_do_position(s, s->fingers.departure_mm + 0.0);
         primitive_do_executing(s);
         break;
-    case 1: /* primitive/departure_position_fingers.rcs line 2 */
+    /* primitive/departure_position_fingers.rcs line 2: new_command true; fingers.known false */
+    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_2:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 2: /* primitive/departure_position_fingers.rcs line 3 */
+    /* primitive/departure_position_fingers.rcs line 3: new_command false; cur_state fingering;
+       gripper.status executing */
+    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_3:
         primitive_do_executing(s);
         break;
-    case 3: /* primitive/departure_position_fingers.rcs line 4 */
-        primitive_do_nextstate(s, INT64_C(0));
+    /* primitive/departure_position_fingers.rcs line 4: new_command false; cur_state fingering;
+       gripper.status done */
+    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_4:
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
         primitive_do_done(s);
         break;
-    case 4: /* primitive/departure_position_fingers.rcs line 5 */
+    /* primitive/departure_position_fingers.rcs line 5: new_command false; cur_state fingering;
+       gripper.status failed */
+    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_5:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 5: /* primitive/departure_position_fingers.rcs line 6 */
+    /* primitive/departure_position_fingers.rcs line 6: new_command false; cur_state d_state */
+    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_6:
         primitive_do_done(s);
         break;
-    case 6: /* primitive/departure_position_fingers.rcs line 7 */
+    /* primitive/departure_position_fingers.rcs line 7: new_command false; cur_state f_state */
+    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_7:
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 7: /* primitive/departure_position_fingers.rcs line 8 */
+    /* primitive/departure_position_fingers.rcs line 8: no other line matches */
+    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_8:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = PRIMITIVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -849,80 +757,92 @@ static void primitive_run_departure_position_fingers(primitive_t *s)
 /* Matches table goto and runs the line. */
 static void primitive_run_goto_(primitive_t *s)
 {
-    /* goto_in_step */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(2)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 2u);
+    if (!primitive_holds_goto_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_GOTO_IN_STEP);
     }
     s->line = primitive_goto__line(s);
     switch (s->line) {
-    case 0: /* primitive/goto.rcs line 1 */
+    case PRIMITIVE_LINE_GOTO_1: /* primitive/goto.rcs line 1: new_command true; goal.known true */
         primitive_do_start(s);
-        primitive_do_nextstate(s, INT64_C(2));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_MOVING);
         primitive_do_follow(s);
         primitive_do_executing(s);
         break;
-    case 1: /* primitive/goto.rcs line 2 */
+    case PRIMITIVE_LINE_GOTO_2: /* primitive/goto.rcs line 2: new_command true; goal.known false */
         primitive_do_no_pose(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 2: /* primitive/goto.rcs line 3 */
+    /* primitive/goto.rcs line 3: new_command false; cur_state moving; robot.status /= failed; there false */
+    case PRIMITIVE_LINE_GOTO_3:
         primitive_do_advance(s);
         primitive_do_executing(s);
         break;
-    case 3: /* primitive/goto.rcs line 4 */
+    /* primitive/goto.rcs line 4: new_command false; cur_state moving; robot.status executing; there true;
+       waited < most_waited */
+    case PRIMITIVE_LINE_GOTO_4:
         primitive_do_stop(s);
         primitive_do_wait(s);
         primitive_do_executing(s);
         break;
-    case 4: /* primitive/goto.rcs line 5 */
+    /* primitive/goto.rcs line 5: new_command false; cur_state moving; robot.status executing; there true;
+       waited most_waited */
+    case PRIMITIVE_LINE_GOTO_5:
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 5: /* primitive/goto.rcs line 6 */
+    /* primitive/goto.rcs line 6: new_command false; cur_state moving; robot.status done; there true;
+       settled true */
+    case PRIMITIVE_LINE_GOTO_6:
         primitive_do_stop(s);
-        primitive_do_nextstate(s, INT64_C(0));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
         primitive_do_done(s);
         break;
-    case 6: /* primitive/goto.rcs line 6a */
+    /* primitive/goto.rcs line 6a: new_command false; cur_state moving; robot.status done; there true;
+       settled false; waited < most_waited */
+    case PRIMITIVE_LINE_GOTO_6A:
         primitive_do_stop(s);
         primitive_do_wait(s);
         primitive_do_executing(s);
         break;
-    case 7: /* primitive/goto.rcs line 6b */
+    /* primitive/goto.rcs line 6b: new_command false; cur_state moving; robot.status done; there true;
+       settled false; waited most_waited */
+    case PRIMITIVE_LINE_GOTO_6B:
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 8: /* primitive/goto.rcs line 7 */
+    /* primitive/goto.rcs line 7: new_command false; cur_state moving; robot.status failed */
+    case PRIMITIVE_LINE_GOTO_7:
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 9: /* primitive/goto.rcs line 8 */
+    case PRIMITIVE_LINE_GOTO_8: /* primitive/goto.rcs line 8: new_command false; cur_state d_state */
         primitive_do_done(s);
         break;
-    case 10: /* primitive/goto.rcs line 9 */
+    case PRIMITIVE_LINE_GOTO_9: /* primitive/goto.rcs line 9: new_command false; cur_state f_state */
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 11: /* primitive/goto.rcs line 10 */
+    case PRIMITIVE_LINE_GOTO_10: /* primitive/goto.rcs line 10: no other line matches */
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = PRIMITIVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -930,59 +850,63 @@ static void primitive_run_goto_(primitive_t *s)
 /* Matches table gothru and runs the line. */
 static void primitive_run_gothru(primitive_t *s)
 {
-    /* gothru_in_step */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(2)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 3u);
+    if (!primitive_holds_gothru_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_GOTHRU_IN_STEP);
     }
     s->line = primitive_gothru_line(s);
     switch (s->line) {
-    case 0: /* primitive/gothru.rcs line 1 */
+    case PRIMITIVE_LINE_GOTHRU_1: /* primitive/gothru.rcs line 1: new_command true; goal.known true */
         primitive_do_start(s);
-        primitive_do_nextstate(s, INT64_C(2));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_MOVING);
         primitive_do_follow(s);
         primitive_do_executing(s);
         break;
-    case 1: /* primitive/gothru.rcs line 2 */
+    case PRIMITIVE_LINE_GOTHRU_2: /* primitive/gothru.rcs line 2: new_command true; goal.known false */
         primitive_do_no_pose(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 2: /* primitive/gothru.rcs line 3 */
+    /* primitive/gothru.rcs line 3: new_command false; cur_state moving; robot.status /= failed; near false */
+    case PRIMITIVE_LINE_GOTHRU_3:
         primitive_do_advance_thru(s);
         primitive_do_executing(s);
         break;
-    case 3: /* primitive/gothru.rcs line 4 */
+    /* primitive/gothru.rcs line 4: new_command false; cur_state moving; robot.status /= failed; near true */
+    case PRIMITIVE_LINE_GOTHRU_4:
         primitive_do_advance_thru(s);
-        primitive_do_nextstate(s, INT64_C(0));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
         primitive_do_done(s);
         break;
-    case 4: /* primitive/gothru.rcs line 5 */
+    /* primitive/gothru.rcs line 5: new_command false; cur_state d_state; robot.status /= failed */
+    case PRIMITIVE_LINE_GOTHRU_5:
         primitive_do_advance_thru(s);
         primitive_do_done(s);
         break;
-    case 5: /* primitive/gothru.rcs line 6 */
+    /* primitive/gothru.rcs line 6: new_command false; cur_state in {moving, d_state}; robot.status failed */
+    case PRIMITIVE_LINE_GOTHRU_6:
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 6: /* primitive/gothru.rcs line 7 */
+    case PRIMITIVE_LINE_GOTHRU_7: /* primitive/gothru.rcs line 7: new_command false; cur_state f_state */
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 7: /* primitive/gothru.rcs line 8 */
+    case PRIMITIVE_LINE_GOTHRU_8: /* primitive/gothru.rcs line 8: no other line matches */
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = PRIMITIVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -990,61 +914,71 @@ static void primitive_run_gothru(primitive_t *s)
 /* Matches table immed_grasp and runs the line. */
 static void primitive_run_immed_grasp(primitive_t *s)
 {
-    /* immed_grasp_in_step */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(3)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 4u);
+    if (!primitive_holds_immed_grasp_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_IMMED_GRASP_IN_STEP);
     }
     s->line = primitive_immed_grasp_line(s);
     switch (s->line) {
-    case 0: /* primitive/immed_grasp.rcs line 1 */
-        primitive_do_nextstate(s, INT64_C(3));
+    /* primitive/immed_grasp.rcs line 1: new_command true; fingers.known true */
+    case PRIMITIVE_LINE_IMMED_GRASP_1:
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
         primitive_do_grasp(s);
         primitive_do_executing(s);
         break;
-    case 1: /* primitive/immed_grasp.rcs line 2 */
+    /* primitive/immed_grasp.rcs line 2: new_command true; fingers.known false */
+    case PRIMITIVE_LINE_IMMED_GRASP_2:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 2: /* primitive/immed_grasp.rcs line 3 */
+    /* primitive/immed_grasp.rcs line 3: new_command false; cur_state fingering; gripper.status executing */
+    case PRIMITIVE_LINE_IMMED_GRASP_3:
         primitive_do_executing(s);
         break;
-    case 3: /* primitive/immed_grasp.rcs line 4 */
-        primitive_do_nextstate(s, INT64_C(0));
+    /* primitive/immed_grasp.rcs line 4: new_command false; cur_state fingering; gripper.status done; fits
+       true */
+    case PRIMITIVE_LINE_IMMED_GRASP_4:
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
         primitive_do_done(s);
         break;
-    case 4: /* primitive/immed_grasp.rcs line 5 */
+    /* primitive/immed_grasp.rcs line 5: new_command false; cur_state fingering; gripper.status done; fits
+       false */
+    case PRIMITIVE_LINE_IMMED_GRASP_5:
         primitive_do_misfit_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 5: /* primitive/immed_grasp.rcs line 6 */
+    /* primitive/immed_grasp.rcs line 6: new_command false; cur_state fingering; gripper.status failed */
+    case PRIMITIVE_LINE_IMMED_GRASP_6:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 6: /* primitive/immed_grasp.rcs line 7 */
+    /* primitive/immed_grasp.rcs line 7: new_command false; cur_state d_state */
+    case PRIMITIVE_LINE_IMMED_GRASP_7:
         primitive_do_done(s);
         break;
-    case 7: /* primitive/immed_grasp.rcs line 8 */
+    /* primitive/immed_grasp.rcs line 8: new_command false; cur_state f_state */
+    case PRIMITIVE_LINE_IMMED_GRASP_8:
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case 8: /* primitive/immed_grasp.rcs line 9 */
+    case PRIMITIVE_LINE_IMMED_GRASP_9: /* primitive/immed_grasp.rcs line 9: no other line matches */
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, INT64_C(1));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = PRIMITIVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -1054,23 +988,23 @@ static void primitive_run_pause_primitive(primitive_t *s)
 {
     s->line = primitive_pause_primitive_line(s);
     switch (s->line) {
-    case 0: /* primitive/pause.rcs line 1 */
-        primitive_do_nextstate(s, INT64_C(0));
+    case PRIMITIVE_LINE_PAUSE_PRIMITIVE_1: /* primitive/pause.rcs line 1: idle true */
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
         primitive_do_pause(s);
         primitive_do_done(s);
         break;
-    case 1: /* primitive/pause.rcs line 2 */
+    case PRIMITIVE_LINE_PAUSE_PRIMITIVE_2: /* primitive/pause.rcs line 2: idle false */
         primitive_do_settle(s);
-        primitive_do_nextstate(s, INT64_C(0));
+        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
         primitive_do_pause(s);
         primitive_do_executing(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = PRIMITIVE_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -1079,32 +1013,32 @@ static void primitive_run_pause_primitive(primitive_t *s)
 void primitive_init(primitive_t *s)
 {
     s->line = -1;
-    s->fault = 0;
+    s->fault = PRIMITIVE_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->emove.inc_command = (uint16_t)INT64_C(0);
-    s->emove.input_command = (uint8_t)INT64_C(0);
-    s->emove.obj_ptr = (uint8_t)INT64_C(0);
-    s->emove.grasp = (uint8_t)INT64_C(0);
-    s->emove.pose_ptr = (uint16_t)INT64_C(0);
+    s->emove.inc_command = 0u;
+    s->emove.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->emove.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
+    s->emove.grasp = 0u;
+    s->emove.pose_ptr = 0u;
     s->emove.displaced.x = (-500.0);
     s->emove.displaced.y = (-500.0);
     s->emove.displaced.z = (-500.0);
     s->emove.displaced.c = (-1.0);
     s->emove.displaced.s = (-1.0);
-    s->to_emove.inc_command_echo = (uint16_t)INT64_C(0);
-    s->to_emove.ref_command_echo = (uint8_t)INT64_C(0);
-    s->to_emove.status_report = (uint8_t)INT64_C(0);
-    s->to_emove.failure = (uint8_t)INT64_C(0);
+    s->to_emove.inc_command_echo = 0u;
+    s->to_emove.ref_command_echo = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->to_emove.failure = VOCABULARY_REASON_NONE;
     s->to_emove.holds = false;
     s->new_command = false;
     s->answered = false;
     s->settling = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
-    s->from_robot.inc_command_echo = (uint16_t)INT64_C(0);
-    s->from_robot.ref_command_echo = (uint8_t)INT64_C(0);
-    s->from_robot.status_report = (uint8_t)INT64_C(0);
-    s->from_robot.failure = (uint8_t)INT64_C(0);
+    s->inc_command_seen = 0u;
+    s->from_robot.inc_command_echo = 0u;
+    s->from_robot.ref_command_echo = VOCABULARY_ROBOT_COMMAND_HOLD;
+    s->from_robot.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->from_robot.failure = VOCABULARY_REASON_NONE;
     s->from_robot.plate[0] = (-4000.0);
     s->from_robot.plate[1] = (-4000.0);
     s->from_robot.plate[2] = (-4000.0);
@@ -1114,8 +1048,8 @@ void primitive_init(primitive_t *s)
     s->from_robot.plate[6] = (-4000.0);
     s->from_robot.plate[7] = (-4000.0);
     s->from_robot.plate[8] = (-4000.0);
-    s->to_robot.inc_command = (uint16_t)INT64_C(0);
-    s->to_robot.input_command = (uint8_t)INT64_C(0);
+    s->to_robot.inc_command = 0u;
+    s->to_robot.input_command = VOCABULARY_ROBOT_COMMAND_HOLD;
     s->to_robot.plate[0] = (-4000.0);
     s->to_robot.plate[1] = (-4000.0);
     s->to_robot.plate[2] = (-4000.0);
@@ -1125,26 +1059,26 @@ void primitive_init(primitive_t *s)
     s->to_robot.plate[6] = (-4000.0);
     s->to_robot.plate[7] = (-4000.0);
     s->to_robot.plate[8] = (-4000.0);
-    s->robot.command = (uint8_t)INT64_C(0);
-    s->robot.status = (uint8_t)INT64_C(0);
+    s->robot.command = VOCABULARY_ROBOT_COMMAND_HOLD;
+    s->robot.status = VOCABULARY_LEVEL_STATUS_DONE;
     s->robot.resting = false;
-    s->robot.failure = (uint8_t)INT64_C(0);
-    s->last_robot.input_command = (uint8_t)INT64_C(0);
-    s->from_gripper.inc_command_echo = (uint16_t)INT64_C(0);
-    s->from_gripper.ref_command_echo = (uint8_t)INT64_C(0);
-    s->from_gripper.status_report = (uint8_t)INT64_C(0);
-    s->from_gripper.failure = (uint8_t)INT64_C(0);
+    s->robot.failure = VOCABULARY_REASON_NONE;
+    s->last_robot.input_command = VOCABULARY_ROBOT_COMMAND_HOLD;
+    s->from_gripper.inc_command_echo = 0u;
+    s->from_gripper.ref_command_echo = VOCABULARY_GRIPPER_COMMAND_PAUSE;
+    s->from_gripper.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->from_gripper.failure = VOCABULARY_REASON_NONE;
     s->from_gripper.opening_mm = 0.0;
-    s->to_gripper.inc_command = (uint16_t)INT64_C(0);
-    s->to_gripper.input_command = (uint8_t)INT64_C(0);
+    s->to_gripper.inc_command = 0u;
+    s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
     s->to_gripper.opening_mm = 0.0;
     s->to_gripper.force_n = 0.0;
     s->to_gripper.speed_mm_s = 0.0;
-    s->gripper.command = (uint8_t)INT64_C(0);
-    s->gripper.status = (uint8_t)INT64_C(0);
+    s->gripper.command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
+    s->gripper.status = VOCABULARY_LEVEL_STATUS_DONE;
     s->gripper.resting = false;
-    s->gripper.failure = (uint8_t)INT64_C(0);
-    s->last_gripper.input_command = (uint8_t)INT64_C(0);
+    s->gripper.failure = VOCABULARY_REASON_NONE;
+    s->last_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
     s->last_gripper.opening_mm = 0.0;
     s->last_gripper.force_n = 0.0;
     s->last_gripper.speed_mm_s = 0.0;
@@ -1170,8 +1104,8 @@ void primitive_init(primitive_t *s)
     s->fingers.force_n = 0.0;
     s->fingers.speed_mm_s = 0.0;
     s->idle = true;
-    s->cur_state = (uint8_t)INT64_C(0);
-    s->cur_state_next = (uint8_t)INT64_C(0);
+    s->cur_state = PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE;
+    s->cur_state_next = PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE;
     s->from[0] = (-4000.0);
     s->from[1] = (-4000.0);
     s->from[2] = (-4000.0);
@@ -1198,223 +1132,226 @@ void primitive_init(primitive_t *s)
     s->settled = false;
     s->fits = false;
     s->closed = false;
-    s->waited = (uint8_t)INT64_C(0);
-    s->display = (uint8_t)INT64_C(0);
+    s->waited = 0u;
+    s->display = PRIMITIVE_COMMON_DISPLAY_PATH;
     s->echoed = false;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t primitive_check(const primitive_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && (((int64_t)s->to_emove.ref_command_echo > INT64_C(5)))) {
-        at = 11;
+    if ((at < 0) && (s->to_emove.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+        at = PRIMITIVE_LEAF_TO_EMOVE_REF_COMMAND_ECHO;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.status_report > INT64_C(2)))) {
-        at = 12;
+    if ((at < 0) && (s->to_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = PRIMITIVE_LEAF_TO_EMOVE_STATUS_REPORT;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(17)))) {
-        at = 13;
+    if ((at < 0) && (s->to_emove.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = PRIMITIVE_LEAF_TO_EMOVE_FAILURE;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->to_emove.holds) > 1u)) {
-        at = 14;
+        at = PRIMITIVE_LEAF_TO_EMOVE_HOLDS;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
-        at = 15;
+        at = PRIMITIVE_LEAF_NEW_COMMAND;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
-        at = 16;
+        at = PRIMITIVE_LEAF_ANSWERED;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
-        at = 17;
+        at = PRIMITIVE_LEAF_SETTLING;
     }
-    if ((at < 0) && (((int64_t)s->to_robot.input_command > INT64_C(1)))) {
-        at = 33;
+    if ((at < 0) && (s->to_robot.input_command > VOCABULARY_ROBOT_COMMAND_FOLLOW)) {
+        at = PRIMITIVE_LEAF_TO_ROBOT_INPUT_COMMAND;
     }
     if ((at < 0) && (!((s->to_robot.plate[0] >= (-4000.0)) && (s->to_robot.plate[0] <= 4000.0)))) {
-        at = 34;
+        at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_0;
     }
     if ((at < 0) && (!((s->to_robot.plate[1] >= (-4000.0)) && (s->to_robot.plate[1] <= 4000.0)))) {
-        at = 35;
+        at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_1;
     }
     if ((at < 0) && (!((s->to_robot.plate[2] >= (-4000.0)) && (s->to_robot.plate[2] <= 4000.0)))) {
-        at = 36;
+        at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_2;
     }
     if ((at < 0) && (!((s->to_robot.plate[3] >= (-4000.0)) && (s->to_robot.plate[3] <= 4000.0)))) {
-        at = 37;
+        at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_3;
     }
     if ((at < 0) && (!((s->to_robot.plate[4] >= (-4000.0)) && (s->to_robot.plate[4] <= 4000.0)))) {
-        at = 38;
+        at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_4;
     }
     if ((at < 0) && (!((s->to_robot.plate[5] >= (-4000.0)) && (s->to_robot.plate[5] <= 4000.0)))) {
-        at = 39;
+        at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_5;
     }
     if ((at < 0) && (!((s->to_robot.plate[6] >= (-4000.0)) && (s->to_robot.plate[6] <= 4000.0)))) {
-        at = 40;
+        at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_6;
     }
     if ((at < 0) && (!((s->to_robot.plate[7] >= (-4000.0)) && (s->to_robot.plate[7] <= 4000.0)))) {
-        at = 41;
+        at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_7;
     }
     if ((at < 0) && (!((s->to_robot.plate[8] >= (-4000.0)) && (s->to_robot.plate[8] <= 4000.0)))) {
-        at = 42;
+        at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_8;
     }
-    if ((at < 0) && (((int64_t)s->robot.command > INT64_C(1)))) {
-        at = 43;
+    if ((at < 0) && (s->robot.command > VOCABULARY_ROBOT_COMMAND_FOLLOW)) {
+        at = PRIMITIVE_LEAF_ROBOT_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->robot.status > INT64_C(2)))) {
-        at = 44;
+    if ((at < 0) && (s->robot.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = PRIMITIVE_LEAF_ROBOT_STATUS;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->robot.resting) > 1u)) {
-        at = 45;
+        at = PRIMITIVE_LEAF_ROBOT_RESTING;
     }
-    if ((at < 0) && (((int64_t)s->robot.failure > INT64_C(17)))) {
-        at = 46;
+    if ((at < 0) && (s->robot.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = PRIMITIVE_LEAF_ROBOT_FAILURE;
     }
-    if ((at < 0) && (((int64_t)s->last_robot.input_command > INT64_C(1)))) {
-        at = 47;
+    if ((at < 0) && (s->last_robot.input_command > VOCABULARY_ROBOT_COMMAND_FOLLOW)) {
+        at = PRIMITIVE_LEAF_LAST_ROBOT_INPUT_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->to_gripper.input_command > INT64_C(2)))) {
-        at = 54;
+    if ((at < 0) && (s->to_gripper.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+        at = PRIMITIVE_LEAF_TO_GRIPPER_INPUT_COMMAND;
     }
     if ((at < 0) && (!((s->to_gripper.opening_mm >= 0.0) && (s->to_gripper.opening_mm <= 200.0)))) {
-        at = 55;
+        at = PRIMITIVE_LEAF_TO_GRIPPER_OPENING_MM;
     }
     if ((at < 0) && (!((s->to_gripper.force_n >= 0.0) && (s->to_gripper.force_n <= 1000.0)))) {
-        at = 56;
+        at = PRIMITIVE_LEAF_TO_GRIPPER_FORCE_N;
     }
     if ((at < 0) && (!((s->to_gripper.speed_mm_s >= 0.0) && (s->to_gripper.speed_mm_s <= 500.0)))) {
-        at = 57;
+        at = PRIMITIVE_LEAF_TO_GRIPPER_SPEED_MM_S;
     }
-    if ((at < 0) && (((int64_t)s->gripper.command > INT64_C(2)))) {
-        at = 58;
+    if ((at < 0) && (s->gripper.command > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+        at = PRIMITIVE_LEAF_GRIPPER_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->gripper.status > INT64_C(2)))) {
-        at = 59;
+    if ((at < 0) && (s->gripper.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = PRIMITIVE_LEAF_GRIPPER_STATUS;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->gripper.resting) > 1u)) {
-        at = 60;
+        at = PRIMITIVE_LEAF_GRIPPER_RESTING;
     }
-    if ((at < 0) && (((int64_t)s->gripper.failure > INT64_C(17)))) {
-        at = 61;
+    if ((at < 0) && (s->gripper.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = PRIMITIVE_LEAF_GRIPPER_FAILURE;
     }
-    if ((at < 0) && (((int64_t)s->last_gripper.input_command > INT64_C(2)))) {
-        at = 62;
+    if ((at < 0) && (s->last_gripper.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+        at = PRIMITIVE_LEAF_LAST_GRIPPER_INPUT_COMMAND;
     }
     if ((at < 0) && (!((s->last_gripper.opening_mm >= 0.0) && (s->last_gripper.opening_mm <= 200.0)))) {
-        at = 63;
+        at = PRIMITIVE_LEAF_LAST_GRIPPER_OPENING_MM;
     }
     if ((at < 0) && (!((s->last_gripper.force_n >= 0.0) && (s->last_gripper.force_n <= 1000.0)))) {
-        at = 64;
+        at = PRIMITIVE_LEAF_LAST_GRIPPER_FORCE_N;
     }
     if ((at < 0) && (!((s->last_gripper.speed_mm_s >= 0.0) && (s->last_gripper.speed_mm_s <= 500.0)))) {
-        at = 65;
+        at = PRIMITIVE_LEAF_LAST_GRIPPER_SPEED_MM_S;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->goal.known) > 1u)) {
-        at = 66;
+        at = PRIMITIVE_LEAF_GOAL_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->fingers.known) > 1u)) {
-        at = 80;
+        at = PRIMITIVE_LEAF_FINGERS_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
-        at = 87;
+        at = PRIMITIVE_LEAF_IDLE;
     }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(3)))) {
-        at = 88;
+    if ((at < 0) && (s->cur_state > PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING)) {
+        at = PRIMITIVE_LEAF_CUR_STATE;
     }
-    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(3)))) {
-        at = 89;
+    if ((at < 0) && (s->cur_state_next > PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING)) {
+        at = PRIMITIVE_LEAF_CUR_STATE_NEXT;
     }
     if ((at < 0) && (!((s->from[0] >= (-4000.0)) && (s->from[0] <= 4000.0)))) {
-        at = 90;
+        at = PRIMITIVE_LEAF_FROM_0;
     }
     if ((at < 0) && (!((s->from[1] >= (-4000.0)) && (s->from[1] <= 4000.0)))) {
-        at = 91;
+        at = PRIMITIVE_LEAF_FROM_1;
     }
     if ((at < 0) && (!((s->from[2] >= (-4000.0)) && (s->from[2] <= 4000.0)))) {
-        at = 92;
+        at = PRIMITIVE_LEAF_FROM_2;
     }
     if ((at < 0) && (!((s->from[3] >= (-4000.0)) && (s->from[3] <= 4000.0)))) {
-        at = 93;
+        at = PRIMITIVE_LEAF_FROM_3;
     }
     if ((at < 0) && (!((s->from[4] >= (-4000.0)) && (s->from[4] <= 4000.0)))) {
-        at = 94;
+        at = PRIMITIVE_LEAF_FROM_4;
     }
     if ((at < 0) && (!((s->from[5] >= (-4000.0)) && (s->from[5] <= 4000.0)))) {
-        at = 95;
+        at = PRIMITIVE_LEAF_FROM_5;
     }
     if ((at < 0) && (!((s->from[6] >= (-4000.0)) && (s->from[6] <= 4000.0)))) {
-        at = 96;
+        at = PRIMITIVE_LEAF_FROM_6;
     }
     if ((at < 0) && (!((s->from[7] >= (-4000.0)) && (s->from[7] <= 4000.0)))) {
-        at = 97;
+        at = PRIMITIVE_LEAF_FROM_7;
     }
     if ((at < 0) && (!((s->from[8] >= (-4000.0)) && (s->from[8] <= 4000.0)))) {
-        at = 98;
+        at = PRIMITIVE_LEAF_FROM_8;
     }
     if ((at < 0) && (!((s->to[0] >= (-4000.0)) && (s->to[0] <= 4000.0)))) {
-        at = 99;
+        at = PRIMITIVE_LEAF_TO_0;
     }
     if ((at < 0) && (!((s->to[1] >= (-4000.0)) && (s->to[1] <= 4000.0)))) {
-        at = 100;
+        at = PRIMITIVE_LEAF_TO_1;
     }
     if ((at < 0) && (!((s->to[2] >= (-4000.0)) && (s->to[2] <= 4000.0)))) {
-        at = 101;
+        at = PRIMITIVE_LEAF_TO_2;
     }
     if ((at < 0) && (!((s->to[3] >= (-4000.0)) && (s->to[3] <= 4000.0)))) {
-        at = 102;
+        at = PRIMITIVE_LEAF_TO_3;
     }
     if ((at < 0) && (!((s->to[4] >= (-4000.0)) && (s->to[4] <= 4000.0)))) {
-        at = 103;
+        at = PRIMITIVE_LEAF_TO_4;
     }
     if ((at < 0) && (!((s->to[5] >= (-4000.0)) && (s->to[5] <= 4000.0)))) {
-        at = 104;
+        at = PRIMITIVE_LEAF_TO_5;
     }
     if ((at < 0) && (!((s->to[6] >= (-4000.0)) && (s->to[6] <= 4000.0)))) {
-        at = 105;
+        at = PRIMITIVE_LEAF_TO_6;
     }
     if ((at < 0) && (!((s->to[7] >= (-4000.0)) && (s->to[7] <= 4000.0)))) {
-        at = 106;
+        at = PRIMITIVE_LEAF_TO_7;
     }
     if ((at < 0) && (!((s->to[8] >= (-4000.0)) && (s->to[8] <= 4000.0)))) {
-        at = 107;
+        at = PRIMITIVE_LEAF_TO_8;
     }
     if ((at < 0) && (!((s->length_mm >= 1.0) && (s->length_mm <= 30000.0)))) {
-        at = 108;
+        at = PRIMITIVE_LEAF_LENGTH_MM;
     }
     if ((at < 0) && (!((s->travelled_mm >= 0.0) && (s->travelled_mm <= 30000.0)))) {
-        at = 109;
+        at = PRIMITIVE_LEAF_TRAVELLED_MM;
     }
     if ((at < 0) && (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0)))) {
-        at = 110;
+        at = PRIMITIVE_LEAF_SPEED_MM_S;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->near_) > 1u)) {
-        at = 111;
+        at = PRIMITIVE_LEAF_NEAR;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->there) > 1u)) {
-        at = 112;
+        at = PRIMITIVE_LEAF_THERE;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->settled) > 1u)) {
-        at = 113;
+        at = PRIMITIVE_LEAF_SETTLED;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
-        at = 114;
+        at = PRIMITIVE_LEAF_FITS;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->closed) > 1u)) {
-        at = 115;
+        at = PRIMITIVE_LEAF_CLOSED;
     }
-    if ((at < 0) && (((int64_t)s->waited > INT64_C(250)))) {
-        at = 116;
+    if ((at < 0) && (s->waited > 250u)) {
+        at = PRIMITIVE_LEAF_WAITED;
     }
-    if ((at < 0) && (((int64_t)s->display > INT64_C(1)))) {
-        at = 117;
+    if ((at < 0) && (s->display > PRIMITIVE_COMMON_DISPLAY_FINGERS)) {
+        at = PRIMITIVE_LEAF_DISPLAY;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
-        at = 118;
+        at = PRIMITIVE_LEAF_ECHOED;
     }
     return at;
 }
 
-/* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2 several. */
+/* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2
+   several. */
 int32_t primitive_approach_position_fingers_line(const primitive_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
@@ -1424,20 +1361,28 @@ int32_t primitive_approach_position_fingers_line(const primitive_t *s)
         uint8_t t2[2];
         uint8_t t3[4];
     } t = {
-        {
-            0x7cu, 0x3u
+        { /* new_command */
+            0x7cu, /* false: lines 3, 4, 5, 6, 7 */
+            0x3u /* true: lines 1, 2 */
         },
-        {
-            0x6bu, 0x67u, 0x73u
+        { /* gripper.status */
+            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
+            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
+            0x73u /* failed: lines 1, 2, 5, 6, 7 */
         },
-        {
-            0x7eu, 0x7du
+        { /* fingers.known */
+            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
+            0x7du /* true: lines 1, 3, 4, 5, 6, 7 */
         },
-        {
-            0x23u, 0x43u, 0x3u, 0x1fu
+        { /* cur_state */
+            0x23u, /* d_state: lines 1, 2, 6 */
+            0x43u, /* f_state: lines 1, 2, 7 */
+            0x3u, /* moving: lines 1, 2 */
+            0x1fu /* fingering: lines 1, 2, 3, 4, 5 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] & (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] &
+            (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1453,7 +1398,8 @@ void primitive_approach_position_fingers_lines(const primitive_t *in, int32_t *o
     }
 }
 
-/* The line of table departure_position_fingers that matches admitted inputs: its position; -1 none, -2 several. */
+/* The line of table departure_position_fingers that matches admitted inputs: its position; -1 none, -2
+   several. */
 int32_t primitive_departure_position_fingers_line(const primitive_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
@@ -1463,20 +1409,28 @@ int32_t primitive_departure_position_fingers_line(const primitive_t *s)
         uint8_t t2[2];
         uint8_t t3[4];
     } t = {
-        {
-            0x7cu, 0x3u
+        { /* new_command */
+            0x7cu, /* false: lines 3, 4, 5, 6, 7 */
+            0x3u /* true: lines 1, 2 */
         },
-        {
-            0x6bu, 0x67u, 0x73u
+        { /* gripper.status */
+            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
+            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
+            0x73u /* failed: lines 1, 2, 5, 6, 7 */
         },
-        {
-            0x7eu, 0x7du
+        { /* fingers.known */
+            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
+            0x7du /* true: lines 1, 3, 4, 5, 6, 7 */
         },
-        {
-            0x23u, 0x43u, 0x3u, 0x1fu
+        { /* cur_state */
+            0x23u, /* d_state: lines 1, 2, 6 */
+            0x43u, /* f_state: lines 1, 2, 7 */
+            0x3u, /* moving: lines 1, 2 */
+            0x1fu /* fingering: lines 1, 2, 3, 4, 5 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] & (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] &
+            (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1505,25 +1459,34 @@ int32_t primitive_goto__line(const primitive_t *s)
         uint16_t t5[2];
         uint16_t t6[251];
     } t = {
-        {
-            0x7fcu, 0x3u
+        { /* new_command */
+            0x7fcu, /* false: lines 3, 4, 5, 6, 6a, 6b, 7, 8, 9 */
+            0x3u /* true: lines 1, 2 */
         },
-        {
-            0x6e7u, 0x61fu, 0x703u
+        { /* robot.status */
+            0x6e7u, /* done: lines 1, 2, 3, 6, 6a, 6b, 8, 9 */
+            0x61fu, /* executing: lines 1, 2, 3, 4, 5, 8, 9 */
+            0x703u /* failed: lines 1, 2, 7, 8, 9 */
         },
-        {
-            0x7feu, 0x7fdu
+        { /* goal.known */
+            0x7feu, /* false: lines 2, 3, 4, 5, 6, 6a, 6b, 7, 8, 9 */
+            0x7fdu /* true: lines 1, 3, 4, 5, 6, 6a, 6b, 7, 8, 9 */
         },
-        {
-            0x203u, 0x403u, 0x1ffu, 0x3u
+        { /* cur_state */
+            0x203u, /* d_state: lines 1, 2, 8 */
+            0x403u, /* f_state: lines 1, 2, 9 */
+            0x1ffu, /* moving: lines 1, 2, 3, 4, 5, 6, 6a, 6b, 7 */
+            0x3u /* fingering: lines 1, 2 */
         },
-        {
-            0x707u, 0x7fbu
+        { /* there */
+            0x707u, /* false: lines 1, 2, 3, 7, 8, 9 */
+            0x7fbu /* true: lines 1, 2, 4, 5, 6, 6a, 6b, 7, 8, 9 */
         },
-        {
-            0x7dfu, 0x73fu
+        { /* settled */
+            0x7dfu, /* false: lines 1, 2, 3, 4, 5, 6a, 6b, 7, 8, 9 */
+            0x73fu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9 */
         },
-        {
+        { /* waited */
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
@@ -1552,7 +1515,10 @@ int32_t primitive_goto__line(const primitive_t *s)
             0x7b7u
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->robot.status] & (uint32_t)t.t2[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->there ? 1u : 0u)] & (uint32_t)t.t5[(s->settled ? 1u : 0u)] & (uint32_t)t.t6[s->waited];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->robot.status] &
+            (uint32_t)t.t2[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] &
+            (uint32_t)t.t4[(s->there ? 1u : 0u)] & (uint32_t)t.t5[(s->settled ? 1u : 0u)] &
+            (uint32_t)t.t6[s->waited];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x800u);
     line = several ? (-2) : line;
@@ -1579,23 +1545,33 @@ int32_t primitive_gothru_line(const primitive_t *s)
         uint8_t t3[4];
         uint8_t t4[2];
     } t = {
-        {
-            0x7cu, 0x3u
+        { /* new_command */
+            0x7cu, /* false: lines 3, 4, 5, 6, 7 */
+            0x3u /* true: lines 1, 2 */
         },
-        {
-            0x5fu, 0x5fu, 0x63u
+        { /* robot.status */
+            0x5fu, /* done: lines 1, 2, 3, 4, 5, 7 */
+            0x5fu, /* executing: lines 1, 2, 3, 4, 5, 7 */
+            0x63u /* failed: lines 1, 2, 6, 7 */
         },
-        {
-            0x7eu, 0x7du
+        { /* goal.known */
+            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
+            0x7du /* true: lines 1, 3, 4, 5, 6, 7 */
         },
-        {
-            0x33u, 0x43u, 0x2fu, 0x3u
+        { /* cur_state */
+            0x33u, /* d_state: lines 1, 2, 5, 6 */
+            0x43u, /* f_state: lines 1, 2, 7 */
+            0x2fu, /* moving: lines 1, 2, 3, 4, 6 */
+            0x3u /* fingering: lines 1, 2 */
         },
-        {
-            0x77u, 0x7bu
+        { /* near */
+            0x77u, /* false: lines 1, 2, 3, 5, 6, 7 */
+            0x7bu /* true: lines 1, 2, 4, 5, 6, 7 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->robot.status] & (uint32_t)t.t2[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->near_ ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->robot.status] &
+            (uint32_t)t.t2[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] &
+            (uint32_t)t.t4[(s->near_ ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1622,23 +1598,33 @@ int32_t primitive_immed_grasp_line(const primitive_t *s)
         uint16_t t3[4];
         uint16_t t4[2];
     } t = {
-        {
-            0xfcu, 0x3u
+        { /* new_command */
+            0xfcu, /* false: lines 3, 4, 5, 6, 7, 8 */
+            0x3u /* true: lines 1, 2 */
         },
-        {
-            0xdbu, 0xc7u, 0xe3u
+        { /* gripper.status */
+            0xdbu, /* done: lines 1, 2, 4, 5, 7, 8 */
+            0xc7u, /* executing: lines 1, 2, 3, 7, 8 */
+            0xe3u /* failed: lines 1, 2, 6, 7, 8 */
         },
-        {
-            0xfeu, 0xfdu
+        { /* fingers.known */
+            0xfeu, /* false: lines 2, 3, 4, 5, 6, 7, 8 */
+            0xfdu /* true: lines 1, 3, 4, 5, 6, 7, 8 */
         },
-        {
-            0x43u, 0x83u, 0x3u, 0x3fu
+        { /* cur_state */
+            0x43u, /* d_state: lines 1, 2, 7 */
+            0x83u, /* f_state: lines 1, 2, 8 */
+            0x3u, /* moving: lines 1, 2 */
+            0x3fu /* fingering: lines 1, 2, 3, 4, 5, 6 */
         },
-        {
-            0xf7u, 0xefu
+        { /* fits */
+            0xf7u, /* false: lines 1, 2, 3, 5, 6, 7, 8 */
+            0xefu /* true: lines 1, 2, 3, 4, 6, 7, 8 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] & (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->fits ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] &
+            (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] &
+            (uint32_t)t.t4[(s->fits ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x100u);
     line = several ? (-2) : line;
@@ -1661,8 +1647,9 @@ int32_t primitive_pause_primitive_line(const primitive_t *s)
     static const struct {
         uint8_t t0[2];
     } t = {
-        {
-            0x2u, 0x1u
+        { /* idle */
+            0x2u, /* false: lines 2 */
+            0x1u /* true: lines 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->idle ? 1u : 0u)];
@@ -1682,22 +1669,24 @@ void primitive_pause_primitive_lines(const primitive_t *in, int32_t *out, uint32
     }
 }
 
-/* One step of table approach_position_fingers: admits, settles, matches, acts; returns the fault, 0 for none. */
+/* One step of table approach_position_fingers: admits, settles, matches, acts; returns the fault, 0 for
+   none. */
 int32_t primitive_approach_position_fingers_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == PRIMITIVE_FAULT_NONE) {
         primitive_settle(s);
         primitive_run_approach_position_fingers(s);
     }
     return s->fault;
 }
 
-/* One step of table departure_position_fingers: admits, settles, matches, acts; returns the fault, 0 for none. */
+/* One step of table departure_position_fingers: admits, settles, matches, acts; returns the fault, 0 for
+   none. */
 int32_t primitive_departure_position_fingers_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == PRIMITIVE_FAULT_NONE) {
         primitive_settle(s);
         primitive_run_departure_position_fingers(s);
     }
@@ -1708,7 +1697,7 @@ int32_t primitive_departure_position_fingers_step(primitive_t *s)
 int32_t primitive_goto__step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == PRIMITIVE_FAULT_NONE) {
         primitive_settle(s);
         primitive_run_goto_(s);
     }
@@ -1719,7 +1708,7 @@ int32_t primitive_goto__step(primitive_t *s)
 int32_t primitive_gothru_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == PRIMITIVE_FAULT_NONE) {
         primitive_settle(s);
         primitive_run_gothru(s);
     }
@@ -1730,7 +1719,7 @@ int32_t primitive_gothru_step(primitive_t *s)
 int32_t primitive_immed_grasp_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == PRIMITIVE_FAULT_NONE) {
         primitive_settle(s);
         primitive_run_immed_grasp(s);
     }
@@ -1741,7 +1730,7 @@ int32_t primitive_immed_grasp_step(primitive_t *s)
 int32_t primitive_pause_primitive_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == PRIMITIVE_FAULT_NONE) {
         primitive_settle(s);
         primitive_run_pause_primitive(s);
     }
@@ -1752,39 +1741,39 @@ int32_t primitive_pause_primitive_step(primitive_t *s)
 int32_t primitive_primitive_cycle(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == PRIMITIVE_FAULT_NONE) {
         primitive_settle(s);
-        if (s->fault == 0) {
+        if (s->fault == PRIMITIVE_FAULT_NONE) {
             primitive_do_take_orders(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == PRIMITIVE_FAULT_NONE) {
             primitive_do_start_waiting(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == PRIMITIVE_FAULT_NONE) {
             primitive_do_measure(s);
         }
-        if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->emove.input_command;
-            if (chosen == INT64_C(0)) {
+        if (s->fault == PRIMITIVE_FAULT_NONE) {
+            const uint8_t chosen = s->emove.input_command;
+            if (chosen == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) {
                 primitive_run_pause_primitive(s);
-            } else if (chosen == INT64_C(1)) {
+            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_GOTO) {
                 primitive_run_goto_(s);
-            } else if (chosen == INT64_C(2)) {
+            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU) {
                 primitive_run_gothru(s);
-            } else if (chosen == INT64_C(3)) {
+            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS) {
                 primitive_run_approach_position_fingers(s);
-            } else if (chosen == INT64_C(4)) {
+            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS) {
                 primitive_run_departure_position_fingers(s);
-            } else if (chosen == INT64_C(5)) {
+            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
                 primitive_run_immed_grasp(s);
             } else {
-                s->fault = 2; /* no table for it: proved impossible */
+                s->fault = PRIMITIVE_FAULT_NO_LINE; /* no table for it: proved impossible */
             }
         }
-        if (s->fault == 0) {
+        if (s->fault == PRIMITIVE_FAULT_NONE) {
             primitive_do_hold_part(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == PRIMITIVE_FAULT_NONE) {
             primitive_do_give_orders(s);
         }
     }

@@ -85,11 +85,136 @@ enum {
 
 /* Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed. */
 enum {
-    PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP = 0, /* approach_position_fingers_in_step: only told in approach_position_fingers */
-    PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP = 1, /* departure_position_fingers_in_step: only told in departure_position_fingers */
+    /* approach_position_fingers_in_step: only told in approach_position_fingers */
+    PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP = 0,
+    /* departure_position_fingers_in_step: only told in departure_position_fingers */
+    PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP = 1,
     PRIMITIVE_ASSUMPTION_GOTO_IN_STEP = 2, /* goto_in_step: only told in goto */
     PRIMITIVE_ASSUMPTION_GOTHRU_IN_STEP = 3, /* gothru_in_step: only told in gothru */
     PRIMITIVE_ASSUMPTION_IMMED_GRASP_IN_STEP = 4 /* immed_grasp_in_step: only told in immed_grasp */
+};
+
+/* `fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants. */
+enum {
+    PRIMITIVE_LEAF_EMOVE_INC_COMMAND = 0,
+    PRIMITIVE_LEAF_EMOVE_INPUT_COMMAND = 1,
+    PRIMITIVE_LEAF_EMOVE_OBJ_PTR = 2,
+    PRIMITIVE_LEAF_EMOVE_GRASP = 3,
+    PRIMITIVE_LEAF_EMOVE_POSE_PTR = 4,
+    PRIMITIVE_LEAF_EMOVE_DISPLACED_X = 5,
+    PRIMITIVE_LEAF_EMOVE_DISPLACED_Y = 6,
+    PRIMITIVE_LEAF_EMOVE_DISPLACED_Z = 7,
+    PRIMITIVE_LEAF_EMOVE_DISPLACED_C = 8,
+    PRIMITIVE_LEAF_EMOVE_DISPLACED_S = 9,
+    PRIMITIVE_LEAF_TO_EMOVE_INC_COMMAND_ECHO = 10,
+    PRIMITIVE_LEAF_TO_EMOVE_REF_COMMAND_ECHO = 11,
+    PRIMITIVE_LEAF_TO_EMOVE_STATUS_REPORT = 12,
+    PRIMITIVE_LEAF_TO_EMOVE_FAILURE = 13,
+    PRIMITIVE_LEAF_TO_EMOVE_HOLDS = 14,
+    PRIMITIVE_LEAF_NEW_COMMAND = 15,
+    PRIMITIVE_LEAF_ANSWERED = 16,
+    PRIMITIVE_LEAF_SETTLING = 17,
+    PRIMITIVE_LEAF_INC_COMMAND_SEEN = 18,
+    PRIMITIVE_LEAF_FROM_ROBOT_INC_COMMAND_ECHO = 19,
+    PRIMITIVE_LEAF_FROM_ROBOT_REF_COMMAND_ECHO = 20,
+    PRIMITIVE_LEAF_FROM_ROBOT_STATUS_REPORT = 21,
+    PRIMITIVE_LEAF_FROM_ROBOT_FAILURE = 22,
+    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_0 = 23,
+    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_1 = 24,
+    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_2 = 25,
+    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_3 = 26,
+    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_4 = 27,
+    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_5 = 28,
+    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_6 = 29,
+    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_7 = 30,
+    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_8 = 31,
+    PRIMITIVE_LEAF_TO_ROBOT_INC_COMMAND = 32,
+    PRIMITIVE_LEAF_TO_ROBOT_INPUT_COMMAND = 33,
+    PRIMITIVE_LEAF_TO_ROBOT_PLATE_0 = 34,
+    PRIMITIVE_LEAF_TO_ROBOT_PLATE_1 = 35,
+    PRIMITIVE_LEAF_TO_ROBOT_PLATE_2 = 36,
+    PRIMITIVE_LEAF_TO_ROBOT_PLATE_3 = 37,
+    PRIMITIVE_LEAF_TO_ROBOT_PLATE_4 = 38,
+    PRIMITIVE_LEAF_TO_ROBOT_PLATE_5 = 39,
+    PRIMITIVE_LEAF_TO_ROBOT_PLATE_6 = 40,
+    PRIMITIVE_LEAF_TO_ROBOT_PLATE_7 = 41,
+    PRIMITIVE_LEAF_TO_ROBOT_PLATE_8 = 42,
+    PRIMITIVE_LEAF_ROBOT_COMMAND = 43,
+    PRIMITIVE_LEAF_ROBOT_STATUS = 44,
+    PRIMITIVE_LEAF_ROBOT_RESTING = 45,
+    PRIMITIVE_LEAF_ROBOT_FAILURE = 46,
+    PRIMITIVE_LEAF_LAST_ROBOT_INPUT_COMMAND = 47,
+    PRIMITIVE_LEAF_FROM_GRIPPER_INC_COMMAND_ECHO = 48,
+    PRIMITIVE_LEAF_FROM_GRIPPER_REF_COMMAND_ECHO = 49,
+    PRIMITIVE_LEAF_FROM_GRIPPER_STATUS_REPORT = 50,
+    PRIMITIVE_LEAF_FROM_GRIPPER_FAILURE = 51,
+    PRIMITIVE_LEAF_FROM_GRIPPER_OPENING_MM = 52,
+    PRIMITIVE_LEAF_TO_GRIPPER_INC_COMMAND = 53,
+    PRIMITIVE_LEAF_TO_GRIPPER_INPUT_COMMAND = 54,
+    PRIMITIVE_LEAF_TO_GRIPPER_OPENING_MM = 55,
+    PRIMITIVE_LEAF_TO_GRIPPER_FORCE_N = 56,
+    PRIMITIVE_LEAF_TO_GRIPPER_SPEED_MM_S = 57,
+    PRIMITIVE_LEAF_GRIPPER_COMMAND = 58,
+    PRIMITIVE_LEAF_GRIPPER_STATUS = 59,
+    PRIMITIVE_LEAF_GRIPPER_RESTING = 60,
+    PRIMITIVE_LEAF_GRIPPER_FAILURE = 61,
+    PRIMITIVE_LEAF_LAST_GRIPPER_INPUT_COMMAND = 62,
+    PRIMITIVE_LEAF_LAST_GRIPPER_OPENING_MM = 63,
+    PRIMITIVE_LEAF_LAST_GRIPPER_FORCE_N = 64,
+    PRIMITIVE_LEAF_LAST_GRIPPER_SPEED_MM_S = 65,
+    PRIMITIVE_LEAF_GOAL_KNOWN = 66,
+    PRIMITIVE_LEAF_GOAL_PLATE_0 = 67,
+    PRIMITIVE_LEAF_GOAL_PLATE_1 = 68,
+    PRIMITIVE_LEAF_GOAL_PLATE_2 = 69,
+    PRIMITIVE_LEAF_GOAL_PLATE_3 = 70,
+    PRIMITIVE_LEAF_GOAL_PLATE_4 = 71,
+    PRIMITIVE_LEAF_GOAL_PLATE_5 = 72,
+    PRIMITIVE_LEAF_GOAL_PLATE_6 = 73,
+    PRIMITIVE_LEAF_GOAL_PLATE_7 = 74,
+    PRIMITIVE_LEAF_GOAL_PLATE_8 = 75,
+    PRIMITIVE_LEAF_GOAL_SPEED_MM_S = 76,
+    PRIMITIVE_LEAF_GOAL_ACCEL_MM_S2 = 77,
+    PRIMITIVE_LEAF_GOAL_DECEL_MM_S2 = 78,
+    PRIMITIVE_LEAF_GOAL_BREAKPOINT_MM = 79,
+    PRIMITIVE_LEAF_FINGERS_KNOWN = 80,
+    PRIMITIVE_LEAF_FINGERS_APPROACH_MM = 81,
+    PRIMITIVE_LEAF_FINGERS_DEPARTURE_MM = 82,
+    PRIMITIVE_LEAF_FINGERS_GRIP_MM = 83,
+    PRIMITIVE_LEAF_FINGERS_TOLERANCE_MM = 84,
+    PRIMITIVE_LEAF_FINGERS_FORCE_N = 85,
+    PRIMITIVE_LEAF_FINGERS_SPEED_MM_S = 86,
+    PRIMITIVE_LEAF_IDLE = 87,
+    PRIMITIVE_LEAF_CUR_STATE = 88,
+    PRIMITIVE_LEAF_CUR_STATE_NEXT = 89,
+    PRIMITIVE_LEAF_FROM_0 = 90,
+    PRIMITIVE_LEAF_FROM_1 = 91,
+    PRIMITIVE_LEAF_FROM_2 = 92,
+    PRIMITIVE_LEAF_FROM_3 = 93,
+    PRIMITIVE_LEAF_FROM_4 = 94,
+    PRIMITIVE_LEAF_FROM_5 = 95,
+    PRIMITIVE_LEAF_FROM_6 = 96,
+    PRIMITIVE_LEAF_FROM_7 = 97,
+    PRIMITIVE_LEAF_FROM_8 = 98,
+    PRIMITIVE_LEAF_TO_0 = 99,
+    PRIMITIVE_LEAF_TO_1 = 100,
+    PRIMITIVE_LEAF_TO_2 = 101,
+    PRIMITIVE_LEAF_TO_3 = 102,
+    PRIMITIVE_LEAF_TO_4 = 103,
+    PRIMITIVE_LEAF_TO_5 = 104,
+    PRIMITIVE_LEAF_TO_6 = 105,
+    PRIMITIVE_LEAF_TO_7 = 106,
+    PRIMITIVE_LEAF_TO_8 = 107,
+    PRIMITIVE_LEAF_LENGTH_MM = 108,
+    PRIMITIVE_LEAF_TRAVELLED_MM = 109,
+    PRIMITIVE_LEAF_SPEED_MM_S = 110,
+    PRIMITIVE_LEAF_NEAR = 111,
+    PRIMITIVE_LEAF_THERE = 112,
+    PRIMITIVE_LEAF_SETTLED = 113,
+    PRIMITIVE_LEAF_FITS = 114,
+    PRIMITIVE_LEAF_CLOSED = 115,
+    PRIMITIVE_LEAF_WAITED = 116,
+    PRIMITIVE_LEAF_DISPLAY = 117,
+    PRIMITIVE_LEAF_ECHOED = 118
 };
 
 /* `fault`, and what a cycle returns. */
@@ -98,41 +223,62 @@ enum {
     PRIMITIVE_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
     PRIMITIVE_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
     PRIMITIVE_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
-    PRIMITIVE_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
-    PRIMITIVE_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
-    PRIMITIVE_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    PRIMITIVE_FAULT_EXTERN = 4,
+    /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    PRIMITIVE_FAULT_ASSUMPTION = 5,
+    /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    PRIMITIVE_FAULT_STATE = 6,
     PRIMITIVE_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
-/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
+   positions of variables.
+   After PRIMITIVE_FAULT_ADMIT nothing has changed but the trace below.
+   After another fault the state is as it was when the cycle ended. After any fault an output that has a safe
+   value shows it, and every other output keeps what it has.
+   No function waits, allocates, or keeps anything outside this block. None calls another library than the
+   compiler's own: memcpy and memset, operations on doubles, bit counting and division
+   where the processor has none. */
 typedef struct {
     vocabulary_primitive_order_t emove; /* 0 to 9: input; Orders of emove. */
     vocabulary_primitive_report_t to_emove; /* 10 to 14: output; Reports to emove. */
-    bool new_command; /* 15: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    /* 15: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool new_command;
     bool answered; /* 16: state; A line has answered the new command. */
-    bool settling; /* 17: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    /* 17: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    bool settling;
     uint16_t inc_command_seen; /* 18: state; 0 .. 65535; Number of the order that was taken last. */
     vocabulary_robot_report_t from_robot; /* 19 to 31: input; Reports of robot, as they come. */
     vocabulary_robot_order_t to_robot; /* 32 to 42: output; Orders to robot. */
-    primitive_common_robot_held_t robot; /* 43 to 46: state; What robot says of the last orders, held until they are echoed. */
+    /* 43 to 46: state; What robot says of the last orders, held until they are echoed. */
+    primitive_common_robot_held_t robot;
     primitive_common_robot_last_t last_robot; /* 47: state; The order to robot that was numbered last. */
     vocabulary_gripper_report_t from_gripper; /* 48 to 52: input; Reports of gripper, as they come. */
     vocabulary_gripper_order_t to_gripper; /* 53 to 57: output; Orders to gripper. */
-    primitive_common_gripper_held_t gripper; /* 58 to 61: state; What gripper says of the last orders, held until they are echoed. */
-    primitive_common_gripper_last_t last_gripper; /* 62 to 65: state; The order to gripper that was numbered last. */
+    /* 58 to 61: state; What gripper says of the last orders, held until they are echoed. */
+    primitive_common_gripper_held_t gripper;
+    /* 62 to 65: state; The order to gripper that was numbered last. */
+    primitive_common_gripper_last_t last_gripper;
     primitive_common_goal_point_t goal; /* 66 to 79: input; From the database: the point of the command. */
-    primitive_common_end_effector_t fingers; /* 80 to 86: input; From the database: how the part of the command is gripped. */
+    /* 80 to 86: input; From the database: how the part of the command is gripped. */
+    primitive_common_end_effector_t fingers;
     bool idle; /* 87: state; Both controllers rest. */
-    primitive_common_primitive_state_t cur_state; /* 88: state; Where the table is in its sequence; both echoes must match before it moves on (section 9). */
+    /* 88: state; Where the table is in its sequence; both echoes must match before it moves on (section
+       9). */
+    primitive_common_primitive_state_t cur_state;
     primitive_common_primitive_state_t cur_state_next; /* 89: state; the deferred next value of cur_state */
     double from[9]; /* 90 to 98: state; -4000.0 .. 4000.0 mm; The straight line under way. */
     double to[9]; /* 99 to 107: state; -4000.0 .. 4000.0 mm */
     double length_mm; /* 108: state; 1.0 .. 30000.0 mm */
     double travelled_mm; /* 109: state; 0.0 .. 30000.0 mm */
     double speed_mm_s; /* 110: state; 0.0 .. 2000.0 mm*s^-1 */
-    bool near_; /* 111: state; The end of the line is within the breakpoint distance; the line is at its end. */
+    /* 111: state; The end of the line is within the breakpoint distance; the line is at its end. */
+    bool near_;
     bool there; /* 112: state */
-    bool settled; /* 113: state; The robot says that it is at the end of the line: its status may be that of an earlier pose. Looked at while it follows. */
+    /* 113: state; The robot says that it is at the end of the line: its status may be that of an earlier
+       pose. Looked at while it follows. */
+    bool settled;
     bool fits; /* 114: state; The finger spacing is that of the part; the fingers touch each other. */
     bool closed; /* 115: state */
     uint8_t waited; /* 116: state; 0 .. 250; Cycles that the robot has been waited for. */
@@ -140,23 +286,28 @@ typedef struct {
     bool echoed; /* 118: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
-    int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    int32_t fault_at;
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } primitive_t;
 
 /* Every variable's initial value. */
 void primitive_init(primitive_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t primitive_check(const primitive_t *s);
 
-/* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2 several. */
+/* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2
+   several. */
 int32_t primitive_approach_position_fingers_line(const primitive_t *s);
 
 /* The same for n inputs at once, table approach_position_fingers. */
 void primitive_approach_position_fingers_lines(const primitive_t *in, int32_t *out, uint32_t n);
 
-/* The line of table departure_position_fingers that matches admitted inputs: its position; -1 none, -2 several. */
+/* The line of table departure_position_fingers that matches admitted inputs: its position; -1 none, -2
+   several. */
 int32_t primitive_departure_position_fingers_line(const primitive_t *s);
 
 /* The same for n inputs at once, table departure_position_fingers. */
@@ -186,10 +337,12 @@ int32_t primitive_pause_primitive_line(const primitive_t *s);
 /* The same for n inputs at once, table pause_primitive. */
 void primitive_pause_primitive_lines(const primitive_t *in, int32_t *out, uint32_t n);
 
-/* One step of table approach_position_fingers: admits, settles, matches, acts; returns the fault, 0 for none. */
+/* One step of table approach_position_fingers: admits, settles, matches, acts; returns the fault, 0 for
+   none. */
 int32_t primitive_approach_position_fingers_step(primitive_t *s);
 
-/* One step of table departure_position_fingers: admits, settles, matches, acts; returns the fault, 0 for none. */
+/* One step of table departure_position_fingers: admits, settles, matches, acts; returns the fault, 0 for
+   none. */
 int32_t primitive_departure_position_fingers_step(primitive_t *s);
 
 /* One step of table goto: admits, settles, matches, acts; returns the fault, 0 for none. */

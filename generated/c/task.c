@@ -26,13 +26,7 @@ static inline int32_t task_bit32(uint32_t m)
 #endif
 
 /* A value that was proved to fit. */
-static inline uint16_t task_u16_of_i64(int64_t a)
-{
-    return (uint16_t)a;
-}
-
-/* A value that was proved to fit. */
-static inline uint8_t task_u8_of_i64(int64_t a)
+static inline uint8_t task_u8_of_i32(int32_t a)
 {
     return (uint8_t)a;
 }
@@ -40,8 +34,8 @@ static inline uint8_t task_u8_of_i64(int64_t a)
 /* A command that has not failed has no cause of failure. */
 static void task_do_forget_cause(task_t *s)
 {
-    if (((int64_t)s->to_workstation.failure == INT64_C(0))) {
-        s->to_workstation.cause = (uint8_t)INT64_C(0);
+    if (s->to_workstation.failure == VOCABULARY_REASON_NONE) {
+        s->to_workstation.cause = VOCABULARY_REASON_NONE;
     }
 }
 
@@ -49,28 +43,30 @@ static void task_do_forget_cause(task_t *s)
 static void task_do_look(task_t *s, bool v_vision)
 {
     if (v_vision) {
-        s->loc_of_obj = (uint8_t)INT64_C(0);
+        s->loc_of_obj = TASK_COMMON_LOCATING_VIS_REQD;
     } else {
-        s->loc_of_obj = (uint8_t)INT64_C(1);
+        s->loc_of_obj = TASK_COMMON_LOCATING_KNOWN;
     }
 }
 
-/* Where the part is to be taken: found once for each command, for `current_loc` is forgotten as soon as the robot moves. */
+/* Where the part is to be taken: found once for each command, for `current_loc` is forgotten as soon as
+   the robot moves. */
 static void task_do_find_source(task_t *s)
 {
-    if ((!s->answered)) {
-        if ((((int64_t)s->workstation.input_command == INT64_C(1)) && ((int64_t)s->workstation.source_locpt == INT64_C(0)))) {
-            s->source_spec = (((int64_t)s->current_loc != INT64_C(0)) && s->here.known);
-            s->source_loc = (uint8_t)(int64_t)s->current_loc;
-            s->source_sector = (uint8_t)(int64_t)s->current_sector;
-            s->source_vupos = (uint8_t)(int64_t)s->here.vupos;
+    if (!s->answered) {
+        if ((s->workstation.input_command == VOCABULARY_TASK_COMMAND_ACQUIRE) &&
+                (s->workstation.source_locpt == 0u)) {
+            s->source_spec = ((s->current_loc != 0u) && s->here.known);
+            s->source_loc = s->current_loc;
+            s->source_sector = s->current_sector;
+            s->source_vupos = s->here.vupos;
             s->source_buffer = s->here.buffer;
             task_do_look(s, s->here.vision);
         } else {
-            s->source_spec = (((int64_t)s->workstation.source_locpt != INT64_C(0)) && s->source.known);
-            s->source_loc = (uint8_t)(int64_t)s->workstation.source_locpt;
-            s->source_sector = (uint8_t)(int64_t)s->workstation.sector;
-            s->source_vupos = (uint8_t)(int64_t)s->source.vupos;
+            s->source_spec = ((s->workstation.source_locpt != 0u) && s->source.known);
+            s->source_loc = s->workstation.source_locpt;
+            s->source_sector = s->workstation.sector;
+            s->source_vupos = s->source.vupos;
             s->source_buffer = s->source.buffer;
             task_do_look(s, s->source.vision);
         }
@@ -80,111 +76,113 @@ static void task_do_find_source(task_t *s)
 /* The other table test variables that the command and the database give (section 8.1). */
 static void task_do_test_variables(task_t *s)
 {
-    s->dest_spec = (((int64_t)s->workstation.dest_locpt != INT64_C(0)) && s->dest.known);
-    s->names_known = (((((int64_t)s->workstation.source_locpt == INT64_C(0)) || s->source.known) && (((int64_t)s->workstation.dest_locpt == INT64_C(0)) || s->dest.known)) && (((int64_t)s->workstation.end_at_locpt == INT64_C(0)) || s->end_at.known));
+    s->dest_spec = ((s->workstation.dest_locpt != 0u) && s->dest.known);
+    s->names_known = (((s->workstation.source_locpt == 0u) || s->source.known) &&
+            ((s->workstation.dest_locpt == 0u) || s->dest.known) &&
+            ((s->workstation.end_at_locpt == 0u) || s->end_at.known));
 }
 
 /* The WORKSTATION is told what is in the gripper. */
 static void task_do_tell_gripped(task_t *s)
 {
-    s->to_workstation.status_parameter = (uint8_t)(int64_t)s->obj_now_in_gripper;
+    s->to_workstation.status_parameter = s->obj_now_in_gripper;
 }
 
 /* Procedure nextstate. */
-static void task_do_nextstate(task_t *s, int64_t v_value)
+static void task_do_nextstate(task_t *s, task_common_task_state_t v_value)
 {
-    s->cur_state_next = (uint8_t)v_value;
+    s->cur_state_next = v_value;
 }
 
 /* Procedure set_source. */
 static void task_do_set_source(task_t *s)
 {
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
-    s->to_emove.grasp = (uint8_t)(int64_t)s->workstation.grasp;
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->source_loc;
-    s->to_emove.sector = (uint8_t)(int64_t)s->source_sector;
-    s->remember_current_loc = (uint8_t)(int64_t)s->source_loc;
-    s->current_loc = (uint8_t)INT64_C(0);
+    s->to_emove.obj_ptr = s->workstation.obj;
+    s->to_emove.grasp = s->workstation.grasp;
+    s->to_emove.locpt_ptr = s->source_loc;
+    s->to_emove.sector = s->source_sector;
+    s->remember_current_loc = s->source_loc;
+    s->current_loc = 0u;
 }
 
 /* Procedure vupos_setup. */
 static void task_do_vupos_setup(task_t *s)
 {
-    s->to_emove.sector = (uint8_t)(int64_t)s->source_sector;
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->source_vupos;
-    s->remember_current_loc = (uint8_t)(int64_t)s->source_loc;
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
-    s->to_emove.grasp = (uint8_t)(int64_t)s->workstation.grasp;
+    s->to_emove.sector = s->source_sector;
+    s->to_emove.locpt_ptr = s->source_vupos;
+    s->remember_current_loc = s->source_loc;
+    s->to_emove.obj_ptr = s->workstation.obj;
+    s->to_emove.grasp = s->workstation.grasp;
     s->to_emove.apoint_pos_flag = false;
-    s->current_loc = (uint8_t)INT64_C(0);
+    s->current_loc = 0u;
 }
 
 /* Procedure locate. */
 static void task_do_locate(task_t *s)
 {
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->source_loc;
-    s->to_emove.input_command = (uint8_t)INT64_C(3);
+    s->to_emove.obj_ptr = s->workstation.obj;
+    s->to_emove.locpt_ptr = s->source_loc;
+    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_LOCATE;
 }
 
 /* Procedure move_to. */
 static void task_do_move_to(task_t *s)
 {
-    s->to_emove.input_command = (uint8_t)INT64_C(1);
+    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_MOVE_TO;
 }
 
 /* Procedure move_to_obj. */
 static void task_do_move_to_obj(task_t *s)
 {
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
-    s->to_emove.grasp = (uint8_t)(int64_t)s->workstation.grasp;
-    s->to_emove.input_command = (uint8_t)INT64_C(2);
+    s->to_emove.obj_ptr = s->workstation.obj;
+    s->to_emove.grasp = s->workstation.grasp;
+    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ;
 }
 
 /* Nothing is in the gripper. */
 static void task_do_none_acquired(task_t *s)
 {
     s->obj_acquired = false;
-    s->obj_now_in_gripper = (uint8_t)INT64_C(0);
-    s->to_emove.gripped_obj_ptr = (uint8_t)INT64_C(0);
+    s->obj_now_in_gripper = VOCABULARY_OBJECT_NULL_OBJ;
+    s->to_emove.gripped_obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
 }
 
 /* Nothing of that type is on the buffer: fail, and let the robot rest. */
 static void task_do_buffer_empty(task_t *s)
 {
-    s->to_workstation.failure = (uint8_t)INT64_C(6);
+    s->to_workstation.failure = VOCABULARY_REASON_BUF;
     task_do_none_acquired(s);
-    s->to_emove.input_command = (uint8_t)INT64_C(0);
-    s->cur_state_next = (uint8_t)INT64_C(1);
+    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->cur_state_next = TASK_COMMON_TASK_STATE_F_STATE;
 }
 
 /* Counts once: the line matches again until PICKUP is echoed, and by then PICKUP is the old workstation. */
 static void task_do_remove_from_buffer_db(task_t *s)
 {
-    if ((s->source_buffer && ((int64_t)s->last_emove.input_command != INT64_C(4)))) {
+    if (s->source_buffer && (s->last_emove.input_command != VOCABULARY_EMOVE_COMMAND_PICKUP)) {
         {
-            const int64_t subject = (int64_t)s->workstation.obj;
-            if ((subject == INT64_C(1))) {
-                if (((int64_t)s->tbuffer_boxt > INT64_C(0))) {
-                    s->tbuffer_boxt = task_u8_of_i64(((int64_t)s->tbuffer_boxt - INT64_C(1)));
+            const uint8_t subject = s->workstation.obj;
+            if (subject == VOCABULARY_OBJECT_TBOX) {
+                if (s->tbuffer_boxt > 0u) {
+                    s->tbuffer_boxt = task_u8_of_i32((int32_t)s->tbuffer_boxt - 1);
                 } else {
                     task_do_buffer_empty(s);
                 }
-            } else if ((subject == INT64_C(2))) {
-                if (((int64_t)s->bbuffer_boxb > INT64_C(0))) {
-                    s->bbuffer_boxb = task_u8_of_i64(((int64_t)s->bbuffer_boxb - INT64_C(1)));
+            } else if (subject == VOCABULARY_OBJECT_BBOX) {
+                if (s->bbuffer_boxb > 0u) {
+                    s->bbuffer_boxb = task_u8_of_i32((int32_t)s->bbuffer_boxb - 1);
                 } else {
                     task_do_buffer_empty(s);
                 }
-            } else if ((subject == INT64_C(3))) {
-                if (((int64_t)s->fbuffer_flag > INT64_C(0))) {
-                    s->fbuffer_flag = task_u8_of_i64(((int64_t)s->fbuffer_flag - INT64_C(1)));
+            } else if (subject == VOCABULARY_OBJECT_FLAG) {
+                if (s->fbuffer_flag > 0u) {
+                    s->fbuffer_flag = task_u8_of_i32((int32_t)s->fbuffer_flag - 1);
                 } else {
                     task_do_buffer_empty(s);
                 }
-            } else if ((subject == INT64_C(4))) {
-                if (((int64_t)s->hbuffer_hous > INT64_C(0))) {
-                    s->hbuffer_hous = task_u8_of_i64(((int64_t)s->hbuffer_hous - INT64_C(1)));
+            } else if (subject == VOCABULARY_OBJECT_HOUS) {
+                if (s->hbuffer_hous > 0u) {
+                    s->hbuffer_hous = task_u8_of_i32((int32_t)s->hbuffer_hous - 1);
                 } else {
                     task_do_buffer_empty(s);
                 }
@@ -198,34 +196,34 @@ static void task_do_remove_from_buffer_db(task_t *s)
 /* Takes one part off the count of the buffer, or gives up: nothing to pick up. */
 static void task_do_pickup(task_t *s)
 {
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
-    s->to_emove.input_command = (uint8_t)INT64_C(4);
+    s->to_emove.obj_ptr = s->workstation.obj;
+    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PICKUP;
     s->obj_acquired = true;
-    s->obj_now_in_gripper = (uint8_t)(int64_t)s->workstation.obj;
-    s->grasp_now = (uint8_t)(int64_t)s->workstation.grasp;
-    s->to_emove.gripped_obj_ptr = (uint8_t)(int64_t)s->workstation.obj;
-    s->current_loc = (uint8_t)(int64_t)s->source_loc;
-    s->current_sector = (uint8_t)(int64_t)s->source_sector;
+    s->obj_now_in_gripper = s->workstation.obj;
+    s->grasp_now = s->workstation.grasp;
+    s->to_emove.gripped_obj_ptr = s->workstation.obj;
+    s->current_loc = s->source_loc;
+    s->current_sector = s->source_sector;
     task_do_remove_from_buffer_db(s);
 }
 
 /* Procedure cmd_failure. */
 static void task_do_cmd_failure(task_t *s)
 {
-    s->to_workstation.failure = (uint8_t)INT64_C(1);
+    s->to_workstation.failure = VOCABULARY_REASON_CMD;
 }
 
 /* What E-MOVE says went wrong. */
 static void task_do_cause_below(task_t *s)
 {
-    s->to_workstation.cause = (uint8_t)(int64_t)s->emove.failure;
+    s->to_workstation.cause = s->emove.failure;
 }
 
 /* E-MOVE found that the part is not between the fingers any more. */
 static void task_do_lost_on_the_way(task_t *s)
 {
-    if (((int64_t)s->emove.failure == INT64_C(11))) {
-        s->to_workstation.failure = (uint8_t)INT64_C(11);
+    if (s->emove.failure == VOCABULARY_REASON_NOTHING_GRIPPED) {
+        s->to_workstation.failure = VOCABULARY_REASON_NOTHING_GRIPPED;
         task_do_none_acquired(s);
     }
 }
@@ -233,39 +231,39 @@ static void task_do_lost_on_the_way(task_t *s)
 /* Procedure move_failure. */
 static void task_do_move_failure(task_t *s)
 {
-    s->to_workstation.failure = (uint8_t)INT64_C(2);
+    s->to_workstation.failure = VOCABULARY_REASON_MOVE;
     task_do_cause_below(s);
-    s->remember_current_loc = (uint8_t)INT64_C(0);
+    s->remember_current_loc = 0u;
     task_do_lost_on_the_way(s);
 }
 
 /* Procedure loc_failure. */
 static void task_do_loc_failure(task_t *s)
 {
-    s->to_workstation.failure = (uint8_t)INT64_C(3);
+    s->to_workstation.failure = VOCABULARY_REASON_LOC;
     task_do_cause_below(s);
 }
 
 /* One part more on the buffer table. */
-static void task_do_add_to_buffer_db(task_t *s, int64_t v_what)
+static void task_do_add_to_buffer_db(task_t *s, vocabulary_object_t v_what)
 {
     {
-        const int64_t subject = v_what;
-        if ((subject == INT64_C(1))) {
-            if (((int64_t)s->tbuffer_boxt < INT64_C(99))) {
-                s->tbuffer_boxt = task_u8_of_i64(((int64_t)s->tbuffer_boxt + INT64_C(1)));
+        const uint8_t subject = v_what;
+        if (subject == VOCABULARY_OBJECT_TBOX) {
+            if (s->tbuffer_boxt < 99u) {
+                s->tbuffer_boxt = (uint8_t)((uint32_t)s->tbuffer_boxt + 1u);
             }
-        } else if ((subject == INT64_C(2))) {
-            if (((int64_t)s->bbuffer_boxb < INT64_C(99))) {
-                s->bbuffer_boxb = task_u8_of_i64(((int64_t)s->bbuffer_boxb + INT64_C(1)));
+        } else if (subject == VOCABULARY_OBJECT_BBOX) {
+            if (s->bbuffer_boxb < 99u) {
+                s->bbuffer_boxb = (uint8_t)((uint32_t)s->bbuffer_boxb + 1u);
             }
-        } else if ((subject == INT64_C(3))) {
-            if (((int64_t)s->fbuffer_flag < INT64_C(99))) {
-                s->fbuffer_flag = task_u8_of_i64(((int64_t)s->fbuffer_flag + INT64_C(1)));
+        } else if (subject == VOCABULARY_OBJECT_FLAG) {
+            if (s->fbuffer_flag < 99u) {
+                s->fbuffer_flag = (uint8_t)((uint32_t)s->fbuffer_flag + 1u);
             }
-        } else if ((subject == INT64_C(4))) {
-            if (((int64_t)s->hbuffer_hous < INT64_C(99))) {
-                s->hbuffer_hous = task_u8_of_i64(((int64_t)s->hbuffer_hous + INT64_C(1)));
+        } else if (subject == VOCABULARY_OBJECT_HOUS) {
+            if (s->hbuffer_hous < 99u) {
+                s->hbuffer_hous = (uint8_t)((uint32_t)s->hbuffer_hous + 1u);
             }
         } else {
             /* nothing */
@@ -273,91 +271,94 @@ static void task_do_add_to_buffer_db(task_t *s, int64_t v_what)
     }
 }
 
-/* What was counted off and could not be picked up lies there still; once: the order that follows is no PICKUP. */
+/* What was counted off and could not be picked up lies there still; once: the order that follows is no
+   PICKUP. */
 static void task_do_back_to_buffer_db(task_t *s)
 {
-    if ((s->source_buffer && ((int64_t)s->last_emove.input_command == INT64_C(4)))) {
-        task_do_add_to_buffer_db(s, (int64_t)s->workstation.obj);
+    if (s->source_buffer && (s->last_emove.input_command == VOCABULARY_EMOVE_COMMAND_PICKUP)) {
+        task_do_add_to_buffer_db(s, s->workstation.obj);
     }
 }
 
 /* Nothing, or a part of the wrong size, is in the gripper. */
 static void task_do_pic_failure(task_t *s)
 {
-    s->to_workstation.failure = (uint8_t)INT64_C(4);
+    s->to_workstation.failure = VOCABULARY_REASON_PIC;
     task_do_cause_below(s);
     task_do_back_to_buffer_db(s);
     task_do_none_acquired(s);
-    if (((int64_t)s->emove.failure == INT64_C(12))) {
+    if (s->emove.failure == VOCABULARY_REASON_WRONG_SIZE) {
         s->obj_acquired = true;
-        s->obj_now_in_gripper = (uint8_t)INT64_C(6);
-        s->to_emove.gripped_obj_ptr = (uint8_t)INT64_C(6);
+        s->obj_now_in_gripper = VOCABULARY_OBJECT_UNKNOWN_OBJECT;
+        s->to_emove.gripped_obj_ptr = VOCABULARY_OBJECT_UNKNOWN_OBJECT;
     }
 }
 
 /* Procedure state_failure. */
 static void task_do_state_failure(task_t *s)
 {
-    s->to_workstation.failure = (uint8_t)INT64_C(5);
+    s->to_workstation.failure = VOCABULARY_REASON_STATE;
 }
 
 /* The destination of the workstation. */
 static void task_do_set_dest(task_t *s)
 {
-    s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->workstation.dest_locpt;
-    s->to_emove.sector = (uint8_t)(int64_t)s->workstation.sector;
-    s->current_loc = (uint8_t)INT64_C(0);
+    s->to_emove.locpt_ptr = s->workstation.dest_locpt;
+    s->to_emove.sector = s->workstation.sector;
+    s->current_loc = 0u;
 }
 
 /* The robot is at the destination. */
 static void task_do_arrived(task_t *s)
 {
-    s->current_loc = (uint8_t)(int64_t)s->workstation.dest_locpt;
-    s->current_sector = (uint8_t)(int64_t)s->workstation.sector;
+    s->current_loc = s->workstation.dest_locpt;
+    s->current_sector = s->workstation.sector;
 }
 
 /* Opens the gripper where it is. */
 static void task_do_release(task_t *s)
 {
-    s->to_emove.obj_ptr = (uint8_t)(int64_t)s->obj_now_in_gripper;
-    s->to_emove.grasp = (uint8_t)(int64_t)s->grasp_now;
-    s->to_emove.input_command = (uint8_t)INT64_C(5);
+    s->to_emove.obj_ptr = s->obj_now_in_gripper;
+    s->to_emove.grasp = s->grasp_now;
+    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_RELEASE;
 }
 
-/* The part lies where the robot is; on the buffer it is counted, once: by the next cycle none is in the gripper. */
+/* The part lies where the robot is; on the buffer it is counted, once: by the next cycle none is in the
+   gripper. */
 static void task_do_released(task_t *s)
 {
     if (s->here.buffer) {
-        task_do_add_to_buffer_db(s, (int64_t)s->obj_now_in_gripper);
+        task_do_add_to_buffer_db(s, s->obj_now_in_gripper);
     }
     task_do_none_acquired(s);
 }
 
-/* Where to end: as the command says, else at the safe position of the place where the robot is. It leaves that: the line may match again, and by then MOVE-TO is the last order. */
+/* Where to end: as the command says, else at the safe position of the place where the robot is. It leaves
+   that: the line may match again, and by then MOVE-TO is the last order. */
 static void task_do_set_end(task_t *s)
 {
-    if (((int64_t)s->workstation.end_at_locpt != INT64_C(0))) {
-        s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->workstation.end_at_locpt;
+    if (s->workstation.end_at_locpt != 0u) {
+        s->to_emove.locpt_ptr = s->workstation.end_at_locpt;
     } else {
-        if (((int64_t)s->last_emove.input_command != INT64_C(1))) {
-            s->to_emove.locpt_ptr = (uint8_t)(int64_t)s->here.safe;
+        if (s->last_emove.input_command != VOCABULARY_EMOVE_COMMAND_MOVE_TO) {
+            s->to_emove.locpt_ptr = s->here.safe;
         }
     }
-    s->to_emove.sector = (uint8_t)INT64_C(0);
-    s->current_loc = (uint8_t)INT64_C(0);
+    s->to_emove.sector = 0u;
+    s->current_loc = 0u;
 }
 
 /* The robot is at the end position. */
 static void task_do_ended(task_t *s)
 {
-    s->current_loc = (uint8_t)(int64_t)s->to_emove.locpt_ptr;
-    s->current_sector = (uint8_t)INT64_C(0);
+    s->current_loc = s->to_emove.locpt_ptr;
+    s->current_sector = 0u;
 }
 
 /* Opening the gripper failed: what it holds is not known. */
 static void task_do_release_failure(task_t *s)
 {
-    s->to_workstation.failure = (uint8_t)(int64_t)s->emove.failure;
+    s->to_workstation.failure = s->emove.failure;
     task_do_cause_below(s);
     task_do_lost_on_the_way(s);
 }
@@ -365,251 +366,383 @@ static void task_do_release_failure(task_t *s)
 /* Procedure take_orders. */
 static void task_do_take_orders(task_t *s)
 {
-    s->echoed = ((int64_t)s->from_emove.inc_command_echo == (int64_t)s->to_emove.inc_command);
-    if (((int64_t)s->workstation.inc_command != (int64_t)s->inc_command_seen)) {
-        s->inc_command_seen = (uint16_t)(int64_t)s->workstation.inc_command;
+    s->echoed = (s->from_emove.inc_command_echo == s->to_emove.inc_command);
+    if (s->workstation.inc_command != s->inc_command_seen) {
+        s->inc_command_seen = s->workstation.inc_command;
         s->new_command = true;
         s->answered = false;
-        s->to_workstation.status_report = (uint8_t)INT64_C(1);
-        s->to_workstation.failure = (uint8_t)INT64_C(0);
+        s->to_workstation.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
+        s->to_workstation.failure = VOCABULARY_REASON_NONE;
     } else {
-        if ((s->answered && s->echoed)) {
+        if (s->answered && s->echoed) {
             s->new_command = false;
         }
     }
     s->settling = false;
     if (s->echoed) {
-        s->emove.command = (uint8_t)(int64_t)s->from_emove.ref_command_echo;
-        s->emove.status = (uint8_t)(int64_t)s->from_emove.status_report;
-        s->emove.failure = (uint8_t)(int64_t)s->from_emove.failure;
+        s->emove.command = s->from_emove.ref_command_echo;
+        s->emove.status = s->from_emove.status_report;
+        s->emove.failure = s->from_emove.failure;
     }
-    s->emove.resting = ((((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0))) && (s->answered || s->echoed));
+    s->emove.resting = ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+            (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
 /* Procedure give_orders. */
 static void task_do_give_orders(task_t *s)
 {
-    if ((s->new_command && (!s->settling))) {
+    if (s->new_command && (!s->settling)) {
         s->answered = true;
     }
-    s->to_workstation.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->to_workstation.ref_command_echo = (uint8_t)(int64_t)s->workstation.input_command;
-    if (((((((int64_t)s->to_emove.input_command != (int64_t)s->last_emove.input_command) || ((int64_t)s->to_emove.obj_ptr != (int64_t)s->last_emove.obj_ptr)) || ((int64_t)s->to_emove.grasp != (int64_t)s->last_emove.grasp)) || ((int64_t)s->to_emove.locpt_ptr != (int64_t)s->last_emove.locpt_ptr)) || ((int64_t)s->to_emove.sector != (int64_t)s->last_emove.sector))) {
-        s->to_emove.inc_command = task_u16_of_i64((((int64_t)s->to_emove.inc_command + INT64_C(1)) % INT64_C(65536)));
+    s->to_workstation.inc_command_echo = s->inc_command_seen;
+    s->to_workstation.ref_command_echo = s->workstation.input_command;
+    if ((s->to_emove.input_command != s->last_emove.input_command) ||
+            (s->to_emove.obj_ptr != s->last_emove.obj_ptr) || (s->to_emove.grasp != s->last_emove.grasp) ||
+            (s->to_emove.locpt_ptr != s->last_emove.locpt_ptr) ||
+            (s->to_emove.sector != s->last_emove.sector)) {
+        s->to_emove.inc_command = (uint16_t)(((uint32_t)s->to_emove.inc_command + 1u) % 65536u);
     }
-    s->last_emove.input_command = (uint8_t)(int64_t)s->to_emove.input_command;
-    s->last_emove.obj_ptr = (uint8_t)(int64_t)s->to_emove.obj_ptr;
-    s->last_emove.grasp = (uint8_t)(int64_t)s->to_emove.grasp;
-    s->last_emove.locpt_ptr = (uint8_t)(int64_t)s->to_emove.locpt_ptr;
-    s->last_emove.sector = (uint8_t)(int64_t)s->to_emove.sector;
+    s->last_emove.input_command = s->to_emove.input_command;
+    s->last_emove.obj_ptr = s->to_emove.obj_ptr;
+    s->last_emove.grasp = s->to_emove.grasp;
+    s->last_emove.locpt_ptr = s->to_emove.locpt_ptr;
+    s->last_emove.sector = s->to_emove.sector;
 }
 
 /* A new command finds a level below at work: let it rest first. */
 static void task_do_settle(task_t *s)
 {
     s->settling = true;
-    s->to_emove.input_command = (uint8_t)INT64_C(0);
+    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
 }
 
 /* Procedure done. */
 static void task_do_done(task_t *s)
 {
-    s->to_workstation.status_report = (uint8_t)INT64_C(0);
+    s->to_workstation.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
 /* Procedure executing. */
 static void task_do_executing(task_t *s)
 {
-    s->to_workstation.status_report = (uint8_t)INT64_C(1);
+    s->to_workstation.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
 /* Procedure failed. */
 static void task_do_failed(task_t *s)
 {
-    s->to_workstation.status_report = (uint8_t)INT64_C(2);
+    s->to_workstation.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
 /* Procedure pause. */
 static void task_do_pause(task_t *s)
 {
-    s->to_emove.input_command = (uint8_t)INT64_C(0);
+    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
 static void task_admit(task_t *s)
 {
-    task_t before = *s;
     s->line = -1;
-    s->fault = 0;
+    s->fault = TASK_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    if (((int64_t)s->workstation.input_command > INT64_C(5))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 1;
-        }
+    int32_t at = -1;
+    if ((at < 0) && (s->workstation.input_command > VOCABULARY_TASK_COMMAND_CLEAR)) {
+        at = TASK_LEAF_WORKSTATION_INPUT_COMMAND;
     }
-    if (((int64_t)s->workstation.obj > INT64_C(7))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 2;
-        }
+    if ((at < 0) && (s->workstation.obj > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = TASK_LEAF_WORKSTATION_OBJ;
     }
-    if (((int64_t)s->workstation.grasp > INT64_C(9))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 3;
-        }
+    if ((at < 0) && (s->workstation.grasp > 9u)) {
+        at = TASK_LEAF_WORKSTATION_GRASP;
     }
-    if (((int64_t)s->workstation.sector > INT64_C(99))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 7;
-        }
+    if ((at < 0) && (s->workstation.sector > 99u)) {
+        at = TASK_LEAF_WORKSTATION_SECTOR;
     }
-    if (((int64_t)s->from_emove.ref_command_echo > INT64_C(5))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 19;
-        }
+    if ((at < 0) && (s->from_emove.ref_command_echo > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+        at = TASK_LEAF_FROM_EMOVE_REF_COMMAND_ECHO;
     }
-    if (((int64_t)s->from_emove.status_report > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 20;
-        }
+    if ((at < 0) && (s->from_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = TASK_LEAF_FROM_EMOVE_STATUS_REPORT;
     }
-    if (((int64_t)s->from_emove.failure > INT64_C(17))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 21;
-        }
+    if ((at < 0) && (s->from_emove.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = TASK_LEAF_FROM_EMOVE_FAILURE;
     }
-    if (s->fault != 0) {
-        before.line = -1;
-        before.fault = s->fault;
-        before.fault_at = s->fault_at;
-        before.assumptions_failed = 0;
-        *s = before;
+    if (at >= 0) {
+        s->fault = TASK_FAULT_ADMIT;
+        s->fault_at = at;
     }
 }
 
 /* Deferred variables take their next values, all at once. */
 static void task_settle(task_t *s)
 {
-    const bool ready0 = ((int64_t)s->from_emove.inc_command_echo == (int64_t)s->to_emove.inc_command);
+    const bool ready0 = s->from_emove.inc_command_echo == s->to_emove.inc_command;
     if (ready0) {
         s->cur_state = s->cur_state_next;
     }
 }
 
+/* Assumption acquire_in_step: A state goes with the orders that it waits for (section 9). */
+static bool task_holds_acquire_in_step(const task_t *s)
+{
+    return s->new_command ||
+            (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
+                (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_2) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_3) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_LOCATE)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_4) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_5) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP));
+}
+
+/* Assumption acquire_resting: What rests says so. */
+static bool task_holds_acquire_resting(const task_t *s)
+{
+    return (!s->emove.resting) ||
+            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+                (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
+}
+
+/* Assumption clear_in_step: A state goes with the orders that it waits for (section 9). */
+static bool task_holds_clear_in_step(const task_t *s)
+{
+    return s->new_command ||
+            (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
+                (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+            (((s->cur_state == TASK_COMMON_TASK_STATE_STATE_6) ||
+                (s->cur_state == TASK_COMMON_TASK_STATE_STATE_8)) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_7) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE));
+}
+
+/* Assumption clear_resting: What rests says so. */
+static bool task_holds_clear_resting(const task_t *s)
+{
+    return (!s->emove.resting) ||
+            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+                (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
+}
+
+/* Assumption move_in_step: A state goes with the orders that it waits for (section 9). */
+static bool task_holds_move_in_step(const task_t *s)
+{
+    return s->new_command ||
+            (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
+                (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_2) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_3) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_LOCATE)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_4) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_5) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_6) &&
+                ((s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO) ||
+                    (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ)));
+}
+
+/* Assumption move_resting: What rests says so. */
+static bool task_holds_move_resting(const task_t *s)
+{
+    return (!s->emove.resting) ||
+            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+                (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
+}
+
+/* Assumption release_part_in_step: A state goes with the orders that it waits for (section 9). */
+static bool task_holds_release_part_in_step(const task_t *s)
+{
+    return s->new_command ||
+            (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
+                (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_7) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_8) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO));
+}
+
+/* Assumption release_part_resting: What rests says so. */
+static bool task_holds_release_part_resting(const task_t *s)
+{
+    return (!s->emove.resting) ||
+            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+                (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
+}
+
+/* Assumption transfer_in_step: A state goes with the orders that it waits for (section 9). */
+static bool task_holds_transfer_in_step(const task_t *s)
+{
+    return s->new_command ||
+            (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
+                (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+            (((s->cur_state == TASK_COMMON_TASK_STATE_STATE_2) ||
+                (s->cur_state == TASK_COMMON_TASK_STATE_STATE_6) ||
+                (s->cur_state == TASK_COMMON_TASK_STATE_STATE_8)) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_3) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_LOCATE)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_4) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_5) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP)) ||
+            ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_7) &&
+                (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE));
+}
+
+/* Assumption transfer_resting: What rests says so. */
+static bool task_holds_transfer_resting(const task_t *s)
+{
+    return (!s->emove.resting) ||
+            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+                (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
+}
+
 /* Matches table acquire and runs the line. */
 static void task_run_acquire(task_t *s)
 {
-    /* acquire_in_step */
-    if (!(((!(!s->new_command)) || ((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->emove.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->emove.command == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->emove.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->emove.command == INT64_C(4))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
+    if (!task_holds_acquire_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_ACQUIRE_IN_STEP);
     }
-    /* acquire_resting */
-    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
+    if (!task_holds_acquire_resting(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_ACQUIRE_RESTING);
     }
     s->line = task_acquire_line(s);
     switch (s->line) {
-    case 0: /* task/acquire.rcs line 0 */
+    case TASK_LINE_ACQUIRE_0: /* task/acquire.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
         task_do_pause(s);
         task_do_executing(s);
         break;
-    case 1: /* task/acquire.rcs line 1 */
+    /* task/acquire.rcs line 1: new_command true; emove.resting true; emove.command pause; emove.status
+       done; loc_of_obj /= vis_reqd; obj_acquired false; source_spec true */
+    case TASK_LINE_ACQUIRE_1:
         task_do_set_source(s);
-        task_do_nextstate(s, INT64_C(4));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_4);
         task_do_move_to_obj(s);
         task_do_executing(s);
         break;
-    case 2: /* task/acquire.rcs line 2 */
+    /* task/acquire.rcs line 2: new_command true; emove.resting true; emove.command pause; emove.status
+       done; obj_acquired true */
+    case TASK_LINE_ACQUIRE_2:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 3: /* task/acquire.rcs line 3 */
+    /* task/acquire.rcs line 3: new_command true; emove.resting true; emove.command pause; emove.status
+       done; obj_acquired false; source_spec false */
+    case TASK_LINE_ACQUIRE_3:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 4: /* task/acquire.rcs line 4 */
+    /* task/acquire.rcs line 4: new_command true; emove.resting true; emove.command pause; emove.status
+       done; loc_of_obj vis_reqd; obj_acquired false; source_spec true */
+    case TASK_LINE_ACQUIRE_4:
         task_do_vupos_setup(s);
-        task_do_nextstate(s, INT64_C(2));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_2);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 5: /* task/acquire.rcs line 5 */
-        task_do_nextstate(s, INT64_C(5));
+    /* task/acquire.rcs line 5: new_command false; emove.command move_to_obj; emove.status done; cur_state
+       state_4 */
+    case TASK_LINE_ACQUIRE_5:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_pickup(s);
         task_do_executing(s);
         break;
-    case 6: /* task/acquire.rcs line 6 */
-        task_do_nextstate(s, INT64_C(3));
+    /* task/acquire.rcs line 6: new_command false; emove.command move_to; emove.status done; cur_state
+       state_2 */
+    case TASK_LINE_ACQUIRE_6:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_3);
         task_do_locate(s);
         task_do_executing(s);
         break;
-    case 7: /* task/acquire.rcs line 7 */
-        task_do_nextstate(s, INT64_C(5));
+    /* task/acquire.rcs line 7: new_command false; emove.command locate; emove.status done; cur_state
+       state_3 */
+    case TASK_LINE_ACQUIRE_7:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_pickup(s);
         task_do_executing(s);
         break;
-    case 8: /* task/acquire.rcs line 8 */
-        task_do_nextstate(s, INT64_C(0));
+    /* task/acquire.rcs line 8: new_command false; emove.command pickup; emove.status done; cur_state
+       state_5 */
+    case TASK_LINE_ACQUIRE_8:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_D_STATE);
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 9: /* task/acquire.rcs line 9 */
+    /* task/acquire.rcs line 9: new_command false; emove.command pause; cur_state d_state */
+    case TASK_LINE_ACQUIRE_9:
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 10: /* task/acquire.rcs line 10 */
+    /* task/acquire.rcs line 10: new_command false; emove.command move_to; emove.status failed; cur_state
+       /= f_state */
+    case TASK_LINE_ACQUIRE_10:
         task_do_move_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 11: /* task/acquire.rcs line 11 */
+    /* task/acquire.rcs line 11: new_command false; emove.command move_to_obj; emove.status failed;
+       cur_state /= f_state */
+    case TASK_LINE_ACQUIRE_11:
         task_do_move_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 12: /* task/acquire.rcs line 12 */
+    /* task/acquire.rcs line 12: new_command false; emove.command locate; emove.status failed; cur_state /=
+       f_state */
+    case TASK_LINE_ACQUIRE_12:
         task_do_loc_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 13: /* task/acquire.rcs line 13 */
+    /* task/acquire.rcs line 13: new_command false; emove.command pickup; emove.status failed; cur_state /=
+       f_state */
+    case TASK_LINE_ACQUIRE_13:
         task_do_pic_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 14: /* task/acquire.rcs line 14 */
+    case TASK_LINE_ACQUIRE_14: /* task/acquire.rcs line 14: new_command false; cur_state f_state */
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 15: /* task/acquire.rcs line 15 */
+    /* task/acquire.rcs line 15: new_command false; emove.status executing; cur_state in {state_2, state_3,
+       state_4, state_5} */
+    case TASK_LINE_ACQUIRE_15:
         task_do_executing(s);
         break;
-    case 16: /* task/acquire.rcs line 16 */
+    case TASK_LINE_ACQUIRE_16: /* task/acquire.rcs line 16: no other line matches */
         task_do_state_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = TASK_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -617,96 +750,117 @@ static void task_run_acquire(task_t *s)
 /* Matches table clear and runs the line. */
 static void task_run_clear(task_t *s)
 {
-    /* clear_in_step */
-    if (!(((!(!s->new_command)) || ((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(6)) || ((int64_t)s->cur_state == INT64_C(8))) && ((int64_t)s->emove.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->emove.command == INT64_C(5))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 2u);
+    if (!task_holds_clear_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_CLEAR_IN_STEP);
     }
-    /* clear_resting */
-    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 3u);
+    if (!task_holds_clear_resting(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_CLEAR_RESTING);
     }
     s->line = task_clear_line(s);
     switch (s->line) {
-    case 0: /* task/clear.rcs line 0 */
+    case TASK_LINE_CLEAR_0: /* task/clear.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
         task_do_pause(s);
         task_do_executing(s);
         break;
-    case 1: /* task/clear.rcs line 1 */
+    /* task/clear.rcs line 1: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known false */
+    case TASK_LINE_CLEAR_1:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 2: /* task/clear.rcs line 2 */
+    /* task/clear.rcs line 2: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; dest_spec false */
+    case TASK_LINE_CLEAR_2:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 3: /* task/clear.rcs line 3 */
+    /* task/clear.rcs line 3: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; dest_spec true; obj_acquired false */
+    case TASK_LINE_CLEAR_3:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 4: /* task/clear.rcs line 4 */
+    /* task/clear.rcs line 4: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; dest_spec true; obj_acquired true */
+    case TASK_LINE_CLEAR_4:
         task_do_set_dest(s);
-        task_do_nextstate(s, INT64_C(6));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_6);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 5: /* task/clear.rcs line 5 */
+    /* task/clear.rcs line 5: new_command false; emove.command in {move_to, move_to_obj}; emove.status
+       done; cur_state state_6 */
+    case TASK_LINE_CLEAR_5:
         task_do_arrived(s);
-        task_do_nextstate(s, INT64_C(7));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_7);
         task_do_release(s);
         task_do_executing(s);
         break;
-    case 6: /* task/clear.rcs line 6 */
+    /* task/clear.rcs line 6: new_command false; emove.command release; emove.status done; cur_state
+       state_7 */
+    case TASK_LINE_CLEAR_6:
         task_do_released(s);
         task_do_set_end(s);
-        task_do_nextstate(s, INT64_C(8));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_8);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 7: /* task/clear.rcs line 7 */
+    /* task/clear.rcs line 7: new_command false; emove.command move_to; emove.status done; cur_state
+       state_8 */
+    case TASK_LINE_CLEAR_7:
         task_do_ended(s);
-        task_do_nextstate(s, INT64_C(0));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_D_STATE);
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 8: /* task/clear.rcs line 8 */
+    /* task/clear.rcs line 8: new_command false; emove.command pause; cur_state d_state */
+    case TASK_LINE_CLEAR_8:
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 9: /* task/clear.rcs line 9 */
+    /* task/clear.rcs line 9: new_command false; emove.command in {move_to, move_to_obj}; emove.status
+       failed; cur_state /= f_state */
+    case TASK_LINE_CLEAR_9:
         task_do_move_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 10: /* task/clear.rcs line 10 */
+    /* task/clear.rcs line 10: new_command false; emove.command release; emove.status failed; cur_state /=
+       f_state */
+    case TASK_LINE_CLEAR_10:
         task_do_release_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 11: /* task/clear.rcs line 11 */
+    case TASK_LINE_CLEAR_11: /* task/clear.rcs line 11: new_command false; cur_state f_state */
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 12: /* task/clear.rcs line 12 */
+    /* task/clear.rcs line 12: new_command false; emove.status executing; cur_state in {state_6, state_7,
+       state_8} */
+    case TASK_LINE_CLEAR_12:
         task_do_executing(s);
         break;
-    case 13: /* task/clear.rcs line 13 */
+    case TASK_LINE_CLEAR_13: /* task/clear.rcs line 13: no other line matches */
         task_do_state_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = TASK_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -714,133 +868,166 @@ static void task_run_clear(task_t *s)
 /* Matches table move and runs the line. */
 static void task_run_move(task_t *s)
 {
-    /* move_in_step */
-    if (!(((!(!s->new_command)) || (((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->emove.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->emove.command == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->emove.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->emove.command == INT64_C(4)))) || (((int64_t)s->cur_state == INT64_C(6)) && (((int64_t)s->emove.command == INT64_C(1)) || ((int64_t)s->emove.command == INT64_C(2)))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 4u);
+    if (!task_holds_move_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_MOVE_IN_STEP);
     }
-    /* move_resting */
-    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 5u);
+    if (!task_holds_move_resting(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_MOVE_RESTING);
     }
     s->line = task_move_line(s);
     switch (s->line) {
-    case 0: /* task/move.rcs line 0 */
+    case TASK_LINE_MOVE_0: /* task/move.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
         task_do_pause(s);
         task_do_executing(s);
         break;
-    case 1: /* task/move.rcs line 1 */
+    /* task/move.rcs line 1: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known false */
+    case TASK_LINE_MOVE_1:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 2: /* task/move.rcs line 2 */
+    /* task/move.rcs line 2: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; dest_spec false */
+    case TASK_LINE_MOVE_2:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 3: /* task/move.rcs line 3 */
+    /* task/move.rcs line 3: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; source_spec true; dest_spec true; obj_acquired true */
+    case TASK_LINE_MOVE_3:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 4: /* task/move.rcs line 4 */
+    /* task/move.rcs line 4: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; source_spec true; dest_spec true; obj_acquired false; loc_of_obj /= vis_reqd */
+    case TASK_LINE_MOVE_4:
         task_do_set_source(s);
-        task_do_nextstate(s, INT64_C(4));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_4);
         task_do_move_to_obj(s);
         task_do_executing(s);
         break;
-    case 5: /* task/move.rcs line 5 */
+    /* task/move.rcs line 5: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; source_spec true; dest_spec true; obj_acquired false; loc_of_obj vis_reqd */
+    case TASK_LINE_MOVE_5:
         task_do_vupos_setup(s);
-        task_do_nextstate(s, INT64_C(2));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_2);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 6: /* task/move.rcs line 6 */
+    /* task/move.rcs line 6: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; source_spec false; dest_spec true; workstation.obj /= close_grip */
+    case TASK_LINE_MOVE_6:
         task_do_set_dest(s);
-        task_do_nextstate(s, INT64_C(6));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_6);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 7: /* task/move.rcs line 7 */
+    /* task/move.rcs line 7: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; source_spec false; dest_spec true; obj_acquired false; workstation.obj =
+       close_grip */
+    case TASK_LINE_MOVE_7:
         task_do_set_dest(s);
-        task_do_nextstate(s, INT64_C(6));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_6);
         task_do_move_to_obj(s);
         task_do_executing(s);
         break;
-    case 8: /* task/move.rcs line 8 */
+    /* task/move.rcs line 8: new_command true; emove.resting true; emove.command pause; emove.status done;
+       names_known true; source_spec false; dest_spec true; obj_acquired true; workstation.obj = close_grip */
+    case TASK_LINE_MOVE_8:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 9: /* task/move.rcs line 9 */
-        task_do_nextstate(s, INT64_C(3));
+    /* task/move.rcs line 9: new_command false; emove.command move_to; emove.status done; cur_state state_2 */
+    case TASK_LINE_MOVE_9:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_3);
         task_do_locate(s);
         task_do_executing(s);
         break;
-    case 10: /* task/move.rcs line 10 */
-        task_do_nextstate(s, INT64_C(5));
+    /* task/move.rcs line 10: new_command false; emove.command locate; emove.status done; cur_state state_3 */
+    case TASK_LINE_MOVE_10:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_pickup(s);
         task_do_executing(s);
         break;
-    case 11: /* task/move.rcs line 11 */
-        task_do_nextstate(s, INT64_C(5));
+    /* task/move.rcs line 11: new_command false; emove.command move_to_obj; emove.status done; cur_state
+       state_4 */
+    case TASK_LINE_MOVE_11:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_pickup(s);
         task_do_executing(s);
         break;
-    case 12: /* task/move.rcs line 12 */
+    /* task/move.rcs line 12: new_command false; emove.command pickup; emove.status done; cur_state state_5 */
+    case TASK_LINE_MOVE_12:
         task_do_set_dest(s);
-        task_do_nextstate(s, INT64_C(6));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_6);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 13: /* task/move.rcs line 13 */
+    /* task/move.rcs line 13: new_command false; emove.command in {move_to, move_to_obj}; emove.status
+       done; cur_state state_6 */
+    case TASK_LINE_MOVE_13:
         task_do_arrived(s);
-        task_do_nextstate(s, INT64_C(0));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_D_STATE);
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 14: /* task/move.rcs line 14 */
+    /* task/move.rcs line 14: new_command false; emove.command pause; cur_state d_state */
+    case TASK_LINE_MOVE_14:
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 15: /* task/move.rcs line 15 */
+    /* task/move.rcs line 15: new_command false; emove.command in {move_to, move_to_obj}; emove.status
+       failed; cur_state /= f_state */
+    case TASK_LINE_MOVE_15:
         task_do_move_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 16: /* task/move.rcs line 16 */
+    /* task/move.rcs line 16: new_command false; emove.command locate; emove.status failed; cur_state /=
+       f_state */
+    case TASK_LINE_MOVE_16:
         task_do_loc_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 17: /* task/move.rcs line 17 */
+    /* task/move.rcs line 17: new_command false; emove.command pickup; emove.status failed; cur_state /=
+       f_state */
+    case TASK_LINE_MOVE_17:
         task_do_pic_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 18: /* task/move.rcs line 18 */
+    case TASK_LINE_MOVE_18: /* task/move.rcs line 18: new_command false; cur_state f_state */
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 19: /* task/move.rcs line 19 */
+    /* task/move.rcs line 19: new_command false; emove.status executing; cur_state in {state_2, state_3,
+       state_4, state_5, state_6} */
+    case TASK_LINE_MOVE_19:
         task_do_executing(s);
         break;
-    case 20: /* task/move.rcs line 20 */
+    case TASK_LINE_MOVE_20: /* task/move.rcs line 20: no other line matches */
         task_do_state_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = TASK_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -850,23 +1037,23 @@ static void task_run_pause_task(task_t *s)
 {
     s->line = task_pause_task_line(s);
     switch (s->line) {
-    case 0: /* task/pause.rcs line 1 */
-        task_do_nextstate(s, INT64_C(0));
+    case TASK_LINE_PAUSE_TASK_1: /* task/pause.rcs line 1: emove.resting true */
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_D_STATE);
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 1: /* task/pause.rcs line 2 */
+    case TASK_LINE_PAUSE_TASK_2: /* task/pause.rcs line 2: emove.resting false */
         task_do_settle(s);
-        task_do_nextstate(s, INT64_C(0));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_D_STATE);
         task_do_pause(s);
         task_do_executing(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = TASK_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -874,84 +1061,100 @@ static void task_run_pause_task(task_t *s)
 /* Matches table release_part and runs the line. */
 static void task_run_release_part(task_t *s)
 {
-    /* release_part_in_step */
-    if (!(((!(!s->new_command)) || ((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->emove.command == INT64_C(5)))) || (((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->emove.command == INT64_C(1))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 6u);
+    if (!task_holds_release_part_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_IN_STEP);
     }
-    /* release_part_resting */
-    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 7u);
+    if (!task_holds_release_part_resting(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_RESTING);
     }
     s->line = task_release_part_line(s);
     switch (s->line) {
-    case 0: /* task/release.rcs line 0 */
+    case TASK_LINE_RELEASE_PART_0: /* task/release.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
         task_do_pause(s);
         task_do_executing(s);
         break;
-    case 1: /* task/release.rcs line 1 */
+    /* task/release.rcs line 1: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known false */
+    case TASK_LINE_RELEASE_PART_1:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 2: /* task/release.rcs line 2 */
+    /* task/release.rcs line 2: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known true; obj_acquired false */
+    case TASK_LINE_RELEASE_PART_2:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 3: /* task/release.rcs line 3 */
-        task_do_nextstate(s, INT64_C(7));
+    /* task/release.rcs line 3: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known true; obj_acquired true */
+    case TASK_LINE_RELEASE_PART_3:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_7);
         task_do_release(s);
         task_do_executing(s);
         break;
-    case 4: /* task/release.rcs line 4 */
+    /* task/release.rcs line 4: new_command false; emove.command release; emove.status done; cur_state
+       state_7 */
+    case TASK_LINE_RELEASE_PART_4:
         task_do_released(s);
         task_do_set_end(s);
-        task_do_nextstate(s, INT64_C(8));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_8);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 5: /* task/release.rcs line 5 */
+    /* task/release.rcs line 5: new_command false; emove.command move_to; emove.status done; cur_state
+       state_8 */
+    case TASK_LINE_RELEASE_PART_5:
         task_do_ended(s);
-        task_do_nextstate(s, INT64_C(0));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_D_STATE);
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 6: /* task/release.rcs line 6 */
+    /* task/release.rcs line 6: new_command false; emove.command pause; cur_state d_state */
+    case TASK_LINE_RELEASE_PART_6:
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 7: /* task/release.rcs line 7 */
+    /* task/release.rcs line 7: new_command false; emove.command release; emove.status failed; cur_state /=
+       f_state */
+    case TASK_LINE_RELEASE_PART_7:
         task_do_release_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 8: /* task/release.rcs line 8 */
+    /* task/release.rcs line 8: new_command false; emove.command move_to; emove.status failed; cur_state /=
+       f_state */
+    case TASK_LINE_RELEASE_PART_8:
         task_do_move_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 9: /* task/release.rcs line 9 */
+    case TASK_LINE_RELEASE_PART_9: /* task/release.rcs line 9: new_command false; cur_state f_state */
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 10: /* task/release.rcs line 10 */
+    /* task/release.rcs line 10: new_command false; emove.status executing; cur_state in {state_7, state_8} */
+    case TASK_LINE_RELEASE_PART_10:
         task_do_executing(s);
         break;
-    case 11: /* task/release.rcs line 11 */
+    case TASK_LINE_RELEASE_PART_11: /* task/release.rcs line 11: no other line matches */
         task_do_state_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = TASK_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -959,146 +1162,185 @@ static void task_run_release_part(task_t *s)
 /* Matches table transfer and runs the line. */
 static void task_run_transfer(task_t *s)
 {
-    /* transfer_in_step */
-    if (!(((!(!s->new_command)) || (((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->emove.command == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) || ((int64_t)s->cur_state == INT64_C(6)) || ((int64_t)s->cur_state == INT64_C(8))) && ((int64_t)s->emove.command == INT64_C(1)))) || (((int64_t)s->cur_state == INT64_C(3)) && ((int64_t)s->emove.command == INT64_C(3)))) || (((int64_t)s->cur_state == INT64_C(4)) && ((int64_t)s->emove.command == INT64_C(2)))) || (((int64_t)s->cur_state == INT64_C(5)) && ((int64_t)s->emove.command == INT64_C(4)))) || (((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->emove.command == INT64_C(5))))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 8u);
+    if (!task_holds_transfer_in_step(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_TRANSFER_IN_STEP);
     }
-    /* transfer_resting */
-    if (!(((!s->emove.resting) || (((int64_t)s->emove.command == INT64_C(0)) && ((int64_t)s->emove.status == INT64_C(0)))))) {
-        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 9u);
+    if (!task_holds_transfer_resting(s)) {
+        s->assumptions_failed = s->assumptions_failed |
+                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_TRANSFER_RESTING);
     }
     s->line = task_transfer_line(s);
     switch (s->line) {
-    case 0: /* task/transfer.rcs line 0 */
+    case TASK_LINE_TRANSFER_0: /* task/transfer.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
         task_do_pause(s);
         task_do_executing(s);
         break;
-    case 1: /* task/transfer.rcs line 1 */
+    /* task/transfer.rcs line 1: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known false */
+    case TASK_LINE_TRANSFER_1:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 2: /* task/transfer.rcs line 2 */
+    /* task/transfer.rcs line 2: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known true; dest_spec false */
+    case TASK_LINE_TRANSFER_2:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 3: /* task/transfer.rcs line 3 */
+    /* task/transfer.rcs line 3: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known true; source_spec true; dest_spec true; obj_acquired true */
+    case TASK_LINE_TRANSFER_3:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 4: /* task/transfer.rcs line 4 */
+    /* task/transfer.rcs line 4: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known true; source_spec true; dest_spec true; obj_acquired false; loc_of_obj /= vis_reqd */
+    case TASK_LINE_TRANSFER_4:
         task_do_set_source(s);
-        task_do_nextstate(s, INT64_C(4));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_4);
         task_do_move_to_obj(s);
         task_do_executing(s);
         break;
-    case 5: /* task/transfer.rcs line 5 */
+    /* task/transfer.rcs line 5: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known true; source_spec true; dest_spec true; obj_acquired false; loc_of_obj vis_reqd */
+    case TASK_LINE_TRANSFER_5:
         task_do_vupos_setup(s);
-        task_do_nextstate(s, INT64_C(2));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_2);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 6: /* task/transfer.rcs line 6 */
+    /* task/transfer.rcs line 6: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known true; source_spec false; dest_spec true; obj_acquired true */
+    case TASK_LINE_TRANSFER_6:
         task_do_set_dest(s);
-        task_do_nextstate(s, INT64_C(6));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_6);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 7: /* task/transfer.rcs line 7 */
+    /* task/transfer.rcs line 7: new_command true; emove.resting true; emove.command pause; emove.status
+       done; names_known true; source_spec false; dest_spec true; obj_acquired false */
+    case TASK_LINE_TRANSFER_7:
         task_do_cmd_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_failed(s);
         break;
-    case 8: /* task/transfer.rcs line 8 */
-        task_do_nextstate(s, INT64_C(3));
+    /* task/transfer.rcs line 8: new_command false; emove.command move_to; emove.status done; cur_state
+       state_2 */
+    case TASK_LINE_TRANSFER_8:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_3);
         task_do_locate(s);
         task_do_executing(s);
         break;
-    case 9: /* task/transfer.rcs line 9 */
-        task_do_nextstate(s, INT64_C(5));
+    /* task/transfer.rcs line 9: new_command false; emove.command locate; emove.status done; cur_state
+       state_3 */
+    case TASK_LINE_TRANSFER_9:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_pickup(s);
         task_do_executing(s);
         break;
-    case 10: /* task/transfer.rcs line 10 */
-        task_do_nextstate(s, INT64_C(5));
+    /* task/transfer.rcs line 10: new_command false; emove.command move_to_obj; emove.status done;
+       cur_state state_4 */
+    case TASK_LINE_TRANSFER_10:
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_pickup(s);
         task_do_executing(s);
         break;
-    case 11: /* task/transfer.rcs line 11 */
+    /* task/transfer.rcs line 11: new_command false; emove.command pickup; emove.status done; cur_state
+       state_5 */
+    case TASK_LINE_TRANSFER_11:
         task_do_set_dest(s);
-        task_do_nextstate(s, INT64_C(6));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_6);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 12: /* task/transfer.rcs line 12 */
+    /* task/transfer.rcs line 12: new_command false; emove.command in {move_to, move_to_obj}; emove.status
+       done; cur_state state_6 */
+    case TASK_LINE_TRANSFER_12:
         task_do_arrived(s);
-        task_do_nextstate(s, INT64_C(7));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_7);
         task_do_release(s);
         task_do_executing(s);
         break;
-    case 13: /* task/transfer.rcs line 13 */
+    /* task/transfer.rcs line 13: new_command false; emove.command release; emove.status done; cur_state
+       state_7 */
+    case TASK_LINE_TRANSFER_13:
         task_do_released(s);
         task_do_set_end(s);
-        task_do_nextstate(s, INT64_C(8));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_8);
         task_do_move_to(s);
         task_do_executing(s);
         break;
-    case 14: /* task/transfer.rcs line 14 */
+    /* task/transfer.rcs line 14: new_command false; emove.command move_to; emove.status done; cur_state
+       state_8 */
+    case TASK_LINE_TRANSFER_14:
         task_do_ended(s);
-        task_do_nextstate(s, INT64_C(0));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_D_STATE);
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 15: /* task/transfer.rcs line 15 */
+    /* task/transfer.rcs line 15: new_command false; emove.command pause; cur_state d_state */
+    case TASK_LINE_TRANSFER_15:
         task_do_pause(s);
         task_do_done(s);
         break;
-    case 16: /* task/transfer.rcs line 16 */
+    /* task/transfer.rcs line 16: new_command false; emove.command in {move_to, move_to_obj}; emove.status
+       failed; cur_state /= f_state */
+    case TASK_LINE_TRANSFER_16:
         task_do_move_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 17: /* task/transfer.rcs line 17 */
+    /* task/transfer.rcs line 17: new_command false; emove.command locate; emove.status failed; cur_state
+       /= f_state */
+    case TASK_LINE_TRANSFER_17:
         task_do_loc_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 18: /* task/transfer.rcs line 18 */
+    /* task/transfer.rcs line 18: new_command false; emove.command pickup; emove.status failed; cur_state
+       /= f_state */
+    case TASK_LINE_TRANSFER_18:
         task_do_pic_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 19: /* task/transfer.rcs line 19 */
+    /* task/transfer.rcs line 19: new_command false; emove.command release; emove.status failed; cur_state
+       /= f_state */
+    case TASK_LINE_TRANSFER_19:
         task_do_release_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 20: /* task/transfer.rcs line 20 */
+    case TASK_LINE_TRANSFER_20: /* task/transfer.rcs line 20: new_command false; cur_state f_state */
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case 21: /* task/transfer.rcs line 21 */
+    /* task/transfer.rcs line 21: new_command false; emove.status executing; cur_state in {state_2,
+       state_3, state_4, state_5, state_6, state_7, state_8} */
+    case TASK_LINE_TRANSFER_21:
         task_do_executing(s);
         break;
-    case 22: /* task/transfer.rcs line 22 */
+    case TASK_LINE_TRANSFER_22: /* task/transfer.rcs line 22: no other line matches */
         task_do_state_failure(s);
-        task_do_nextstate(s, INT64_C(1));
+        task_do_nextstate(s, TASK_COMMON_TASK_STATE_F_STATE);
         task_do_pause(s);
         task_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = TASK_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -1107,247 +1349,249 @@ static void task_run_transfer(task_t *s)
 void task_init(task_t *s)
 {
     s->line = -1;
-    s->fault = 0;
+    s->fault = TASK_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->workstation.inc_command = (uint16_t)INT64_C(0);
-    s->workstation.input_command = (uint8_t)INT64_C(0);
-    s->workstation.obj = (uint8_t)INT64_C(0);
-    s->workstation.grasp = (uint8_t)INT64_C(0);
-    s->workstation.source_locpt = (uint8_t)INT64_C(0);
-    s->workstation.dest_locpt = (uint8_t)INT64_C(0);
-    s->workstation.end_at_locpt = (uint8_t)INT64_C(0);
-    s->workstation.sector = (uint8_t)INT64_C(0);
-    s->to_workstation.inc_command_echo = (uint16_t)INT64_C(0);
-    s->to_workstation.ref_command_echo = (uint8_t)INT64_C(0);
-    s->to_workstation.status_report = (uint8_t)INT64_C(0);
-    s->to_workstation.status_parameter = (uint8_t)INT64_C(0);
-    s->to_workstation.failure = (uint8_t)INT64_C(0);
-    s->to_workstation.cause = (uint8_t)INT64_C(0);
+    s->workstation.inc_command = 0u;
+    s->workstation.input_command = VOCABULARY_TASK_COMMAND_PAUSE;
+    s->workstation.obj = VOCABULARY_OBJECT_NULL_OBJ;
+    s->workstation.grasp = 0u;
+    s->workstation.source_locpt = 0u;
+    s->workstation.dest_locpt = 0u;
+    s->workstation.end_at_locpt = 0u;
+    s->workstation.sector = 0u;
+    s->to_workstation.inc_command_echo = 0u;
+    s->to_workstation.ref_command_echo = VOCABULARY_TASK_COMMAND_PAUSE;
+    s->to_workstation.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->to_workstation.status_parameter = VOCABULARY_OBJECT_NULL_OBJ;
+    s->to_workstation.failure = VOCABULARY_REASON_NONE;
+    s->to_workstation.cause = VOCABULARY_REASON_NONE;
     s->new_command = false;
     s->answered = false;
     s->settling = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
-    s->from_emove.inc_command_echo = (uint16_t)INT64_C(0);
-    s->from_emove.ref_command_echo = (uint8_t)INT64_C(0);
-    s->from_emove.status_report = (uint8_t)INT64_C(0);
-    s->from_emove.failure = (uint8_t)INT64_C(0);
-    s->to_emove.inc_command = (uint16_t)INT64_C(0);
-    s->to_emove.input_command = (uint8_t)INT64_C(0);
-    s->to_emove.obj_ptr = (uint8_t)INT64_C(0);
-    s->to_emove.grasp = (uint8_t)INT64_C(0);
-    s->to_emove.locpt_ptr = (uint8_t)INT64_C(0);
-    s->to_emove.sector = (uint8_t)INT64_C(0);
+    s->inc_command_seen = 0u;
+    s->from_emove.inc_command_echo = 0u;
+    s->from_emove.ref_command_echo = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->from_emove.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->from_emove.failure = VOCABULARY_REASON_NONE;
+    s->to_emove.inc_command = 0u;
+    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->to_emove.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
+    s->to_emove.grasp = 0u;
+    s->to_emove.locpt_ptr = 0u;
+    s->to_emove.sector = 0u;
     s->to_emove.apoint_pos_flag = false;
-    s->to_emove.gripped_obj_ptr = (uint8_t)INT64_C(0);
-    s->emove.command = (uint8_t)INT64_C(0);
-    s->emove.status = (uint8_t)INT64_C(0);
+    s->to_emove.gripped_obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
+    s->emove.command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->emove.status = VOCABULARY_LEVEL_STATUS_DONE;
     s->emove.resting = false;
-    s->emove.failure = (uint8_t)INT64_C(0);
-    s->last_emove.input_command = (uint8_t)INT64_C(0);
-    s->last_emove.obj_ptr = (uint8_t)INT64_C(0);
-    s->last_emove.grasp = (uint8_t)INT64_C(0);
-    s->last_emove.locpt_ptr = (uint8_t)INT64_C(0);
-    s->last_emove.sector = (uint8_t)INT64_C(0);
+    s->emove.failure = VOCABULARY_REASON_NONE;
+    s->last_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->last_emove.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
+    s->last_emove.grasp = 0u;
+    s->last_emove.locpt_ptr = 0u;
+    s->last_emove.sector = 0u;
     s->source.known = false;
     s->source.vision = false;
     s->source.buffer = false;
-    s->source.vupos = (uint8_t)INT64_C(0);
-    s->source.safe = (uint8_t)INT64_C(0);
+    s->source.vupos = 0u;
+    s->source.safe = 0u;
     s->dest.known = false;
     s->dest.vision = false;
     s->dest.buffer = false;
-    s->dest.vupos = (uint8_t)INT64_C(0);
-    s->dest.safe = (uint8_t)INT64_C(0);
+    s->dest.vupos = 0u;
+    s->dest.safe = 0u;
     s->end_at.known = false;
     s->end_at.vision = false;
     s->end_at.buffer = false;
-    s->end_at.vupos = (uint8_t)INT64_C(0);
-    s->end_at.safe = (uint8_t)INT64_C(0);
+    s->end_at.vupos = 0u;
+    s->end_at.safe = 0u;
     s->here.known = false;
     s->here.vision = false;
     s->here.buffer = false;
-    s->here.vupos = (uint8_t)INT64_C(0);
-    s->here.safe = (uint8_t)INT64_C(0);
-    s->cur_state = (uint8_t)INT64_C(0);
-    s->cur_state_next = (uint8_t)INT64_C(0);
-    s->loc_of_obj = (uint8_t)INT64_C(0);
+    s->here.vupos = 0u;
+    s->here.safe = 0u;
+    s->cur_state = TASK_COMMON_TASK_STATE_D_STATE;
+    s->cur_state_next = TASK_COMMON_TASK_STATE_D_STATE;
+    s->loc_of_obj = TASK_COMMON_LOCATING_VIS_REQD;
     s->source_spec = false;
-    s->source_loc = (uint8_t)INT64_C(0);
-    s->source_sector = (uint8_t)INT64_C(0);
-    s->source_vupos = (uint8_t)INT64_C(0);
+    s->source_loc = 0u;
+    s->source_sector = 0u;
+    s->source_vupos = 0u;
     s->source_buffer = false;
     s->dest_spec = false;
     s->names_known = false;
     s->obj_acquired = false;
-    s->obj_now_in_gripper = (uint8_t)INT64_C(0);
-    s->grasp_now = (uint8_t)INT64_C(0);
-    s->remember_current_loc = (uint8_t)INT64_C(0);
-    s->current_loc = (uint8_t)INT64_C(0);
-    s->current_sector = (uint8_t)INT64_C(0);
-    s->tbuffer_boxt = (uint8_t)INT64_C(10);
-    s->bbuffer_boxb = (uint8_t)INT64_C(10);
-    s->fbuffer_flag = (uint8_t)INT64_C(10);
-    s->hbuffer_hous = (uint8_t)INT64_C(10);
+    s->obj_now_in_gripper = VOCABULARY_OBJECT_NULL_OBJ;
+    s->grasp_now = 0u;
+    s->remember_current_loc = 0u;
+    s->current_loc = 0u;
+    s->current_sector = 0u;
+    s->tbuffer_boxt = 10u;
+    s->bbuffer_boxb = 10u;
+    s->fbuffer_flag = 10u;
+    s->hbuffer_hous = 10u;
     s->echoed = false;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t task_check(const task_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && (((int64_t)s->to_workstation.ref_command_echo > INT64_C(5)))) {
-        at = 9;
+    if ((at < 0) && (s->to_workstation.ref_command_echo > VOCABULARY_TASK_COMMAND_CLEAR)) {
+        at = TASK_LEAF_TO_WORKSTATION_REF_COMMAND_ECHO;
     }
-    if ((at < 0) && (((int64_t)s->to_workstation.status_report > INT64_C(2)))) {
-        at = 10;
+    if ((at < 0) && (s->to_workstation.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = TASK_LEAF_TO_WORKSTATION_STATUS_REPORT;
     }
-    if ((at < 0) && (((int64_t)s->to_workstation.status_parameter > INT64_C(7)))) {
-        at = 11;
+    if ((at < 0) && (s->to_workstation.status_parameter > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = TASK_LEAF_TO_WORKSTATION_STATUS_PARAMETER;
     }
-    if ((at < 0) && (((int64_t)s->to_workstation.failure > INT64_C(17)))) {
-        at = 12;
+    if ((at < 0) && (s->to_workstation.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = TASK_LEAF_TO_WORKSTATION_FAILURE;
     }
-    if ((at < 0) && (((int64_t)s->to_workstation.cause > INT64_C(17)))) {
-        at = 13;
+    if ((at < 0) && (s->to_workstation.cause > VOCABULARY_REASON_NO_PICTURE)) {
+        at = TASK_LEAF_TO_WORKSTATION_CAUSE;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
-        at = 14;
+        at = TASK_LEAF_NEW_COMMAND;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
-        at = 15;
+        at = TASK_LEAF_ANSWERED;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
-        at = 16;
+        at = TASK_LEAF_SETTLING;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.input_command > INT64_C(5)))) {
-        at = 23;
+    if ((at < 0) && (s->to_emove.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+        at = TASK_LEAF_TO_EMOVE_INPUT_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.obj_ptr > INT64_C(7)))) {
-        at = 24;
+    if ((at < 0) && (s->to_emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = TASK_LEAF_TO_EMOVE_OBJ_PTR;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.grasp > INT64_C(9)))) {
-        at = 25;
+    if ((at < 0) && (s->to_emove.grasp > 9u)) {
+        at = TASK_LEAF_TO_EMOVE_GRASP;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.sector > INT64_C(99)))) {
-        at = 27;
+    if ((at < 0) && (s->to_emove.sector > 99u)) {
+        at = TASK_LEAF_TO_EMOVE_SECTOR;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->to_emove.apoint_pos_flag) > 1u)) {
-        at = 28;
+        at = TASK_LEAF_TO_EMOVE_APOINT_POS_FLAG;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.gripped_obj_ptr > INT64_C(7)))) {
-        at = 29;
+    if ((at < 0) && (s->to_emove.gripped_obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = TASK_LEAF_TO_EMOVE_GRIPPED_OBJ_PTR;
     }
-    if ((at < 0) && (((int64_t)s->emove.command > INT64_C(5)))) {
-        at = 30;
+    if ((at < 0) && (s->emove.command > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+        at = TASK_LEAF_EMOVE_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->emove.status > INT64_C(2)))) {
-        at = 31;
+    if ((at < 0) && (s->emove.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = TASK_LEAF_EMOVE_STATUS;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->emove.resting) > 1u)) {
-        at = 32;
+        at = TASK_LEAF_EMOVE_RESTING;
     }
-    if ((at < 0) && (((int64_t)s->emove.failure > INT64_C(17)))) {
-        at = 33;
+    if ((at < 0) && (s->emove.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = TASK_LEAF_EMOVE_FAILURE;
     }
-    if ((at < 0) && (((int64_t)s->last_emove.input_command > INT64_C(5)))) {
-        at = 34;
+    if ((at < 0) && (s->last_emove.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+        at = TASK_LEAF_LAST_EMOVE_INPUT_COMMAND;
     }
-    if ((at < 0) && (((int64_t)s->last_emove.obj_ptr > INT64_C(7)))) {
-        at = 35;
+    if ((at < 0) && (s->last_emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = TASK_LEAF_LAST_EMOVE_OBJ_PTR;
     }
-    if ((at < 0) && (((int64_t)s->last_emove.grasp > INT64_C(9)))) {
-        at = 36;
+    if ((at < 0) && (s->last_emove.grasp > 9u)) {
+        at = TASK_LEAF_LAST_EMOVE_GRASP;
     }
-    if ((at < 0) && (((int64_t)s->last_emove.sector > INT64_C(99)))) {
-        at = 38;
+    if ((at < 0) && (s->last_emove.sector > 99u)) {
+        at = TASK_LEAF_LAST_EMOVE_SECTOR;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->source.known) > 1u)) {
-        at = 39;
+        at = TASK_LEAF_SOURCE_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->source.vision) > 1u)) {
-        at = 40;
+        at = TASK_LEAF_SOURCE_VISION;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->source.buffer) > 1u)) {
-        at = 41;
+        at = TASK_LEAF_SOURCE_BUFFER;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->dest.known) > 1u)) {
-        at = 44;
+        at = TASK_LEAF_DEST_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->dest.vision) > 1u)) {
-        at = 45;
+        at = TASK_LEAF_DEST_VISION;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->dest.buffer) > 1u)) {
-        at = 46;
+        at = TASK_LEAF_DEST_BUFFER;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->end_at.known) > 1u)) {
-        at = 49;
+        at = TASK_LEAF_END_AT_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->end_at.vision) > 1u)) {
-        at = 50;
+        at = TASK_LEAF_END_AT_VISION;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->end_at.buffer) > 1u)) {
-        at = 51;
+        at = TASK_LEAF_END_AT_BUFFER;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->here.known) > 1u)) {
-        at = 54;
+        at = TASK_LEAF_HERE_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->here.vision) > 1u)) {
-        at = 55;
+        at = TASK_LEAF_HERE_VISION;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->here.buffer) > 1u)) {
-        at = 56;
+        at = TASK_LEAF_HERE_BUFFER;
     }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(8)))) {
-        at = 59;
+    if ((at < 0) && (s->cur_state > TASK_COMMON_TASK_STATE_STATE_8)) {
+        at = TASK_LEAF_CUR_STATE;
     }
-    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(8)))) {
-        at = 60;
+    if ((at < 0) && (s->cur_state_next > TASK_COMMON_TASK_STATE_STATE_8)) {
+        at = TASK_LEAF_CUR_STATE_NEXT;
     }
-    if ((at < 0) && (((int64_t)s->loc_of_obj > INT64_C(1)))) {
-        at = 61;
+    if ((at < 0) && (s->loc_of_obj > TASK_COMMON_LOCATING_KNOWN)) {
+        at = TASK_LEAF_LOC_OF_OBJ;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->source_spec) > 1u)) {
-        at = 62;
+        at = TASK_LEAF_SOURCE_SPEC;
     }
-    if ((at < 0) && (((int64_t)s->source_sector > INT64_C(99)))) {
-        at = 64;
+    if ((at < 0) && (s->source_sector > 99u)) {
+        at = TASK_LEAF_SOURCE_SECTOR;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->source_buffer) > 1u)) {
-        at = 66;
+        at = TASK_LEAF_SOURCE_BUFFER_2;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->dest_spec) > 1u)) {
-        at = 67;
+        at = TASK_LEAF_DEST_SPEC;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->names_known) > 1u)) {
-        at = 68;
+        at = TASK_LEAF_NAMES_KNOWN;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
-        at = 69;
+        at = TASK_LEAF_OBJ_ACQUIRED;
     }
-    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(7)))) {
-        at = 70;
+    if ((at < 0) && (s->obj_now_in_gripper > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = TASK_LEAF_OBJ_NOW_IN_GRIPPER;
     }
-    if ((at < 0) && (((int64_t)s->grasp_now > INT64_C(9)))) {
-        at = 71;
+    if ((at < 0) && (s->grasp_now > 9u)) {
+        at = TASK_LEAF_GRASP_NOW;
     }
-    if ((at < 0) && (((int64_t)s->current_sector > INT64_C(99)))) {
-        at = 74;
+    if ((at < 0) && (s->current_sector > 99u)) {
+        at = TASK_LEAF_CURRENT_SECTOR;
     }
-    if ((at < 0) && (((int64_t)s->tbuffer_boxt > INT64_C(99)))) {
-        at = 75;
+    if ((at < 0) && (s->tbuffer_boxt > 99u)) {
+        at = TASK_LEAF_TBUFFER_BOXT;
     }
-    if ((at < 0) && (((int64_t)s->bbuffer_boxb > INT64_C(99)))) {
-        at = 76;
+    if ((at < 0) && (s->bbuffer_boxb > 99u)) {
+        at = TASK_LEAF_BBUFFER_BOXB;
     }
-    if ((at < 0) && (((int64_t)s->fbuffer_flag > INT64_C(99)))) {
-        at = 77;
+    if ((at < 0) && (s->fbuffer_flag > 99u)) {
+        at = TASK_LEAF_FBUFFER_FLAG;
     }
-    if ((at < 0) && (((int64_t)s->hbuffer_hous > INT64_C(99)))) {
-        at = 78;
+    if ((at < 0) && (s->hbuffer_hous > 99u)) {
+        at = TASK_LEAF_HBUFFER_HOUS;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
-        at = 79;
+        at = TASK_LEAF_ECHOED;
     }
     return at;
 }
@@ -1366,32 +1610,55 @@ int32_t task_acquire_line(const task_t *s)
         uint32_t t6[2];
         uint32_t t7[2];
     } t = {
-        {
-            0xffe0u, 0x1fu
+        { /* new_command */
+            0xffe0u, /* false: lines 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
+            0x1fu /* true: lines 0, 1, 2, 3, 4 */
         },
-        {
-            0xc21fu, 0xc441u, 0xc821u, 0xd081u, 0xe101u, 0xc001u
+        { /* emove.command */
+            0xc21fu, /* pause: lines 0, 1, 2, 3, 4, 9, 14, 15 */
+            0xc441u, /* move_to: lines 0, 6, 10, 14, 15 */
+            0xc821u, /* move_to_obj: lines 0, 5, 11, 14, 15 */
+            0xd081u, /* locate: lines 0, 7, 12, 14, 15 */
+            0xe101u, /* pickup: lines 0, 8, 13, 14, 15 */
+            0xc001u /* release: lines 0, 14, 15 */
         },
-        {
-            0x43ffu, 0xc201u, 0x7e01u
+        { /* emove.status */
+            0x43ffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 14 */
+            0xc201u, /* executing: lines 0, 9, 14, 15 */
+            0x7e01u /* failed: lines 0, 9, 10, 11, 12, 13, 14 */
         },
-        {
-            0xffe1u, 0xfffeu
+        { /* emove.resting */
+            0xffe1u, /* false: lines 0, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
+            0xfffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
         },
-        {
-            0x3e1fu, 0x401fu, 0xbc5fu, 0xbc9fu, 0xbc3fu, 0xbd1fu, 0x3c1fu, 0x3c1fu, 0x3c1fu
+        { /* cur_state */
+            0x3e1fu, /* d_state: lines 0, 1, 2, 3, 4, 9, 10, 11, 12, 13 */
+            0x401fu, /* f_state: lines 0, 1, 2, 3, 4, 14 */
+            0xbc5fu, /* state_2: lines 0, 1, 2, 3, 4, 6, 10, 11, 12, 13, 15 */
+            0xbc9fu, /* state_3: lines 0, 1, 2, 3, 4, 7, 10, 11, 12, 13, 15 */
+            0xbc3fu, /* state_4: lines 0, 1, 2, 3, 4, 5, 10, 11, 12, 13, 15 */
+            0xbd1fu, /* state_5: lines 0, 1, 2, 3, 4, 8, 10, 11, 12, 13, 15 */
+            0x3c1fu, /* state_6: lines 0, 1, 2, 3, 4, 10, 11, 12, 13 */
+            0x3c1fu, /* state_7: lines 0, 1, 2, 3, 4, 10, 11, 12, 13 */
+            0x3c1fu /* state_8: lines 0, 1, 2, 3, 4, 10, 11, 12, 13 */
         },
-        {
-            0xfffdu, 0xffefu
+        { /* loc_of_obj */
+            0xfffdu, /* vis_reqd: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
+            0xffefu /* known: lines 0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
         },
-        {
-            0xffedu, 0xfff7u
+        { /* source_spec */
+            0xffedu, /* false: lines 0, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
+            0xfff7u /* true: lines 0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
         },
-        {
-            0xfffbu, 0xffe5u
+        { /* obj_acquired */
+            0xfffbu, /* false: lines 0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
+            0xffe5u /* true: lines 0, 2, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] & (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] & (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] &
+            (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] &
+            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] &
+            (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x10000u);
     line = several ? (-2) : line;
@@ -1421,32 +1688,55 @@ int32_t task_clear_line(const task_t *s)
         uint16_t t6[2];
         uint16_t t7[2];
     } t = {
-        {
-            0x1fe0u, 0x1fu
+        { /* new_command */
+            0x1fe0u, /* false: lines 5, 6, 7, 8, 9, 10, 11, 12 */
+            0x1fu /* true: lines 0, 1, 2, 3, 4 */
         },
-        {
-            0x191fu, 0x1aa1u, 0x1a21u, 0x1801u, 0x1801u, 0x1c41u
+        { /* emove.command */
+            0x191fu, /* pause: lines 0, 1, 2, 3, 4, 8, 11, 12 */
+            0x1aa1u, /* move_to: lines 0, 5, 7, 9, 11, 12 */
+            0x1a21u, /* move_to_obj: lines 0, 5, 9, 11, 12 */
+            0x1801u, /* locate: lines 0, 11, 12 */
+            0x1801u, /* pickup: lines 0, 11, 12 */
+            0x1c41u /* release: lines 0, 6, 10, 11, 12 */
         },
-        {
-            0x9ffu, 0x1901u, 0xf01u
+        { /* emove.status */
+            0x9ffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 11 */
+            0x1901u, /* executing: lines 0, 8, 11, 12 */
+            0xf01u /* failed: lines 0, 8, 9, 10, 11 */
         },
-        {
-            0x1fe1u, 0x1ffeu
+        { /* emove.resting */
+            0x1fe1u, /* false: lines 0, 5, 6, 7, 8, 9, 10, 11, 12 */
+            0x1ffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
         },
-        {
-            0x71fu, 0x81fu, 0x61fu, 0x61fu, 0x61fu, 0x61fu, 0x163fu, 0x165fu, 0x169fu
+        { /* cur_state */
+            0x71fu, /* d_state: lines 0, 1, 2, 3, 4, 8, 9, 10 */
+            0x81fu, /* f_state: lines 0, 1, 2, 3, 4, 11 */
+            0x61fu, /* state_2: lines 0, 1, 2, 3, 4, 9, 10 */
+            0x61fu, /* state_3: lines 0, 1, 2, 3, 4, 9, 10 */
+            0x61fu, /* state_4: lines 0, 1, 2, 3, 4, 9, 10 */
+            0x61fu, /* state_5: lines 0, 1, 2, 3, 4, 9, 10 */
+            0x163fu, /* state_6: lines 0, 1, 2, 3, 4, 5, 9, 10, 12 */
+            0x165fu, /* state_7: lines 0, 1, 2, 3, 4, 6, 9, 10, 12 */
+            0x169fu /* state_8: lines 0, 1, 2, 3, 4, 7, 9, 10, 12 */
         },
-        {
-            0x1fe7u, 0x1ffbu
+        { /* dest_spec */
+            0x1fe7u, /* false: lines 0, 1, 2, 5, 6, 7, 8, 9, 10, 11, 12 */
+            0x1ffbu /* true: lines 0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
         },
-        {
-            0x1fe3u, 0x1ffdu
+        { /* names_known */
+            0x1fe3u, /* false: lines 0, 1, 5, 6, 7, 8, 9, 10, 11, 12 */
+            0x1ffdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
         },
-        {
-            0x1fefu, 0x1ff7u
+        { /* obj_acquired */
+            0x1fefu, /* false: lines 0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12 */
+            0x1ff7u /* true: lines 0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] & (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t6[(s->names_known ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] &
+            (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] &
+            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->dest_spec ? 1u : 0u)] &
+            (uint32_t)t.t6[(s->names_known ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x2000u);
     line = several ? (-2) : line;
@@ -1479,42 +1769,77 @@ int32_t task_move_line(const task_t *s)
         uint32_t t9[2];
         uint32_t t10[2];
     } t = {
-        {
-            0xffe7fu, 0xffe7fu, 0xffe7fu, 0xffe7fu, 0xffe7fu, 0xfffbfu, 0xffe7fu, 0xffe7fu
+        { /* workstation.obj */
+            0xffe7fu, /* null_obj: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7fu, /* tbox: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7fu, /* bbox: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7fu, /* flag: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7fu, /* hous: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            /* close_grip: lines 0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xfffbfu,
+            /* unknown_object: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7fu,
+            0xffe7fu /* open_grip: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
         },
-        {
-            0xffe00u, 0x1ffu
+        { /* new_command */
+            0xffe00u, /* false: lines 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0x1ffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
         },
-        {
-            0xc41ffu, 0xca201u, 0xca801u, 0xd0401u, 0xe1001u, 0xc0001u
+        { /* emove.command */
+            0xc41ffu, /* pause: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 14, 18, 19 */
+            0xca201u, /* move_to: lines 0, 9, 13, 15, 18, 19 */
+            0xca801u, /* move_to_obj: lines 0, 11, 13, 15, 18, 19 */
+            0xd0401u, /* locate: lines 0, 10, 16, 18, 19 */
+            0xe1001u, /* pickup: lines 0, 12, 17, 18, 19 */
+            0xc0001u /* release: lines 0, 18, 19 */
         },
-        {
-            0x47fffu, 0xc4001u, 0x7c001u
+        { /* emove.status */
+            0x47fffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 18 */
+            0xc4001u, /* executing: lines 0, 14, 18, 19 */
+            0x7c001u /* failed: lines 0, 14, 15, 16, 17, 18 */
         },
-        {
-            0xffe01u, 0xffffeu
+        { /* emove.resting */
+            0xffe01u, /* false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
         },
-        {
-            0x3c1ffu, 0x401ffu, 0xb83ffu, 0xb85ffu, 0xb89ffu, 0xb91ffu, 0xba1ffu, 0x381ffu,
-            0x381ffu
+        { /* cur_state */
+            0x3c1ffu, /* d_state: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 14, 15, 16, 17 */
+            0x401ffu, /* f_state: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 18 */
+            0xb83ffu, /* state_2: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 15, 16, 17, 19 */
+            0xb85ffu, /* state_3: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 15, 16, 17, 19 */
+            0xb89ffu, /* state_4: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 16, 17, 19 */
+            0xb91ffu, /* state_5: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 15, 16, 17, 19 */
+            0xba1ffu, /* state_6: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 13, 15, 16, 17, 19 */
+            0x381ffu, /* state_7: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 15, 16, 17 */
+            0x381ffu /* state_8: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 15, 16, 17 */
         },
-        {
-            0xfffefu, 0xfffdfu
+        { /* loc_of_obj */
+            0xfffefu, /* vis_reqd: lines 0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xfffdfu /* known: lines 0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
         },
-        {
-            0xfffc7u, 0xffe3fu
+        { /* source_spec */
+            0xfffc7u, /* false: lines 0, 1, 2, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe3fu /* true: lines 0, 1, 2, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
         },
-        {
-            0xffe07u, 0xffffbu
+        { /* dest_spec */
+            0xffe07u, /* false: lines 0, 1, 2, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffffbu /* true: lines 0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
         },
-        {
-            0xffe03u, 0xffffdu
+        { /* names_known */
+            0xffe03u, /* false: lines 0, 1, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffffdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
         },
-        {
-            0xffef7u, 0xfff4fu
+        { /* obj_acquired */
+            0xffef7u, /* false: lines 0, 1, 2, 4, 5, 6, 7, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xfff4fu /* true: lines 0, 1, 2, 3, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[s->workstation.obj] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->emove.command] & (uint32_t)t.t3[s->emove.status] & (uint32_t)t.t4[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->loc_of_obj] & (uint32_t)t.t7[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t8[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t9[(s->names_known ? 1u : 0u)] & (uint32_t)t.t10[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->workstation.obj] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t2[s->emove.command] & (uint32_t)t.t3[s->emove.status] &
+            (uint32_t)t.t4[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] &
+            (uint32_t)t.t6[s->loc_of_obj] & (uint32_t)t.t7[(s->source_spec ? 1u : 0u)] &
+            (uint32_t)t.t8[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t9[(s->names_known ? 1u : 0u)] &
+            (uint32_t)t.t10[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x100000u);
     line = several ? (-2) : line;
@@ -1537,8 +1862,9 @@ int32_t task_pause_task_line(const task_t *s)
     static const struct {
         uint8_t t0[2];
     } t = {
-        {
-            0x2u, 0x1u
+        { /* emove.resting */
+            0x2u, /* false: lines 2 */
+            0x1u /* true: lines 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->emove.resting ? 1u : 0u)];
@@ -1571,29 +1897,51 @@ int32_t task_release_part_line(const task_t *s)
         uint16_t t5[2];
         uint16_t t6[2];
     } t = {
-        {
-            0x7f0u, 0xfu
+        { /* new_command */
+            0x7f0u, /* false: lines 4, 5, 6, 7, 8, 9, 10 */
+            0xfu /* true: lines 0, 1, 2, 3 */
         },
-        {
-            0x64fu, 0x721u, 0x601u, 0x601u, 0x601u, 0x691u
+        { /* emove.command */
+            0x64fu, /* pause: lines 0, 1, 2, 3, 6, 9, 10 */
+            0x721u, /* move_to: lines 0, 5, 8, 9, 10 */
+            0x601u, /* move_to_obj: lines 0, 9, 10 */
+            0x601u, /* locate: lines 0, 9, 10 */
+            0x601u, /* pickup: lines 0, 9, 10 */
+            0x691u /* release: lines 0, 4, 7, 9, 10 */
         },
-        {
-            0x27fu, 0x641u, 0x3c1u
+        { /* emove.status */
+            0x27fu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 9 */
+            0x641u, /* executing: lines 0, 6, 9, 10 */
+            0x3c1u /* failed: lines 0, 6, 7, 8, 9 */
         },
-        {
-            0x7f1u, 0x7feu
+        { /* emove.resting */
+            0x7f1u, /* false: lines 0, 4, 5, 6, 7, 8, 9, 10 */
+            0x7feu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10 */
         },
-        {
-            0x1cfu, 0x20fu, 0x18fu, 0x18fu, 0x18fu, 0x18fu, 0x18fu, 0x59fu, 0x5afu
+        { /* cur_state */
+            0x1cfu, /* d_state: lines 0, 1, 2, 3, 6, 7, 8 */
+            0x20fu, /* f_state: lines 0, 1, 2, 3, 9 */
+            0x18fu, /* state_2: lines 0, 1, 2, 3, 7, 8 */
+            0x18fu, /* state_3: lines 0, 1, 2, 3, 7, 8 */
+            0x18fu, /* state_4: lines 0, 1, 2, 3, 7, 8 */
+            0x18fu, /* state_5: lines 0, 1, 2, 3, 7, 8 */
+            0x18fu, /* state_6: lines 0, 1, 2, 3, 7, 8 */
+            0x59fu, /* state_7: lines 0, 1, 2, 3, 4, 7, 8, 10 */
+            0x5afu /* state_8: lines 0, 1, 2, 3, 5, 7, 8, 10 */
         },
-        {
-            0x7f3u, 0x7fdu
+        { /* names_known */
+            0x7f3u, /* false: lines 0, 1, 4, 5, 6, 7, 8, 9, 10 */
+            0x7fdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10 */
         },
-        {
-            0x7f7u, 0x7fbu
+        { /* obj_acquired */
+            0x7f7u, /* false: lines 0, 1, 2, 4, 5, 6, 7, 8, 9, 10 */
+            0x7fbu /* true: lines 0, 1, 3, 4, 5, 6, 7, 8, 9, 10 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] & (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->names_known ? 1u : 0u)] & (uint32_t)t.t6[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] &
+            (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] &
+            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->names_known ? 1u : 0u)] &
+            (uint32_t)t.t6[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x800u);
     line = several ? (-2) : line;
@@ -1625,39 +1973,64 @@ int32_t task_transfer_line(const task_t *s)
         uint32_t t8[2];
         uint32_t t9[2];
     } t = {
-        {
-            0x3fff00u, 0xffu
+        { /* new_command */
+            0x3fff00u, /* false: lines 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 */
+            0xffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
         },
-        {
-            0x3080ffu, 0x315101u, 0x311401u, 0x320201u, 0x340801u, 0x382001u
+        { /* emove.command */
+            0x3080ffu, /* pause: lines 0, 1, 2, 3, 4, 5, 6, 7, 15, 20, 21 */
+            0x315101u, /* move_to: lines 0, 8, 12, 14, 16, 20, 21 */
+            0x311401u, /* move_to_obj: lines 0, 10, 12, 16, 20, 21 */
+            0x320201u, /* locate: lines 0, 9, 17, 20, 21 */
+            0x340801u, /* pickup: lines 0, 11, 18, 20, 21 */
+            0x382001u /* release: lines 0, 13, 19, 20, 21 */
         },
-        {
-            0x10ffffu, 0x308001u, 0x1f8001u
+        { /* emove.status */
+            0x10ffffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x308001u, /* executing: lines 0, 15, 20, 21 */
+            0x1f8001u /* failed: lines 0, 15, 16, 17, 18, 19, 20 */
         },
-        {
-            0x3fff01u, 0x3ffffeu
+        { /* emove.resting */
+            0x3fff01u, /* false: lines 0, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 */
+            0x3ffffeu /* true */
         },
-        {
-            0xf80ffu, 0x1000ffu, 0x2f01ffu, 0x2f02ffu, 0x2f04ffu, 0x2f08ffu, 0x2f10ffu,
-            0x2f20ffu, 0x2f40ffu
+        { /* cur_state */
+            0xf80ffu, /* d_state: lines 0, 1, 2, 3, 4, 5, 6, 7, 15, 16, 17, 18, 19 */
+            0x1000ffu, /* f_state: lines 0, 1, 2, 3, 4, 5, 6, 7, 20 */
+            0x2f01ffu, /* state_2: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 16, 17, 18, 19, 21 */
+            0x2f02ffu, /* state_3: lines 0, 1, 2, 3, 4, 5, 6, 7, 9, 16, 17, 18, 19, 21 */
+            0x2f04ffu, /* state_4: lines 0, 1, 2, 3, 4, 5, 6, 7, 10, 16, 17, 18, 19, 21 */
+            0x2f08ffu, /* state_5: lines 0, 1, 2, 3, 4, 5, 6, 7, 11, 16, 17, 18, 19, 21 */
+            0x2f10ffu, /* state_6: lines 0, 1, 2, 3, 4, 5, 6, 7, 12, 16, 17, 18, 19, 21 */
+            0x2f20ffu, /* state_7: lines 0, 1, 2, 3, 4, 5, 6, 7, 13, 16, 17, 18, 19, 21 */
+            0x2f40ffu /* state_8: lines 0, 1, 2, 3, 4, 5, 6, 7, 14, 16, 17, 18, 19, 21 */
         },
-        {
-            0x3fffefu, 0x3fffdfu
+        { /* loc_of_obj */
+            0x3fffefu, /* vis_reqd */
+            0x3fffdfu /* known */
         },
-        {
-            0x3fffc7u, 0x3fff3fu
+        { /* source_spec */
+            0x3fffc7u, /* false */
+            0x3fff3fu /* true */
         },
-        {
-            0x3fff07u, 0x3ffffbu
+        { /* dest_spec */
+            0x3fff07u, /* false: lines 0, 1, 2, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 */
+            0x3ffffbu /* true */
         },
-        {
-            0x3fff03u, 0x3ffffdu
+        { /* names_known */
+            0x3fff03u, /* false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 */
+            0x3ffffdu /* true */
         },
-        {
-            0x3fffb7u, 0x3fff4fu
+        { /* obj_acquired */
+            0x3fffb7u, /* false */
+            0x3fff4fu /* true */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] & (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] & (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t8[(s->names_known ? 1u : 0u)] & (uint32_t)t.t9[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] &
+            (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] &
+            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] &
+            (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->dest_spec ? 1u : 0u)] &
+            (uint32_t)t.t8[(s->names_known ? 1u : 0u)] & (uint32_t)t.t9[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x400000u);
     line = several ? (-2) : line;
@@ -1677,7 +2050,7 @@ void task_transfer_lines(const task_t *in, int32_t *out, uint32_t n)
 int32_t task_acquire_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == TASK_FAULT_NONE) {
         task_settle(s);
         task_run_acquire(s);
     }
@@ -1688,7 +2061,7 @@ int32_t task_acquire_step(task_t *s)
 int32_t task_clear_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == TASK_FAULT_NONE) {
         task_settle(s);
         task_run_clear(s);
     }
@@ -1699,7 +2072,7 @@ int32_t task_clear_step(task_t *s)
 int32_t task_move_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == TASK_FAULT_NONE) {
         task_settle(s);
         task_run_move(s);
     }
@@ -1710,7 +2083,7 @@ int32_t task_move_step(task_t *s)
 int32_t task_pause_task_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == TASK_FAULT_NONE) {
         task_settle(s);
         task_run_pause_task(s);
     }
@@ -1721,7 +2094,7 @@ int32_t task_pause_task_step(task_t *s)
 int32_t task_release_part_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == TASK_FAULT_NONE) {
         task_settle(s);
         task_run_release_part(s);
     }
@@ -1732,7 +2105,7 @@ int32_t task_release_part_step(task_t *s)
 int32_t task_transfer_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == TASK_FAULT_NONE) {
         task_settle(s);
         task_run_transfer(s);
     }
@@ -1743,42 +2116,42 @@ int32_t task_transfer_step(task_t *s)
 int32_t task_task_cycle(task_t *s)
 {
     task_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == TASK_FAULT_NONE) {
         task_settle(s);
-        if (s->fault == 0) {
+        if (s->fault == TASK_FAULT_NONE) {
             task_do_take_orders(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == TASK_FAULT_NONE) {
             task_do_forget_cause(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == TASK_FAULT_NONE) {
             task_do_find_source(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == TASK_FAULT_NONE) {
             task_do_test_variables(s);
         }
-        if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->workstation.input_command;
-            if (chosen == INT64_C(0)) {
+        if (s->fault == TASK_FAULT_NONE) {
+            const uint8_t chosen = s->workstation.input_command;
+            if (chosen == VOCABULARY_TASK_COMMAND_PAUSE) {
                 task_run_pause_task(s);
-            } else if (chosen == INT64_C(1)) {
+            } else if (chosen == VOCABULARY_TASK_COMMAND_ACQUIRE) {
                 task_run_acquire(s);
-            } else if (chosen == INT64_C(2)) {
+            } else if (chosen == VOCABULARY_TASK_COMMAND_MOVE) {
                 task_run_move(s);
-            } else if (chosen == INT64_C(3)) {
+            } else if (chosen == VOCABULARY_TASK_COMMAND_RELEASE) {
                 task_run_release_part(s);
-            } else if (chosen == INT64_C(4)) {
+            } else if (chosen == VOCABULARY_TASK_COMMAND_TRANSFER) {
                 task_run_transfer(s);
-            } else if (chosen == INT64_C(5)) {
+            } else if (chosen == VOCABULARY_TASK_COMMAND_CLEAR) {
                 task_run_clear(s);
             } else {
-                s->fault = 2; /* no table for it: proved impossible */
+                s->fault = TASK_FAULT_NO_LINE; /* no table for it: proved impossible */
             }
         }
-        if (s->fault == 0) {
+        if (s->fault == TASK_FAULT_NONE) {
             task_do_tell_gripped(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == TASK_FAULT_NONE) {
             task_do_give_orders(s);
         }
     }

@@ -139,29 +139,126 @@ enum {
     TASK_ASSUMPTION_TRANSFER_RESTING = 9 /* transfer_resting: only told in transfer */
 };
 
+/* `fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants. */
+enum {
+    TASK_LEAF_WORKSTATION_INC_COMMAND = 0,
+    TASK_LEAF_WORKSTATION_INPUT_COMMAND = 1,
+    TASK_LEAF_WORKSTATION_OBJ = 2,
+    TASK_LEAF_WORKSTATION_GRASP = 3,
+    TASK_LEAF_WORKSTATION_SOURCE_LOCPT = 4,
+    TASK_LEAF_WORKSTATION_DEST_LOCPT = 5,
+    TASK_LEAF_WORKSTATION_END_AT_LOCPT = 6,
+    TASK_LEAF_WORKSTATION_SECTOR = 7,
+    TASK_LEAF_TO_WORKSTATION_INC_COMMAND_ECHO = 8,
+    TASK_LEAF_TO_WORKSTATION_REF_COMMAND_ECHO = 9,
+    TASK_LEAF_TO_WORKSTATION_STATUS_REPORT = 10,
+    TASK_LEAF_TO_WORKSTATION_STATUS_PARAMETER = 11,
+    TASK_LEAF_TO_WORKSTATION_FAILURE = 12,
+    TASK_LEAF_TO_WORKSTATION_CAUSE = 13,
+    TASK_LEAF_NEW_COMMAND = 14,
+    TASK_LEAF_ANSWERED = 15,
+    TASK_LEAF_SETTLING = 16,
+    TASK_LEAF_INC_COMMAND_SEEN = 17,
+    TASK_LEAF_FROM_EMOVE_INC_COMMAND_ECHO = 18,
+    TASK_LEAF_FROM_EMOVE_REF_COMMAND_ECHO = 19,
+    TASK_LEAF_FROM_EMOVE_STATUS_REPORT = 20,
+    TASK_LEAF_FROM_EMOVE_FAILURE = 21,
+    TASK_LEAF_TO_EMOVE_INC_COMMAND = 22,
+    TASK_LEAF_TO_EMOVE_INPUT_COMMAND = 23,
+    TASK_LEAF_TO_EMOVE_OBJ_PTR = 24,
+    TASK_LEAF_TO_EMOVE_GRASP = 25,
+    TASK_LEAF_TO_EMOVE_LOCPT_PTR = 26,
+    TASK_LEAF_TO_EMOVE_SECTOR = 27,
+    TASK_LEAF_TO_EMOVE_APOINT_POS_FLAG = 28,
+    TASK_LEAF_TO_EMOVE_GRIPPED_OBJ_PTR = 29,
+    TASK_LEAF_EMOVE_COMMAND = 30,
+    TASK_LEAF_EMOVE_STATUS = 31,
+    TASK_LEAF_EMOVE_RESTING = 32,
+    TASK_LEAF_EMOVE_FAILURE = 33,
+    TASK_LEAF_LAST_EMOVE_INPUT_COMMAND = 34,
+    TASK_LEAF_LAST_EMOVE_OBJ_PTR = 35,
+    TASK_LEAF_LAST_EMOVE_GRASP = 36,
+    TASK_LEAF_LAST_EMOVE_LOCPT_PTR = 37,
+    TASK_LEAF_LAST_EMOVE_SECTOR = 38,
+    TASK_LEAF_SOURCE_KNOWN = 39,
+    TASK_LEAF_SOURCE_VISION = 40,
+    TASK_LEAF_SOURCE_BUFFER = 41,
+    TASK_LEAF_SOURCE_VUPOS = 42,
+    TASK_LEAF_SOURCE_SAFE = 43,
+    TASK_LEAF_DEST_KNOWN = 44,
+    TASK_LEAF_DEST_VISION = 45,
+    TASK_LEAF_DEST_BUFFER = 46,
+    TASK_LEAF_DEST_VUPOS = 47,
+    TASK_LEAF_DEST_SAFE = 48,
+    TASK_LEAF_END_AT_KNOWN = 49,
+    TASK_LEAF_END_AT_VISION = 50,
+    TASK_LEAF_END_AT_BUFFER = 51,
+    TASK_LEAF_END_AT_VUPOS = 52,
+    TASK_LEAF_END_AT_SAFE = 53,
+    TASK_LEAF_HERE_KNOWN = 54,
+    TASK_LEAF_HERE_VISION = 55,
+    TASK_LEAF_HERE_BUFFER = 56,
+    TASK_LEAF_HERE_VUPOS = 57,
+    TASK_LEAF_HERE_SAFE = 58,
+    TASK_LEAF_CUR_STATE = 59,
+    TASK_LEAF_CUR_STATE_NEXT = 60,
+    TASK_LEAF_LOC_OF_OBJ = 61,
+    TASK_LEAF_SOURCE_SPEC = 62,
+    TASK_LEAF_SOURCE_LOC = 63,
+    TASK_LEAF_SOURCE_SECTOR = 64,
+    TASK_LEAF_SOURCE_VUPOS_2 = 65,
+    TASK_LEAF_SOURCE_BUFFER_2 = 66,
+    TASK_LEAF_DEST_SPEC = 67,
+    TASK_LEAF_NAMES_KNOWN = 68,
+    TASK_LEAF_OBJ_ACQUIRED = 69,
+    TASK_LEAF_OBJ_NOW_IN_GRIPPER = 70,
+    TASK_LEAF_GRASP_NOW = 71,
+    TASK_LEAF_REMEMBER_CURRENT_LOC = 72,
+    TASK_LEAF_CURRENT_LOC = 73,
+    TASK_LEAF_CURRENT_SECTOR = 74,
+    TASK_LEAF_TBUFFER_BOXT = 75,
+    TASK_LEAF_BBUFFER_BOXB = 76,
+    TASK_LEAF_FBUFFER_FLAG = 77,
+    TASK_LEAF_HBUFFER_HOUS = 78,
+    TASK_LEAF_ECHOED = 79
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     TASK_FAULT_NONE = 0,
     TASK_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
     TASK_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
     TASK_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
-    TASK_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
-    TASK_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
-    TASK_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    TASK_FAULT_EXTERN = 4,
+    /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    TASK_FAULT_ASSUMPTION = 5,
+    /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    TASK_FAULT_STATE = 6,
     TASK_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
-/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
+   positions of variables.
+   After TASK_FAULT_ADMIT nothing has changed but the trace below.
+   After another fault the state is as it was when the cycle ended. After any fault an output that has a safe
+   value shows it, and every other output keeps what it has.
+   No function waits, allocates, or keeps anything outside this block. None calls another library than the
+   compiler's own: memcpy and memset, bit counting and division
+   where the processor has none. */
 typedef struct {
     vocabulary_task_order_t workstation; /* 0 to 7: input; Orders of workstation. */
     vocabulary_task_report_t to_workstation; /* 8 to 13: output; Reports to workstation. */
-    bool new_command; /* 14: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    /* 14: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool new_command;
     bool answered; /* 15: state; A line has answered the new command. */
-    bool settling; /* 16: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    /* 16: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    bool settling;
     uint16_t inc_command_seen; /* 17: state; 0 .. 65535; Number of the order that was taken last. */
     vocabulary_emove_report_t from_emove; /* 18 to 21: input; Reports of emove, as they come. */
     vocabulary_emove_order_t to_emove; /* 22 to 29: output; Orders to emove. */
-    task_common_emove_held_t emove; /* 30 to 33: state; What emove says of the last orders, held until they are echoed. */
+    /* 30 to 33: state; What emove says of the last orders, held until they are echoed. */
+    task_common_emove_held_t emove;
     task_common_emove_last_t last_emove; /* 34 to 38: state; The order to emove that was numbered last. */
     task_common_place_t source; /* 39 to 43: input; From the database: the source of the workstation. */
     task_common_place_t dest; /* 44 to 48: input; From the database: its destination. */
@@ -170,10 +267,15 @@ typedef struct {
     task_common_task_state_t cur_state; /* 59: state; Where the table is in its sequence. */
     task_common_task_state_t cur_state_next; /* 60: state; the deferred next value of cur_state */
     task_common_locating_t loc_of_obj; /* 61: state; Whether vision is needed at the source. */
-    bool source_spec; /* 62: state; Whether there is a place to take the part from: the source that the WORKSTATION named, if the database knows it, or where the robot is. */
-    uint8_t source_loc; /* 63: state; 0 .. 255; Where the part is taken: at the source; an ACQUIRE without one takes it from where the robot is (section 3.1). */
+    /* 62: state; Whether there is a place to take the part from: the source that the WORKSTATION named, if
+       the database knows it, or where the robot is. */
+    bool source_spec;
+    /* 63: state; 0 .. 255; Where the part is taken: at the source; an ACQUIRE without one takes it from
+       where the robot is (section 3.1). */
+    uint8_t source_loc;
     uint8_t source_sector; /* 64: state; 0 .. 99 */
-    uint8_t source_vupos; /* 65: state; 0 .. 255; From where vision looks for it there; whether parts are counted there. */
+    /* 65: state; 0 .. 255; From where vision looks for it there; whether parts are counted there. */
+    uint8_t source_vupos;
     bool source_buffer; /* 66: state */
     bool dest_spec; /* 67: state; Whether it named a destination that the database knows. */
     bool names_known; /* 68: state; Every location that it named is known. */
@@ -190,14 +292,17 @@ typedef struct {
     bool echoed; /* 79: state; Every last order is echoed, or too late. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
-    int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    int32_t fault_at;
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } task_t;
 
 /* Every variable's initial value. */
 void task_init(task_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t task_check(const task_t *s);
 
 /* The line of table acquire that matches admitted inputs: its position; -1 none, -2 several. */

@@ -58,41 +58,32 @@ static inline double vision_abs_f64(double a)
     return (a <= 0.0) ? (0.0 - a) : a;
 }
 
-/* A value that was proved to fit. */
-static inline uint16_t vision_u16_of_i64(int64_t a)
-{
-    return (uint16_t)a;
-}
-
-/* A value that was proved to fit. */
-static inline uint8_t vision_u8_of_i64(int64_t a)
-{
-    return (uint8_t)a;
-}
-
 /* Procedure measure. */
 static void vision_do_measure(vision_t *s)
 {
     if (s->new_command) {
-        s->waited = (uint8_t)INT64_C(0);
+        s->waited = 0u;
     }
-    s->arrived = ((int64_t)s->camera.number == (int64_t)s->to_camera.number);
-    s->fits = (vision_abs_f64((s->camera.range_mm - s->emove.expected_range_mm)) <= 4.0);
-    s->faces = ((((s->camera.normal.x * s->emove.expected_normal.x) + (s->camera.normal.y * s->emove.expected_normal.y)) + (s->camera.normal.z * s->emove.expected_normal.z)) >= 0.9848);
+    s->arrived = (s->camera.number == s->to_camera.number);
+    s->fits = (vision_abs_f64(s->camera.range_mm - s->emove.expected_range_mm) <= 4.0);
+    s->faces = ((((s->camera.normal.x * s->emove.expected_normal.x) +
+        (s->camera.normal.y * s->emove.expected_normal.y)) +
+        (s->camera.normal.z * s->emove.expected_normal.z)) >=
+            0.9848);
 }
 
 /* Fires a flash; the picture that answers has the next number. */
-static void vision_do_shoot(vision_t *s, int64_t v_which)
+static void vision_do_shoot(vision_t *s, vision_flash_t v_which)
 {
-    s->to_camera.number = vision_u16_of_i64((((int64_t)s->to_camera.number + INT64_C(1)) % INT64_C(65536)));
-    s->to_camera.fire = (uint8_t)v_which;
-    s->to_camera.obj_ptr = (uint8_t)(int64_t)s->emove.obj_ptr;
+    s->to_camera.number = (uint16_t)(((uint32_t)s->to_camera.number + 1u) % 65536u);
+    s->to_camera.fire = v_which;
+    s->to_camera.obj_ptr = s->emove.obj_ptr;
 }
 
 /* Procedure rest. */
 static void vision_do_rest(vision_t *s)
 {
-    s->to_camera.fire = (uint8_t)INT64_C(0);
+    s->to_camera.fire = VISION_FLASH_DARK;
 }
 
 /* Where the part is in camera coordinates, how it is turned, and its range if it lies flat. */
@@ -114,52 +105,52 @@ static void vision_do_measured(vision_t *s)
 /* Procedure no_picture. */
 static void vision_do_no_picture(vision_t *s)
 {
-    s->to_emove.failure = (uint8_t)INT64_C(17);
+    s->to_emove.failure = VOCABULARY_REASON_NO_PICTURE;
 }
 
 /* Procedure no_match. */
 static void vision_do_no_match(vision_t *s)
 {
-    s->to_emove.failure = (uint8_t)INT64_C(13);
+    s->to_emove.failure = VOCABULARY_REASON_NO_MATCH;
 }
 
 /* Procedure range_failure. */
 static void vision_do_range_failure(vision_t *s)
 {
-    s->to_emove.failure = (uint8_t)INT64_C(14);
+    s->to_emove.failure = VOCABULARY_REASON_WRONG_RANGE;
 }
 
 /* Procedure surface_failure. */
 static void vision_do_surface_failure(vision_t *s)
 {
-    s->to_emove.failure = (uint8_t)INT64_C(16);
+    s->to_emove.failure = VOCABULARY_REASON_WRONG_SURFACE;
 }
 
 /* Procedure state. */
-static void vision_do_state(vision_t *s, int64_t v_value)
+static void vision_do_state(vision_t *s, vision_vision_state_t v_value)
 {
-    s->cur_state = (uint8_t)v_value;
+    s->cur_state = v_value;
 }
 
 /* Procedure wait. */
 static void vision_do_wait(vision_t *s)
 {
-    if (((int64_t)s->waited < INT64_C(100))) {
-        s->waited = vision_u8_of_i64(((int64_t)s->waited + INT64_C(1)));
+    if (s->waited < 100u) {
+        s->waited = (uint8_t)((uint32_t)s->waited + 1u);
     }
 }
 
 /* Procedure take_orders. */
 static void vision_do_take_orders(vision_t *s)
 {
-    if (((int64_t)s->emove.inc_command != (int64_t)s->inc_command_seen)) {
-        s->inc_command_seen = (uint16_t)(int64_t)s->emove.inc_command;
+    if (s->emove.inc_command != s->inc_command_seen) {
+        s->inc_command_seen = s->emove.inc_command;
         s->new_command = true;
         s->answered = false;
-        s->to_emove.status_report = (uint8_t)INT64_C(1);
-        s->to_emove.failure = (uint8_t)INT64_C(0);
+        s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
+        s->to_emove.failure = VOCABULARY_REASON_NONE;
     } else {
-        if ((s->answered && true)) {
+        if (s->answered && true) {
             s->new_command = false;
         }
     }
@@ -169,156 +160,101 @@ static void vision_do_take_orders(vision_t *s)
 /* Procedure give_orders. */
 static void vision_do_give_orders(vision_t *s)
 {
-    if ((s->new_command && (!s->settling))) {
+    if (s->new_command && (!s->settling)) {
         s->answered = true;
     }
-    s->to_emove.inc_command_echo = (uint16_t)(int64_t)s->inc_command_seen;
-    s->to_emove.ref_command_echo = (uint8_t)(int64_t)s->emove.input_command;
+    s->to_emove.inc_command_echo = s->inc_command_seen;
+    s->to_emove.ref_command_echo = s->emove.input_command;
 }
 
 /* Procedure done. */
 static void vision_do_done(vision_t *s)
 {
-    s->to_emove.status_report = (uint8_t)INT64_C(0);
+    s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
 /* Procedure executing. */
 static void vision_do_executing(vision_t *s)
 {
-    s->to_emove.status_report = (uint8_t)INT64_C(1);
+    s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
 /* Procedure failed. */
 static void vision_do_failed(vision_t *s)
 {
-    s->to_emove.status_report = (uint8_t)INT64_C(2);
+    s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */
 static void vision_admit(vision_t *s)
 {
-    vision_t before = *s;
     s->line = -1;
-    s->fault = 0;
+    s->fault = VISION_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
     if (!vision_exact()) {
-        s->fault = 7;
-    }
-    if (((int64_t)s->emove.input_command > INT64_C(2))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 1;
-        }
-    }
-    if (((int64_t)s->emove.obj_ptr > INT64_C(7))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 2;
-        }
-    }
-    if (!((s->emove.expected_range_mm >= 0.0) && (s->emove.expected_range_mm <= 2000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 3;
-        }
+        s->fault = VISION_FAULT_ARITHMETIC;
     } else {
-        s->emove.expected_range_mm = s->emove.expected_range_mm + 0.0;
-    }
-    if (!((s->emove.expected_normal.x >= (-1.0)) && (s->emove.expected_normal.x <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 4;
+        int32_t at = -1;
+        if ((at < 0) && (s->emove.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+            at = VISION_LEAF_EMOVE_INPUT_COMMAND;
         }
-    } else {
-        s->emove.expected_normal.x = s->emove.expected_normal.x + 0.0;
-    }
-    if (!((s->emove.expected_normal.y >= (-1.0)) && (s->emove.expected_normal.y <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 5;
+        if ((at < 0) && (s->emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+            at = VISION_LEAF_EMOVE_OBJ_PTR;
         }
-    } else {
-        s->emove.expected_normal.y = s->emove.expected_normal.y + 0.0;
-    }
-    if (!((s->emove.expected_normal.z >= (-1.0)) && (s->emove.expected_normal.z <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 6;
+        if ((at < 0) && (!((s->emove.expected_range_mm >= 0.0) && (s->emove.expected_range_mm <= 2000.0)))) {
+            at = VISION_LEAF_EMOVE_EXPECTED_RANGE_MM;
         }
-    } else {
-        s->emove.expected_normal.z = s->emove.expected_normal.z + 0.0;
-    }
-    if (!((s->camera.x_mm >= (-500.0)) && (s->camera.x_mm <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 22;
+        if ((at < 0) && (!((s->emove.expected_normal.x >= (-1.0)) && (s->emove.expected_normal.x <= 1.0)))) {
+            at = VISION_LEAF_EMOVE_EXPECTED_NORMAL_X;
         }
-    } else {
-        s->camera.x_mm = s->camera.x_mm + 0.0;
-    }
-    if (!((s->camera.y_mm >= (-500.0)) && (s->camera.y_mm <= 500.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 23;
+        if ((at < 0) && (!((s->emove.expected_normal.y >= (-1.0)) && (s->emove.expected_normal.y <= 1.0)))) {
+            at = VISION_LEAF_EMOVE_EXPECTED_NORMAL_Y;
         }
-    } else {
-        s->camera.y_mm = s->camera.y_mm + 0.0;
-    }
-    if (!((s->camera.c >= (-1.0)) && (s->camera.c <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 24;
+        if ((at < 0) && (!((s->emove.expected_normal.z >= (-1.0)) && (s->emove.expected_normal.z <= 1.0)))) {
+            at = VISION_LEAF_EMOVE_EXPECTED_NORMAL_Z;
         }
-    } else {
-        s->camera.c = s->camera.c + 0.0;
-    }
-    if (!((s->camera.s >= (-1.0)) && (s->camera.s <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 25;
+        if ((at < 0) && (!((s->camera.x_mm >= (-500.0)) && (s->camera.x_mm <= 500.0)))) {
+            at = VISION_LEAF_CAMERA_X_MM;
         }
-    } else {
-        s->camera.s = s->camera.s + 0.0;
-    }
-    if (!((s->camera.range_mm >= 0.0) && (s->camera.range_mm <= 2000.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 26;
+        if ((at < 0) && (!((s->camera.y_mm >= (-500.0)) && (s->camera.y_mm <= 500.0)))) {
+            at = VISION_LEAF_CAMERA_Y_MM;
         }
-    } else {
-        s->camera.range_mm = s->camera.range_mm + 0.0;
-    }
-    if (!((s->camera.normal.x >= (-1.0)) && (s->camera.normal.x <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 27;
+        if ((at < 0) && (!((s->camera.c >= (-1.0)) && (s->camera.c <= 1.0)))) {
+            at = VISION_LEAF_CAMERA_C;
         }
-    } else {
-        s->camera.normal.x = s->camera.normal.x + 0.0;
-    }
-    if (!((s->camera.normal.y >= (-1.0)) && (s->camera.normal.y <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 28;
+        if ((at < 0) && (!((s->camera.s >= (-1.0)) && (s->camera.s <= 1.0)))) {
+            at = VISION_LEAF_CAMERA_S;
         }
-    } else {
-        s->camera.normal.y = s->camera.normal.y + 0.0;
-    }
-    if (!((s->camera.normal.z >= (-1.0)) && (s->camera.normal.z <= 1.0))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 29;
+        if ((at < 0) && (!((s->camera.range_mm >= 0.0) && (s->camera.range_mm <= 2000.0)))) {
+            at = VISION_LEAF_CAMERA_RANGE_MM;
         }
-    } else {
-        s->camera.normal.z = s->camera.normal.z + 0.0;
-    }
-    if (s->fault != 0) {
-        before.line = -1;
-        before.fault = s->fault;
-        before.fault_at = s->fault_at;
-        before.assumptions_failed = 0;
-        *s = before;
+        if ((at < 0) && (!((s->camera.normal.x >= (-1.0)) && (s->camera.normal.x <= 1.0)))) {
+            at = VISION_LEAF_CAMERA_NORMAL_X;
+        }
+        if ((at < 0) && (!((s->camera.normal.y >= (-1.0)) && (s->camera.normal.y <= 1.0)))) {
+            at = VISION_LEAF_CAMERA_NORMAL_Y;
+        }
+        if ((at < 0) && (!((s->camera.normal.z >= (-1.0)) && (s->camera.normal.z <= 1.0)))) {
+            at = VISION_LEAF_CAMERA_NORMAL_Z;
+        }
+        if (at >= 0) {
+            s->fault = VISION_FAULT_ADMIT;
+            s->fault_at = at;
+        } else {
+            s->emove.expected_range_mm = s->emove.expected_range_mm + 0.0;
+            s->emove.expected_normal.x = s->emove.expected_normal.x + 0.0;
+            s->emove.expected_normal.y = s->emove.expected_normal.y + 0.0;
+            s->emove.expected_normal.z = s->emove.expected_normal.z + 0.0;
+            s->camera.x_mm = s->camera.x_mm + 0.0;
+            s->camera.y_mm = s->camera.y_mm + 0.0;
+            s->camera.c = s->camera.c + 0.0;
+            s->camera.s = s->camera.s + 0.0;
+            s->camera.range_mm = s->camera.range_mm + 0.0;
+            s->camera.normal.x = s->camera.normal.x + 0.0;
+            s->camera.normal.y = s->camera.normal.y + 0.0;
+            s->camera.normal.z = s->camera.normal.z + 0.0;
+        }
     }
 }
 
@@ -333,47 +269,51 @@ static void vision_run_flood_flash(vision_t *s)
 {
     s->line = vision_flood_flash_line(s);
     switch (s->line) {
-    case 0: /* vision/vision.rcs line 1 */
-        vision_do_state(s, INT64_C(2));
-        vision_do_shoot(s, INT64_C(1));
+    case VISION_LINE_FLOOD_FLASH_1: /* vision/vision.rcs line 1: new_command true */
+        vision_do_state(s, VISION_VISION_STATE_LOOKING);
+        vision_do_shoot(s, VISION_FLASH_FLOOD);
         vision_do_executing(s);
         break;
-    case 1: /* vision/vision.rcs line 2 */
+    /* vision/vision.rcs line 2: new_command false; cur_state looking; arrived false; waited < most_waited */
+    case VISION_LINE_FLOOD_FLASH_2:
         vision_do_wait(s);
         vision_do_executing(s);
         break;
-    case 2: /* vision/vision.rcs line 3 */
+    /* vision/vision.rcs line 3: new_command false; cur_state looking; arrived false; waited most_waited */
+    case VISION_LINE_FLOOD_FLASH_3:
         vision_do_no_picture(s);
-        vision_do_state(s, INT64_C(1));
+        vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    case 3: /* vision/vision.rcs line 4 */
+    /* vision/vision.rcs line 4: new_command false; cur_state looking; arrived true; camera.matched true */
+    case VISION_LINE_FLOOD_FLASH_4:
         vision_do_found(s);
-        vision_do_state(s, INT64_C(0));
+        vision_do_state(s, VISION_VISION_STATE_D_STATE);
         vision_do_rest(s);
         vision_do_done(s);
         break;
-    case 4: /* vision/vision.rcs line 5 */
+    /* vision/vision.rcs line 5: new_command false; cur_state looking; arrived true; camera.matched false */
+    case VISION_LINE_FLOOD_FLASH_5:
         vision_do_no_match(s);
-        vision_do_state(s, INT64_C(1));
+        vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    case 5: /* vision/vision.rcs line 6 */
+    case VISION_LINE_FLOOD_FLASH_6: /* vision/vision.rcs line 6: new_command false; cur_state d_state */
         vision_do_rest(s);
         vision_do_done(s);
         break;
-    case 6: /* vision/vision.rcs line 7 */
+    case VISION_LINE_FLOOD_FLASH_7: /* vision/vision.rcs line 7: new_command false; cur_state f_state */
         vision_do_rest(s);
         vision_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = VISION_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = VISION_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -383,53 +323,59 @@ static void vision_run_line_flash(vision_t *s)
 {
     s->line = vision_line_flash_line(s);
     switch (s->line) {
-    case 0: /* vision/vision.rcs line 1 */
-        vision_do_state(s, INT64_C(2));
-        vision_do_shoot(s, INT64_C(2));
+    case VISION_LINE_LINE_FLASH_1: /* vision/vision.rcs line 1: new_command true */
+        vision_do_state(s, VISION_VISION_STATE_LOOKING);
+        vision_do_shoot(s, VISION_FLASH_LINE);
         vision_do_executing(s);
         break;
-    case 1: /* vision/vision.rcs line 2 */
+    /* vision/vision.rcs line 2: new_command false; cur_state looking; arrived false; waited < most_waited */
+    case VISION_LINE_LINE_FLASH_2:
         vision_do_wait(s);
         vision_do_executing(s);
         break;
-    case 2: /* vision/vision.rcs line 3 */
+    /* vision/vision.rcs line 3: new_command false; cur_state looking; arrived false; waited most_waited */
+    case VISION_LINE_LINE_FLASH_3:
         vision_do_no_picture(s);
-        vision_do_state(s, INT64_C(1));
+        vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    case 3: /* vision/vision.rcs line 4 */
+    /* vision/vision.rcs line 4: new_command false; cur_state looking; arrived true; fits true; faces true */
+    case VISION_LINE_LINE_FLASH_4:
         vision_do_measured(s);
-        vision_do_state(s, INT64_C(0));
+        vision_do_state(s, VISION_VISION_STATE_D_STATE);
         vision_do_rest(s);
         vision_do_done(s);
         break;
-    case 4: /* vision/vision.rcs line 5a */
+    /* vision/vision.rcs line 5a: new_command false; cur_state looking; arrived true; fits false */
+    case VISION_LINE_LINE_FLASH_5A:
         vision_do_range_failure(s);
-        vision_do_state(s, INT64_C(1));
+        vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    case 5: /* vision/vision.rcs line 5b */
+    /* vision/vision.rcs line 5b: new_command false; cur_state looking; arrived true; fits true; faces
+       false */
+    case VISION_LINE_LINE_FLASH_5B:
         vision_do_surface_failure(s);
-        vision_do_state(s, INT64_C(1));
+        vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    case 6: /* vision/vision.rcs line 6 */
+    case VISION_LINE_LINE_FLASH_6: /* vision/vision.rcs line 6: new_command false; cur_state d_state */
         vision_do_rest(s);
         vision_do_done(s);
         break;
-    case 7: /* vision/vision.rcs line 7 */
+    case VISION_LINE_LINE_FLASH_7: /* vision/vision.rcs line 7: new_command false; cur_state f_state */
         vision_do_rest(s);
         vision_do_failed(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = VISION_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = VISION_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -439,17 +385,17 @@ static void vision_run_pause_vision(vision_t *s)
 {
     s->line = vision_pause_vision_line(s);
     switch (s->line) {
-    case 0: /* vision/vision.rcs line 1 */
-        vision_do_state(s, INT64_C(0));
+    case VISION_LINE_PAUSE_VISION_1: /* vision/vision.rcs line 1 */
+        vision_do_state(s, VISION_VISION_STATE_D_STATE);
         vision_do_rest(s);
         vision_do_done(s);
         break;
     case (-1):
-        s->fault = 2;
+        s->fault = VISION_FAULT_NO_LINE;
         break;
     default:
         s->line = -1;
-        s->fault = 3;
+        s->fault = VISION_FAULT_SEVERAL_LINES;
         break;
     }
 }
@@ -458,20 +404,20 @@ static void vision_run_pause_vision(vision_t *s)
 void vision_init(vision_t *s)
 {
     s->line = -1;
-    s->fault = 0;
+    s->fault = VISION_FAULT_NONE;
     s->fault_at = -1;
     s->assumptions_failed = 0;
-    s->emove.inc_command = (uint16_t)INT64_C(0);
-    s->emove.input_command = (uint8_t)INT64_C(0);
-    s->emove.obj_ptr = (uint8_t)INT64_C(0);
+    s->emove.inc_command = 0u;
+    s->emove.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
+    s->emove.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->emove.expected_range_mm = 0.0;
     s->emove.expected_normal.x = (-1.0);
     s->emove.expected_normal.y = (-1.0);
     s->emove.expected_normal.z = (-1.0);
-    s->to_emove.inc_command_echo = (uint16_t)INT64_C(0);
-    s->to_emove.ref_command_echo = (uint8_t)INT64_C(0);
-    s->to_emove.status_report = (uint8_t)INT64_C(0);
-    s->to_emove.failure = (uint8_t)INT64_C(0);
+    s->to_emove.inc_command_echo = 0u;
+    s->to_emove.ref_command_echo = VOCABULARY_VISION_COMMAND_PAUSE;
+    s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_DONE;
+    s->to_emove.failure = VOCABULARY_REASON_NONE;
     s->to_emove.x_mm = (-500.0);
     s->to_emove.y_mm = (-500.0);
     s->to_emove.c = (-1.0);
@@ -480,8 +426,8 @@ void vision_init(vision_t *s)
     s->new_command = false;
     s->answered = false;
     s->settling = false;
-    s->inc_command_seen = (uint16_t)INT64_C(0);
-    s->camera.number = (uint16_t)INT64_C(0);
+    s->inc_command_seen = 0u;
+    s->camera.number = 0u;
     s->camera.matched = false;
     s->camera.x_mm = (-500.0);
     s->camera.y_mm = (-500.0);
@@ -491,76 +437,78 @@ void vision_init(vision_t *s)
     s->camera.normal.x = (-1.0);
     s->camera.normal.y = (-1.0);
     s->camera.normal.z = (-1.0);
-    s->cur_state = (uint8_t)INT64_C(0);
+    s->cur_state = VISION_VISION_STATE_D_STATE;
     s->arrived = false;
     s->fits = false;
     s->faces = false;
-    s->waited = (uint8_t)INT64_C(0);
-    s->to_camera.number = (uint16_t)INT64_C(0);
-    s->to_camera.fire = (uint8_t)INT64_C(0);
-    s->to_camera.obj_ptr = (uint8_t)INT64_C(0);
+    s->waited = 0u;
+    s->to_camera.number = 0u;
+    s->to_camera.fire = VISION_FLASH_DARK;
+    s->to_camera.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t vision_check(const vision_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && (((int64_t)s->to_emove.ref_command_echo > INT64_C(2)))) {
-        at = 8;
+    if ((at < 0) && (s->to_emove.ref_command_echo > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+        at = VISION_LEAF_TO_EMOVE_REF_COMMAND_ECHO;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.status_report > INT64_C(2)))) {
-        at = 9;
+    if ((at < 0) && (s->to_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        at = VISION_LEAF_TO_EMOVE_STATUS_REPORT;
     }
-    if ((at < 0) && (((int64_t)s->to_emove.failure > INT64_C(17)))) {
-        at = 10;
+    if ((at < 0) && (s->to_emove.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        at = VISION_LEAF_TO_EMOVE_FAILURE;
     }
     if ((at < 0) && (!((s->to_emove.x_mm >= (-500.0)) && (s->to_emove.x_mm <= 500.0)))) {
-        at = 11;
+        at = VISION_LEAF_TO_EMOVE_X_MM;
     }
     if ((at < 0) && (!((s->to_emove.y_mm >= (-500.0)) && (s->to_emove.y_mm <= 500.0)))) {
-        at = 12;
+        at = VISION_LEAF_TO_EMOVE_Y_MM;
     }
     if ((at < 0) && (!((s->to_emove.c >= (-1.0)) && (s->to_emove.c <= 1.0)))) {
-        at = 13;
+        at = VISION_LEAF_TO_EMOVE_C;
     }
     if ((at < 0) && (!((s->to_emove.s >= (-1.0)) && (s->to_emove.s <= 1.0)))) {
-        at = 14;
+        at = VISION_LEAF_TO_EMOVE_S;
     }
     if ((at < 0) && (!((s->to_emove.range_mm >= 0.0) && (s->to_emove.range_mm <= 2000.0)))) {
-        at = 15;
+        at = VISION_LEAF_TO_EMOVE_RANGE_MM;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
-        at = 16;
+        at = VISION_LEAF_NEW_COMMAND;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
-        at = 17;
+        at = VISION_LEAF_ANSWERED;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
-        at = 18;
+        at = VISION_LEAF_SETTLING;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->camera.matched) > 1u)) {
-        at = 21;
+        at = VISION_LEAF_CAMERA_MATCHED;
     }
-    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(2)))) {
-        at = 30;
+    if ((at < 0) && (s->cur_state > VISION_VISION_STATE_LOOKING)) {
+        at = VISION_LEAF_CUR_STATE;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->arrived) > 1u)) {
-        at = 31;
+        at = VISION_LEAF_ARRIVED;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
-        at = 32;
+        at = VISION_LEAF_FITS;
     }
     if ((at < 0) && ((*(const uint8_t *)&s->faces) > 1u)) {
-        at = 33;
+        at = VISION_LEAF_FACES;
     }
-    if ((at < 0) && (((int64_t)s->waited > INT64_C(100)))) {
-        at = 34;
+    if ((at < 0) && (s->waited > 100u)) {
+        at = VISION_LEAF_WAITED;
     }
-    if ((at < 0) && (((int64_t)s->to_camera.fire > INT64_C(2)))) {
-        at = 36;
+    if ((at < 0) && (s->to_camera.fire > VISION_FLASH_LINE)) {
+        at = VISION_LEAF_TO_CAMERA_FIRE;
     }
-    if ((at < 0) && (((int64_t)s->to_camera.obj_ptr > INT64_C(7)))) {
-        at = 37;
+    if ((at < 0) && (s->to_camera.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        at = VISION_LEAF_TO_CAMERA_OBJ_PTR;
     }
     return at;
 }
@@ -576,19 +524,24 @@ int32_t vision_flood_flash_line(const vision_t *s)
         uint8_t t3[2];
         uint8_t t4[101];
     } t = {
-        {
-            0x7eu, 0x1u
+        { /* new_command */
+            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
+            0x1u /* true: lines 1 */
         },
-        {
-            0x77u, 0x6fu
+        { /* camera.matched */
+            0x77u, /* false: lines 1, 2, 3, 5, 6, 7 */
+            0x6fu /* true: lines 1, 2, 3, 4, 6, 7 */
         },
-        {
-            0x21u, 0x41u, 0x1fu
+        { /* cur_state */
+            0x21u, /* d_state: lines 1, 6 */
+            0x41u, /* f_state: lines 1, 7 */
+            0x1fu /* looking: lines 1, 2, 3, 4, 5 */
         },
-        {
-            0x67u, 0x79u
+        { /* arrived */
+            0x67u, /* false: lines 1, 2, 3, 6, 7 */
+            0x79u /* true: lines 1, 4, 5, 6, 7 */
         },
-        {
+        { /* waited */
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
@@ -600,7 +553,9 @@ int32_t vision_flood_flash_line(const vision_t *s)
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7du
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[(s->camera.matched ? 1u : 0u)] & (uint32_t)t.t2[s->cur_state] & (uint32_t)t.t3[(s->arrived ? 1u : 0u)] & (uint32_t)t.t4[s->waited];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(s->camera.matched ? 1u : 0u)] & (uint32_t)t.t2[s->cur_state] &
+            (uint32_t)t.t3[(s->arrived ? 1u : 0u)] & (uint32_t)t.t4[s->waited];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = vision_bit32(m | 0x80u);
     line = (m == 0x0u) ? (-1) : line;
@@ -629,22 +584,28 @@ int32_t vision_line_flash_line(const vision_t *s)
         uint16_t t4[2];
         uint16_t t5[101];
     } t = {
-        {
-            0xfeu, 0x1u
+        { /* new_command */
+            0xfeu, /* false: lines 2, 3, 4, 5a, 5b, 6, 7 */
+            0x1u /* true: lines 1 */
         },
-        {
-            0x41u, 0x81u, 0x3fu
+        { /* cur_state */
+            0x41u, /* d_state: lines 1, 6 */
+            0x81u, /* f_state: lines 1, 7 */
+            0x3fu /* looking: lines 1, 2, 3, 4, 5a, 5b */
         },
-        {
-            0xc7u, 0xf9u
+        { /* arrived */
+            0xc7u, /* false: lines 1, 2, 3, 6, 7 */
+            0xf9u /* true: lines 1, 4, 5a, 5b, 6, 7 */
         },
-        {
-            0xd7u, 0xefu
+        { /* fits */
+            0xd7u, /* false: lines 1, 2, 3, 5a, 6, 7 */
+            0xefu /* true: lines 1, 2, 3, 4, 5b, 6, 7 */
         },
-        {
-            0xf7u, 0xdfu
+        { /* faces */
+            0xf7u, /* false: lines 1, 2, 3, 5a, 5b, 6, 7 */
+            0xdfu /* true: lines 1, 2, 3, 4, 5a, 6, 7 */
         },
-        {
+        { /* waited */
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
@@ -656,7 +617,9 @@ int32_t vision_line_flash_line(const vision_t *s)
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfdu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] & (uint32_t)t.t2[(s->arrived ? 1u : 0u)] & (uint32_t)t.t3[(s->fits ? 1u : 0u)] & (uint32_t)t.t4[(s->faces ? 1u : 0u)] & (uint32_t)t.t5[s->waited];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] &
+            (uint32_t)t.t2[(s->arrived ? 1u : 0u)] & (uint32_t)t.t3[(s->fits ? 1u : 0u)] &
+            (uint32_t)t.t4[(s->faces ? 1u : 0u)] & (uint32_t)t.t5[s->waited];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = vision_bit32(m | 0x100u);
     line = (m == 0x0u) ? (-1) : line;
@@ -698,7 +661,7 @@ void vision_pause_vision_lines(const vision_t *in, int32_t *out, uint32_t n)
 int32_t vision_flood_flash_step(vision_t *s)
 {
     vision_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == VISION_FAULT_NONE) {
         vision_settle(s);
         vision_run_flood_flash(s);
     }
@@ -709,7 +672,7 @@ int32_t vision_flood_flash_step(vision_t *s)
 int32_t vision_line_flash_step(vision_t *s)
 {
     vision_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == VISION_FAULT_NONE) {
         vision_settle(s);
         vision_run_line_flash(s);
     }
@@ -720,7 +683,7 @@ int32_t vision_line_flash_step(vision_t *s)
 int32_t vision_pause_vision_step(vision_t *s)
 {
     vision_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == VISION_FAULT_NONE) {
         vision_settle(s);
         vision_run_pause_vision(s);
     }
@@ -731,27 +694,27 @@ int32_t vision_pause_vision_step(vision_t *s)
 int32_t vision_vision_cycle(vision_t *s)
 {
     vision_admit(s);
-    if (s->fault == 0) {
+    if (s->fault == VISION_FAULT_NONE) {
         vision_settle(s);
-        if (s->fault == 0) {
+        if (s->fault == VISION_FAULT_NONE) {
             vision_do_take_orders(s);
         }
-        if (s->fault == 0) {
+        if (s->fault == VISION_FAULT_NONE) {
             vision_do_measure(s);
         }
-        if (s->fault == 0) {
-            const int64_t chosen = (int64_t)s->emove.input_command;
-            if (chosen == INT64_C(0)) {
+        if (s->fault == VISION_FAULT_NONE) {
+            const uint8_t chosen = s->emove.input_command;
+            if (chosen == VOCABULARY_VISION_COMMAND_PAUSE) {
                 vision_run_pause_vision(s);
-            } else if (chosen == INT64_C(1)) {
+            } else if (chosen == VOCABULARY_VISION_COMMAND_FLOOD_FLASH) {
                 vision_run_flood_flash(s);
-            } else if (chosen == INT64_C(2)) {
+            } else if (chosen == VOCABULARY_VISION_COMMAND_LINE_FLASH) {
                 vision_run_line_flash(s);
             } else {
-                s->fault = 2; /* no table for it: proved impossible */
+                s->fault = VISION_FAULT_NO_LINE; /* no table for it: proved impossible */
             }
         }
-        if (s->fault == 0) {
+        if (s->fault == VISION_FAULT_NONE) {
             vision_do_give_orders(s);
         }
     }

@@ -40,25 +40,79 @@ enum {
     VISION_LINE_PAUSE_VISION_1 = 0
 };
 
+/* `fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants. */
+enum {
+    VISION_LEAF_EMOVE_INC_COMMAND = 0,
+    VISION_LEAF_EMOVE_INPUT_COMMAND = 1,
+    VISION_LEAF_EMOVE_OBJ_PTR = 2,
+    VISION_LEAF_EMOVE_EXPECTED_RANGE_MM = 3,
+    VISION_LEAF_EMOVE_EXPECTED_NORMAL_X = 4,
+    VISION_LEAF_EMOVE_EXPECTED_NORMAL_Y = 5,
+    VISION_LEAF_EMOVE_EXPECTED_NORMAL_Z = 6,
+    VISION_LEAF_TO_EMOVE_INC_COMMAND_ECHO = 7,
+    VISION_LEAF_TO_EMOVE_REF_COMMAND_ECHO = 8,
+    VISION_LEAF_TO_EMOVE_STATUS_REPORT = 9,
+    VISION_LEAF_TO_EMOVE_FAILURE = 10,
+    VISION_LEAF_TO_EMOVE_X_MM = 11,
+    VISION_LEAF_TO_EMOVE_Y_MM = 12,
+    VISION_LEAF_TO_EMOVE_C = 13,
+    VISION_LEAF_TO_EMOVE_S = 14,
+    VISION_LEAF_TO_EMOVE_RANGE_MM = 15,
+    VISION_LEAF_NEW_COMMAND = 16,
+    VISION_LEAF_ANSWERED = 17,
+    VISION_LEAF_SETTLING = 18,
+    VISION_LEAF_INC_COMMAND_SEEN = 19,
+    VISION_LEAF_CAMERA_NUMBER = 20,
+    VISION_LEAF_CAMERA_MATCHED = 21,
+    VISION_LEAF_CAMERA_X_MM = 22,
+    VISION_LEAF_CAMERA_Y_MM = 23,
+    VISION_LEAF_CAMERA_C = 24,
+    VISION_LEAF_CAMERA_S = 25,
+    VISION_LEAF_CAMERA_RANGE_MM = 26,
+    VISION_LEAF_CAMERA_NORMAL_X = 27,
+    VISION_LEAF_CAMERA_NORMAL_Y = 28,
+    VISION_LEAF_CAMERA_NORMAL_Z = 29,
+    VISION_LEAF_CUR_STATE = 30,
+    VISION_LEAF_ARRIVED = 31,
+    VISION_LEAF_FITS = 32,
+    VISION_LEAF_FACES = 33,
+    VISION_LEAF_WAITED = 34,
+    VISION_LEAF_TO_CAMERA_NUMBER = 35,
+    VISION_LEAF_TO_CAMERA_FIRE = 36,
+    VISION_LEAF_TO_CAMERA_OBJ_PTR = 37
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     VISION_FAULT_NONE = 0,
     VISION_FAULT_ADMIT = 1, /* an input was refused: `fault_at` is its position */
     VISION_FAULT_NO_LINE = 2, /* no line matched, which was proved impossible */
     VISION_FAULT_SEVERAL_LINES = 3, /* several lines matched, which was proved impossible */
-    VISION_FAULT_EXTERN = 4, /* a result of a function of yours was refused: `fault_at` is the position of its variable */
-    VISION_FAULT_ASSUMPTION = 5, /* an assumption failed that the table's safety rests on: `fault_at` is its position */
-    VISION_FAULT_STATE = 6, /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    /* a result of a function of yours was refused: `fault_at` is the position of its variable */
+    VISION_FAULT_EXTERN = 4,
+    /* an assumption failed that the table's safety rests on: `fault_at` is its position */
+    VISION_FAULT_ASSUMPTION = 5,
+    /* of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it */
+    VISION_FAULT_STATE = 6,
     VISION_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
-/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are positions of variables. */
+/* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
+   positions of variables.
+   After VISION_FAULT_ADMIT nothing has changed but the trace below.
+   After another fault the state is as it was when the cycle ended. After any fault an output that has a safe
+   value shows it, and every other output keeps what it has.
+   No function waits, allocates, or keeps anything outside this block. None calls another library than the
+   compiler's own: memcpy and memset, operations on doubles, bit counting and division
+   where the processor has none. */
 typedef struct {
     vocabulary_vision_order_t emove; /* 0 to 6: input; Orders of emove. */
     vocabulary_vision_report_t to_emove; /* 7 to 15: output; Reports to emove. */
-    bool new_command; /* 16: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    /* 16: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
+    bool new_command;
     bool answered; /* 17: state; A line has answered the new command. */
-    bool settling; /* 18: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    /* 18: state; The line of this cycle lets the levels below rest first, and answers nothing. */
+    bool settling;
     uint16_t inc_command_seen; /* 19: state; 0 .. 65535; Number of the order that was taken last. */
     vision_picture_t camera; /* 20 to 29: input; From the image processing. */
     vision_vision_state_t cur_state; /* 30: state */
@@ -69,14 +123,17 @@ typedef struct {
     vision_camera_order_t to_camera; /* 35 to 37: output; To the camera. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
-    int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    int32_t fault_at;
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } vision_t;
 
 /* Every variable's initial value. */
 void vision_init(vision_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
+   counted after the variables, of the first invariant that does not hold. Call it on every state that
+   comes from outside. */
 int32_t vision_check(const vision_t *s);
 
 /* The line of table flood_flash that matches admitted inputs: its position; -1 none, -2 several. */

@@ -1,6 +1,7 @@
 """A plan to C99: `<program>.h`, `<program>.c`, the symbol file, CMake and pkg-config files."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import product
 from typing import TypeAlias, assert_never
 
 from rcsc.emit.code_tree import (
@@ -32,7 +33,17 @@ from rcsc.emit.code_tree import (
     repeated,
     when,
 )
-from rcsc.emit.ctext import SHORT, CText, c_type, declared, locals_of, type_bounds, wide_type
+from rcsc.emit.ctext import (
+    SHORT,
+    CText,
+    c_type,
+    declared,
+    local_type,
+    locals_of,
+    type_bounds,
+    wide_type,
+    word_type,
+)
 from rcsc.emit.identifiers import (
     FAILED_BITS,
     NameScope,
@@ -59,12 +70,28 @@ from rcsc.emit.plan import (
 )
 from rcsc.emit.rendering import render
 from rcsc.emit.symbols import symbols, unit_text
-from rcsc.emit.translate import FAULT, FAULT_AT, FAULTED, FAULTLESS, LINE, STATE, constant, local
+from rcsc.emit.translate import FAULT, FAULT_AT, LINE, STATE, constant, local
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
 from rcsc.lang.leaves import everything
-from rcsc.lang.model import Bool, Enum, Int, Procedure, Program, Real, Variable, key_bounds, pending, spell
+from rcsc.lang.model import (
+    Bool,
+    Enum,
+    Int,
+    Procedure,
+    Program,
+    Real,
+    Variable,
+    key_bounds,
+    pending,
+    spell,
+    value_of_key,
+)
 
+MOST_TOLD = 32
+"""Masks in a table up to which each stands in a line of its own, with its class."""
+MOST_NAMED = 72
+"""Characters up to which the lines that a mask leaves are named."""
 NONE, SEVERAL = Constant(-1), Constant(-2)
 ONE, NOTHING = Constant(1, "uint64_t"), Constant(0, "uint64_t")
 AT, FOUND, M = Name("at"), Name("line"), Name("m")
@@ -127,11 +154,19 @@ def helper(program: str, name: str) -> Function:
         return Function("A value that was proved to fit.", head, (Leave(Cast(target, a)),))
     op, short = name.split("_")
     kind = SHORT[short]
+    if op == "number":
+        zero, positive = Constant(0, kind), Name("positive")
+        body = (
+            Let("const bool", positive.text, infix(">", a, zero)),
+            Leave(infix("||", positive, infix("<=", a, zero))),
+        )
+        doc = "Whether it is a number: what is none satisfies no comparison."
+        return Function(doc, f"bool {program}_{name}({kind} a)", body)
     if op == "abs":
         zero, absolute = Constant(0, kind), None
         if kind == "double":
             absolute = Choice(infix("<=", a, zero), infix("-", zero, a), a)  # of -0.0 too
-        elif kind == "int64_t":
+        elif not kind.startswith("u"):
             absolute = Choice(infix("<", a, zero), Prefix("-", a), a)
         return Function("The absolute value.", f"{kind} {program}_{name}({kind} a)", (Leave(absolute or a),))
     sign, word = ("<", "lesser") if op == "min" else (">", "greater")
@@ -162,13 +197,15 @@ class _Maker:
         procedures = [self._procedure(procedure) for procedure in _callees_first(self.program)]
         tables = [function for table in self.plan.tables for function in self._table(table)]
         levels = [self._level(level) for level in self.program.levels]
-        shared = [self._settle(), *self._safe(), *self._actions()]
+        shared = [self._settle(), *self._safe(), *self._assumptions(), *self._actions()]
         publics = (self._init(), self._check(), *tables, *self._steps(), *levels)
         code = tuple(read((*procedures, *shared, *publics, *self.cuts)))
-        used = {invoke.helper for invoke in code if isinstance(invoke, Invoke) and invoke.helper}
-        bits = {name for name in used if name.startswith("bit")}
         kinds = {c_type(variable.type) for variable in self.program.variables}
         reals = "double" in kinds.union(getattr(node, "type", "") for node in code)
+        admit = self._admit(reals)
+        calls = (node for node in (*code, *read(admit)) if isinstance(node, Invoke))
+        used = {call.helper for call in calls if call.helper}
+        bits = {name for name in used if name.startswith("bit")}
         return {
             "plan": self.plan,
             "program": self.p,
@@ -178,11 +215,12 @@ class _Maker:
             "positions": list(self._positions()),
             "fields": list(self._fields()),
             "failed": self.names.failed,
+            "faults": self.names.faults,
             "reals": reals,
             "bits": bits,
             "externs": list(self._externs()),
             "helpers": [*(helper(self.p, name) for name in sorted(used - bits)), *self.cuts],
-            "privates": [*procedures, self._admit(reals), *shared, *self._begin()],
+            "privates": [*procedures, admit, *shared, *self._begin()],
             "publics": publics,
         }
 
@@ -267,6 +305,11 @@ class _Maker:
         if self.names.assumptions:
             doc = "Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed"
             yield doc, self._numbered(self.names.assumptions, self.plan.checked)
+        positions = (
+            f"{name} = {at}" for at, name in enumerate((*self.names.leaves.values(), *self.names.invariants))
+        )
+        doc = "`fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants"
+        yield doc, tuple((position, "") for position in positions)
         yield "`fault`, and what a cycle returns", self._numbered(self.names.faults, FAULT_DOCS)
 
     def _fields(self) -> Iterator[tuple[str, str]]:
@@ -324,14 +367,17 @@ class _Maker:
         return Function(doc, f"{gives} {self.p}_{name}({self.p}_t *s)", body)
 
     def _procedure(self, procedure: Procedure) -> Function:
-        params = [f"{self.p}_t *s", *(f"{wide_type(p.type)} v_{p.name}" for p in procedure.params)]
+        params = [f"{self.p}_t *s", *(f"{self._held(p.type)} v_{p.name}" for p in procedure.params)]
         head = f"void {self.p}_do_{self.names.procedures[procedure.name]}({', '.join(params)})"
         body = self._extern_body(procedure) if procedure.extern else self._body(procedure)
         return Function(comment(procedure.doc) or f"Procedure {procedure.name}.", head, tuple(body))
 
     def _body(self, procedure: Procedure) -> Iterator[Stmt]:
         kinds = dict(locals_of(procedure))
-        yield from (Let(wide_type(kind), f"v_{name}", constant(kind, 0)) for name, kind in kinds.items())
+        yield from (
+            Let(self._held(kind), f"v_{name}", self.text.constant(kind, 0, local_type(kind)))
+            for name, kind in kinds.items()
+        )
         body = self.text.block(procedure.body)
         used = {code.text for code in read(body) if isinstance(code, Name)}
         named = (local(name) for name in (*kinds, *(param.name for param in procedure.params)))
@@ -342,63 +388,113 @@ class _Maker:
         if not _of_state(body):
             yield _unused(STATE)
 
+    def _held(self, kind: model.Scalar) -> str:
+        """The type of a parameter or a local; that of an enumeration by its name."""
+        return self.names.types[kind.name] if isinstance(kind, Enum) else local_type(kind)
+
     def _extern_body(self, procedure: Procedure) -> Iterator[Stmt]:
         assert procedure.extern is not None
-        variables = {v.name: (at, v) for at, v in enumerate(self.program.variables)}
-        results = [(*variables[name], Name(f"w{at}")) for at, name in enumerate(procedure.writes)]
-        for _, variable, result in results:
+        variables = {v.name: v for v in self.program.variables}
+        results = [(variables[name], Name(f"w{at}")) for at, name in enumerate(procedure.writes)]
+        for variable, result in results:
             yield Let(c_type(variable.type), result.text, self.text.place(variable.name))
         given: list[Code] = [self.text.place(name) for name in procedure.reads]
-        given += [local(p.name) for p in procedure.params]
-        outs = (Prefix("&", result) for *_, result in results)
+        given += [
+            self.text.converted(local(p.name), local_type(p.type), wide_type(p.type))
+            for p in procedure.params
+        ]
+        outs = (Prefix("&", result) for _, result in results)
         yield Do(Invoke(procedure.extern.c, (*given, *outs)))
-        for at, variable, result in results:
-            yield when(FAULTLESS, *_admitted(variable, result, at, Fault.EXTERN))
-            yield when(FAULTLESS, Set(self.text.place(variable.name), result))
+        for variable, result in results:
+            kept = (*self._taken(variable, result), Set(self.text.place(variable.name), result))
+            refused, at = self._refused(variable, result), Name(self.names.leaves[variable.name])
+            told = Set(FAULT, self._fault(Fault.EXTERN)), Set(FAULT_AT, at)
+            body = kept if refused is None else (Branch(((refused, told),), kept),)
+            yield from body if variable is results[0][0] else (when(self.text.faultless, *body),)
 
     # --- admission ---
 
-    def _trace(self, fault: Code, at: Code, before: str = "") -> Body:
+    def _trace(self, fault: Code, at: Code) -> Body:
         """The trace of a cycle that has run no line."""
         told = {"line": NONE, "fault": fault, "fault_at": at} | dict.fromkeys(self.names.failed, Constant(0))
-        return tuple(
-            Set(Name(f"{before}.{name}") if before else Place((name,)), value) for name, value in told.items()
-        )
+        return tuple(Set(Place((name,)), value) for name, value in told.items())
 
     def _admit(self, reals: bool) -> Function:
-        """Admits into a copy, so that a refused cycle changes nothing."""
-        exact = when(Prefix("!", Invoke(f"{self.p}_exact")), Set(FAULT, Constant(Fault.ARITHMETIC)))
-        inputs = [
-            (at, variable)
-            for at, variable in enumerate(self.program.variables)
-            if variable.kind is model.Kind.INPUT
-        ]
-        refused = when(
-            FAULTED,
-            *self._trace(FAULT, FAULT_AT, "before"),
-            Set(Prefix("*", STATE), Name("before")),
-        )
+        """Refuses first, then admits: a refused cycle changes nothing but its trace."""
+        inputs = [v for v in self.program.variables if v.kind is model.Kind.INPUT]
+        tests = [(v, self._refused(v, self.text.place(v.name))) for v in inputs]
+        asked = [(v, test) for v, test in tests if test is not None]
+        taken = tuple(s for v in inputs for s in self._taken(v, self.text.place(v.name)))
+        told = Set(FAULT, self._fault(Fault.ADMIT)), Set(FAULT_AT, AT)
+        body: Body = taken
+        if asked:
+            branch = Branch(((infix(">=", AT, Constant(0)), told),), taken or None)
+            body = (Let("int32_t", "at", NONE), *self._first(asked), branch)
+        if reals:
+            inexact = Prefix("!", Invoke(f"{self.p}_exact"))
+            body = (Branch(((inexact, (Set(FAULT, self._fault(Fault.ARITHMETIC)),)),), body or None),)
         return self._on_state(
             "Admits every input; a refused one leaves everything else as it was.",
             "admit",
-            Let(f"{self.p}_t", "before", Prefix("*", STATE)),
-            *self._trace(Constant(0), NONE),
-            *((exact,) if reals else ()),
-            *(
-                s
-                for at, variable in inputs
-                for s in _admitted(variable, self.text.place(variable.name), at, Fault.ADMIT)
-            ),
-            refused,
+            *self._trace(self._fault(Fault.OK), NONE),
+            *body,
         )
+
+    def _first(self, asked: Iterable[tuple[Variable, Code]]) -> Iterator[Stmt]:
+        """Leaves in `at` the position of the first variable whose test holds."""
+        for variable, test in asked:
+            leaf = Name(self.names.leaves[variable.name])
+            yield when(infix("&&", infix("<", AT, Constant(0)), test), Set(AT, leaf))
+
+    def _refused(self, variable: Variable, place: Code) -> Code | None:
+        """A condition that a value is refused; None where none can be. A NaN satisfies no comparison."""
+        kind, clamped = variable.type, variable.admit is model.Admit.CLAMP
+        if isinstance(kind, Real):
+            if not clamped:
+                return self._beyond(kind, place)
+            name = "number_f64"
+            return Prefix("!", Invoke(f"{self.p}_{name}", (place,), "bool", helper=name))
+        if isinstance(kind, Bool) or clamped:
+            return None
+        outside = tuple(test for test, _ in self._outside(kind, place))
+        return Infix("||", outside) if len(outside) > 1 else outside[0] if outside else None
+
+    def _taken(self, variable: Variable, place: Code) -> Iterator[Stmt]:
+        """What admission makes of a value that is not refused: clamped, and no -0.0."""
+        kind, clamped = variable.type, variable.admit is model.Admit.CLAMP
+        if isinstance(kind, Real):
+            if clamped:
+                low, high = (self.text.constant(kind, end) for end in (kind.low, kind.high))
+                yield when(infix("<", place, low), Set(place, low))
+                yield when(infix(">", place, high), Set(place, high))
+            yield Set(place, infix("+", place, constant(kind, 0)))
+        elif clamped and not isinstance(kind, Bool):
+            yield from (when(test, Set(place, end)) for test, end in self._outside(kind, place))
+
+    def _beyond(self, kind: Real, place: Code) -> Code:
+        """A condition that a real is outside its range, or no number."""
+        low, high = (self.text.constant(kind, end) for end in (kind.low, kind.high))
+        return Prefix("!", infix("&&", infix(">=", place, low), infix("<=", place, high)))
+
+    def _outside(self, kind: Int | Enum, place: Code) -> list[tuple[Code, Code]]:
+        """For each end of the range that the C type passes: the test that a value is beyond it, and the end."""
+        low, high = key_bounds(kind)
+        least, greatest = type_bounds(c_type(kind))
+        ends = ((least < low, "<", low), (greatest > high, ">", high))
+        shown = ((op, self.text.constant(kind, end)) for passed, op, end in ends if passed)
+        return [(infix(op, place, end), end) for op, end in shown]
+
+    def _fault(self, fault: Fault) -> Name:
+        return Name(self.names.faults[fault])
 
     def _check(self) -> Function:
         """Checks all states and outputs, and the representation of every bool; then the invariants over them."""
-        tests = [self._unfit(variable) for variable in self.program.variables]
+        tests = [(Name(self.names.leaves[v.name]), self._unfit(v)) for v in self.program.variables]
         tests += [
-            Prefix("!", Round(self.text.expr(invariant.condition))) for invariant in self.program.invariants
+            (Name(name), Prefix("!", self.text.expr(invariant.condition)))
+            for name, invariant in zip(self.names.invariants, self.program.invariants, strict=True)
         ]
-        asked = [(at, test) for at, test in enumerate(tests) if test is not None]
+        asked = [(at, test) for at, test in tests if test is not None]
         doc = (
             "Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after "
             "the variables, of the first invariant that does not hold. Call it on every state that comes from outside."
@@ -406,10 +502,7 @@ class _Maker:
         body = (
             Let("int32_t" if asked else "const int32_t", "at", NONE),
             *(() if asked else (_unused(STATE),)),
-            *(
-                when(infix("&&", infix("<", AT, Constant(0)), test), Set(AT, Constant(at)))
-                for at, test in asked
-            ),
+            *(when(infix("&&", infix("<", AT, Constant(0)), test), Set(AT, at)) for at, test in asked),
             Leave(AT),
         )
         return Function(doc, f"int32_t {self.p}_check(const {self.p}_t *s)", body)
@@ -423,9 +516,9 @@ class _Maker:
         if variable.kind is model.Kind.INPUT:
             return None
         if isinstance(kind, Real):
-            return _beyond(kind, place)
-        outside = tuple(test for test, _ in _outside(kind, place))
-        return Infix("||", outside) if outside else None
+            return self._beyond(kind, place)
+        outside = tuple(test for test, _ in self._outside(kind, place))
+        return Infix("||", outside) if len(outside) > 1 else outside[0] if outside else None
 
     def _begin(self) -> Iterator[Function]:
         if self.plan.defensive:
@@ -435,7 +528,7 @@ class _Maker:
                 Let("const int32_t", "at", Invoke(f"{self.p}_check", (STATE,))),
                 Branch(
                     ((infix("<", AT, Constant(0)), (self._run_on_state("admit"),)),),
-                    self._trace(Constant(Fault.STATE), AT),
+                    self._trace(self._fault(Fault.STATE), AT),
                 ),
             )
 
@@ -466,10 +559,7 @@ class _Maker:
             yield self._on_state("After a fault: outputs that have a safe value show it.", "safe", *shown)
 
     def _assigned(self, variable: Variable, value: model.Value) -> Set:
-        given: Code = constant(variable.type, value)
-        if not isinstance(variable.type, Bool | Real):
-            given = Cast(c_type(variable.type), given)
-        return Set(self.text.place(variable.name), given)
+        return Set(self.text.place(variable.name), self.text.constant(variable.type, value))
 
     # --- tables ---
 
@@ -490,7 +580,7 @@ class _Maker:
         matcher = table.matcher
         if matcher.groups:
             yield Line("/* The masks: bit k of an entry is set where line k does not exclude that class. */")
-            yield from _masks(matcher)
+            yield from _masks(matcher, [line.name for line in table.lines])
         indices = [self._index(group, f"{name}_{at}") for at, group in enumerate(matcher.groups)]
         masks = [Element(Name(f"t.t{at}"), index) for at, index in enumerate(indices)]
         yield from (self._one_word if matcher.words <= 1 else self._many_words)(matcher, masks)
@@ -511,30 +601,33 @@ class _Maker:
             case Direct(leaf=leaf, low=0):
                 return self.text.place(leaf)
             case Direct(leaf=leaf, type=kind, low=low):
-                return self.text.converted(
-                    _less(kind, self.text.place(leaf), low), wide_type(kind), "uint32_t"
-                )
+                return self._above(kind, self.text.place(leaf), low)
             case Truth(condition=condition):
                 return Round(_bit(self.text.expr(condition)))
             case Coded(leaf=leaf, type=kind, low=low):
-                above: Code = Cast("int64_t", self.text.place(leaf))
-                if low != 0:
-                    less = _less(kind, self.text.place(leaf), low)
-                    above = self.text.converted(less, wide_type(kind), "int64_t")
-                return self._classify(name, "The class of the value.", above, "int64_t", _codes(index))
+                above = self._above(kind, self.text.place(leaf), low)
+                return self._classify(name, "The class of the value.", above, "uint32_t", _codes(index))
             case Cuts(leaf=leaf, type=kind, cuts=cuts):
-                wide, place = wide_type(kind), self.text.place(leaf)
-                value = place if isinstance(kind, Real) else Cast(wide, place)
+                held, place = c_type(kind), self.text.place(leaf)
                 if not cuts:
                     return Constant(0, "uint32_t")
                 if len(cuts) <= 6:
-                    tests = (_bit(infix(">=", value, constant(kind, cut))) for cut in cuts)
+                    tests = (_bit(infix(">=", place, self.text.constant(kind, cut))) for cut in cuts)
                     return Round(Infix("+", tuple(tests)))
                 return self._classify(
-                    name, "How many cuts are at most the value.", value, wide, tuple(_search(index, wide))
+                    name, "How many cuts are at most the value.", place, held, tuple(_search(index, held))
                 )
             case _:
                 assert_never(index)
+
+    def _above(self, kind: model.Scalar, place: Place, low: int) -> Code:
+        """How far a value is above the least that has a class."""
+        if low == 0:
+            return place
+        word, sign = word_type(*key_bounds(kind)), "+" if low < 0 else "-"
+        return self.text.converted(
+            Round(infix(sign, Cast(word, place), Constant(abs(low), word))), word, "uint32_t"
+        )
 
     def _classify(self, name: str, doc: str, value: Code, kind: str, body: Body) -> Code:
         """A call of a function of its own, which finds the class of a value."""
@@ -597,28 +690,41 @@ class _Maker:
                 stmt for place in table.monitored for stmt in self._told(place, stops=place in table.stops)
             ]
             matched = self._matched(table, name)
-            run = (when(FAULTLESS, *matched),) if table.stops else matched
+            run = (when(self.text.faultless, *matched),) if table.stops else matched
             doc = f"Matches table {table.table.name} and runs the line."
             yield self._on_state(doc, f"run_{name}", *told, *run)
 
+    def _assumptions(self) -> Iterator[Function]:
+        """One function for each assumption that is checked."""
+        for place, name in zip(self.plan.monitored, self.names.holding, strict=True):
+            assumption = self.program.assumptions[place]
+            words = comment(assumption.doc)
+            doc = f"Assumption {assumption.name}{f': {words}' if words else ' holds.'}"
+            body: Body = (Leave(self.text.expr(assumption.condition)),)
+            unread = () if _of_state(body) else (_unused(STATE),)
+            yield Function(doc, f"bool {name}(const {self.p}_t *s)", (*unread, *body))
+
     def _told(self, place: int, *, stops: bool) -> Body:
         """Marks an assumption that fails; one that stops ends the cycle."""
-        assumption = self.program.assumptions[self.plan.monitored[place]]
         word, bit = divmod(place, FAILED_BITS)
         failed = Place((self.names.failed[word],))
-        mark = Set(failed, infix("|", failed, infix("<<", ONE, Constant(bit, "uint32_t"))))
-        ended = (when(FAULTLESS, *_faulted(Fault.ASSUMPTION, place)),) if stops else ()
-        test = Prefix("!", Round(self.text.expr(assumption.condition)))
-        return Line(f"/* {comment(assumption.name)} */"), when(test, mark, *ended)
+        shift = Constant(bit, "uint32_t") if word else Cast("uint32_t", Name(self.names.assumptions[place]))
+        mark = Set(failed, infix("|", failed, infix("<<", ONE, shift)))
+        name = Name(self.names.assumptions[place])
+        end = Set(FAULT, self._fault(Fault.ASSUMPTION)), Set(FAULT_AT, name)
+        ended = (when(self.text.faultless, *end),) if stops else ()
+        test = Prefix("!", Invoke(self.names.holding[place], (STATE,)))
+        return (when(test, mark, *ended),)
 
     def _matched(self, table: PlanTable, name: str) -> Body:
         """Finds the line and runs its actions."""
         cases: list[Stmt] = []
-        for number, line in enumerate(table.lines):
+        named = zip(self.names.lines[table.table.name], table.lines, strict=True)
+        for number, (line_name, line) in enumerate(named, 1):
             body = self.text.block([action.statement for action in line.actions])
-            head = "case ", Constant(number), f": /* {comment(line.source)} */"
-            cases.append(Frame(head, (*self._kept(table, number + 1), *body, Line("break;"))))
-        none, several = Set(FAULT, Constant(Fault.NO_LINE)), Set(FAULT, Constant(Fault.SEVERAL_LINES))
+            head = (f"case {line_name}: /* {comment(line.told)} */",)
+            cases.append(Frame(head, (*self._kept(table, number), *body, Line("break;"))))
+        none, several = (Set(FAULT, self._fault(fault)) for fault in (Fault.NO_LINE, Fault.SEVERAL_LINES))
         return (
             Set(LINE, Invoke(f"{self.p}_{name}_line", (STATE,))),
             Frame(("switch (", LINE, ") {")),
@@ -639,8 +745,8 @@ class _Maker:
         """The frame of every step and cycle."""
         begin = self._run_on_state("begin" if self.plan.defensive else "admit")
         shown = any(variable.safe is not None for variable in self.program.variables)
-        safe = (when(FAULTED, self._run_on_state("safe")),) if shown else ()
-        run = when(FAULTLESS, self._run_on_state("settle"), *body)
+        safe = (when(self.text.faulted, self._run_on_state("safe")),) if shown else ()
+        run = when(self.text.faultless, self._run_on_state("settle"), *body)
         return self._on_state(doc, name, begin, run, *safe, Leave(FAULT), gives="int32_t")
 
     def _steps(self) -> Iterator[Function]:
@@ -650,12 +756,12 @@ class _Maker:
             yield self._cycle(doc, f"{name}_step", self._run_on_state(f"run_{name}"))
 
     def _level(self, level: model.Level) -> Function:
-        before = (when(FAULTLESS, Do(self.text.call(name))) for name in level.preprocess)
-        stages = (when(FAULTLESS, *self._chosen(stage, self._stage)) for stage in level.stages)
-        after = (when(FAULTLESS, Do(self.text.call(name))) for name in level.postprocess)
+        before = (when(self.text.faultless, Do(self.text.call(name))) for name in level.preprocess)
+        stages = (when(self.text.faultless, *self._chosen(stage, self._stage)) for stage in level.stages)
+        after = (when(self.text.faultless, Do(self.text.call(name))) for name in level.postprocess)
         doc = f"One cycle of level {level.name}, every {level.period_ms} ms: returns the fault, 0 for none.{self._order(level)}"
         name = f"{self.names.levels[level.name]}_cycle"
-        last = when(FAULTLESS, *self._chosen(level.tables, lambda table: (self._table_run(table),)))
+        last = when(self.text.faultless, *self._chosen(level.tables, lambda table: (self._table_run(table),)))
         return self._cycle(doc, name, *before, *stages, last, *after)
 
     def _order(self, level: model.Level) -> str:
@@ -676,7 +782,7 @@ class _Maker:
         """Runs a table that others follow: the trace's line is the last one's, a fault for want of a line names the table."""
         unmatched = Infix(
             "||",
-            tuple(Round(infix("==", FAULT, Constant(end))) for end in (Fault.NO_LINE, Fault.SEVERAL_LINES)),
+            tuple(infix("==", FAULT, self._fault(end)) for end in (Fault.NO_LINE, Fault.SEVERAL_LINES)),
         )
         named = when(unmatched, Set(FAULT_AT, Constant(table_position(self.program, table))))
         return self._table_run(table), Set(LINE, NONE), named
@@ -686,18 +792,25 @@ class _Maker:
         if isinstance(choice, model.OneTable):
             yield from run(choice.table)
             return
-        kind, chosen = choice.selector.type, Name("chosen")
-        yield Let(f"const {wide_type(kind)}", "chosen", self.text.expr(choice.selector))
-        arms = ((infix("==", chosen, constant(kind, value)), run(name)) for value, name in choice.tables)
+        kind, given = choice.selector.type, self.text.whole(choice.selector)
+        chosen = Name("chosen")
+        yield Let(f"const {c_type(kind) if isinstance(given, Place) else local_type(kind)}", "chosen", given)
+        arms = (
+            (infix("==", chosen, self.text.constant(kind, value)), run(name)) for value, name in choice.tables
+        )
         yield Branch(
             tuple(arms),
-            (Frame((FAULT, " = ", Constant(Fault.NO_LINE), "; /* no table for it: proved impossible */")),),
+            (
+                Frame(
+                    (FAULT, " = ", self._fault(Fault.NO_LINE), "; /* no table for it: proved impossible */")
+                ),
+            ),
         )
 
     def _init(self) -> Function:
         values = (self._assigned(variable, variable.initial) for variable in self.program.variables)
         return self._on_state(
-            "Every variable's initial value.", "init", *self._trace(Constant(0), NONE), *values
+            "Every variable's initial value.", "init", *self._trace(self._fault(Fault.OK), NONE), *values
         )
 
 
@@ -719,61 +832,6 @@ def _of_state(body: Body) -> bool:
     return any(isinstance(code, Place) or code == STATE for code in read(body))
 
 
-def _faulted(fault: Fault, at: int) -> Body:
-    return Set(FAULT, Constant(fault)), Set(FAULT_AT, Constant(at))
-
-
-def _admitted(variable: Variable, place: Code, position: int, fault: Fault) -> Iterator[Stmt]:
-    """Clamps `place`, or records the fault; a NaN satisfies no comparison."""
-    kind, refuse = variable.type, when(FAULTLESS, *_faulted(fault, position))
-    if isinstance(kind, Real):
-        low, high = constant(kind, kind.low), constant(kind, kind.high)
-        if variable.admit is model.Admit.CLAMP:
-            arms = (
-                (infix("<", place, low), (Set(place, low),)),
-                (infix(">", place, high), (Set(place, high),)),
-            )
-            yield Branch(arms, (Line("/* in range, or not a number */"),))
-        yield Branch(
-            ((_beyond(kind, place), (refuse,)),), (Set(place, infix("+", place, constant(kind, 0))),)
-        )
-    elif not isinstance(kind, Bool):
-        outside = _outside(kind, place)
-        if variable.admit is model.Admit.CLAMP:
-            yield from (when(test, Set(place, Cast(c_type(kind), end))) for test, end in outside)
-        elif outside:
-            yield when(Infix("||", tuple(test for test, _ in outside)), refuse)
-
-
-def _beyond(kind: Real, place: Code) -> Code:
-    """A condition that a real is outside its range, or no number."""
-    low, high = constant(kind, kind.low), constant(kind, kind.high)
-    return Prefix("!", infix("&&", infix(">=", place, low), infix("<=", place, high)))
-
-
-def _outside(kind: Int | Enum, place: Code) -> list[tuple[Code, Constant]]:
-    """For each end of the range that the C type passes: the test that a value is beyond it, and the end.
-
-    What is compared is anything that the C type holds: a `uint64_t` is not made an `int64_t`, whatever its range.
-    """
-    low, high = key_bounds(kind)
-    held = c_type(kind)
-    least, greatest = type_bounds(held)
-    whole = held == "uint64_t"
-    wide = place if whole else Cast(wide_type(kind), place)
-    ends = ((least < low, "<", low), (greatest > high, ">", high))
-    shown = [
-        (op, Constant(end, held) if whole else constant(kind, end)) for passed, op, end in ends if passed
-    ]
-    return [(infix(op, wide, end), end) for op, end in shown]
-
-
-def _less(kind: model.Scalar, place: Code, low: int) -> Code:
-    """How far a value is above the least of its type, in the type that its values are computed in."""
-    wide = wide_type(kind)
-    return Round(infix("-", Cast(wide, place), Constant(low, wide)))
-
-
 def _bit(condition: Code) -> Code:
     return Choice(condition, Constant(1, "uint32_t"), Constant(0, "uint32_t"))
 
@@ -787,25 +845,81 @@ def _width(lines: int) -> int:
     return next(bits for bits in (8, 16, 32, 64) if lines < bits or bits == 64)
 
 
-def _masks(matcher: Matcher) -> Iterator[Stmt]:
+def _masks(matcher: Matcher, lines: Sequence[str]) -> Iterator[Stmt]:
     """All tables of masks as one object: one address to load."""
     bits = _width(matcher.lines) if matcher.words <= 1 else WORD
     words = "" if matcher.words <= 1 else f"[{matcher.words}]"
     masks = [joined(group) for group in matcher.groups]
+    masks = [joined(group) for group in matcher.groups]
     members = (Line(f"uint{bits}_t t{at}[{len(entries)}]{words};") for at, entries in enumerate(masks))
     yield Frame(("static const struct {",), tuple(members))
-    rows = (Frame(("{",), tuple(_rows(entries, matcher.words, bits)), "},") for entries in masks)
+    rows = (
+        Frame(
+            (f"{{ /* {_leaves(group)} */",),
+            tuple(_rows(entries, matcher.words, bits, _told(group, entries, lines))),
+            "},",
+        )
+        for group, entries in zip(matcher.groups, masks, strict=True)
+    )
     yield Frame(("} t = {",), tuple(rows), "};")
 
 
-def _rows(entries: Iterable[int], words: int, bits: int) -> Iterator[Line]:
-    """Masks, or the words of each, from the lowest."""
-    if words <= 1:
+def _leaves(group: Group) -> str:
+    """What the classes of a group are of, in words."""
+    return comment(
+        " by ".join(
+            probe.index.text if isinstance(probe.index, Truth) else probe.index.leaf for probe in group
+        )
+    )
+
+
+def _rows(entries: tuple[int, ...], words: int, bits: int, told: Sequence[str]) -> Iterator[Line]:
+    """Masks, or the words of each, from the lowest; each in a line with what is told of it, if anything is."""
+    if words <= 1 and not told:
         yield from _wrapped([_word(mask, bits) for mask in entries], 84)
         return
-    for mask in entries:
+    ends = (f" /* {comment(text)} */" for text in told or [""] * len(entries))
+    for at, (mask, end) in enumerate(zip(entries, ends, strict=True), 1):
         parts = Items(tuple(_word(mask >> (WORD * w) & (2**WORD - 1), WORD) for w in range(words)))
-        yield Line(f"{IN_C.code(parts)},")
+        code = IN_C.code(parts if words > 1 else _word(mask, bits))
+        yield Line(f"{code}{',' if words > 1 or at < len(entries) else ''}{end.replace(' /*  */', '')}")
+
+
+def _told(group: Group, entries: Sequence[int], lines: Sequence[str]) -> list[str]:
+    """Of each mask its class and the lines that it leaves, by name, where that is short; nothing of many masks."""
+    if len(entries) > MOST_TOLD:
+        return []
+    left = ([line for at, line in enumerate(lines) if mask >> at & 1] for mask in entries)
+    named = (
+        "every line" if len(some) == len(lines) else f"lines {', '.join(some)}" if some else "no line"
+        for some in left
+    )
+    return [
+        f"{words}: {names}" if len(names) <= MOST_NAMED else words
+        for words, names in zip(_classes(group), named, strict=True)
+    ]
+
+
+def _classes(group: Group) -> list[str]:
+    """The words of each combination of classes, the last leaf's fastest."""
+    return [", ".join(words) for words in product(*(_class_words(probe.index) for probe in group))]
+
+
+def _class_words(index: Index) -> list[str]:
+    """The values of each class."""
+    match index:
+        case Truth():
+            return ["false", "true"]
+        case Direct(type=kind, low=low, count=count):
+            return [spell(kind, value_of_key(kind, key)) for key in range(low, low + count)]
+        case Cuts(type=kind, cuts=cuts):
+            spelled = [spell(kind, cut) for cut in cuts]
+            return [f"below {spelled[0]}", *(f"{cut} and above" for cut in spelled)] if cuts else ["any"]
+        case Coded(low=low, classes=classes):
+            starts = [low + classes.index(number) for number in range(index.count)]
+            return [f"{spell(index.type, start)} and above" for start in starts]
+        case _:
+            assert_never(index)
 
 
 def _wrapped(values: Iterable[Code], width: int = 88) -> Iterator[Line]:
@@ -829,7 +943,7 @@ def _codes(index: Coded) -> Body:
 def _search(index: Cuts, wide: str) -> Iterator[Stmt]:
     """How many cuts are at most `value`, in a number of steps that depends on nothing."""
     count, cuts = Constant(len(index.cuts), "uint32_t"), Name("cuts")
-    rows = tuple(_wrapped(constant(index.type, cut) for cut in index.cuts))
+    rows = tuple(_wrapped(Constant(cut, wide) for cut in index.cuts))
     yield Frame((f"static const {wide} cuts[{len(index.cuts)}] = {{",), rows, "};")
     yield Let("uint32_t", "at", Constant(0, "uint32_t"))
     step = 1 << len(index.cuts).bit_length() - 1

@@ -158,13 +158,18 @@ class Branch:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """`name` from `low` to `high`, both included, while `guard` holds (in C; Python leaves by an exception)."""
+    """`name` from `low` to `high`, both included, while `guard` holds (in C; Python leaves by an exception).
+
+    Attributes:
+        type: Of the variable, in C.
+    """
 
     name: str
     low: int
     high: int
     body: "Body"
     guard: tuple[Code, ...] = ()
+    type: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,10 +206,10 @@ def infix(op: str, *operands: Code) -> Infix:
     return Infix(op, operands)
 
 
-def repeated(begin: Set, goes: Code, step: Set, *body: Stmt) -> Frame:
-    """C's `for`."""
+def repeated(begin: Set, goes: Code, step: Set, *body: Stmt, declared: str = "") -> Frame:
+    """C's `for`; it declares its variable, where a type is given."""
     first, then = (infix("=", assignment.place, assignment.value) for assignment in (begin, step))
-    return Frame(("for (", first, "; ", goes, "; ", then, ") {"), body, "}")
+    return Frame((f"for ({declared}", first, "; ", goes, "; ", then, ") {"), body, "}")
 
 
 def when(condition: Code, *body: Stmt) -> Branch:
@@ -230,6 +235,10 @@ def read(node: object) -> Iterator[Code]:
 
 # --- spelling ------------------------------------------------------------------------
 
+HIGHEST = MappingProxyType(
+    {"int32_t": 2**31 - 1, "uint32_t": 2**32 - 1, "int64_t": I64_MAX, "uint64_t": U64_MAX}
+)
+"""The greatest value of each type that a loop may count in."""
 TIGHTEST = 9
 """A level above that of every operator."""
 
@@ -332,10 +341,10 @@ class Language(ABC):
 
 
 class C(Language):
-    """C99: every operation inside another is in parentheses, but for a product in a sum."""
+    """C99: every operation inside another is in parentheses (MISRA C 12.1)."""
 
     state, end = "s->", ";"
-    levels = MappingProxyType({"=": -1, "*": 1})
+    levels = MappingProxyType({"=": -1})
     heads = ("if ({}) {{", "}} else if ({}) {{", "} else {", "}")
 
     def constant(self, constant: Constant) -> str:
@@ -353,8 +362,10 @@ class C(Language):
                     return f"(-INT64_C({I64_MAX}) - INT64_C(1))"
                 word = "UINT64_C" if value > I64_MAX or constant.type == "uint64_t" else "INT64_C"
                 return f"{word}({value:d})" if value >= 0 else f"(-{word}({-value:d}))"
+            case "int32_t" if value == -(2**31):
+                return "(-INT32_C(2147483647) - 1)"
             case _:
-                return f"{value:d}{'u' if constant.type == 'uint32_t' else ''}"
+                return f"{value:d}{'u' if constant.type.startswith('u') else ''}"
 
     def own(self, code: Cast | Choice | Items) -> str:
         """As ISO C99, 6.5.4, 6.5.15 and 6.7.8."""
@@ -371,17 +382,19 @@ class C(Language):
         match stmt:
             case Let(type=kind, name=name, value=value):
                 return (Line(f"{kind} {name}{'' if value is None else f' = {self.code(value)}'};"),)
-            case Loop(name=name, guard=guard):
-                count, high = Name(name), Constant(stmt.high, "int64_t")
-                begin = Set(count, Constant(stmt.low, "int64_t"))
-                wide = stmt.low >= 0 and stmt.high > I64_MAX
-                step = Set(count, infix("+", count, Constant(1, "uint64_t" if wide else "int64_t")))
-        if stmt.high < (U64_MAX if wide else I64_MAX):
-            return (repeated(begin, infix("&&", infix("<=", count, high), *guard), step, *stmt.body),)
+            case Loop(name=name, guard=guard, type=kind):
+                count, high = Name(name), Constant(stmt.high, kind)
+                begin = Set(count, Constant(stmt.low, kind))
+                step = Set(count, infix("+", count, Constant(1, kind)))
+        if stmt.high < HIGHEST[kind]:
+            goes = infix("<=", count, high)
+            goes = infix("&&", goes, *guard) if guard else goes
+            return (repeated(begin, goes, step, *stmt.body, declared=f"{kind} "),)
         more = Name(f"more_{name.removeprefix('v_')}")
         inner = (*stmt.body, Set(more, infix("<", count, high)), when(more, step))
-        again = Frame(("while (", infix("&&", more, *guard), ") {"), inner, "}")
-        return (Frame(("{",), (Let("bool", more.text, Constant(1, "bool")), begin, again), "}"),)
+        again = Frame(("while (", infix("&&", more, *guard) if guard else more, ") {"), inner, "}")
+        first = Let(kind, name, begin.value)
+        return (Frame(("{",), (Let("bool", more.text, Constant(1, "bool")), first, again), "}"),)
 
 
 class Python(Language):

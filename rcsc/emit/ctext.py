@@ -1,8 +1,10 @@
 """Types, constants, expressions and statements as a tree of C99.
 
-Integers are computed in `int64_t`, or in `uint64_t` where the bounds of operands and result need it and none is negative; that all of
-them fit there was proved (`symbolic.execution.word`). Bits of words are masked and shifted without a sign.
-Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
+A leaf, a parameter and a local have the smallest type that holds their range, and are compared as they are. Arithmetic is done in the
+smallest of `int32_t`, `uint32_t`, `int64_t` and `uint64_t` that holds the bounds of its operands and of its result; where bounds exceed 64
+bits it was proved that the values do not (`symbolic.execution.word`). What may differ is only which operands are cast: all of these
+types give the same value. Bits of words are masked and shifted without a sign. Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is
+stored has no -0.0.
 """
 
 import math
@@ -22,6 +24,7 @@ from rcsc.emit.code_tree import (
     Invoke,
     Let,
     Line,
+    Loop,
     Name,
     Place,
     Prefix,
@@ -32,12 +35,12 @@ from rcsc.emit.code_tree import (
     when,
 )
 from rcsc.emit.identifiers import Names
-from rcsc.emit.translate import FAULTLESS, Text, constant, local
+from rcsc.emit.translate import FAULT, Text, constant, local
 from rcsc.lang import model
 from rcsc.lang.expressions.words import bits_of, field_of, mask_of
 from rcsc.lang.leaves import everything
-from rcsc.lang.model import I64_MAX, I64_MIN, Bool, Enum, Expr, Int, Op, Real, Scalar, Value
-from rcsc.lang.operator_table import Arithmetic, Comparison, Operator, is_comparison
+from rcsc.lang.model import I64_MAX, Bool, Enum, Expr, Int, Op, Real, Scalar, Value
+from rcsc.lang.operator_table import Arithmetic, Comparison, Operator, is_arithmetic, is_comparison
 
 _INFIX = {
     Op.AND: "&&", Op.OR: "||", Op.EQ: "==", Op.NE: "!=", Op.LT: "<", Op.LE: "<=", Op.GT: ">", Op.GE: ">=",
@@ -45,6 +48,11 @@ _INFIX = {
 }  # fmt: skip
 SHORT = {"f64": "double"} | {f"{s or 'i'}{n}": f"{s}int{n}_t" for s in ("", "u") for n in (8, 16, 32, 64)}
 """How a type is called in the name of a helper."""
+WORD_TYPES = ("int32_t", "uint32_t", "int64_t", "uint64_t")
+"""Types in which whole numbers are computed."""
+LOGIC = frozenset({"&&", "||", "==", "!=", "<", "<=", ">", ">="})
+"""Operators whose result is a truth value."""
+LEAVES = (model.Read, model.ReadLocal, model.Select)
 _CALLED = {kind: short for short, kind in SHORT.items()}
 
 
@@ -77,10 +85,22 @@ def declared(names: Names, name: str, kind: model.Type) -> str:
 
 
 def wide_type(kind: Scalar) -> str:
-    """The type that expressions of the kind are computed in."""
+    """The type in which a parameter of an extern procedure is given: a function of yours need not change with its range."""
     if isinstance(kind, Int):
         return "uint64_t" if kind.low >= 0 and kind.high > I64_MAX else "int64_t"
     return "int64_t" if isinstance(kind, Enum) else c_type(kind)
+
+
+def word_type(low: int, high: int) -> str:
+    """The type in which whole numbers between these bounds are computed; never one that C would compute in another."""
+    if low >= 0:
+        return "uint32_t" if high < 1 << 32 else "uint64_t"
+    return "int32_t" if low >= -(1 << 31) and high < 1 << 31 else "int64_t"
+
+
+def local_type(kind: Scalar) -> str:
+    """The type of a parameter, a local or a loop variable."""
+    return word_type(kind.low, kind.high) if isinstance(kind, Int) else c_type(kind)
 
 
 def type_bounds(name: str) -> tuple[int, int]:
@@ -89,6 +109,27 @@ def type_bounds(name: str) -> tuple[int, int]:
         return 0, 1
     bits = int(name.strip("uint_"))
     return (0, 2**bits - 1) if name.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+
+def carried(expr: Expr) -> str:
+    """The C type of the code of an expression; of a whole number as a constant, one that it fits in."""
+    match expr:
+        case model.Literal(value=value, type=Int()):
+            return word_type(int(value), int(value))
+        case model.ReadLocal(type=kind):
+            return local_type(kind)
+        case model.Apply(op=Op.TO_INT, args=(arg,)) if isinstance(arg.type, Bool):
+            return "uint32_t"
+        case model.Apply(type=Int()):
+            return _working(expr)
+        case _:
+            return c_type(expr.type)
+
+
+def _working(expr: model.Apply) -> str:
+    """The type in which an operation with a whole number as its result is done: it holds the bounds of operands and result."""
+    kinds = [kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int)]
+    return word_type(min(kind.low for kind in kinds), max(kind.high for kind in kinds))
 
 
 def _c_bounds(expr: Expr) -> tuple[Value, Value]:
@@ -105,9 +146,7 @@ def _c_bounds(expr: Expr) -> tuple[Value, Value]:
             low, high = _c_bounds(whole)  # the result lies no farther from 0
             far = max(abs(low), abs(high))
             return (min(low, 0), max(high, 0)) if divisor > 0 else (-far, far)
-    return type_bounds(
-        c_type(expr.type) if isinstance(expr, model.Read | model.Select) else wide_type(expr.type)
-    )
+    return type_bounds(carried(expr))
 
 
 def _decided(op: Comparison, args: tuple[Expr, ...]) -> bool | None:
@@ -130,19 +169,39 @@ def _decided(op: Comparison, args: tuple[Expr, ...]) -> bool | None:
     return (not known if op in (Op.GE, Op.GT, Op.NE) else known) if known is not None else None
 
 
-def _shared(kinds: Sequence[Scalar]) -> str:
-    """The type in which an operation on these is done: signed as soon as one of them can be negative."""
-    if any(isinstance(kind, Int) and kind.low < 0 for kind in kinds):
-        return "int64_t"
-    wide = [wide_type(kind) for kind in kinds]
-    return "uint64_t" if "uint64_t" in wide else wide[0]
+def _compared_in(args: Sequence[Expr]) -> str | None:
+    """The type in which whole numbers are compared; None where each may stand as it is.
+
+    C compares two types of one sign by their values, whichever is the wider.
+    """
+    signed = {not carried(arg).startswith("u") for arg in args if not isinstance(arg, model.Literal)}
+    negative = any(isinstance(arg, model.Literal) and arg.value < 0 for arg in args)
+    if signed == {True} or (signed == {False} and not negative):
+        return None
+    kinds = [arg.type for arg in args if isinstance(arg.type, Int)]
+    return word_type(min(kind.low for kind in kinds), max(kind.high for kind in kinds))
+
+
+def _spelled(value: int, sign: str) -> str:
+    """The type of a constant beside an operand, unsigned for the sign ``."""
+    return word_type(min(value, -1) if sign else value, value)
+
+
+def negated(code: Code) -> Code:
+    """The negation of a condition."""
+    return code.operand if isinstance(code, Prefix) and code.op == "!" else Prefix("!", code)
+
+
+def _joined(op: str, code: Code) -> tuple[Code, ...]:
+    """The operands of a chain of one operator."""
+    return code.operands if isinstance(code, Infix) and code.op == op else (code,)
 
 
 def _plain(code: Code) -> bool:
     """Whether it may be cast as it stands: a variable, or a constant that is one token."""
     match code:
         case Constant(value=value, type=kind):
-            return value != I64_MIN and (kind != "double" or value >= 0)
+            return kind != "double" or value >= 0
         case Place(steps=steps):
             return all(isinstance(step, str | Name) for step in steps)
         case Cast(type=kind, operand=operand):
@@ -151,13 +210,23 @@ def _plain(code: Code) -> bool:
             return isinstance(code, Name)
 
 
-def _widened(kind: Scalar, code: Code) -> Code:
-    return code if isinstance(kind, Bool | Real) else Cast(wide_type(kind), code)
+def _narrower(source: str, target: str) -> bool:
+    """Whether `target` is an integer type of the same sign, and no wider: the result of an operation may be cast to it (MISRA C 10.8)."""
+    if "double" in (source, target) or "bool" in (source, target):
+        return False
+    return (
+        source.startswith("u") == target.startswith("u") and type_bounds(target)[1] <= type_bounds(source)[1]
+    )
 
 
 def _unsigned(word: Expr) -> str:
     """The type without a sign in which bits of a word are computed."""
     return "uint32_t" if bits_of(word) <= 32 else "uint64_t"
+
+
+def _pattern(bits: int, word: Expr) -> Name:
+    """Bits as a constant, in the type in which those of the word are computed."""
+    return Name(f"{bits:#x}u" if _unsigned(word) == "uint32_t" else f"UINT64_C({bits:#x})", _unsigned(word))
 
 
 @dataclass
@@ -171,6 +240,16 @@ class CText(Text):
     failing: frozenset[str] = frozenset()
     _nested: int = 0
 
+    @property
+    def faultless(self) -> Code:
+        """That no fault stands."""
+        return infix("==", FAULT, Name(self.names.faults[0]))
+
+    @property
+    def faulted(self) -> Code:
+        """That a fault stands."""
+        return infix("!=", FAULT, Name(self.names.faults[0]))
+
     def place(self, leaf: str) -> Place:
         """A leaf."""
         return Place(self.names.paths[leaf])
@@ -179,23 +258,31 @@ class CText(Text):
         """The function of a procedure."""
         return f"{self.names.program}_do_{self.names.procedures[procedure]}"
 
+    def constant(self, kind: Scalar, value: Value, held: str = "") -> Code:
+        """A constant: the enumerator of a member; a number as one of type `held`, else of the kind's own."""
+        if isinstance(kind, Enum):
+            return Name(self.names.constants[kind.name][int(value)], c_type(kind))
+        return Constant(value, held or c_type(kind))
+
     def expr(self, expr: Expr) -> Code:
-        """An expression in the wide type of its kind."""
+        """An expression, in its type `carried`."""
         match expr:
             case model.Literal(value=value, type=kind):
-                return constant(kind, value)
+                return self.constant(kind, value, carried(expr))
             case model.Read(name=name, type=kind):
-                return _widened(kind, self._element((name,), kind))
+                return self._element((name,), kind)
             case model.ReadLocal(name=name, type=kind):
-                return Name(local(name).text, wide_type(kind))
+                return Name(local(name).text, local_type(kind))
             case model.Select(leaves=leaves, index=index, type=kind):
-                return _widened(kind, self._element(leaves, kind, index))
+                return self._element(leaves, kind, index)
             case model.Among(subject=subject, values=values):
+                if isinstance(subject, model.Literal):  # a comparison of constants looks like a mistake
+                    return constant(Bool(), subject.value in values)
                 kind, (low, high) = subject.type, _c_bounds(subject)
                 able = [value for value in values if isinstance(kind, Real) or low <= value <= high]
-                return Round(self.among(self.expr(subject), kind, able))
-            case model.Apply(op=op, args=args, type=kind):
-                return self._bits(expr) or self._applied(op, args, kind)
+                return self.among(self.whole(subject), kind, able)
+            case model.Apply(op=op, args=args):
+                return self._bits(expr) or self._applied(op, args, expr)
             case _:
                 assert_never(expr)
 
@@ -203,21 +290,48 @@ class CText(Text):
         """A mask as one comparison, a field as a shift and a mask; None where the expression is neither."""
         mask, part = mask_of(expr), field_of(expr)
         if mask is not None:
-            care, value = (Constant(bits, _unsigned(mask.word)) for bits in (mask.care, mask.value))
-            return Round(infix("==", Round(infix("&", self._word(mask.word), care)), value))
+            care, value = (_pattern(bits, mask.word) for bits in (mask.care, mask.value))
+            return infix("==", infix("&", self._word(mask.word), care), value)
         if part is None:
             return None
         number, ones = self._word(part.word), (2 << part.high - part.low) - 1
         if part.low:
             number = infix(">>", number, Constant(part.low, "uint32_t"))
         if part.high < bits_of(part.word) - 1:
-            number = infix("&", number, Constant(ones, _unsigned(part.word)))
-        return self.converted(Round(number), _unsigned(part.word), wide_type(expr.type))
+            number = infix("&", number, _pattern(ones, part.word))
+        return self.converted(number, _unsigned(part.word), carried(expr))
 
     def _word(self, word: Expr) -> Code:
-        """A word in the type in which its bits are computed."""
-        code = self.expr(word)
-        return Cast(_unsigned(word), code.operand if isinstance(code, Cast) else code)
+        """A word in a type without a sign."""
+        if isinstance(word, LEAVES) and carried(word).startswith("u"):
+            return self.expr(word)
+        return self.in_type(word, _unsigned(word))
+
+    def whole(self, expr: Expr) -> Code:
+        """An expression in a type that is signed only where its values can be negative."""
+        kind, held = expr.type, carried(expr)
+        if isinstance(kind, Int) and kind.low >= 0 and not held.startswith("u"):
+            return self.in_type(expr, local_type(kind))
+        return self.expr(expr)
+
+    def in_type(self, expr: Expr, target: str) -> Code:
+        """The value of an expression as one of C type `target`, in which it was proved to fit.
+
+        What is computed on the way is computed there, too, where all of it fits: nothing is cast twice.
+        """
+        if isinstance(expr, model.Literal):
+            return self.constant(expr.type, expr.value, target)
+        if (
+            isinstance(expr, model.Apply)
+            and is_arithmetic(expr.op)
+            and target in WORD_TYPES
+            and not field_of(expr)
+        ):
+            low, high = type_bounds(target)
+            kinds = [each.type for each in (*expr.args, expr) if isinstance(each.type, Int)]
+            if kinds and all(low <= kind.low and kind.high <= high for kind in kinds):
+                return self._operation(expr.op, tuple(self.in_type(arg, target) for arg in expr.args), target)
+        return self.converted(self.expr(expr), carried(expr), target)
 
     def _element(self, leaves: Sequence[str], kind: Scalar, index: Expr | None = None) -> Place:
         """An array element by a computed index, which is left out where it can only be 0."""
@@ -230,23 +344,45 @@ class CText(Text):
 
     def among(self, subject: Code, kind: Scalar, values: Sequence[Value]) -> Code:
         """Whether it is one of the values."""
-        equal = tuple(infix("==", subject, constant(kind, value)) for value in values)
+        equal = tuple(infix("==", subject, self.constant(kind, value)) for value in values)
+        if len(equal) == 1:
+            return equal[0]
         return Infix("||", equal) if equal else constant(Bool(), value=False)
 
-    def _applied(self, op: Operator, args: tuple[Expr, ...], kind: Scalar) -> Code:
+    def _applied(self, op: Operator, args: tuple[Expr, ...], expr: model.Apply) -> Code:
         """An operation, in the type that the prover shows operands and result to fit in."""
         if op is Op.XOR:  # of truth values; it is no comparison where the operands are known to be equal
             op = Op.NE
-        if is_comparison(op) and (known := _decided(op, args)) is not None:
-            return constant(Bool(), known)
-        given = [(self.expr(arg), wide_type(arg.type)) for arg in args]
-        if op is Op.TO_INT and isinstance(args[0].type, Bool):
-            return Round(Choice(given[0][0], constant(kind, 1), constant(kind, 0)))
+        if is_comparison(op):
+            known, sides = _decided(op, args), self._operands(args)
+            if known is None and sides[0] == sides[1] and not isinstance(args[0].type, Real):
+                known = op in (Op.EQ, Op.LE, Op.GE)  # two ways to write one variable
+            return self._operation(op, sides, "") if known is None else constant(Bool(), known)
         if op is Op.TO_INT or op is Op.TO_REAL:
-            return self.converted(*given[0], wide_type(kind))
-        shared = _shared((*(arg.type for arg in args), kind))
-        result = self._operation(op, tuple(self.converted(*operand, shared) for operand in given), shared)
-        return result if is_comparison(op) else self.converted(result, shared, wide_type(kind))
+            given = self.expr(args[0])
+            if isinstance(args[0].type, Bool):
+                return Choice(given, Constant(1, "uint32_t"), Constant(0, "uint32_t"))
+            return self.converted(given, carried(args[0]), carried(expr))
+        held = carried(expr)
+        if isinstance(expr.type, Int):
+            return self._operation(op, tuple(self.in_type(arg, held) for arg in args), held)
+        return self._operation(op, tuple(map(self.expr, args)), held)
+
+    def _operands(self, args: tuple[Expr, ...]) -> tuple[Code, ...]:
+        """The two sides of a comparison: each as it is where C compares them by their values."""
+        if not isinstance(args[0].type, Int):
+            return tuple(map(self.expr, args))
+        shared = _compared_in(args)
+        if shared is not None:
+            return tuple(self.in_type(arg, shared) for arg in args)
+        other = next(carried(arg) for arg in args if not isinstance(arg, model.Literal))
+        sign = "" if other.startswith("u") else "-"
+        return tuple(
+            self.in_type(arg, _spelled(int(arg.value), sign))
+            if isinstance(arg, model.Literal)
+            else self.expr(arg)
+            for arg in args
+        )
 
     def _operation(
         self,
@@ -256,41 +392,49 @@ class CText(Text):
     ) -> Code:
         match op:
             case Op.NOT:
-                return Round(Prefix("!", args[0]))
+                return negated(args[0])
             case Op.NEG:
-                return Round(Prefix("-", args[0]))
+                return Prefix("-", args[0])
             case Op.IMPLIES:
-                return Round(infix("||", Prefix("!", args[0]), args[1]))
+                return Infix("||", (negated(args[0]), *_joined("||", args[1])))
             case Op.ABS | Op.MIN | Op.MAX:
                 return self._helper(f"{op.value}_{_CALLED[shared]}", args, shared)
+            case Op.AND | Op.OR:
+                return Infix(_INFIX[op], tuple(part for arg in args for part in _joined(_INFIX[op], arg)))
             case (
-                Op.AND | Op.OR | Op.EQ | Op.NE | Op.LT | Op.LE | Op.GT | Op.GE
+                Op.EQ | Op.NE | Op.LT | Op.LE | Op.GT | Op.GE
                 | Op.ADD | Op.SUB | Op.MUL | Op.DIV | Op.MOD
             ):  # fmt: skip
-                return Round(Infix(_INFIX[op], args))
+                return Infix(_INFIX[op], args)
             case _:
                 assert_never(op)
 
     def _helper(self, name: str, args: tuple[Code, ...], kind: str) -> Code:
-        return Invoke(f"{self.names.program}_{name}", args, kind, helper=name)
+        bare = tuple(arg.inner if isinstance(arg, Round) else arg for arg in args)
+        return Invoke(f"{self.names.program}_{name}", bare, kind, helper=name)
 
     def converted(self, code: Code, source: str, target: str) -> Code:
         """A value of C type `source` as one of `target`; it was proved to fit.
 
-        The result of an operation is converted by a function of its own: MISRA C 10.8 forbids a cast there.
+        The result of an operation is cast only to a type of its sign that is no wider; else a function of its own converts it
+        (MISRA C 10.8).
         """
         if source == target:
             return code
-        if _plain(code):
+        if isinstance(code, Constant) and target != "double":
+            return Constant(code.value, target)
+        if _plain(code) or _narrower(source, target):
             return Cast(target, code)
         return self._helper(f"{_CALLED[target]}_of_{_CALLED[source]}", (code,), target)
 
     def stored(self, kind: Scalar, value: Expr, *, leaf: bool = False) -> Code:
         """A value for a leaf, or for a local, in the type that it is kept in."""
-        code = self.expr(value)
         if isinstance(kind, Real):
-            return infix("+", code, constant(kind, 0))
-        return self.converted(code, wide_type(value.type), c_type(kind) if leaf else wide_type(kind))
+            return infix("+", self.expr(value), constant(kind, 0))
+        target, source = c_type(kind) if leaf else local_type(kind), carried(value)
+        if isinstance(kind, Bool) or (isinstance(value, LEAVES) and _narrower(target, source)):
+            return self.expr(value)  # C widens a variable by itself
+        return self.in_type(value, target)
 
     # --- statements ---
 
@@ -300,7 +444,7 @@ class CText(Text):
         for at, statement in enumerate(body, 1):
             done += self.statement(statement)
             if at < len(body) and self._may_fail(statement):
-                return (*done, when(FAULTLESS, *self.block(body[at:])))
+                return (*done, when(self.faultless, *self.block(body[at:])))
         return tuple(done)
 
     def _may_fail(self, statement: model.Statement) -> bool:
@@ -309,27 +453,20 @@ class CText(Text):
 
     def guard(self, loop: model.For) -> tuple[Code, ...]:
         """What must hold in a loop that it goes on."""
-        return (FAULTLESS,) if self._may_fail(loop) else ()
+        return (self.faultless,) if self._may_fail(loop) else ()
 
     def statement(self, statement: model.Statement) -> Iterator[Stmt]:
         """A statement; a local begins as zero, and is an integer of 64 bits."""
         match statement:
             case model.Local(name=name, type=kind, value=None):
-                yield Set(local(name), constant(kind, 0))
+                yield Set(local(name), self.constant(kind, 0, local_type(kind)))
             case model.For(low=low, high=high) if low > high:
                 return
+            case model.For(name=name, low=low, high=high, body=body):
+                counted = word_type(low, high)
+                yield Loop(local(name).text, low, high, self.block(body), self.guard(statement), counted)
             case _:
                 yield from super().statement(statement)
-
-    def asked(self, condition: Expr) -> Code:
-        """A condition as it stands in the parentheses of an `if`: `(a == b)` in them looks like a mistyped assignment."""
-        match self.expr(condition):
-            case Round(Infix(op="==", operands=(Name() | Place() | Invoke() as left, right))):
-                return infix("==", left, right)
-            case Round(Infix(op="==", operands=(Constant(value=value) as left, right))) if value >= 0:
-                return infix("==", left, right)
-            case code:
-                return code
 
     def assigned(self, place: model.Place, value: Expr) -> Stmt:
         """An assignment."""
@@ -341,14 +478,17 @@ class CText(Text):
             case model.ToElement(leaves=leaves, index=index, type=kind):
                 target = self._element(leaves, kind, index)
             case model.ToLocal(name=name, type=kind):
-                target = Name(local(name).text, wide_type(kind))
+                target = Name(local(name).text, local_type(kind))
+        given = Round(given) if isinstance(given, Infix) and given.op in LOGIC else given
         return Set(target, given) if given != target else Line("/* keeps its value */")
 
     def case(self, statement: model.Case) -> Body:
         """A block with the value in it, and a chain of `if`."""
         self._nested += 1
-        subject = Name("subject" if self._nested == 1 else f"subject_{self._nested}")
-        let = Let(f"const {wide_type(statement.subject.type)}", subject.text, self.expr(statement.subject))
+        kind, given = statement.subject.type, self.whole(statement.subject)
+        held = c_type(kind) if isinstance(given, Place) else local_type(kind)
+        subject = Name("subject" if self._nested == 1 else f"subject_{self._nested}", held)
+        let = Let(f"const {held}", subject.text, given)
         arms = self.arms(subject, statement)
         orelse = self.block(statement.orelse) if statement.orelse else (Line("/* nothing */"),)
         self._nested -= 1
@@ -356,9 +496,7 @@ class CText(Text):
 
 
 def locals_of(procedure: model.Procedure) -> Iterator[tuple[str, Scalar]]:
-    """Locals and loop variables, declared at the top of the function."""
+    """Locals, declared at the top of the function; a loop declares its variable itself."""
     for statement in everything(procedure.body):
         if isinstance(statement, model.Local):
             yield statement.name, statement.type
-        elif isinstance(statement, model.For):
-            yield statement.name, Int(statement.low, statement.high)

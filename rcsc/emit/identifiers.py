@@ -144,13 +144,14 @@ class Names:
         roots: Member of the C struct for each declared variable.
         members: For each record, what its struct calls each field.
         tables, levels, procedures: The stem of each.
+        holding: The C function of each assumption that is checked.
         units: Prefix of the types of each file that declares some: programs that use the file share them.
         types: C type of each record and enumeration.
         constants: For each enumeration, the C constant of each member.
         classes: Python class of each enumeration.
         class_members: For each enumeration, what its Python class calls each member.
         failed: Words of the trace for the monitored assumptions that failed.
-        lines: For each table, the C constant of each line; `assumptions` and `faults` likewise.
+        lines: For each table, the C constant of each line; `assumptions`, `faults`, `leaves` and `invariants` likewise.
         c: What stands at file scope in C; `module` in the Python module.
     """
 
@@ -171,7 +172,10 @@ class Names:
     failed: tuple[str, ...]
     lines: dict[str, tuple[str, ...]]
     assumptions: tuple[str, ...]
+    holding: tuple[str, ...]
     faults: tuple[str, ...]
+    leaves: dict[str, str]
+    invariants: tuple[str, ...]
     c: NameScope
     module: NameScope
 
@@ -364,8 +368,18 @@ def _constants(program: Program, units: Mapping[str, str], scope: NameScope) -> 
 
 def _positions(
     program: Program, p: str, scope: NameScope
-) -> tuple[dict[str, tuple[str, ...]], tuple[str, ...], tuple[str, ...]]:
-    """Constants for what a cycle tells by its position: lines of each table, assumptions that are checked, faults."""
+) -> tuple[
+    dict[str, tuple[str, ...]],
+    tuple[str, ...],
+    tuple[str, ...],
+    tuple[str, ...],
+    dict[str, str],
+    tuple[str, ...],
+]:
+    """Constants for what a cycle tells by its position.
+
+    Lines of each table, assumptions that are checked, faults, variables, invariants.
+    """
     lines = {
         str(table.name): tuple(
             scope.fresh(constant_word(p, "line", table.name, name))
@@ -376,9 +390,17 @@ def _positions(
         )
         for table in program.tables
     }
-    named = (program.assumptions[at].name for at in checked(program))
+    named = [program.assumptions[at].name for at in checked(program)]
+    holding = tuple(scope.fresh(f"{p}_holds_{_stem(str(name))}") for name in named)
     assumptions = tuple(scope.fresh(constant_word(p, "assumption", name)) for name in named)
-    return lines, assumptions, tuple(scope.fresh(constant_word(p, "fault", word)) for word in FAULTS)
+    faults = tuple(scope.fresh(constant_word(p, "fault", word)) for word in FAULTS)
+    leaves = {
+        str(v.name): scope.fresh(constant_word(p, "leaf", _flat(str(v.name)))) for v in program.variables
+    }
+    invariants = tuple(
+        scope.fresh(constant_word(p, "invariant", invariant.name)) for invariant in program.invariants
+    )
+    return lines, assumptions, holding, faults, leaves, invariants
 
 
 def _class_members(program: Program) -> dict[str, tuple[str, ...]]:

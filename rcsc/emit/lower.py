@@ -22,6 +22,7 @@ from rcsc.lang.meaning import checked
 from rcsc.lang.model import (
     Bool,
     Box,
+    Column,
     Enum,
     Line,
     Program,
@@ -82,11 +83,12 @@ def _place(file: str, root: str) -> str:
 
 def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str) -> PlanTable:
     lines = [
-        PlanLine(line.name, line.actions, f"{file} line {line.name}{_below(line)}") for line in table.lines
+        PlanLine(line.name, line.actions, f"{file} line {line.name}", _conditions(table, line))
+        for line in table.lines
     ]
     if table.default is not None:
         name = table.default.name
-        lines.append(PlanLine(name, table.default.actions, f"{file} line {name}"))
+        lines.append(PlanLine(name, table.default.actions, f"{file} line {name}", ("no other line matches",)))
     named = [(place, program.assumptions[at]) for place, at in enumerate(monitored)]
     stops = tuple(place for place, assumption in named if assumption.name in table.stops)
     relied = tuple(
@@ -97,27 +99,37 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
     return PlanTable(table, _matcher(program, table), tuple(lines), relied, stops)
 
 
-def _below(line: Line) -> str:
-    """Name the lines that run instead where both match, for a comment; empty where there are none."""
-    said = (("where none above it matches", line.below), ("the same as", line.same))
-    return "".join(f", {words}: {', '.join(names)}" for words, names in said if names)
+def _conditions(table: Table, line: Line) -> tuple[str, ...]:
+    """What a line states, heading by heading; its condition alone under `when`."""
+    stated = zip(table.columns, line.tests, strict=True)
+    conditions = tuple(
+        _stated(column, test) for column, test in stated if test is not None and column.written
+    )
+    others = (("no line above it", line.below), ("the same as", line.same))
+    return (*conditions, *(f"{words}: {', '.join(names)}" for words, names in others if names))
+
+
+def _stated(column: Column, test: Test) -> str:
+    """A condition in words: the heading and the cell; the cell alone under `when`."""
+    return test.text if column.subject is None else f"{column.heading} {test.text}"
 
 
 def _matcher(program: Program, table: Table) -> Matcher:
     variables: dict[str, Variable] = {v.name: v for v in program.variables}
     by_leaf: dict[str, list[tuple[int, Box]]] = {}
-    relational: dict[int, tuple[Test, list[int]]] = {}
+    relational: dict[int, tuple[Truth, list[int]]] = {}
     for at, line in enumerate(table.lines):
-        for test in line.tests:
+        for column, test in zip(table.columns, line.tests, strict=True):
             if test is None:
                 continue
             if test.box is None:
-                relational.setdefault(id(test), (test, []))[1].append(at)
+                truth = Truth(test.condition, _stated(column, test))
+                relational.setdefault(id(test), (truth, []))[1].append(at)
             else:
                 by_leaf.setdefault(test.variables[0], []).append((at, test.box))
     everyone = (1 << len(table.lines)) - 1
     probes = [_leaf_probe(variables[name], stated, everyone) for name, stated in _declared(table, by_leaf)]
-    probes += [_test_probe(test, lines, everyone) for test, lines in relational.values()]
+    probes += [_test_probe(truth, lines, everyone) for truth, lines in relational.values()]
     groups = grouped(probes, MOST_GROUPED) if len(table.lines) > WORD else tuple((probe,) for probe in probes)
     return Matcher(len(table.lines), table.default is not None, groups)
 
@@ -162,7 +174,7 @@ def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int
     return Probe(index, tuple(everyone & ~mask for mask in excluded))
 
 
-def _test_probe(test: Test, lines: list[int], everyone: int) -> Probe:
+def _test_probe(truth: Truth, lines: list[int], everyone: int) -> Probe:
     """The masks of one test: without it, the lines that do not state it."""
     stating = sum(1 << at for at in set(lines))
-    return Probe(Truth(test.condition, test.text), (everyone & ~stating, everyone))
+    return Probe(truth, (everyone & ~stating, everyone))

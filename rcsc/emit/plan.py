@@ -129,11 +129,22 @@ def table_position(program: Program, table: str) -> int:
 
 @dataclass(frozen=True, slots=True)
 class PlanLine:
-    """A line and what it does, for DEFAULT too."""
+    """A line and what it does, for DEFAULT too.
+
+    Attributes:
+        source: The file, and the line's name.
+        conditions: What it states, heading by heading.
+    """
 
     name: LineName
     actions: tuple[Action, ...]
-    source: str  # file:line
+    source: str
+    conditions: tuple[str, ...] = ()
+
+    @property
+    def told(self) -> str:
+        """Where it stands, and when it runs, in words."""
+        return f"{self.source}: {'; '.join(self.conditions)}" if self.conditions else self.source
 
 
 @dataclass(frozen=True, slots=True)

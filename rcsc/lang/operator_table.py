@@ -113,6 +113,11 @@ def is_comparison(op: Operator) -> "TypeIs[Comparison]":
     return op in COMPARISONS
 
 
+def is_arithmetic(op: Operator) -> "TypeIs[Arithmetic]":
+    """Whether it takes numbers and gives one of their kind."""
+    return op in get_args(Arithmetic)
+
+
 PAIRS = ((True, True), (True, False), (False, True), (False, False))
 T = TypeVar("T")
 Signed: TypeAlias = Callable[[bool], T]

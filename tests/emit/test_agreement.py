@@ -289,17 +289,21 @@ def swap(old: str, new: str) -> Change:
 
 C_FAULTS = {
     "admission of an integer": ("< (-INT64_C(3000000000))", "< (-INT64_C(3000000009))", "step"),
-    "clamp": ("s->width = (uint8_t)INT64_C(100);", "s->width = (uint8_t)INT64_C(99);", "step"),
+    "clamp": ("s->width = 100u;", "s->width = 99u;", "step"),
     "array element": (
-        "s->kept[(int64_t)s->at] = (uint16_t)INT64_C(0);",
-        "s->kept[0] = (uint16_t)INT64_C(0);",
+        "s->kept[s->at] = 0u;",
+        "s->kept[0] = 0u;",
         "step",
     ),
     "deferral": ("s->phase = s->phase_next;", ";", "step"),
-    "monitor": ("(UINT64_C(1) << 0u)", "(UINT64_C(1) << 1u)", "step"),
+    "monitor": (
+        "(UINT64_C(1) << (uint32_t)CASE__ASSUMPTION_",
+        "(UINT64_C(2) << (uint32_t)CASE__ASSUMPTION_",
+        "step",
+    ),
     "initial value": (
-        "    s->count = (uint8_t)INT64_C(0);\n",
-        "    s->count = (uint8_t)INT64_C(1);\n",
+        "    s->count = 0u;\n",
+        "    s->count = 1u;\n",
         "init",
     ),
     "division": ("/ INT64_C(7)", "/ INT64_C(70000)", "cycle"),
@@ -344,7 +348,8 @@ def test_the_sign_of_zero_is_compared() -> None:
 
 def test_undefined_behaviour_is_found_though_the_result_is_right() -> None:
     planted = swap(
-        "    s->fault = 0;\n", "    s->fault = 0;\n    { volatile int n = 2147483647; n = n + 1; }\n"
+        "    s->fault = CASE__FAULT_NONE;\n",
+        "    s->fault = CASE__FAULT_NONE;\n    { volatile int n = 2147483647; n = n + 1; }\n",
     )
     compared = AgreementCount()
     with executors_of(program_of(RICH), planted, checked=True) as executors:
@@ -357,7 +362,7 @@ def test_undefined_behaviour_is_found_though_the_result_is_right() -> None:
 def test_an_extern_result_outside_its_range_is_refused_by_all(extern: Everything) -> None:
     assert extern[0] == []
     assert extern[1].faults[0] > 0
-    unchecked = first(EXTERN, c=swap("s->fault = 4;", "s->fault = 0;"))
+    unchecked = first(EXTERN, c=swap("s->fault = CASE__FAULT_EXTERN;", "s->fault = CASE__FAULT_NONE;"))
     assert unchecked is not None
     assert unchecked.executor == "C"
 
@@ -494,9 +499,14 @@ table t {{
     ("last", "old", "new", "said"),
     [
         (2, "", "", EsbmcAnswer.PROVED),
-        (2, "do_pong(s, INT64_C(2))", "do_pong(s, INT64_C(3))", EsbmcAnswer.REFUTED),  # other arguments
-        (2, "case__do_pong(s, INT64_C(2));", ";", EsbmcAnswer.REFUTED),  # a call less
-        (2, "s->fault = 4;", "s->fault = 0;", EsbmcAnswer.REFUTED),  # what is refused is taken
+        (2, "do_pong(s, 2u)", "do_pong(s, 3u)", EsbmcAnswer.REFUTED),  # other arguments
+        (2, "case__do_pong(s, 2u);", ";", EsbmcAnswer.REFUTED),  # a call less
+        (
+            2,
+            "s->fault = CASE__FAULT_EXTERN;",
+            "s->fault = CASE__FAULT_NONE;",
+            EsbmcAnswer.REFUTED,
+        ),  # what is refused is taken
         (16, "", "", EsbmcAnswer.TOO_LARGE),  # more calls than are recorded: not known, and said so
     ],
 )

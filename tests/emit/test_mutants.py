@@ -143,7 +143,7 @@ table t{number} {{
     program = program_of("".join(map(table, range(len(ENDS_OF_64_BITS)), ENDS_OF_64_BITS)))
     files = emitted(program)
     source = next(text for name, text in files.items() if name.endswith(".c"))
-    assert ("_i64_of_u64(" in source) == (width == 300)
+    assert ("classes[" in source) == (width == 300)
     for one in program.tables:
         assert isinstance(check_matcher(program, symbols_of(program, files), files, one), Checked), one.name
 

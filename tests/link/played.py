@@ -172,7 +172,9 @@ class CSystem:
     def _asked(self) -> list[tuple[str, str, str]]:
         """Each function of the user's: its query, its prototype, a feed that it fills."""
         header = (self.system.generated / f"c/{self.word}.h").read_text(encoding="utf-8")
-        found = re.findall(rf"/\* yours: (\S+) of .*\nextern (void {self.word}_(\w+)\(.*\));", header)
+        found = re.findall(
+            rf"/\* yours: (\S+) of [^*]*\*/\nextern (void {self.word}_(\w+)\([^)]*\));", header
+        )
         return [(query, head, fills) for fills, head, query in found]
 
     def _answer(self, at: int, query: str, head: str, fills: str) -> str:

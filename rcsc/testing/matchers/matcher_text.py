@@ -18,28 +18,29 @@ TABLES = re.compile(
     re.DOTALL,
 )
 FIELD = re.compile(r"uint(\d+)_t t(\d+)\[(\d+)\](?:\[(\d+)\])?;")
-CONSTANT = r"(?:\(-INT64_C\(\d+\)(?: - INT64_C\(1\))?\)|U?INT64_C\(\d+\)|\(?-?\d+(?:\.\d+)?(?:e[+-]?\d+)?\)?)"
+CONSTANT = r"(?:\(-INT64_C\(\d+\)(?: - INT64_C\(1\))?\)|U?INT64_C\(\d+\)|\(?-?\d+(?:\.\d+)?(?:e[+-]?\d+)?u?\)?|[A-Z]\w*)"
 PLACE = r"s->(?P<path>[A-Za-z_]\w*(?:\.\w+|\[\d+\])*)"
-AGAIN = r"(?:\((?:u?int64_t)\))?s->[A-Za-z_]\w*(?:\.\w+|\[\d+\])*"
+AGAIN = r"s->[A-Za-z_]\w*(?:\.\w+|\[\d+\])*"
+ABOVE = rf"\(u?int(?:32|64)_t\){PLACE} [-+] {CONSTANT}"
+CONVERTED = r"(?:\(uint32_t\)|\w+_u32_of_[iu](?:32|64))"
 EVERY_KEY = 4096
 """Keys of a leaf up to which `matcher` finds the class of each."""
 UNARY = (
     re.compile(rf"^{PLACE}$"),
     re.compile(rf"^\({PLACE} \? 1u : 0u\)$"),
-    re.compile(rf"^\w+_u32_of_[iu]64\(\(\(u?int64_t\){PLACE} - {CONSTANT}\)\)$"),
+    re.compile(rf"^{CONVERTED}?\({ABOVE}\)$"),
     re.compile(
-        rf"^\(\(\((?:\((?:u?int64_t)\))?{PLACE} >= {CONSTANT}\) \? 1u : 0u\)"
+        rf"^\(\(\({PLACE} >= {CONSTANT}\) \? 1u : 0u\)"
         rf"(?: \+ \(\({AGAIN} >= {CONSTANT}\) \? 1u : 0u\))*\)$"
     ),
     re.compile(
-        rf"^(?P<search>[A-Za-z_]\w*_class_\w+)\((?P<wide>\w+_i64_of_u64\(\()?(?:\((?:u?int64_t)\))?{PLACE}(?: - {CONSTANT})?"
-        r"(?(wide)\)\))\)$"
+        rf"^(?P<search>[A-Za-z_]\w*_class_\w+)\((?:{CONVERTED}\()?(?:\(u?int(?:32|64)_t\))?{PLACE}(?: [-+] {CONSTANT})?\)?\)$"
     ),
 )
 TRUTH = re.compile(r"^\((?P<condition>.*) \? 1u : 0u\)$", re.DOTALL)
 LOAD = re.compile(r"\bt\.t(\d+)\[")
 WHOLE = re.compile(r"\b(0[xX][0-9a-fA-F]+|\d+)[uUlL]*\b")
-NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.])")
+NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?)u?(?![\w.])(?! : 0u)(?<! : 0u)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +107,14 @@ class Numbers:
     values: tuple[int, ...]
 
 
+COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+
+
+def without_comments(source: str) -> str:
+    """The text with blanks for its comments: everything else stands where it stood."""
+    return COMMENT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), source)
+
+
 class ShapeError(Exception):
     """The text is not of the shape that the check is about."""
 
@@ -164,7 +173,7 @@ def _search_text(source: str, name: str) -> str:
 
     A function that looks the class up has none: it is made for leaves of few keys, and `matcher` tries each.
     """
-    head = re.search(rf"static inline uint32_t {name}\((?:u?int64_t|double) value\)", source)
+    head = re.search(rf"static inline uint32_t {name}\((?:u?int(?:8|16|32|64)_t|double) value\)", source)
     if head is None:
         raise ShapeError(f"no function `{name}`")
     body = function_body(source, head[0])
@@ -187,11 +196,13 @@ def matcher_text(source: str, function: str, struct: str) -> MatcherText:
     Raises:
         ShapeError: The text has another shape.
     """
+    source = without_comments(source)
     body = function_body(source, f"int32_t {function}(const {struct} *s)")
     stated = TABLES.search(body)
     declaration = stated[0] if stated else ""
     tables = list(FIELD.finditer(stated["fields"])) if stated else []
     rest = body.replace(declaration, "", 1) if stated else body
+    rest = re.sub(r"(?<=[&|?:+,<>=])\n +", " ", rest)  # a line that was broken
     joined = re.search(r"const uint(\d+)_t m = (?P<loads>.*?);\n", rest, re.DOTALL)
     if joined is None or [int(table[2]) for table in tables] != list(range(len(tables))):
         raise ShapeError("no joined mask")
@@ -247,6 +258,7 @@ def numbers(source: str, function: str, parts: MatcherText) -> Iterator[Numbers]
         function: Name of its `line` function.
         parts: What `matcher_text` made of it.
     """
+    source = without_comments(source)
     for at, lookup in enumerate(parts.lookups):
         if at == 0:
             start = source.index(lookup.declaration, source.index(f"int32_t {function}(const "))
@@ -257,7 +269,7 @@ def numbers(source: str, function: str, parts: MatcherText) -> Iterator[Numbers]
         start = end
         for number, part in enumerate(lookup.components):
             called = UNARY[-1].match(part.text)
-            head = None if called is None else source.find(f" {called['search']}(int64_t value)\n{{")
+            head = None if called is None else source.find(f" {called['search']}(uint32_t value)\n{{")
             table = None if not head else re.compile(r"\w+ classes\[\d+\] = ").search(source, head)
             if table is not None and not part.constants:
                 yield _numbers(source, table.end(), closing(source, table.end(), "{}"), at, number)
