@@ -111,17 +111,16 @@ static void approach_admit(approach_t *s)
         s->fault = APPROACH_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
-        if ((at < 0) && (s->braking_mm > 500u)) {
+        if (s->braking_mm > 500u) {
             at = APPROACH_LEAF_BRAKING_MM;
-        }
-        if ((at < 0) && ((s->tolerance_mm < 1u) || (s->tolerance_mm > 20u))) {
+        } else if ((s->tolerance_mm < 1u) || (s->tolerance_mm > 20u)) {
             at = APPROACH_LEAF_TOLERANCE_MM;
-        }
-        if ((at < 0) && (!((s->force_n >= 0.0) && (s->force_n <= 500.0)))) {
+        } else if (!((s->force_n >= 0.0) && (s->force_n <= 500.0))) {
             at = APPROACH_LEAF_FORCE_N;
-        }
-        if ((at < 0) && (!((s->limit_n >= 10.0) && (s->limit_n <= 400.0)))) {
+        } else if (!((s->limit_n >= 10.0) && (s->limit_n <= 400.0))) {
             at = APPROACH_LEAF_LIMIT_N;
+        } else {
+            /* none of these */
         }
         if (at >= 0) {
             s->fault = APPROACH_FAULT_ADMIT;
@@ -206,17 +205,16 @@ void approach_init(approach_t *s)
 int32_t approach_check(const approach_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && (!((s->smooth_n >= 0.0) && (s->smooth_n <= 500.0)))) {
+    if (!((s->smooth_n >= 0.0) && (s->smooth_n <= 500.0))) {
         at = APPROACH_LEAF_SMOOTH_N;
-    }
-    if ((at < 0) && (s->settled > 25u)) {
+    } else if (s->settled > 25u) {
         at = APPROACH_LEAF_SETTLED;
-    }
-    if ((at < 0) && (s->speed_mm_s > 1000u)) {
+    } else if (s->speed_mm_s > 1000u) {
         at = APPROACH_LEAF_SPEED_MM_S;
-    }
-    if ((at < 0) && (s->status_report > EXAMPLES_WORDS_1984_LEVEL_STATUS_FAILED)) {
+    } else if (s->status_report > EXAMPLES_WORDS_1984_LEVEL_STATUS_FAILED) {
         at = APPROACH_LEAF_STATUS_REPORT;
+    } else {
+        /* none of these */
     }
     return at;
 }

@@ -431,114 +431,79 @@ static void emove_admit(emove_t *s)
         s->fault = EMOVE_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
-        if ((at < 0) && (s->task.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+        if (s->task.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE) {
             at = EMOVE_LEAF_TASK_INPUT_COMMAND;
-        }
-        if ((at < 0) && (s->task.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        } else if (s->task.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
             at = EMOVE_LEAF_TASK_OBJ_PTR;
-        }
-        if ((at < 0) && (s->task.grasp > 9u)) {
+        } else if (s->task.grasp > 9u) {
             at = EMOVE_LEAF_TASK_GRASP;
-        }
-        if ((at < 0) && (s->task.sector > 99u)) {
+        } else if (s->task.sector > 99u) {
             at = EMOVE_LEAF_TASK_SECTOR;
-        }
-        if ((at < 0) && (s->task.gripped_obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        } else if (s->task.gripped_obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
             at = EMOVE_LEAF_TASK_GRIPPED_OBJ_PTR;
-        }
-        if ((at < 0) && (s->from_primitive.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+        } else if (s->from_primitive.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
             at = EMOVE_LEAF_FROM_PRIMITIVE_REF_COMMAND_ECHO;
-        }
-        if ((at < 0) && (s->from_primitive.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        } else if (s->from_primitive.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
             at = EMOVE_LEAF_FROM_PRIMITIVE_STATUS_REPORT;
-        }
-        if ((at < 0) && (s->from_primitive.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        } else if (s->from_primitive.failure > VOCABULARY_REASON_NO_PICTURE) {
             at = EMOVE_LEAF_FROM_PRIMITIVE_FAILURE;
-        }
-        if ((at < 0) && (s->from_vision.ref_command_echo > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+        } else if (s->from_vision.ref_command_echo > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
             at = EMOVE_LEAF_FROM_VISION_REF_COMMAND_ECHO;
-        }
-        if ((at < 0) && (s->from_vision.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        } else if (s->from_vision.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
             at = EMOVE_LEAF_FROM_VISION_STATUS_REPORT;
-        }
-        if ((at < 0) && (s->from_vision.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        } else if (s->from_vision.failure > VOCABULARY_REASON_NO_PICTURE) {
             at = EMOVE_LEAF_FROM_VISION_FAILURE;
-        }
-        if ((at < 0) && (!((s->from_vision.x_mm >= (-500.0)) && (s->from_vision.x_mm <= 500.0)))) {
+        } else if (!((s->from_vision.x_mm >= (-500.0)) && (s->from_vision.x_mm <= 500.0))) {
             at = EMOVE_LEAF_FROM_VISION_X_MM;
-        }
-        if ((at < 0) && (!((s->from_vision.y_mm >= (-500.0)) && (s->from_vision.y_mm <= 500.0)))) {
+        } else if (!((s->from_vision.y_mm >= (-500.0)) && (s->from_vision.y_mm <= 500.0))) {
             at = EMOVE_LEAF_FROM_VISION_Y_MM;
-        }
-        if ((at < 0) && (!((s->from_vision.c >= (-1.0)) && (s->from_vision.c <= 1.0)))) {
+        } else if (!((s->from_vision.c >= (-1.0)) && (s->from_vision.c <= 1.0))) {
             at = EMOVE_LEAF_FROM_VISION_C;
-        }
-        if ((at < 0) && (!((s->from_vision.s >= (-1.0)) && (s->from_vision.s <= 1.0)))) {
+        } else if (!((s->from_vision.s >= (-1.0)) && (s->from_vision.s <= 1.0))) {
             at = EMOVE_LEAF_FROM_VISION_S;
-        }
-        if ((at < 0) && (!((s->from_vision.range_mm >= 0.0) && (s->from_vision.range_mm <= 2000.0)))) {
+        } else if (!((s->from_vision.range_mm >= 0.0) && (s->from_vision.range_mm <= 2000.0))) {
             at = EMOVE_LEAF_FROM_VISION_RANGE_MM;
-        }
-        if ((at < 0) && (s->path.depart_first > 9999u)) {
+        } else if (s->path.depart_first > 9999u) {
             at = EMOVE_LEAF_PATH_DEPART_FIRST;
-        }
-        if ((at < 0) && (s->path.depart_count > 31u)) {
+        } else if (s->path.depart_count > 31u) {
             at = EMOVE_LEAF_PATH_DEPART_COUNT;
-        }
-        if ((at < 0) && (s->path.approach_first > 9999u)) {
+        } else if (s->path.approach_first > 9999u) {
             at = EMOVE_LEAF_PATH_APPROACH_FIRST;
-        }
-        if ((at < 0) && (s->path.approach_count > 31u)) {
+        } else if (s->path.approach_count > 31u) {
             at = EMOVE_LEAF_PATH_APPROACH_COUNT;
-        }
-        if ((at < 0) && (s->target.hover_point > 9999u)) {
+        } else if (s->target.hover_point > 9999u) {
             at = EMOVE_LEAF_TARGET_HOVER_POINT;
-        }
-        if ((at < 0) && (s->target.grasp_point > 9999u)) {
+        } else if (s->target.grasp_point > 9999u) {
             at = EMOVE_LEAF_TARGET_GRASP_POINT;
-        }
-        if ((at < 0) && (s->target.view_point > 9999u)) {
+        } else if (s->target.view_point > 9999u) {
             at = EMOVE_LEAF_TARGET_VIEW_POINT;
-        }
-        if ((at < 0) &&
-                (!((s->object_data.expected_range_mm >= 0.0) &&
-                    (s->object_data.expected_range_mm <= 2000.0)))) {
+        } else if (!((s->object_data.expected_range_mm >= 0.0) &&
+                (s->object_data.expected_range_mm <= 2000.0))) {
             at = EMOVE_LEAF_OBJECT_DATA_EXPECTED_RANGE_MM;
-        }
-        if ((at < 0) &&
-                (!((s->object_data.grip_range_mm >= 0.0) && (s->object_data.grip_range_mm <= 2000.0)))) {
+        } else if (!((s->object_data.grip_range_mm >= 0.0) && (s->object_data.grip_range_mm <= 2000.0))) {
             at = EMOVE_LEAF_OBJECT_DATA_GRIP_RANGE_MM;
-        }
-        if ((at < 0) && (!((s->object_data.lift_mm >= (-500.0)) && (s->object_data.lift_mm <= 500.0)))) {
+        } else if (!((s->object_data.lift_mm >= (-500.0)) && (s->object_data.lift_mm <= 500.0))) {
             at = EMOVE_LEAF_OBJECT_DATA_LIFT_MM;
-        }
-        if ((at < 0) && (!((s->object_data.normal.x >= (-1.0)) && (s->object_data.normal.x <= 1.0)))) {
+        } else if (!((s->object_data.normal.x >= (-1.0)) && (s->object_data.normal.x <= 1.0))) {
             at = EMOVE_LEAF_OBJECT_DATA_NORMAL_X;
-        }
-        if ((at < 0) && (!((s->object_data.normal.y >= (-1.0)) && (s->object_data.normal.y <= 1.0)))) {
+        } else if (!((s->object_data.normal.y >= (-1.0)) && (s->object_data.normal.y <= 1.0))) {
             at = EMOVE_LEAF_OBJECT_DATA_NORMAL_Y;
-        }
-        if ((at < 0) && (!((s->object_data.normal.z >= (-1.0)) && (s->object_data.normal.z <= 1.0)))) {
+        } else if (!((s->object_data.normal.z >= (-1.0)) && (s->object_data.normal.z <= 1.0))) {
             at = EMOVE_LEAF_OBJECT_DATA_NORMAL_Z;
-        }
-        if ((at < 0) &&
-                (!((s->held_data.expected_range_mm >= 0.0) && (s->held_data.expected_range_mm <= 2000.0)))) {
+        } else if (!((s->held_data.expected_range_mm >= 0.0) && (s->held_data.expected_range_mm <= 2000.0))) {
             at = EMOVE_LEAF_HELD_DATA_EXPECTED_RANGE_MM;
-        }
-        if ((at < 0) && (!((s->held_data.grip_range_mm >= 0.0) && (s->held_data.grip_range_mm <= 2000.0)))) {
+        } else if (!((s->held_data.grip_range_mm >= 0.0) && (s->held_data.grip_range_mm <= 2000.0))) {
             at = EMOVE_LEAF_HELD_DATA_GRIP_RANGE_MM;
-        }
-        if ((at < 0) && (!((s->held_data.lift_mm >= (-500.0)) && (s->held_data.lift_mm <= 500.0)))) {
+        } else if (!((s->held_data.lift_mm >= (-500.0)) && (s->held_data.lift_mm <= 500.0))) {
             at = EMOVE_LEAF_HELD_DATA_LIFT_MM;
-        }
-        if ((at < 0) && (!((s->held_data.normal.x >= (-1.0)) && (s->held_data.normal.x <= 1.0)))) {
+        } else if (!((s->held_data.normal.x >= (-1.0)) && (s->held_data.normal.x <= 1.0))) {
             at = EMOVE_LEAF_HELD_DATA_NORMAL_X;
-        }
-        if ((at < 0) && (!((s->held_data.normal.y >= (-1.0)) && (s->held_data.normal.y <= 1.0)))) {
+        } else if (!((s->held_data.normal.y >= (-1.0)) && (s->held_data.normal.y <= 1.0))) {
             at = EMOVE_LEAF_HELD_DATA_NORMAL_Y;
-        }
-        if ((at < 0) && (!((s->held_data.normal.z >= (-1.0)) && (s->held_data.normal.z <= 1.0)))) {
+        } else if (!((s->held_data.normal.z >= (-1.0)) && (s->held_data.normal.z <= 1.0))) {
             at = EMOVE_LEAF_HELD_DATA_NORMAL_Z;
+        } else {
+            /* none of these */
         }
         if (at >= 0) {
             s->fault = EMOVE_FAULT_ADMIT;
@@ -1286,212 +1251,143 @@ void emove_init(emove_t *s)
 int32_t emove_check(const emove_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && ((*(const uint8_t *)&s->task.apoint_pos_flag) > 1u)) {
+    if ((*(const uint8_t *)&s->task.apoint_pos_flag) > 1u) {
         at = EMOVE_LEAF_TASK_APOINT_POS_FLAG;
-    }
-    if ((at < 0) && (s->to_task.ref_command_echo > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+    } else if (s->to_task.ref_command_echo > VOCABULARY_EMOVE_COMMAND_RELEASE) {
         at = EMOVE_LEAF_TO_TASK_REF_COMMAND_ECHO;
-    }
-    if ((at < 0) && (s->to_task.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->to_task.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = EMOVE_LEAF_TO_TASK_STATUS_REPORT;
-    }
-    if ((at < 0) && (s->to_task.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->to_task.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = EMOVE_LEAF_TO_TASK_FAILURE;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+    } else if ((*(const uint8_t *)&s->new_command) > 1u) {
         at = EMOVE_LEAF_NEW_COMMAND;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+    } else if ((*(const uint8_t *)&s->answered) > 1u) {
         at = EMOVE_LEAF_ANSWERED;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+    } else if ((*(const uint8_t *)&s->settling) > 1u) {
         at = EMOVE_LEAF_SETTLING;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->from_primitive.holds) > 1u)) {
+    } else if ((*(const uint8_t *)&s->from_primitive.holds) > 1u) {
         at = EMOVE_LEAF_FROM_PRIMITIVE_HOLDS;
-    }
-    if ((at < 0) && (s->to_primitive.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+    } else if (s->to_primitive.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = EMOVE_LEAF_TO_PRIMITIVE_INPUT_COMMAND;
-    }
-    if ((at < 0) && (s->to_primitive.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->to_primitive.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = EMOVE_LEAF_TO_PRIMITIVE_OBJ_PTR;
-    }
-    if ((at < 0) && (s->to_primitive.grasp > 9u)) {
+    } else if (s->to_primitive.grasp > 9u) {
         at = EMOVE_LEAF_TO_PRIMITIVE_GRASP;
-    }
-    if ((at < 0) && (s->to_primitive.pose_ptr > 9999u)) {
+    } else if (s->to_primitive.pose_ptr > 9999u) {
         at = EMOVE_LEAF_TO_PRIMITIVE_POSE_PTR;
-    }
-    if ((at < 0) &&
-            (!((s->to_primitive.displaced.x >= (-500.0)) && (s->to_primitive.displaced.x <= 500.0)))) {
+    } else if (!((s->to_primitive.displaced.x >= (-500.0)) && (s->to_primitive.displaced.x <= 500.0))) {
         at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_X;
-    }
-    if ((at < 0) &&
-            (!((s->to_primitive.displaced.y >= (-500.0)) && (s->to_primitive.displaced.y <= 500.0)))) {
+    } else if (!((s->to_primitive.displaced.y >= (-500.0)) && (s->to_primitive.displaced.y <= 500.0))) {
         at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_Y;
-    }
-    if ((at < 0) &&
-            (!((s->to_primitive.displaced.z >= (-500.0)) && (s->to_primitive.displaced.z <= 500.0)))) {
+    } else if (!((s->to_primitive.displaced.z >= (-500.0)) && (s->to_primitive.displaced.z <= 500.0))) {
         at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_Z;
-    }
-    if ((at < 0) && (!((s->to_primitive.displaced.c >= (-1.0)) && (s->to_primitive.displaced.c <= 1.0)))) {
+    } else if (!((s->to_primitive.displaced.c >= (-1.0)) && (s->to_primitive.displaced.c <= 1.0))) {
         at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_C;
-    }
-    if ((at < 0) && (!((s->to_primitive.displaced.s >= (-1.0)) && (s->to_primitive.displaced.s <= 1.0)))) {
+    } else if (!((s->to_primitive.displaced.s >= (-1.0)) && (s->to_primitive.displaced.s <= 1.0))) {
         at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_S;
-    }
-    if ((at < 0) && (s->primitive.command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+    } else if (s->primitive.command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = EMOVE_LEAF_PRIMITIVE_COMMAND;
-    }
-    if ((at < 0) && (s->primitive.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->primitive.status > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = EMOVE_LEAF_PRIMITIVE_STATUS;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->primitive.resting) > 1u)) {
+    } else if ((*(const uint8_t *)&s->primitive.resting) > 1u) {
         at = EMOVE_LEAF_PRIMITIVE_RESTING;
-    }
-    if ((at < 0) && (s->primitive.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->primitive.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = EMOVE_LEAF_PRIMITIVE_FAILURE;
-    }
-    if ((at < 0) && (s->last_primitive.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+    } else if (s->last_primitive.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_INPUT_COMMAND;
-    }
-    if ((at < 0) && (s->last_primitive.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->last_primitive.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_OBJ_PTR;
-    }
-    if ((at < 0) && (s->last_primitive.grasp > 9u)) {
+    } else if (s->last_primitive.grasp > 9u) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_GRASP;
-    }
-    if ((at < 0) && (s->last_primitive.pose_ptr > 9999u)) {
+    } else if (s->last_primitive.pose_ptr > 9999u) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_POSE_PTR;
-    }
-    if ((at < 0) &&
-            (!((s->last_primitive.displaced.x >= (-500.0)) && (s->last_primitive.displaced.x <= 500.0)))) {
+    } else if (!((s->last_primitive.displaced.x >= (-500.0)) && (s->last_primitive.displaced.x <= 500.0))) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_X;
-    }
-    if ((at < 0) &&
-            (!((s->last_primitive.displaced.y >= (-500.0)) && (s->last_primitive.displaced.y <= 500.0)))) {
+    } else if (!((s->last_primitive.displaced.y >= (-500.0)) && (s->last_primitive.displaced.y <= 500.0))) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_Y;
-    }
-    if ((at < 0) &&
-            (!((s->last_primitive.displaced.z >= (-500.0)) && (s->last_primitive.displaced.z <= 500.0)))) {
+    } else if (!((s->last_primitive.displaced.z >= (-500.0)) && (s->last_primitive.displaced.z <= 500.0))) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_Z;
-    }
-    if ((at < 0) &&
-            (!((s->last_primitive.displaced.c >= (-1.0)) && (s->last_primitive.displaced.c <= 1.0)))) {
+    } else if (!((s->last_primitive.displaced.c >= (-1.0)) && (s->last_primitive.displaced.c <= 1.0))) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_C;
-    }
-    if ((at < 0) &&
-            (!((s->last_primitive.displaced.s >= (-1.0)) && (s->last_primitive.displaced.s <= 1.0)))) {
+    } else if (!((s->last_primitive.displaced.s >= (-1.0)) && (s->last_primitive.displaced.s <= 1.0))) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_S;
-    }
-    if ((at < 0) && (s->to_vision.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+    } else if (s->to_vision.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
         at = EMOVE_LEAF_TO_VISION_INPUT_COMMAND;
-    }
-    if ((at < 0) && (s->to_vision.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->to_vision.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = EMOVE_LEAF_TO_VISION_OBJ_PTR;
-    }
-    if ((at < 0) &&
-            (!((s->to_vision.expected_range_mm >= 0.0) && (s->to_vision.expected_range_mm <= 2000.0)))) {
+    } else if (!((s->to_vision.expected_range_mm >= 0.0) && (s->to_vision.expected_range_mm <= 2000.0))) {
         at = EMOVE_LEAF_TO_VISION_EXPECTED_RANGE_MM;
-    }
-    if ((at < 0) &&
-            (!((s->to_vision.expected_normal.x >= (-1.0)) && (s->to_vision.expected_normal.x <= 1.0)))) {
+    } else if (!((s->to_vision.expected_normal.x >= (-1.0)) && (s->to_vision.expected_normal.x <= 1.0))) {
         at = EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_X;
-    }
-    if ((at < 0) &&
-            (!((s->to_vision.expected_normal.y >= (-1.0)) && (s->to_vision.expected_normal.y <= 1.0)))) {
+    } else if (!((s->to_vision.expected_normal.y >= (-1.0)) && (s->to_vision.expected_normal.y <= 1.0))) {
         at = EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_Y;
-    }
-    if ((at < 0) &&
-            (!((s->to_vision.expected_normal.z >= (-1.0)) && (s->to_vision.expected_normal.z <= 1.0)))) {
+    } else if (!((s->to_vision.expected_normal.z >= (-1.0)) && (s->to_vision.expected_normal.z <= 1.0))) {
         at = EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_Z;
-    }
-    if ((at < 0) && (s->vision.command > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+    } else if (s->vision.command > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
         at = EMOVE_LEAF_VISION_COMMAND;
-    }
-    if ((at < 0) && (s->vision.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->vision.status > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = EMOVE_LEAF_VISION_STATUS;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->vision.resting) > 1u)) {
+    } else if ((*(const uint8_t *)&s->vision.resting) > 1u) {
         at = EMOVE_LEAF_VISION_RESTING;
-    }
-    if ((at < 0) && (s->vision.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->vision.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = EMOVE_LEAF_VISION_FAILURE;
-    }
-    if ((at < 0) && (s->last_vision.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+    } else if (s->last_vision.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
         at = EMOVE_LEAF_LAST_VISION_INPUT_COMMAND;
-    }
-    if ((at < 0) && (s->last_vision.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->last_vision.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = EMOVE_LEAF_LAST_VISION_OBJ_PTR;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->path.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->path.known) > 1u) {
         at = EMOVE_LEAF_PATH_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->target.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->target.known) > 1u) {
         at = EMOVE_LEAF_TARGET_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->object_data.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->object_data.known) > 1u) {
         at = EMOVE_LEAF_OBJECT_DATA_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->held_data.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->held_data.known) > 1u) {
         at = EMOVE_LEAF_HELD_DATA_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
+    } else if ((*(const uint8_t *)&s->idle) > 1u) {
         at = EMOVE_LEAF_IDLE;
-    }
-    if ((at < 0) && (s->cur_state > EMOVE_COMMON_EMOVE_STATE_RELEASING)) {
+    } else if (s->cur_state > EMOVE_COMMON_EMOVE_STATE_RELEASING) {
         at = EMOVE_LEAF_CUR_STATE;
-    }
-    if ((at < 0) && (s->cur_state_next > EMOVE_COMMON_EMOVE_STATE_RELEASING)) {
+    } else if (s->cur_state_next > EMOVE_COMMON_EMOVE_STATE_RELEASING) {
         at = EMOVE_LEAF_CUR_STATE_NEXT;
-    }
-    if ((at < 0) && (s->path_at > 62u)) {
+    } else if (s->path_at > 62u) {
         at = EMOVE_LEAF_PATH_AT;
-    }
-    if ((at < 0) && (s->path_at_next > 62u)) {
+    } else if (s->path_at_next > 62u) {
         at = EMOVE_LEAF_PATH_AT_NEXT;
-    }
-    if ((at < 0) && (s->here_sector > 99u)) {
+    } else if (s->here_sector > 99u) {
         at = EMOVE_LEAF_HERE_SECTOR;
-    }
-    if ((at < 0) && (s->here_sector_asked > 99u)) {
+    } else if (s->here_sector_asked > 99u) {
         at = EMOVE_LEAF_HERE_SECTOR_ASKED;
-    }
-    if ((at < 0) && (s->depart_first > 9999u)) {
+    } else if (s->depart_first > 9999u) {
         at = EMOVE_LEAF_DEPART_FIRST;
-    }
-    if ((at < 0) && (s->depart_count > 31u)) {
+    } else if (s->depart_count > 31u) {
         at = EMOVE_LEAF_DEPART_COUNT;
-    }
-    if ((at < 0) && (s->approach_first > 9999u)) {
+    } else if (s->approach_first > 9999u) {
         at = EMOVE_LEAF_APPROACH_FIRST;
-    }
-    if ((at < 0) && (s->path_length > 62u)) {
+    } else if (s->path_length > 62u) {
         at = EMOVE_LEAF_PATH_LENGTH;
-    }
-    if ((at < 0) && (!((s->displaced_here.x >= (-500.0)) && (s->displaced_here.x <= 500.0)))) {
+    } else if (!((s->displaced_here.x >= (-500.0)) && (s->displaced_here.x <= 500.0))) {
         at = EMOVE_LEAF_DISPLACED_HERE_X;
-    }
-    if ((at < 0) && (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0)))) {
+    } else if (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0))) {
         at = EMOVE_LEAF_DISPLACED_HERE_Y;
-    }
-    if ((at < 0) && (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0)))) {
+    } else if (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0))) {
         at = EMOVE_LEAF_DISPLACED_HERE_Z;
+    } else {
+        /* none of these */
     }
-    if ((at < 0) && (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0)))) {
-        at = EMOVE_LEAF_DISPLACED_HERE_C;
-    }
-    if ((at < 0) && (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0)))) {
-        at = EMOVE_LEAF_DISPLACED_HERE_S;
-    }
-    if ((at < 0) && (!((s->lift_mm >= (-500.0)) && (s->lift_mm <= 500.0)))) {
-        at = EMOVE_LEAF_LIFT_MM;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->lost) > 1u)) {
-        at = EMOVE_LEAF_LOST;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
-        at = EMOVE_LEAF_ECHOED;
+    if (at < 0) {
+        if (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0))) {
+            at = EMOVE_LEAF_DISPLACED_HERE_C;
+        } else if (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0))) {
+            at = EMOVE_LEAF_DISPLACED_HERE_S;
+        } else if (!((s->lift_mm >= (-500.0)) && (s->lift_mm <= 500.0))) {
+            at = EMOVE_LEAF_LIFT_MM;
+        } else if ((*(const uint8_t *)&s->lost) > 1u) {
+            at = EMOVE_LEAF_LOST;
+        } else if ((*(const uint8_t *)&s->echoed) > 1u) {
+            at = EMOVE_LEAF_ECHOED;
+        } else {
+            /* none of these */
+        }
     }
     return at;
 }

@@ -174,23 +174,20 @@ static void gripper_admit(gripper_t *s)
         s->fault = GRIPPER_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
-        if ((at < 0) && (s->primitive.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+        if (s->primitive.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP) {
             at = GRIPPER_LEAF_PRIMITIVE_INPUT_COMMAND;
-        }
-        if ((at < 0) && (!((s->primitive.opening_mm >= 0.0) && (s->primitive.opening_mm <= 200.0)))) {
+        } else if (!((s->primitive.opening_mm >= 0.0) && (s->primitive.opening_mm <= 200.0))) {
             at = GRIPPER_LEAF_PRIMITIVE_OPENING_MM;
-        }
-        if ((at < 0) && (!((s->primitive.force_n >= 0.0) && (s->primitive.force_n <= 1000.0)))) {
+        } else if (!((s->primitive.force_n >= 0.0) && (s->primitive.force_n <= 1000.0))) {
             at = GRIPPER_LEAF_PRIMITIVE_FORCE_N;
-        }
-        if ((at < 0) && (!((s->primitive.speed_mm_s >= 0.0) && (s->primitive.speed_mm_s <= 500.0)))) {
+        } else if (!((s->primitive.speed_mm_s >= 0.0) && (s->primitive.speed_mm_s <= 500.0))) {
             at = GRIPPER_LEAF_PRIMITIVE_SPEED_MM_S;
-        }
-        if ((at < 0) && (!gripper_number_f64(s->hand.opening_mm))) {
+        } else if (!gripper_number_f64(s->hand.opening_mm)) {
             at = GRIPPER_LEAF_HAND_OPENING_MM;
-        }
-        if ((at < 0) && (!gripper_number_f64(s->hand.force_n))) {
+        } else if (!gripper_number_f64(s->hand.force_n)) {
             at = GRIPPER_LEAF_HAND_FORCE_N;
+        } else {
+            /* none of these */
         }
         if (at >= 0) {
             s->fault = GRIPPER_FAULT_ADMIT;
@@ -387,53 +384,40 @@ void gripper_init(gripper_t *s)
 int32_t gripper_check(const gripper_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && (s->to_primitive.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+    if (s->to_primitive.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP) {
         at = GRIPPER_LEAF_TO_PRIMITIVE_REF_COMMAND_ECHO;
-    }
-    if ((at < 0) && (s->to_primitive.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->to_primitive.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = GRIPPER_LEAF_TO_PRIMITIVE_STATUS_REPORT;
-    }
-    if ((at < 0) && (s->to_primitive.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->to_primitive.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = GRIPPER_LEAF_TO_PRIMITIVE_FAILURE;
-    }
-    if ((at < 0) && (!((s->to_primitive.opening_mm >= 0.0) && (s->to_primitive.opening_mm <= 200.0)))) {
+    } else if (!((s->to_primitive.opening_mm >= 0.0) && (s->to_primitive.opening_mm <= 200.0))) {
         at = GRIPPER_LEAF_TO_PRIMITIVE_OPENING_MM;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+    } else if ((*(const uint8_t *)&s->new_command) > 1u) {
         at = GRIPPER_LEAF_NEW_COMMAND;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+    } else if ((*(const uint8_t *)&s->answered) > 1u) {
         at = GRIPPER_LEAF_ANSWERED;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+    } else if ((*(const uint8_t *)&s->settling) > 1u) {
         at = GRIPPER_LEAF_SETTLING;
-    }
-    if ((at < 0) && (s->cur_state > GRIPPER_GRIPPER_STATE_MOVING)) {
+    } else if (s->cur_state > GRIPPER_GRIPPER_STATE_MOVING) {
         at = GRIPPER_LEAF_CUR_STATE;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->at_opening) > 1u)) {
+    } else if ((*(const uint8_t *)&s->at_opening) > 1u) {
         at = GRIPPER_LEAF_AT_OPENING;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->forced) > 1u)) {
+    } else if ((*(const uint8_t *)&s->forced) > 1u) {
         at = GRIPPER_LEAF_FORCED;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->closing) > 1u)) {
+    } else if ((*(const uint8_t *)&s->closing) > 1u) {
         at = GRIPPER_LEAF_CLOSING;
-    }
-    if ((at < 0) && (s->waited > 150u)) {
+    } else if (s->waited > 150u) {
         at = GRIPPER_LEAF_WAITED;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->to_hand.drive) > 1u)) {
+    } else if ((*(const uint8_t *)&s->to_hand.drive) > 1u) {
         at = GRIPPER_LEAF_TO_HAND_DRIVE;
-    }
-    if ((at < 0) && (!((s->to_hand.opening_mm >= 0.0) && (s->to_hand.opening_mm <= 200.0)))) {
+    } else if (!((s->to_hand.opening_mm >= 0.0) && (s->to_hand.opening_mm <= 200.0))) {
         at = GRIPPER_LEAF_TO_HAND_OPENING_MM;
-    }
-    if ((at < 0) && (!((s->to_hand.force_n >= 0.0) && (s->to_hand.force_n <= 1000.0)))) {
+    } else if (!((s->to_hand.force_n >= 0.0) && (s->to_hand.force_n <= 1000.0))) {
         at = GRIPPER_LEAF_TO_HAND_FORCE_N;
-    }
-    if ((at < 0) && (!((s->to_hand.speed_mm_s >= 0.0) && (s->to_hand.speed_mm_s <= 500.0)))) {
+    } else if (!((s->to_hand.speed_mm_s >= 0.0) && (s->to_hand.speed_mm_s <= 500.0))) {
         at = GRIPPER_LEAF_TO_HAND_SPEED_MM_S;
+    } else {
+        /* none of these */
     }
     return at;
 }

@@ -394,137 +394,96 @@ static void primitive_admit(primitive_t *s)
         s->fault = PRIMITIVE_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
-        if ((at < 0) && (s->emove.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+        if (s->emove.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
             at = PRIMITIVE_LEAF_EMOVE_INPUT_COMMAND;
-        }
-        if ((at < 0) && (s->emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        } else if (s->emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
             at = PRIMITIVE_LEAF_EMOVE_OBJ_PTR;
-        }
-        if ((at < 0) && (s->emove.grasp > 9u)) {
+        } else if (s->emove.grasp > 9u) {
             at = PRIMITIVE_LEAF_EMOVE_GRASP;
-        }
-        if ((at < 0) && (s->emove.pose_ptr > 9999u)) {
+        } else if (s->emove.pose_ptr > 9999u) {
             at = PRIMITIVE_LEAF_EMOVE_POSE_PTR;
-        }
-        if ((at < 0) && (!((s->emove.displaced.x >= (-500.0)) && (s->emove.displaced.x <= 500.0)))) {
+        } else if (!((s->emove.displaced.x >= (-500.0)) && (s->emove.displaced.x <= 500.0))) {
             at = PRIMITIVE_LEAF_EMOVE_DISPLACED_X;
-        }
-        if ((at < 0) && (!((s->emove.displaced.y >= (-500.0)) && (s->emove.displaced.y <= 500.0)))) {
+        } else if (!((s->emove.displaced.y >= (-500.0)) && (s->emove.displaced.y <= 500.0))) {
             at = PRIMITIVE_LEAF_EMOVE_DISPLACED_Y;
-        }
-        if ((at < 0) && (!((s->emove.displaced.z >= (-500.0)) && (s->emove.displaced.z <= 500.0)))) {
+        } else if (!((s->emove.displaced.z >= (-500.0)) && (s->emove.displaced.z <= 500.0))) {
             at = PRIMITIVE_LEAF_EMOVE_DISPLACED_Z;
-        }
-        if ((at < 0) && (!((s->emove.displaced.c >= (-1.0)) && (s->emove.displaced.c <= 1.0)))) {
+        } else if (!((s->emove.displaced.c >= (-1.0)) && (s->emove.displaced.c <= 1.0))) {
             at = PRIMITIVE_LEAF_EMOVE_DISPLACED_C;
-        }
-        if ((at < 0) && (!((s->emove.displaced.s >= (-1.0)) && (s->emove.displaced.s <= 1.0)))) {
+        } else if (!((s->emove.displaced.s >= (-1.0)) && (s->emove.displaced.s <= 1.0))) {
             at = PRIMITIVE_LEAF_EMOVE_DISPLACED_S;
-        }
-        if ((at < 0) && (s->from_robot.ref_command_echo > VOCABULARY_ROBOT_COMMAND_FOLLOW)) {
+        } else if (s->from_robot.ref_command_echo > VOCABULARY_ROBOT_COMMAND_FOLLOW) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_REF_COMMAND_ECHO;
-        }
-        if ((at < 0) && (s->from_robot.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        } else if (s->from_robot.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_STATUS_REPORT;
-        }
-        if ((at < 0) && (s->from_robot.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        } else if (s->from_robot.failure > VOCABULARY_REASON_NO_PICTURE) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_FAILURE;
-        }
-        if ((at < 0) && (!((s->from_robot.plate[0] >= (-4000.0)) && (s->from_robot.plate[0] <= 4000.0)))) {
+        } else if (!((s->from_robot.plate[0] >= (-4000.0)) && (s->from_robot.plate[0] <= 4000.0))) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_0;
-        }
-        if ((at < 0) && (!((s->from_robot.plate[1] >= (-4000.0)) && (s->from_robot.plate[1] <= 4000.0)))) {
+        } else if (!((s->from_robot.plate[1] >= (-4000.0)) && (s->from_robot.plate[1] <= 4000.0))) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_1;
-        }
-        if ((at < 0) && (!((s->from_robot.plate[2] >= (-4000.0)) && (s->from_robot.plate[2] <= 4000.0)))) {
+        } else if (!((s->from_robot.plate[2] >= (-4000.0)) && (s->from_robot.plate[2] <= 4000.0))) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_2;
-        }
-        if ((at < 0) && (!((s->from_robot.plate[3] >= (-4000.0)) && (s->from_robot.plate[3] <= 4000.0)))) {
+        } else if (!((s->from_robot.plate[3] >= (-4000.0)) && (s->from_robot.plate[3] <= 4000.0))) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_3;
-        }
-        if ((at < 0) && (!((s->from_robot.plate[4] >= (-4000.0)) && (s->from_robot.plate[4] <= 4000.0)))) {
+        } else if (!((s->from_robot.plate[4] >= (-4000.0)) && (s->from_robot.plate[4] <= 4000.0))) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_4;
-        }
-        if ((at < 0) && (!((s->from_robot.plate[5] >= (-4000.0)) && (s->from_robot.plate[5] <= 4000.0)))) {
+        } else if (!((s->from_robot.plate[5] >= (-4000.0)) && (s->from_robot.plate[5] <= 4000.0))) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_5;
-        }
-        if ((at < 0) && (!((s->from_robot.plate[6] >= (-4000.0)) && (s->from_robot.plate[6] <= 4000.0)))) {
+        } else if (!((s->from_robot.plate[6] >= (-4000.0)) && (s->from_robot.plate[6] <= 4000.0))) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_6;
-        }
-        if ((at < 0) && (!((s->from_robot.plate[7] >= (-4000.0)) && (s->from_robot.plate[7] <= 4000.0)))) {
+        } else if (!((s->from_robot.plate[7] >= (-4000.0)) && (s->from_robot.plate[7] <= 4000.0))) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_7;
-        }
-        if ((at < 0) && (!((s->from_robot.plate[8] >= (-4000.0)) && (s->from_robot.plate[8] <= 4000.0)))) {
+        } else if (!((s->from_robot.plate[8] >= (-4000.0)) && (s->from_robot.plate[8] <= 4000.0))) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_8;
-        }
-        if ((at < 0) && (s->from_gripper.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+        } else if (s->from_gripper.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP) {
             at = PRIMITIVE_LEAF_FROM_GRIPPER_REF_COMMAND_ECHO;
-        }
-        if ((at < 0) && (s->from_gripper.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+        } else if (s->from_gripper.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
             at = PRIMITIVE_LEAF_FROM_GRIPPER_STATUS_REPORT;
-        }
-        if ((at < 0) && (s->from_gripper.failure > VOCABULARY_REASON_NO_PICTURE)) {
+        } else if (s->from_gripper.failure > VOCABULARY_REASON_NO_PICTURE) {
             at = PRIMITIVE_LEAF_FROM_GRIPPER_FAILURE;
-        }
-        if ((at < 0) && (!((s->from_gripper.opening_mm >= 0.0) && (s->from_gripper.opening_mm <= 200.0)))) {
+        } else if (!((s->from_gripper.opening_mm >= 0.0) && (s->from_gripper.opening_mm <= 200.0))) {
             at = PRIMITIVE_LEAF_FROM_GRIPPER_OPENING_MM;
-        }
-        if ((at < 0) && (!((s->goal.plate[0] >= (-4000.0)) && (s->goal.plate[0] <= 4000.0)))) {
+        } else if (!((s->goal.plate[0] >= (-4000.0)) && (s->goal.plate[0] <= 4000.0))) {
             at = PRIMITIVE_LEAF_GOAL_PLATE_0;
-        }
-        if ((at < 0) && (!((s->goal.plate[1] >= (-4000.0)) && (s->goal.plate[1] <= 4000.0)))) {
+        } else if (!((s->goal.plate[1] >= (-4000.0)) && (s->goal.plate[1] <= 4000.0))) {
             at = PRIMITIVE_LEAF_GOAL_PLATE_1;
-        }
-        if ((at < 0) && (!((s->goal.plate[2] >= (-4000.0)) && (s->goal.plate[2] <= 4000.0)))) {
+        } else if (!((s->goal.plate[2] >= (-4000.0)) && (s->goal.plate[2] <= 4000.0))) {
             at = PRIMITIVE_LEAF_GOAL_PLATE_2;
-        }
-        if ((at < 0) && (!((s->goal.plate[3] >= (-4000.0)) && (s->goal.plate[3] <= 4000.0)))) {
+        } else if (!((s->goal.plate[3] >= (-4000.0)) && (s->goal.plate[3] <= 4000.0))) {
             at = PRIMITIVE_LEAF_GOAL_PLATE_3;
-        }
-        if ((at < 0) && (!((s->goal.plate[4] >= (-4000.0)) && (s->goal.plate[4] <= 4000.0)))) {
+        } else if (!((s->goal.plate[4] >= (-4000.0)) && (s->goal.plate[4] <= 4000.0))) {
             at = PRIMITIVE_LEAF_GOAL_PLATE_4;
-        }
-        if ((at < 0) && (!((s->goal.plate[5] >= (-4000.0)) && (s->goal.plate[5] <= 4000.0)))) {
+        } else if (!((s->goal.plate[5] >= (-4000.0)) && (s->goal.plate[5] <= 4000.0))) {
             at = PRIMITIVE_LEAF_GOAL_PLATE_5;
-        }
-        if ((at < 0) && (!((s->goal.plate[6] >= (-4000.0)) && (s->goal.plate[6] <= 4000.0)))) {
+        } else if (!((s->goal.plate[6] >= (-4000.0)) && (s->goal.plate[6] <= 4000.0))) {
             at = PRIMITIVE_LEAF_GOAL_PLATE_6;
-        }
-        if ((at < 0) && (!((s->goal.plate[7] >= (-4000.0)) && (s->goal.plate[7] <= 4000.0)))) {
+        } else if (!((s->goal.plate[7] >= (-4000.0)) && (s->goal.plate[7] <= 4000.0))) {
             at = PRIMITIVE_LEAF_GOAL_PLATE_7;
-        }
-        if ((at < 0) && (!((s->goal.plate[8] >= (-4000.0)) && (s->goal.plate[8] <= 4000.0)))) {
+        } else if (!((s->goal.plate[8] >= (-4000.0)) && (s->goal.plate[8] <= 4000.0))) {
             at = PRIMITIVE_LEAF_GOAL_PLATE_8;
-        }
-        if ((at < 0) && (!((s->goal.speed_mm_s >= 1.0) && (s->goal.speed_mm_s <= 2000.0)))) {
+        } else if (!((s->goal.speed_mm_s >= 1.0) && (s->goal.speed_mm_s <= 2000.0))) {
             at = PRIMITIVE_LEAF_GOAL_SPEED_MM_S;
-        }
-        if ((at < 0) && (!((s->goal.accel_mm_s2 >= 10.0) && (s->goal.accel_mm_s2 <= 10000.0)))) {
+        } else if (!((s->goal.accel_mm_s2 >= 10.0) && (s->goal.accel_mm_s2 <= 10000.0))) {
             at = PRIMITIVE_LEAF_GOAL_ACCEL_MM_S2;
-        }
-        if ((at < 0) && (!((s->goal.decel_mm_s2 >= 10.0) && (s->goal.decel_mm_s2 <= 10000.0)))) {
+        } else if (!((s->goal.decel_mm_s2 >= 10.0) && (s->goal.decel_mm_s2 <= 10000.0))) {
             at = PRIMITIVE_LEAF_GOAL_DECEL_MM_S2;
-        }
-        if ((at < 0) && (!((s->goal.breakpoint_mm >= 0.0) && (s->goal.breakpoint_mm <= 500.0)))) {
+        } else if (!((s->goal.breakpoint_mm >= 0.0) && (s->goal.breakpoint_mm <= 500.0))) {
             at = PRIMITIVE_LEAF_GOAL_BREAKPOINT_MM;
-        }
-        if ((at < 0) && (!((s->fingers.approach_mm >= 0.0) && (s->fingers.approach_mm <= 200.0)))) {
+        } else if (!((s->fingers.approach_mm >= 0.0) && (s->fingers.approach_mm <= 200.0))) {
             at = PRIMITIVE_LEAF_FINGERS_APPROACH_MM;
-        }
-        if ((at < 0) && (!((s->fingers.departure_mm >= 0.0) && (s->fingers.departure_mm <= 200.0)))) {
+        } else if (!((s->fingers.departure_mm >= 0.0) && (s->fingers.departure_mm <= 200.0))) {
             at = PRIMITIVE_LEAF_FINGERS_DEPARTURE_MM;
-        }
-        if ((at < 0) && (!((s->fingers.grip_mm >= 0.0) && (s->fingers.grip_mm <= 200.0)))) {
+        } else if (!((s->fingers.grip_mm >= 0.0) && (s->fingers.grip_mm <= 200.0))) {
             at = PRIMITIVE_LEAF_FINGERS_GRIP_MM;
-        }
-        if ((at < 0) && (!((s->fingers.tolerance_mm >= 0.0) && (s->fingers.tolerance_mm <= 50.0)))) {
+        } else if (!((s->fingers.tolerance_mm >= 0.0) && (s->fingers.tolerance_mm <= 50.0))) {
             at = PRIMITIVE_LEAF_FINGERS_TOLERANCE_MM;
-        }
-        if ((at < 0) && (!((s->fingers.force_n >= 0.0) && (s->fingers.force_n <= 1000.0)))) {
+        } else if (!((s->fingers.force_n >= 0.0) && (s->fingers.force_n <= 1000.0))) {
             at = PRIMITIVE_LEAF_FINGERS_FORCE_N;
-        }
-        if ((at < 0) && (!((s->fingers.speed_mm_s >= 0.0) && (s->fingers.speed_mm_s <= 500.0)))) {
+        } else if (!((s->fingers.speed_mm_s >= 0.0) && (s->fingers.speed_mm_s <= 500.0))) {
             at = PRIMITIVE_LEAF_FINGERS_SPEED_MM_S;
+        } else {
+            /* none of these */
         }
         if (at >= 0) {
             s->fault = PRIMITIVE_FAULT_ADMIT;
@@ -1143,209 +1102,149 @@ void primitive_init(primitive_t *s)
 int32_t primitive_check(const primitive_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && (s->to_emove.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP)) {
+    if (s->to_emove.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = PRIMITIVE_LEAF_TO_EMOVE_REF_COMMAND_ECHO;
-    }
-    if ((at < 0) && (s->to_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->to_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = PRIMITIVE_LEAF_TO_EMOVE_STATUS_REPORT;
-    }
-    if ((at < 0) && (s->to_emove.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->to_emove.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = PRIMITIVE_LEAF_TO_EMOVE_FAILURE;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->to_emove.holds) > 1u)) {
+    } else if ((*(const uint8_t *)&s->to_emove.holds) > 1u) {
         at = PRIMITIVE_LEAF_TO_EMOVE_HOLDS;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+    } else if ((*(const uint8_t *)&s->new_command) > 1u) {
         at = PRIMITIVE_LEAF_NEW_COMMAND;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+    } else if ((*(const uint8_t *)&s->answered) > 1u) {
         at = PRIMITIVE_LEAF_ANSWERED;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+    } else if ((*(const uint8_t *)&s->settling) > 1u) {
         at = PRIMITIVE_LEAF_SETTLING;
-    }
-    if ((at < 0) && (s->to_robot.input_command > VOCABULARY_ROBOT_COMMAND_FOLLOW)) {
+    } else if (s->to_robot.input_command > VOCABULARY_ROBOT_COMMAND_FOLLOW) {
         at = PRIMITIVE_LEAF_TO_ROBOT_INPUT_COMMAND;
-    }
-    if ((at < 0) && (!((s->to_robot.plate[0] >= (-4000.0)) && (s->to_robot.plate[0] <= 4000.0)))) {
+    } else if (!((s->to_robot.plate[0] >= (-4000.0)) && (s->to_robot.plate[0] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_0;
-    }
-    if ((at < 0) && (!((s->to_robot.plate[1] >= (-4000.0)) && (s->to_robot.plate[1] <= 4000.0)))) {
+    } else if (!((s->to_robot.plate[1] >= (-4000.0)) && (s->to_robot.plate[1] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_1;
-    }
-    if ((at < 0) && (!((s->to_robot.plate[2] >= (-4000.0)) && (s->to_robot.plate[2] <= 4000.0)))) {
+    } else if (!((s->to_robot.plate[2] >= (-4000.0)) && (s->to_robot.plate[2] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_2;
-    }
-    if ((at < 0) && (!((s->to_robot.plate[3] >= (-4000.0)) && (s->to_robot.plate[3] <= 4000.0)))) {
+    } else if (!((s->to_robot.plate[3] >= (-4000.0)) && (s->to_robot.plate[3] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_3;
-    }
-    if ((at < 0) && (!((s->to_robot.plate[4] >= (-4000.0)) && (s->to_robot.plate[4] <= 4000.0)))) {
+    } else if (!((s->to_robot.plate[4] >= (-4000.0)) && (s->to_robot.plate[4] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_4;
-    }
-    if ((at < 0) && (!((s->to_robot.plate[5] >= (-4000.0)) && (s->to_robot.plate[5] <= 4000.0)))) {
+    } else if (!((s->to_robot.plate[5] >= (-4000.0)) && (s->to_robot.plate[5] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_5;
-    }
-    if ((at < 0) && (!((s->to_robot.plate[6] >= (-4000.0)) && (s->to_robot.plate[6] <= 4000.0)))) {
+    } else if (!((s->to_robot.plate[6] >= (-4000.0)) && (s->to_robot.plate[6] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_6;
-    }
-    if ((at < 0) && (!((s->to_robot.plate[7] >= (-4000.0)) && (s->to_robot.plate[7] <= 4000.0)))) {
+    } else if (!((s->to_robot.plate[7] >= (-4000.0)) && (s->to_robot.plate[7] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_7;
-    }
-    if ((at < 0) && (!((s->to_robot.plate[8] >= (-4000.0)) && (s->to_robot.plate[8] <= 4000.0)))) {
+    } else if (!((s->to_robot.plate[8] >= (-4000.0)) && (s->to_robot.plate[8] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_ROBOT_PLATE_8;
-    }
-    if ((at < 0) && (s->robot.command > VOCABULARY_ROBOT_COMMAND_FOLLOW)) {
+    } else if (s->robot.command > VOCABULARY_ROBOT_COMMAND_FOLLOW) {
         at = PRIMITIVE_LEAF_ROBOT_COMMAND;
-    }
-    if ((at < 0) && (s->robot.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->robot.status > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = PRIMITIVE_LEAF_ROBOT_STATUS;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->robot.resting) > 1u)) {
+    } else if ((*(const uint8_t *)&s->robot.resting) > 1u) {
         at = PRIMITIVE_LEAF_ROBOT_RESTING;
-    }
-    if ((at < 0) && (s->robot.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->robot.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = PRIMITIVE_LEAF_ROBOT_FAILURE;
-    }
-    if ((at < 0) && (s->last_robot.input_command > VOCABULARY_ROBOT_COMMAND_FOLLOW)) {
+    } else if (s->last_robot.input_command > VOCABULARY_ROBOT_COMMAND_FOLLOW) {
         at = PRIMITIVE_LEAF_LAST_ROBOT_INPUT_COMMAND;
-    }
-    if ((at < 0) && (s->to_gripper.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+    } else if (s->to_gripper.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP) {
         at = PRIMITIVE_LEAF_TO_GRIPPER_INPUT_COMMAND;
-    }
-    if ((at < 0) && (!((s->to_gripper.opening_mm >= 0.0) && (s->to_gripper.opening_mm <= 200.0)))) {
+    } else if (!((s->to_gripper.opening_mm >= 0.0) && (s->to_gripper.opening_mm <= 200.0))) {
         at = PRIMITIVE_LEAF_TO_GRIPPER_OPENING_MM;
-    }
-    if ((at < 0) && (!((s->to_gripper.force_n >= 0.0) && (s->to_gripper.force_n <= 1000.0)))) {
+    } else if (!((s->to_gripper.force_n >= 0.0) && (s->to_gripper.force_n <= 1000.0))) {
         at = PRIMITIVE_LEAF_TO_GRIPPER_FORCE_N;
-    }
-    if ((at < 0) && (!((s->to_gripper.speed_mm_s >= 0.0) && (s->to_gripper.speed_mm_s <= 500.0)))) {
+    } else if (!((s->to_gripper.speed_mm_s >= 0.0) && (s->to_gripper.speed_mm_s <= 500.0))) {
         at = PRIMITIVE_LEAF_TO_GRIPPER_SPEED_MM_S;
-    }
-    if ((at < 0) && (s->gripper.command > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+    } else if (s->gripper.command > VOCABULARY_GRIPPER_COMMAND_GRASP) {
         at = PRIMITIVE_LEAF_GRIPPER_COMMAND;
-    }
-    if ((at < 0) && (s->gripper.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->gripper.status > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = PRIMITIVE_LEAF_GRIPPER_STATUS;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->gripper.resting) > 1u)) {
+    } else if ((*(const uint8_t *)&s->gripper.resting) > 1u) {
         at = PRIMITIVE_LEAF_GRIPPER_RESTING;
-    }
-    if ((at < 0) && (s->gripper.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->gripper.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = PRIMITIVE_LEAF_GRIPPER_FAILURE;
-    }
-    if ((at < 0) && (s->last_gripper.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP)) {
+    } else if (s->last_gripper.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP) {
         at = PRIMITIVE_LEAF_LAST_GRIPPER_INPUT_COMMAND;
-    }
-    if ((at < 0) && (!((s->last_gripper.opening_mm >= 0.0) && (s->last_gripper.opening_mm <= 200.0)))) {
+    } else if (!((s->last_gripper.opening_mm >= 0.0) && (s->last_gripper.opening_mm <= 200.0))) {
         at = PRIMITIVE_LEAF_LAST_GRIPPER_OPENING_MM;
-    }
-    if ((at < 0) && (!((s->last_gripper.force_n >= 0.0) && (s->last_gripper.force_n <= 1000.0)))) {
+    } else if (!((s->last_gripper.force_n >= 0.0) && (s->last_gripper.force_n <= 1000.0))) {
         at = PRIMITIVE_LEAF_LAST_GRIPPER_FORCE_N;
-    }
-    if ((at < 0) && (!((s->last_gripper.speed_mm_s >= 0.0) && (s->last_gripper.speed_mm_s <= 500.0)))) {
+    } else if (!((s->last_gripper.speed_mm_s >= 0.0) && (s->last_gripper.speed_mm_s <= 500.0))) {
         at = PRIMITIVE_LEAF_LAST_GRIPPER_SPEED_MM_S;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->goal.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->goal.known) > 1u) {
         at = PRIMITIVE_LEAF_GOAL_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->fingers.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->fingers.known) > 1u) {
         at = PRIMITIVE_LEAF_FINGERS_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
+    } else if ((*(const uint8_t *)&s->idle) > 1u) {
         at = PRIMITIVE_LEAF_IDLE;
-    }
-    if ((at < 0) && (s->cur_state > PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING)) {
+    } else if (s->cur_state > PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING) {
         at = PRIMITIVE_LEAF_CUR_STATE;
-    }
-    if ((at < 0) && (s->cur_state_next > PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING)) {
+    } else if (s->cur_state_next > PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING) {
         at = PRIMITIVE_LEAF_CUR_STATE_NEXT;
-    }
-    if ((at < 0) && (!((s->from[0] >= (-4000.0)) && (s->from[0] <= 4000.0)))) {
+    } else if (!((s->from[0] >= (-4000.0)) && (s->from[0] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_0;
-    }
-    if ((at < 0) && (!((s->from[1] >= (-4000.0)) && (s->from[1] <= 4000.0)))) {
+    } else if (!((s->from[1] >= (-4000.0)) && (s->from[1] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_1;
-    }
-    if ((at < 0) && (!((s->from[2] >= (-4000.0)) && (s->from[2] <= 4000.0)))) {
+    } else if (!((s->from[2] >= (-4000.0)) && (s->from[2] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_2;
-    }
-    if ((at < 0) && (!((s->from[3] >= (-4000.0)) && (s->from[3] <= 4000.0)))) {
+    } else if (!((s->from[3] >= (-4000.0)) && (s->from[3] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_3;
-    }
-    if ((at < 0) && (!((s->from[4] >= (-4000.0)) && (s->from[4] <= 4000.0)))) {
+    } else if (!((s->from[4] >= (-4000.0)) && (s->from[4] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_4;
-    }
-    if ((at < 0) && (!((s->from[5] >= (-4000.0)) && (s->from[5] <= 4000.0)))) {
+    } else if (!((s->from[5] >= (-4000.0)) && (s->from[5] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_5;
-    }
-    if ((at < 0) && (!((s->from[6] >= (-4000.0)) && (s->from[6] <= 4000.0)))) {
+    } else if (!((s->from[6] >= (-4000.0)) && (s->from[6] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_6;
-    }
-    if ((at < 0) && (!((s->from[7] >= (-4000.0)) && (s->from[7] <= 4000.0)))) {
+    } else if (!((s->from[7] >= (-4000.0)) && (s->from[7] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_7;
-    }
-    if ((at < 0) && (!((s->from[8] >= (-4000.0)) && (s->from[8] <= 4000.0)))) {
+    } else if (!((s->from[8] >= (-4000.0)) && (s->from[8] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_8;
-    }
-    if ((at < 0) && (!((s->to[0] >= (-4000.0)) && (s->to[0] <= 4000.0)))) {
+    } else if (!((s->to[0] >= (-4000.0)) && (s->to[0] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_0;
-    }
-    if ((at < 0) && (!((s->to[1] >= (-4000.0)) && (s->to[1] <= 4000.0)))) {
+    } else if (!((s->to[1] >= (-4000.0)) && (s->to[1] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_1;
-    }
-    if ((at < 0) && (!((s->to[2] >= (-4000.0)) && (s->to[2] <= 4000.0)))) {
+    } else if (!((s->to[2] >= (-4000.0)) && (s->to[2] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_2;
-    }
-    if ((at < 0) && (!((s->to[3] >= (-4000.0)) && (s->to[3] <= 4000.0)))) {
+    } else if (!((s->to[3] >= (-4000.0)) && (s->to[3] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_3;
-    }
-    if ((at < 0) && (!((s->to[4] >= (-4000.0)) && (s->to[4] <= 4000.0)))) {
+    } else if (!((s->to[4] >= (-4000.0)) && (s->to[4] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_4;
-    }
-    if ((at < 0) && (!((s->to[5] >= (-4000.0)) && (s->to[5] <= 4000.0)))) {
+    } else if (!((s->to[5] >= (-4000.0)) && (s->to[5] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_5;
-    }
-    if ((at < 0) && (!((s->to[6] >= (-4000.0)) && (s->to[6] <= 4000.0)))) {
+    } else if (!((s->to[6] >= (-4000.0)) && (s->to[6] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_6;
-    }
-    if ((at < 0) && (!((s->to[7] >= (-4000.0)) && (s->to[7] <= 4000.0)))) {
+    } else if (!((s->to[7] >= (-4000.0)) && (s->to[7] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_7;
-    }
-    if ((at < 0) && (!((s->to[8] >= (-4000.0)) && (s->to[8] <= 4000.0)))) {
+    } else if (!((s->to[8] >= (-4000.0)) && (s->to[8] <= 4000.0))) {
         at = PRIMITIVE_LEAF_TO_8;
-    }
-    if ((at < 0) && (!((s->length_mm >= 1.0) && (s->length_mm <= 30000.0)))) {
+    } else if (!((s->length_mm >= 1.0) && (s->length_mm <= 30000.0))) {
         at = PRIMITIVE_LEAF_LENGTH_MM;
-    }
-    if ((at < 0) && (!((s->travelled_mm >= 0.0) && (s->travelled_mm <= 30000.0)))) {
+    } else if (!((s->travelled_mm >= 0.0) && (s->travelled_mm <= 30000.0))) {
         at = PRIMITIVE_LEAF_TRAVELLED_MM;
-    }
-    if ((at < 0) && (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0)))) {
+    } else if (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0))) {
         at = PRIMITIVE_LEAF_SPEED_MM_S;
+    } else {
+        /* none of these */
     }
-    if ((at < 0) && ((*(const uint8_t *)&s->near_) > 1u)) {
-        at = PRIMITIVE_LEAF_NEAR;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->there) > 1u)) {
-        at = PRIMITIVE_LEAF_THERE;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->settled) > 1u)) {
-        at = PRIMITIVE_LEAF_SETTLED;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
-        at = PRIMITIVE_LEAF_FITS;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->closed) > 1u)) {
-        at = PRIMITIVE_LEAF_CLOSED;
-    }
-    if ((at < 0) && (s->waited > 250u)) {
-        at = PRIMITIVE_LEAF_WAITED;
-    }
-    if ((at < 0) && (s->display > PRIMITIVE_COMMON_DISPLAY_FINGERS)) {
-        at = PRIMITIVE_LEAF_DISPLAY;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
-        at = PRIMITIVE_LEAF_ECHOED;
+    if (at < 0) {
+        if ((*(const uint8_t *)&s->near_) > 1u) {
+            at = PRIMITIVE_LEAF_NEAR;
+        } else if ((*(const uint8_t *)&s->there) > 1u) {
+            at = PRIMITIVE_LEAF_THERE;
+        } else if ((*(const uint8_t *)&s->settled) > 1u) {
+            at = PRIMITIVE_LEAF_SETTLED;
+        } else if ((*(const uint8_t *)&s->fits) > 1u) {
+            at = PRIMITIVE_LEAF_FITS;
+        } else if ((*(const uint8_t *)&s->closed) > 1u) {
+            at = PRIMITIVE_LEAF_CLOSED;
+        } else if (s->waited > 250u) {
+            at = PRIMITIVE_LEAF_WAITED;
+        } else if (s->display > PRIMITIVE_COMMON_DISPLAY_FINGERS) {
+            at = PRIMITIVE_LEAF_DISPLAY;
+        } else if ((*(const uint8_t *)&s->echoed) > 1u) {
+            at = PRIMITIVE_LEAF_ECHOED;
+        } else {
+            /* none of these */
+        }
     }
     return at;
 }

@@ -448,26 +448,22 @@ static void task_admit(task_t *s)
     s->fault_at = -1;
     s->assumptions_failed = 0;
     int32_t at = -1;
-    if ((at < 0) && (s->workstation.input_command > VOCABULARY_TASK_COMMAND_CLEAR)) {
+    if (s->workstation.input_command > VOCABULARY_TASK_COMMAND_CLEAR) {
         at = TASK_LEAF_WORKSTATION_INPUT_COMMAND;
-    }
-    if ((at < 0) && (s->workstation.obj > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->workstation.obj > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = TASK_LEAF_WORKSTATION_OBJ;
-    }
-    if ((at < 0) && (s->workstation.grasp > 9u)) {
+    } else if (s->workstation.grasp > 9u) {
         at = TASK_LEAF_WORKSTATION_GRASP;
-    }
-    if ((at < 0) && (s->workstation.sector > 99u)) {
+    } else if (s->workstation.sector > 99u) {
         at = TASK_LEAF_WORKSTATION_SECTOR;
-    }
-    if ((at < 0) && (s->from_emove.ref_command_echo > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+    } else if (s->from_emove.ref_command_echo > VOCABULARY_EMOVE_COMMAND_RELEASE) {
         at = TASK_LEAF_FROM_EMOVE_REF_COMMAND_ECHO;
-    }
-    if ((at < 0) && (s->from_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->from_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = TASK_LEAF_FROM_EMOVE_STATUS_REPORT;
-    }
-    if ((at < 0) && (s->from_emove.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->from_emove.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = TASK_LEAF_FROM_EMOVE_FAILURE;
+    } else {
+        /* none of these */
     }
     if (at >= 0) {
         s->fault = TASK_FAULT_ADMIT;
@@ -1440,158 +1436,110 @@ void task_init(task_t *s)
 int32_t task_check(const task_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && (s->to_workstation.ref_command_echo > VOCABULARY_TASK_COMMAND_CLEAR)) {
+    if (s->to_workstation.ref_command_echo > VOCABULARY_TASK_COMMAND_CLEAR) {
         at = TASK_LEAF_TO_WORKSTATION_REF_COMMAND_ECHO;
-    }
-    if ((at < 0) && (s->to_workstation.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->to_workstation.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = TASK_LEAF_TO_WORKSTATION_STATUS_REPORT;
-    }
-    if ((at < 0) && (s->to_workstation.status_parameter > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->to_workstation.status_parameter > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = TASK_LEAF_TO_WORKSTATION_STATUS_PARAMETER;
-    }
-    if ((at < 0) && (s->to_workstation.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->to_workstation.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = TASK_LEAF_TO_WORKSTATION_FAILURE;
-    }
-    if ((at < 0) && (s->to_workstation.cause > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->to_workstation.cause > VOCABULARY_REASON_NO_PICTURE) {
         at = TASK_LEAF_TO_WORKSTATION_CAUSE;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+    } else if ((*(const uint8_t *)&s->new_command) > 1u) {
         at = TASK_LEAF_NEW_COMMAND;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+    } else if ((*(const uint8_t *)&s->answered) > 1u) {
         at = TASK_LEAF_ANSWERED;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+    } else if ((*(const uint8_t *)&s->settling) > 1u) {
         at = TASK_LEAF_SETTLING;
-    }
-    if ((at < 0) && (s->to_emove.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+    } else if (s->to_emove.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE) {
         at = TASK_LEAF_TO_EMOVE_INPUT_COMMAND;
-    }
-    if ((at < 0) && (s->to_emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->to_emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = TASK_LEAF_TO_EMOVE_OBJ_PTR;
-    }
-    if ((at < 0) && (s->to_emove.grasp > 9u)) {
+    } else if (s->to_emove.grasp > 9u) {
         at = TASK_LEAF_TO_EMOVE_GRASP;
-    }
-    if ((at < 0) && (s->to_emove.sector > 99u)) {
+    } else if (s->to_emove.sector > 99u) {
         at = TASK_LEAF_TO_EMOVE_SECTOR;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->to_emove.apoint_pos_flag) > 1u)) {
+    } else if ((*(const uint8_t *)&s->to_emove.apoint_pos_flag) > 1u) {
         at = TASK_LEAF_TO_EMOVE_APOINT_POS_FLAG;
-    }
-    if ((at < 0) && (s->to_emove.gripped_obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->to_emove.gripped_obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = TASK_LEAF_TO_EMOVE_GRIPPED_OBJ_PTR;
-    }
-    if ((at < 0) && (s->emove.command > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+    } else if (s->emove.command > VOCABULARY_EMOVE_COMMAND_RELEASE) {
         at = TASK_LEAF_EMOVE_COMMAND;
-    }
-    if ((at < 0) && (s->emove.status > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->emove.status > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = TASK_LEAF_EMOVE_STATUS;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->emove.resting) > 1u)) {
+    } else if ((*(const uint8_t *)&s->emove.resting) > 1u) {
         at = TASK_LEAF_EMOVE_RESTING;
-    }
-    if ((at < 0) && (s->emove.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->emove.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = TASK_LEAF_EMOVE_FAILURE;
-    }
-    if ((at < 0) && (s->last_emove.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE)) {
+    } else if (s->last_emove.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE) {
         at = TASK_LEAF_LAST_EMOVE_INPUT_COMMAND;
-    }
-    if ((at < 0) && (s->last_emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->last_emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = TASK_LEAF_LAST_EMOVE_OBJ_PTR;
-    }
-    if ((at < 0) && (s->last_emove.grasp > 9u)) {
+    } else if (s->last_emove.grasp > 9u) {
         at = TASK_LEAF_LAST_EMOVE_GRASP;
-    }
-    if ((at < 0) && (s->last_emove.sector > 99u)) {
+    } else if (s->last_emove.sector > 99u) {
         at = TASK_LEAF_LAST_EMOVE_SECTOR;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->source.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->source.known) > 1u) {
         at = TASK_LEAF_SOURCE_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->source.vision) > 1u)) {
+    } else if ((*(const uint8_t *)&s->source.vision) > 1u) {
         at = TASK_LEAF_SOURCE_VISION;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->source.buffer) > 1u)) {
+    } else if ((*(const uint8_t *)&s->source.buffer) > 1u) {
         at = TASK_LEAF_SOURCE_BUFFER;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->dest.known) > 1u) {
         at = TASK_LEAF_DEST_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest.vision) > 1u)) {
+    } else if ((*(const uint8_t *)&s->dest.vision) > 1u) {
         at = TASK_LEAF_DEST_VISION;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest.buffer) > 1u)) {
+    } else if ((*(const uint8_t *)&s->dest.buffer) > 1u) {
         at = TASK_LEAF_DEST_BUFFER;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->end_at.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->end_at.known) > 1u) {
         at = TASK_LEAF_END_AT_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->end_at.vision) > 1u)) {
+    } else if ((*(const uint8_t *)&s->end_at.vision) > 1u) {
         at = TASK_LEAF_END_AT_VISION;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->end_at.buffer) > 1u)) {
+    } else if ((*(const uint8_t *)&s->end_at.buffer) > 1u) {
         at = TASK_LEAF_END_AT_BUFFER;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->here.known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->here.known) > 1u) {
         at = TASK_LEAF_HERE_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->here.vision) > 1u)) {
+    } else if ((*(const uint8_t *)&s->here.vision) > 1u) {
         at = TASK_LEAF_HERE_VISION;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->here.buffer) > 1u)) {
+    } else if ((*(const uint8_t *)&s->here.buffer) > 1u) {
         at = TASK_LEAF_HERE_BUFFER;
-    }
-    if ((at < 0) && (s->cur_state > TASK_COMMON_TASK_STATE_STATE_8)) {
+    } else if (s->cur_state > TASK_COMMON_TASK_STATE_STATE_8) {
         at = TASK_LEAF_CUR_STATE;
-    }
-    if ((at < 0) && (s->cur_state_next > TASK_COMMON_TASK_STATE_STATE_8)) {
+    } else if (s->cur_state_next > TASK_COMMON_TASK_STATE_STATE_8) {
         at = TASK_LEAF_CUR_STATE_NEXT;
-    }
-    if ((at < 0) && (s->loc_of_obj > TASK_COMMON_LOCATING_KNOWN)) {
+    } else if (s->loc_of_obj > TASK_COMMON_LOCATING_KNOWN) {
         at = TASK_LEAF_LOC_OF_OBJ;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->source_spec) > 1u)) {
+    } else if ((*(const uint8_t *)&s->source_spec) > 1u) {
         at = TASK_LEAF_SOURCE_SPEC;
-    }
-    if ((at < 0) && (s->source_sector > 99u)) {
+    } else if (s->source_sector > 99u) {
         at = TASK_LEAF_SOURCE_SECTOR;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->source_buffer) > 1u)) {
+    } else if ((*(const uint8_t *)&s->source_buffer) > 1u) {
         at = TASK_LEAF_SOURCE_BUFFER_2;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->dest_spec) > 1u)) {
+    } else if ((*(const uint8_t *)&s->dest_spec) > 1u) {
         at = TASK_LEAF_DEST_SPEC;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->names_known) > 1u)) {
+    } else if ((*(const uint8_t *)&s->names_known) > 1u) {
         at = TASK_LEAF_NAMES_KNOWN;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
+    } else if ((*(const uint8_t *)&s->obj_acquired) > 1u) {
         at = TASK_LEAF_OBJ_ACQUIRED;
-    }
-    if ((at < 0) && (s->obj_now_in_gripper > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->obj_now_in_gripper > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = TASK_LEAF_OBJ_NOW_IN_GRIPPER;
-    }
-    if ((at < 0) && (s->grasp_now > 9u)) {
+    } else if (s->grasp_now > 9u) {
         at = TASK_LEAF_GRASP_NOW;
-    }
-    if ((at < 0) && (s->current_sector > 99u)) {
+    } else if (s->current_sector > 99u) {
         at = TASK_LEAF_CURRENT_SECTOR;
-    }
-    if ((at < 0) && (s->tbuffer_boxt > 99u)) {
+    } else if (s->tbuffer_boxt > 99u) {
         at = TASK_LEAF_TBUFFER_BOXT;
-    }
-    if ((at < 0) && (s->bbuffer_boxb > 99u)) {
+    } else if (s->bbuffer_boxb > 99u) {
         at = TASK_LEAF_BBUFFER_BOXB;
-    }
-    if ((at < 0) && (s->fbuffer_flag > 99u)) {
+    } else if (s->fbuffer_flag > 99u) {
         at = TASK_LEAF_FBUFFER_FLAG;
-    }
-    if ((at < 0) && (s->hbuffer_hous > 99u)) {
+    } else if (s->hbuffer_hous > 99u) {
         at = TASK_LEAF_HBUFFER_HOUS;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->echoed) > 1u)) {
+    } else if ((*(const uint8_t *)&s->echoed) > 1u) {
         at = TASK_LEAF_ECHOED;
+    } else {
+        /* none of these */
     }
     return at;
 }

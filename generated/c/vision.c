@@ -196,47 +196,36 @@ static void vision_admit(vision_t *s)
         s->fault = VISION_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
-        if ((at < 0) && (s->emove.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+        if (s->emove.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
             at = VISION_LEAF_EMOVE_INPUT_COMMAND;
-        }
-        if ((at < 0) && (s->emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+        } else if (s->emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
             at = VISION_LEAF_EMOVE_OBJ_PTR;
-        }
-        if ((at < 0) && (!((s->emove.expected_range_mm >= 0.0) && (s->emove.expected_range_mm <= 2000.0)))) {
+        } else if (!((s->emove.expected_range_mm >= 0.0) && (s->emove.expected_range_mm <= 2000.0))) {
             at = VISION_LEAF_EMOVE_EXPECTED_RANGE_MM;
-        }
-        if ((at < 0) && (!((s->emove.expected_normal.x >= (-1.0)) && (s->emove.expected_normal.x <= 1.0)))) {
+        } else if (!((s->emove.expected_normal.x >= (-1.0)) && (s->emove.expected_normal.x <= 1.0))) {
             at = VISION_LEAF_EMOVE_EXPECTED_NORMAL_X;
-        }
-        if ((at < 0) && (!((s->emove.expected_normal.y >= (-1.0)) && (s->emove.expected_normal.y <= 1.0)))) {
+        } else if (!((s->emove.expected_normal.y >= (-1.0)) && (s->emove.expected_normal.y <= 1.0))) {
             at = VISION_LEAF_EMOVE_EXPECTED_NORMAL_Y;
-        }
-        if ((at < 0) && (!((s->emove.expected_normal.z >= (-1.0)) && (s->emove.expected_normal.z <= 1.0)))) {
+        } else if (!((s->emove.expected_normal.z >= (-1.0)) && (s->emove.expected_normal.z <= 1.0))) {
             at = VISION_LEAF_EMOVE_EXPECTED_NORMAL_Z;
-        }
-        if ((at < 0) && (!((s->camera.x_mm >= (-500.0)) && (s->camera.x_mm <= 500.0)))) {
+        } else if (!((s->camera.x_mm >= (-500.0)) && (s->camera.x_mm <= 500.0))) {
             at = VISION_LEAF_CAMERA_X_MM;
-        }
-        if ((at < 0) && (!((s->camera.y_mm >= (-500.0)) && (s->camera.y_mm <= 500.0)))) {
+        } else if (!((s->camera.y_mm >= (-500.0)) && (s->camera.y_mm <= 500.0))) {
             at = VISION_LEAF_CAMERA_Y_MM;
-        }
-        if ((at < 0) && (!((s->camera.c >= (-1.0)) && (s->camera.c <= 1.0)))) {
+        } else if (!((s->camera.c >= (-1.0)) && (s->camera.c <= 1.0))) {
             at = VISION_LEAF_CAMERA_C;
-        }
-        if ((at < 0) && (!((s->camera.s >= (-1.0)) && (s->camera.s <= 1.0)))) {
+        } else if (!((s->camera.s >= (-1.0)) && (s->camera.s <= 1.0))) {
             at = VISION_LEAF_CAMERA_S;
-        }
-        if ((at < 0) && (!((s->camera.range_mm >= 0.0) && (s->camera.range_mm <= 2000.0)))) {
+        } else if (!((s->camera.range_mm >= 0.0) && (s->camera.range_mm <= 2000.0))) {
             at = VISION_LEAF_CAMERA_RANGE_MM;
-        }
-        if ((at < 0) && (!((s->camera.normal.x >= (-1.0)) && (s->camera.normal.x <= 1.0)))) {
+        } else if (!((s->camera.normal.x >= (-1.0)) && (s->camera.normal.x <= 1.0))) {
             at = VISION_LEAF_CAMERA_NORMAL_X;
-        }
-        if ((at < 0) && (!((s->camera.normal.y >= (-1.0)) && (s->camera.normal.y <= 1.0)))) {
+        } else if (!((s->camera.normal.y >= (-1.0)) && (s->camera.normal.y <= 1.0))) {
             at = VISION_LEAF_CAMERA_NORMAL_Y;
-        }
-        if ((at < 0) && (!((s->camera.normal.z >= (-1.0)) && (s->camera.normal.z <= 1.0)))) {
+        } else if (!((s->camera.normal.z >= (-1.0)) && (s->camera.normal.z <= 1.0))) {
             at = VISION_LEAF_CAMERA_NORMAL_Z;
+        } else {
+            /* none of these */
         }
         if (at >= 0) {
             s->fault = VISION_FAULT_ADMIT;
@@ -453,62 +442,46 @@ void vision_init(vision_t *s)
 int32_t vision_check(const vision_t *s)
 {
     int32_t at = -1;
-    if ((at < 0) && (s->to_emove.ref_command_echo > VOCABULARY_VISION_COMMAND_LINE_FLASH)) {
+    if (s->to_emove.ref_command_echo > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
         at = VISION_LEAF_TO_EMOVE_REF_COMMAND_ECHO;
-    }
-    if ((at < 0) && (s->to_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED)) {
+    } else if (s->to_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = VISION_LEAF_TO_EMOVE_STATUS_REPORT;
-    }
-    if ((at < 0) && (s->to_emove.failure > VOCABULARY_REASON_NO_PICTURE)) {
+    } else if (s->to_emove.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = VISION_LEAF_TO_EMOVE_FAILURE;
-    }
-    if ((at < 0) && (!((s->to_emove.x_mm >= (-500.0)) && (s->to_emove.x_mm <= 500.0)))) {
+    } else if (!((s->to_emove.x_mm >= (-500.0)) && (s->to_emove.x_mm <= 500.0))) {
         at = VISION_LEAF_TO_EMOVE_X_MM;
-    }
-    if ((at < 0) && (!((s->to_emove.y_mm >= (-500.0)) && (s->to_emove.y_mm <= 500.0)))) {
+    } else if (!((s->to_emove.y_mm >= (-500.0)) && (s->to_emove.y_mm <= 500.0))) {
         at = VISION_LEAF_TO_EMOVE_Y_MM;
-    }
-    if ((at < 0) && (!((s->to_emove.c >= (-1.0)) && (s->to_emove.c <= 1.0)))) {
+    } else if (!((s->to_emove.c >= (-1.0)) && (s->to_emove.c <= 1.0))) {
         at = VISION_LEAF_TO_EMOVE_C;
-    }
-    if ((at < 0) && (!((s->to_emove.s >= (-1.0)) && (s->to_emove.s <= 1.0)))) {
+    } else if (!((s->to_emove.s >= (-1.0)) && (s->to_emove.s <= 1.0))) {
         at = VISION_LEAF_TO_EMOVE_S;
-    }
-    if ((at < 0) && (!((s->to_emove.range_mm >= 0.0) && (s->to_emove.range_mm <= 2000.0)))) {
+    } else if (!((s->to_emove.range_mm >= 0.0) && (s->to_emove.range_mm <= 2000.0))) {
         at = VISION_LEAF_TO_EMOVE_RANGE_MM;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+    } else if ((*(const uint8_t *)&s->new_command) > 1u) {
         at = VISION_LEAF_NEW_COMMAND;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->answered) > 1u)) {
+    } else if ((*(const uint8_t *)&s->answered) > 1u) {
         at = VISION_LEAF_ANSWERED;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->settling) > 1u)) {
+    } else if ((*(const uint8_t *)&s->settling) > 1u) {
         at = VISION_LEAF_SETTLING;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->camera.matched) > 1u)) {
+    } else if ((*(const uint8_t *)&s->camera.matched) > 1u) {
         at = VISION_LEAF_CAMERA_MATCHED;
-    }
-    if ((at < 0) && (s->cur_state > VISION_VISION_STATE_LOOKING)) {
+    } else if (s->cur_state > VISION_VISION_STATE_LOOKING) {
         at = VISION_LEAF_CUR_STATE;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->arrived) > 1u)) {
+    } else if ((*(const uint8_t *)&s->arrived) > 1u) {
         at = VISION_LEAF_ARRIVED;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
+    } else if ((*(const uint8_t *)&s->fits) > 1u) {
         at = VISION_LEAF_FITS;
-    }
-    if ((at < 0) && ((*(const uint8_t *)&s->faces) > 1u)) {
+    } else if ((*(const uint8_t *)&s->faces) > 1u) {
         at = VISION_LEAF_FACES;
-    }
-    if ((at < 0) && (s->waited > 100u)) {
+    } else if (s->waited > 100u) {
         at = VISION_LEAF_WAITED;
-    }
-    if ((at < 0) && (s->to_camera.fire > VISION_FLASH_LINE)) {
+    } else if (s->to_camera.fire > VISION_FLASH_LINE) {
         at = VISION_LEAF_TO_CAMERA_FIRE;
-    }
-    if ((at < 0) && (s->to_camera.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP)) {
+    } else if (s->to_camera.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = VISION_LEAF_TO_CAMERA_OBJ_PTR;
+    } else {
+        /* none of these */
     }
     return at;
 }

@@ -88,6 +88,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 
+MOST_CHAINED = 60
 MOST_TOLD = 32
 """Masks in a table up to which each stands in a line of its own, with its class."""
 MOST_NAMED = 72
@@ -422,14 +423,14 @@ class _Maker:
     def _admit(self, reals: bool) -> Function:
         """Refuses first, then admits: a refused cycle changes nothing but its trace."""
         inputs = [v for v in self.program.variables if v.kind is model.Kind.INPUT]
-        tests = [(v, self._refused(v, self.text.place(v.name))) for v in inputs]
-        asked = [(v, test) for v, test in tests if test is not None]
+        tests = [(Name(self.names.leaves[v.name]), self._refused(v, self.text.place(v.name))) for v in inputs]
+        asked = [(leaf, test) for leaf, test in tests if test is not None]
         taken = tuple(s for v in inputs for s in self._taken(v, self.text.place(v.name)))
         told = Set(FAULT, self._fault(Fault.ADMIT)), Set(FAULT_AT, AT)
         body: Body = taken
         if asked:
             branch = Branch(((infix(">=", AT, Constant(0)), told),), taken or None)
-            body = (Let("int32_t", "at", NONE), *self._first(asked), branch)
+            body = (Let("int32_t", "at", NONE), *_first(asked), branch)
         if reals:
             inexact = Prefix("!", Invoke(f"{self.p}_exact"))
             body = (Branch(((inexact, (Set(FAULT, self._fault(Fault.ARITHMETIC)),)),), body or None),)
@@ -439,12 +440,6 @@ class _Maker:
             *self._trace(self._fault(Fault.OK), NONE),
             *body,
         )
-
-    def _first(self, asked: Iterable[tuple[Variable, Code]]) -> Iterator[Stmt]:
-        """Leaves in `at` the position of the first variable whose test holds."""
-        for variable, test in asked:
-            leaf = Name(self.names.leaves[variable.name])
-            yield when(infix("&&", infix("<", AT, Constant(0)), test), Set(AT, leaf))
 
     def _refused(self, variable: Variable, place: Code) -> Code | None:
         """A condition that a value is refused; None where none can be. A NaN satisfies no comparison."""
@@ -502,7 +497,7 @@ class _Maker:
         body = (
             Let("int32_t" if asked else "const int32_t", "at", NONE),
             *(() if asked else (_unused(STATE),)),
-            *(when(infix("&&", infix("<", AT, Constant(0)), test), Set(AT, at)) for at, test in asked),
+            *_first(asked),
             Leave(AT),
         )
         return Function(doc, f"int32_t {self.p}_check(const {self.p}_t *s)", body)
@@ -815,6 +810,14 @@ class _Maker:
 
 
 # --- small things --------------------------------------------------------------------
+
+
+def _first(asked: Sequence[tuple[Code, Code]]) -> Iterator[Stmt]:
+    """Leaves in `at` the position of the first test that holds; a chain of `else if` is no longer than compilers nest."""
+    for begin in range(0, len(asked), MOST_CHAINED):
+        arms = tuple((test, (Set(AT, leaf),)) for leaf, test in asked[begin : begin + MOST_CHAINED])
+        chain = Branch(arms, (Line("/* none of these */"),))
+        yield when(infix("<", AT, Constant(0)), chain) if begin else chain
 
 
 def _counted(count: Name, end: Code, *body: Stmt) -> Frame:
