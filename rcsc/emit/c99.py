@@ -138,7 +138,7 @@ def outward(plan: Plan) -> Iterator[tuple[str, str]]:
     own += [f"{p}_{stem}_{end}" for stem in names.tables.values() for end in ("line", "lines", "step")]
     own += [f"{p}_{stem}_cycle" for stem in names.levels.values()]
     own += [name for lines in names.lines.values() for name in lines]
-    own += [*names.assumptions, *names.faults]
+    own += [*names.assumptions, *names.faults, *names.leaves.values(), *names.invariants]
     yield from ((name, f"a name of program `{plan.program.name}`") for name in own)
     for unit, shared in maker.shared().items():
         yield from ((name, f"a name of the types of `{unit}`") for name in shared)

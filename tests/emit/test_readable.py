@@ -1,0 +1,146 @@
+"""The C reads back to its table: names for numbers, short lines, what each case and each mask is of, and nothing around it."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcsc.emit import emitted
+from rcsc.emit.lower import lower
+from rcsc.emit.rendering import WIDTH, folded
+from tests.support.programs.stages import verdict_of
+
+GENERATED = Path(__file__).parents[2] / "generated/c"
+SHIPPED = sorted(path.name for path in GENERATED.glob("*.[ch]"))
+PROGRAMS = ("task", "emove", "primitive", "vision", "gripper", "approach")
+
+MIXED = """enum mode { idle, moving, failed }
+input told : mode
+input level : int 0 .. 100 [mm]
+input slope : int -20 .. 20
+input distance : int 0 .. 5000000000
+state now : mode
+state count : int 0 .. 200
+state twice : int -200 .. 300
+state further : int 0 .. 5000000001
+invariant small : count <= 200
+procedure compute {
+  twice := slope + count
+  further := distance + 1
+  for k in 0 .. 3 { if count < 200 { count := count + 1 } }
+}
+table run {
+  | line  | told                | level        || now    | procedures |
+  |-------|---------------------|--------------||--------|------------|
+  | rests | idle                |              || idle   |            |
+  | low   | moving              | < 50 [mm]    || moving | compute    |
+  | high  | moving              | >= 50 [mm]   || failed |            |
+  | fails | failed              |              || failed |            |
+}
+level axis {
+  period 10 [ms]
+  table run
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def mixed() -> dict[str, str]:
+    """The files of a program with members, ranges of several types, a loop and an invariant."""
+    verdict = verdict_of(MIXED)
+    assert verdict.proved is not None
+    files = emitted(lower(verdict.proved))
+    return {Path(name).suffix: text for name, text in files.items() if name.startswith("c/")}
+
+
+def test_numbers_of_members_lines_faults_and_variables_have_names(mixed: dict[str, str]) -> None:
+    source, header = mixed[".c"], mixed[".h"]
+    assert "s->now = CASE__MODE_FAILED;" in source
+    assert "s->fault = CASE__FAULT_NO_LINE;" in source
+    assert "at = CASE__LEAF_LEVEL;" in source
+    assert "at = CASE__INVARIANT_SMALL;" in source
+    assert "case CASE__LINE_RUN_HIGH: /* case.rcs line high: told moving; level >= 50 [mm] */" in source
+    for name in ("CASE__LEAF_LEVEL = 1", "CASE__INVARIANT_SMALL = 8", "CASE__LINE_RUN_HIGH = 2"):
+        assert name in header
+
+
+def test_arithmetic_is_done_in_the_smallest_type_that_holds_it(mixed: dict[str, str]) -> None:
+    source = mixed[".c"]
+    assert "s->twice = (int16_t)((int32_t)s->slope + (int32_t)s->count);" in source
+    assert "s->further = s->distance + UINT64_C(1);" in source
+    assert "s->count = (uint8_t)((uint32_t)s->count + 1u);" in source
+    assert "if (s->count < 200u) {" in source  # no cast where a variable is compared
+    assert "for (uint32_t v_k = 0u; v_k <= 3u; v_k = v_k + 1u) {" in source
+
+
+def test_a_mask_says_of_which_class_it_is_and_which_lines_it_leaves(mixed: dict[str, str]) -> None:
+    rows = re.findall(r"(0x\w+)u,? /\* (.*) \*/", mixed[".c"])
+    assert ("0x6", "moving: lines low, high") in rows
+    lines = ["rests", "low", "high", "fails"]
+    for mask, told in rows:
+        left = [line for at, line in enumerate(lines) if int(mask, 16) >> at & 1]
+        assert told.endswith("every line" if len(left) == 4 else f"lines {', '.join(left)}")
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_lines_are_short(name: str) -> None:
+    text = (GENERATED / name).read_text(encoding="utf-8")
+    assert max(map(len, text.splitlines())) <= WIDTH
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_nothing_is_copied_and_only_the_compilers_library_is_called(program: str, tmp_path: Path) -> None:
+    """A frame as large as the state would be a copy of it; what is called stands in the header."""
+    flags = ("-std=c99", "-Os", "-fno-stack-protector", "-fstack-usage", f"-I{GENERATED}")
+    sizes = f'#include "{program}.h"\nchar bytes[sizeof({program}_t)];\n'
+    (tmp_path / "sizes.c").write_text(sizes, encoding="utf-8")
+    source = GENERATED / f"{program}.c"
+    for path in (tmp_path / "sizes.c", source):
+        subprocess.run(["cc", *flags, "-c", path, "-o", f"{path.stem}.o"], cwd=tmp_path, check=True)
+    symbols = subprocess.run(
+        ["nm", "-S", "sizes.o"], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    [size] = [int(line.split()[1], 16) for line in symbols.stdout.splitlines() if line.endswith(" bytes")]
+    frames = [int(line.split("\t")[1]) for line in (tmp_path / f"{program}.su").read_text().splitlines()]
+    assert max(frames) < size
+    called = subprocess.run(
+        ["nm", "-u", f"{program}.o"], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    names = {line.split()[-1] for line in called.stdout.splitlines()}
+    assert names <= {"memcpy", "memset", "_GLOBAL_OFFSET_TABLE_"}
+
+
+NAMES = st.text("abcdefgh_", min_size=1, max_size=30)
+EXPRESSIONS = st.recursive(
+    NAMES,
+    lambda inner: st.one_of(
+        st.tuples(inner, st.sampled_from(["&&", "||", "+", "&", "<="]), inner).map(
+            lambda parts: f"({' '.join(parts)})"
+        ),
+        st.tuples(NAMES, st.lists(inner, min_size=1, max_size=4)).map(
+            lambda call: f"{call[0]}({', '.join(call[1])})"
+        ),
+        st.tuples(inner, inner, inner).map(lambda parts: f"({parts[0]} ? {parts[1]} : {parts[2]})"),
+    ),
+    max_leaves=40,
+)
+
+
+@given(EXPRESSIONS, st.integers(0, 6))
+def test_a_broken_line_is_the_same_code(expression: str, indent: int) -> None:
+    line = f"{'    ' * indent}value = {expression};"
+    lines = list(folded(line))
+    assert " ".join(" ".join(lines).split()) == line.strip()
+    assert all(len(each) <= WIDTH for each in lines) or indent + line.count("(") > 4
+    assert lines[0].startswith("    " * indent + "value")
+
+
+@given(st.lists(st.text("abc", min_size=5, max_size=20), min_size=20, max_size=40).map(" ".join))
+def test_a_long_comment_stands_before_its_code(words: str) -> None:
+    lines = list(folded(f"    case 1: /* {words} */"))
+    assert lines[-1] == "    case 1:"
+    assert " ".join(" ".join(lines[:-1]).split()) == f"/* {words} */"
+    assert max(map(len, lines)) <= WIDTH
