@@ -138,7 +138,13 @@ def outward(plan: Plan) -> Iterator[tuple[str, str]]:
     own += [f"{p}_{stem}_{end}" for stem in names.tables.values() for end in ("line", "lines", "step")]
     own += [f"{p}_{stem}_cycle" for stem in names.levels.values()]
     own += [name for lines in names.lines.values() for name in lines]
-    own += [*names.assumptions, *names.faults, *names.leaves.values(), *names.invariants]
+    own += [
+        *names.assumptions,
+        *names.faults,
+        *names.leaves.values(),
+        *names.invariants,
+        *names.places.values(),
+    ]
     yield from ((name, f"a name of program `{plan.program.name}`") for name in own)
     for unit, shared in maker.shared().items():
         yield from ((name, f"a name of the types of `{unit}`") for name in shared)
@@ -311,6 +317,12 @@ class _Maker:
         )
         doc = "`fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants"
         yield doc, tuple((position, "") for position in positions)
+        if self.names.places:
+            doc = "`fault_at` where a table that others follow in a cycle has no line, or several"
+            numbered = (
+                (name, table_position(self.program, table)) for table, name in self.names.places.items()
+            )
+            yield doc, tuple((f"{name} = {number}", "") for name, number in numbered)
         yield "`fault`, and what a cycle returns", self._numbered(self.names.faults, FAULT_DOCS)
 
     def _fields(self) -> Iterator[tuple[str, str]]:
@@ -763,10 +775,10 @@ class _Maker:
         """The order of several tables, and how a fault tells one before the last."""
         if not level.stages:
             return ""
-        places = (f"{name} ({table_position(self.program, name)})" for name in level.staged)
+        places = (f"{name} ({self.names.places[name]})" for name in level.staged)
         order = ", ".join((*places, " or ".join(level.tables.names)))
         return (
-            f" Its tables run in this order: {order}; where one before the last has no line, or several, `fault_at` is the number "
+            f" Its tables run in this order: {order}; where one before the last has no line, or several, `fault_at` is the constant "
             "given here."
         )
 
@@ -779,7 +791,7 @@ class _Maker:
             "||",
             tuple(infix("==", FAULT, self._fault(end)) for end in (Fault.NO_LINE, Fault.SEVERAL_LINES)),
         )
-        named = when(unmatched, Set(FAULT_AT, Constant(table_position(self.program, table))))
+        named = when(unmatched, Set(FAULT_AT, Name(self.names.places[table])))
         return self._table_run(table), Set(LINE, NONE), named
 
     def _chosen(self, choice: model.TableChoice, run: Callable[[str], Body]) -> Iterator[Stmt]:

@@ -152,6 +152,7 @@ class Names:
         class_members: For each enumeration, what its Python class calls each member.
         failed: Words of the trace for the monitored assumptions that failed.
         lines: For each table, the C constant of each line; `assumptions`, `faults`, `leaves` and `invariants` likewise.
+        places: The C constant of each table that others follow in a cycle.
         c: What stands at file scope in C; `module` in the Python module.
     """
 
@@ -176,6 +177,7 @@ class Names:
     faults: tuple[str, ...]
     leaves: dict[str, str]
     invariants: tuple[str, ...]
+    places: dict[str, str]
     c: NameScope
     module: NameScope
 
@@ -375,10 +377,11 @@ def _positions(
     tuple[str, ...],
     dict[str, str],
     tuple[str, ...],
+    dict[str, str],
 ]:
     """Constants for what a cycle tells by its position.
 
-    Lines of each table, assumptions that are checked, faults, variables, invariants.
+    Lines of each table, assumptions that are checked, faults, variables, invariants, tables that others follow.
     """
     lines = {
         str(table.name): tuple(
@@ -400,7 +403,8 @@ def _positions(
     invariants = tuple(
         scope.fresh(constant_word(p, "invariant", invariant.name)) for invariant in program.invariants
     )
-    return lines, assumptions, holding, faults, leaves, invariants
+    places = {str(table): scope.fresh(constant_word(p, "table", table)) for table in program.line_leaves}
+    return lines, assumptions, holding, faults, leaves, invariants, places
 
 
 def _class_members(program: Program) -> dict[str, tuple[str, ...]]:

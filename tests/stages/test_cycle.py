@@ -304,12 +304,12 @@ def swapped(c: str) -> str:
 
 def unkept(c: str) -> str:
     """The C that keeps the line of the cycle before where a table did not run."""
-    return c.replace("s->line_of_by_hand = (uint8_t)INT64_C(0);", "", 1)
+    return c.replace("s->line_of_by_hand = CASE__LINE_OF_BY_HAND_NONE;", "", 1)
 
 
 def unnamed(c: str) -> str:
     """The C that names another table in its fault."""
-    return c.replace("s->fault_at = 1;", "s->fault_at = 0;")
+    return edited(c, ("s->fault_at = CASE__TABLE_BY_HAND;", "s->fault_at = 0;"))
 
 
 @pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
