@@ -703,8 +703,9 @@ class _Maker:
 
     def _assumptions(self) -> Iterator[Function]:
         """One function for each assumption that is checked."""
-        for place, name in zip(self.plan.monitored, self.names.holding, strict=True):
-            assumption = self.program.assumptions[place]
+        told = {place for table in self.plan.tables for place in table.monitored}
+        for place in sorted(told):
+            name, assumption = self.names.holding[place], self.program.assumptions[self.plan.monitored[place]]
             words = comment(assumption.doc)
             doc = f"Assumption {assumption.name}{f': {words}' if words else ' holds.'}"
             body: Body = (Leave(self.text.expr(assumption.condition)),)
