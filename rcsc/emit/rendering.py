@@ -37,7 +37,8 @@ def render(template: str, view: Mapping[str, object]) -> str:
     text = environment().get_template(template).render(view)
     if not template.endswith((".c.jinja", ".h.jinja")):
         return text
-    return "".join(f"{line}\n" for long in text.splitlines() for line in folded(long))
+    first, *others = text.splitlines()  # the first says of which program the file is: it is read again
+    return "\n".join([first, *(line for long in others for line in folded(long)), ""])
 
 
 def folded(line: str) -> Iterator[str]:

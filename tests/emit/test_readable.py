@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.emit import emitted
-from rcsc.emit.lower import lower
+from rcsc.emit.generated import write
+from rcsc.emit.lower import lower, lower_by_force
 from rcsc.emit.rendering import WIDTH, folded
 from tests.support.programs.stages import verdict_of
 
@@ -144,3 +146,12 @@ def test_a_long_comment_stands_before_its_code(words: str) -> None:
     assert lines[-1] == "    case 1:"
     assert " ".join(" ".join(lines[:-1]).split()) == f"/* {words} */"
     assert max(map(len, lines)) <= WIDTH
+
+
+def test_a_file_with_a_long_name_is_still_known_as_its_programs(tmp_path: Path) -> None:
+    """The first line of a file says of which program it is; it is read before the file is overwritten."""
+    verdict = verdict_of(MIXED)
+    assert verdict.proved is not None
+    long = replace(verdict.proved.program, file=f"/{'a_long_folder/' * 12}case.rcs")
+    for _ in range(2):
+        assert write(emitted(lower_by_force(long)), str(tmp_path)) == ()
