@@ -31,6 +31,7 @@ from rcsc.emit.code_tree import (
     infix,
     read,
     repeated,
+    type_bounds,
     when,
 )
 from rcsc.emit.ctext import (
@@ -40,7 +41,6 @@ from rcsc.emit.ctext import (
     declared,
     local_type,
     locals_of,
-    type_bounds,
     wide_type,
     word_type,
 )
@@ -89,6 +89,7 @@ from rcsc.lang.model import (
 )
 
 MOST_CHAINED = 60
+"""Tests in a chain of `else if`."""
 MOST_TOLD = 32
 """Masks in a table up to which each stands in a line of its own, with its class."""
 MOST_NAMED = 72
@@ -463,8 +464,8 @@ class _Maker:
             return Prefix("!", Invoke(f"{self.p}_{name}", (place,), "bool", helper=name))
         if isinstance(kind, Bool) or clamped:
             return None
-        outside = tuple(test for test, _ in self._outside(kind, place))
-        return Infix("||", outside) if len(outside) > 1 else outside[0] if outside else None
+        outside = [test for test, _ in self._outside(kind, place)]
+        return infix("||", *outside) if outside else None
 
     def _taken(self, variable: Variable, place: Code) -> Iterator[Stmt]:
         """What admission makes of a value that is not refused: clamped, and no -0.0."""
@@ -524,8 +525,8 @@ class _Maker:
             return None
         if isinstance(kind, Real):
             return self._beyond(kind, place)
-        outside = tuple(test for test, _ in self._outside(kind, place))
-        return Infix("||", outside) if len(outside) > 1 else outside[0] if outside else None
+        outside = [test for test, _ in self._outside(kind, place)]
+        return infix("||", *outside) if outside else None
 
     def _begin(self) -> Iterator[Function]:
         if self.plan.defensive:
@@ -894,11 +895,11 @@ def _rows(entries: tuple[int, ...], words: int, bits: int, told: Sequence[str]) 
     if words <= 1 and not told:
         yield from _wrapped([_word(mask, bits) for mask in entries], 84)
         return
-    ends = (f" /* {comment(text)} */" for text in told or [""] * len(entries))
+    ends = [f" /* {comment(text)} */" for text in told] or [""] * len(entries)
     for at, (mask, end) in enumerate(zip(entries, ends, strict=True), 1):
         parts = Items(tuple(_word(mask >> (WORD * w) & (2**WORD - 1), WORD) for w in range(words)))
         code = IN_C.code(parts if words > 1 else _word(mask, bits))
-        yield Line(f"{code}{',' if words > 1 or at < len(entries) else ''}{end.replace(' /*  */', '')}")
+        yield Line(f"{code}{',' if words > 1 or at < len(entries) else ''}{end}")
 
 
 def _told(group: Group, entries: Sequence[int], lines: Sequence[str]) -> list[str]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import ClassVar, TypeAlias, assert_never
 
-from rcsc.lang.model import I64_MAX, I64_MIN, U64_MAX, Value
+from rcsc.lang.model import I64_MAX, I64_MIN, Value
 
 # --- expressions ---------------------------------------------------------------------
 
@@ -201,9 +201,17 @@ class Function:
     body: Body
 
 
-def infix(op: str, *operands: Code) -> Infix:
-    """An operation on these."""
-    return Infix(op, operands)
+def infix(op: str, *operands: Code) -> Code:
+    """An operation on these; one operand alone is what it is."""
+    return Infix(op, operands) if len(operands) > 1 else operands[0]
+
+
+def type_bounds(name: str) -> tuple[int, int]:
+    """Least and greatest value of an integer type of C, or of `bool`."""
+    if name == "bool":
+        return 0, 1
+    bits = int(name.strip("uint_"))
+    return (0, 2**bits - 1) if name.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
 def repeated(begin: Set, goes: Code, step: Set, *body: Stmt, declared: str = "") -> Frame:
@@ -235,10 +243,6 @@ def read(node: object) -> Iterator[Code]:
 
 # --- spelling ------------------------------------------------------------------------
 
-HIGHEST = MappingProxyType(
-    {"int32_t": 2**31 - 1, "uint32_t": 2**32 - 1, "int64_t": I64_MAX, "uint64_t": U64_MAX}
-)
-"""The greatest value of each type that a loop may count in."""
 TIGHTEST = 9
 """A level above that of every operator."""
 
@@ -386,13 +390,12 @@ class C(Language):
                 count, high = Name(name), Constant(stmt.high, kind)
                 begin = Set(count, Constant(stmt.low, kind))
                 step = Set(count, infix("+", count, Constant(1, kind)))
-        if stmt.high < HIGHEST[kind]:
-            goes = infix("<=", count, high)
-            goes = infix("&&", goes, *guard) if guard else goes
+        if stmt.high < type_bounds(kind)[1]:
+            goes = infix("&&", infix("<=", count, high), *guard)
             return (repeated(begin, goes, step, *stmt.body, declared=f"{kind} "),)
         more = Name(f"more_{name.removeprefix('v_')}")
         inner = (*stmt.body, Set(more, infix("<", count, high)), when(more, step))
-        again = Frame(("while (", infix("&&", more, *guard) if guard else more, ") {"), inner, "}")
+        again = Frame(("while (", infix("&&", more, *guard), ") {"), inner, "}")
         first = Let(kind, name, begin.value)
         return (Frame(("{",), (Let("bool", more.text, Constant(1, "bool")), first, again), "}"),)
 

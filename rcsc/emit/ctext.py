@@ -8,7 +8,7 @@ stored has no -0.0.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, assert_never
 
@@ -32,6 +32,7 @@ from rcsc.emit.code_tree import (
     Set,
     Stmt,
     infix,
+    type_bounds,
     when,
 )
 from rcsc.emit.identifiers import Names
@@ -103,14 +104,6 @@ def local_type(kind: Scalar) -> str:
     return word_type(kind.low, kind.high) if isinstance(kind, Int) else c_type(kind)
 
 
-def type_bounds(name: str) -> tuple[int, int]:
-    """Least and greatest value of an integer type of C, or of `bool`."""
-    if name == "bool":
-        return 0, 1
-    bits = int(name.strip("uint_"))
-    return (0, 2**bits - 1) if name.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-
-
 def carried(expr: Expr) -> str:
     """The C type of the code of an expression; of a whole number as a constant, one that it fits in."""
     match expr:
@@ -128,8 +121,13 @@ def carried(expr: Expr) -> str:
 
 def _working(expr: model.Apply) -> str:
     """The type in which an operation with a whole number as its result is done: it holds the bounds of operands and result."""
-    kinds = [kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int)]
-    return word_type(min(kind.low for kind in kinds), max(kind.high for kind in kinds))
+    return word_type(*_bounds((*expr.args, expr)))
+
+
+def _bounds(exprs: Iterable[Expr]) -> tuple[int, int]:
+    """The bounds of all whole numbers among these together."""
+    kinds = [expr.type for expr in exprs if isinstance(expr.type, Int)]
+    return min(kind.low for kind in kinds), max(kind.high for kind in kinds)
 
 
 def _c_bounds(expr: Expr) -> tuple[Value, Value]:
@@ -178,13 +176,12 @@ def _compared_in(args: Sequence[Expr]) -> str | None:
     negative = any(isinstance(arg, model.Literal) and arg.value < 0 for arg in args)
     if signed == {True} or (signed == {False} and not negative):
         return None
-    kinds = [arg.type for arg in args if isinstance(arg.type, Int)]
-    return word_type(min(kind.low for kind in kinds), max(kind.high for kind in kinds))
+    return word_type(*_bounds(args))
 
 
-def _spelled(value: int, sign: str) -> str:
-    """The type of a constant beside an operand, unsigned for the sign ``."""
-    return word_type(min(value, -1) if sign else value, value)
+def _beside(value: int, other: str) -> str:
+    """The type of a constant beside an operand of type `other`: it has its sign."""
+    return word_type(value if other.startswith("u") else min(value, -1), value)
 
 
 def negated(code: Code) -> Code:
@@ -325,11 +322,12 @@ class CText(Text):
             isinstance(expr, model.Apply)
             and is_arithmetic(expr.op)
             and target in WORD_TYPES
+            and isinstance(expr.type, Int)
             and not field_of(expr)
         ):
             low, high = type_bounds(target)
-            kinds = [each.type for each in (*expr.args, expr) if isinstance(each.type, Int)]
-            if kinds and all(low <= kind.low and kind.high <= high for kind in kinds):
+            least, most = _bounds((*expr.args, expr))
+            if low <= least and most <= high:
                 return self._operation(expr.op, tuple(self.in_type(arg, target) for arg in expr.args), target)
         return self.converted(self.expr(expr), carried(expr), target)
 
@@ -345,9 +343,7 @@ class CText(Text):
     def among(self, subject: Code, kind: Scalar, values: Sequence[Value]) -> Code:
         """Whether it is one of the values."""
         equal = tuple(infix("==", subject, self.constant(kind, value)) for value in values)
-        if len(equal) == 1:
-            return equal[0]
-        return Infix("||", equal) if equal else constant(Bool(), value=False)
+        return infix("||", *equal) if equal else constant(Bool(), value=False)
 
     def _applied(self, op: Operator, args: tuple[Expr, ...], expr: model.Apply) -> Code:
         """An operation, in the type that the prover shows operands and result to fit in."""
@@ -376,9 +372,8 @@ class CText(Text):
         if shared is not None:
             return tuple(self.in_type(arg, shared) for arg in args)
         other = next(carried(arg) for arg in args if not isinstance(arg, model.Literal))
-        sign = "" if other.startswith("u") else "-"
         return tuple(
-            self.in_type(arg, _spelled(int(arg.value), sign))
+            self.in_type(arg, _beside(int(arg.value), other))
             if isinstance(arg, model.Literal)
             else self.expr(arg)
             for arg in args

@@ -97,7 +97,7 @@ class Text(ABC):
                 if value is not None:
                     yield Set(local(name), self.stored(kind, value))
             case model.If(condition=condition, then=then, orelse=orelse):
-                arm = self.asked(condition), self.block(then)
+                arm = self.expr(condition), self.block(then)
                 yield Branch((arm,), self.block(orelse) if orelse else None)
             case model.Case():
                 yield from self.case(statement) if statement.arms else self.block(statement.orelse)
@@ -107,10 +107,6 @@ class Text(ABC):
                 yield Do(self.call(name, args))
             case _:
                 assert_never(statement)
-
-    def asked(self, condition: Expr) -> Code:
-        """The condition of an `if`."""
-        return self.expr(condition)
 
     def guard(self, _loop: model.For) -> tuple[Code, ...]:
         """What must hold in a loop that it goes on."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import TypeAlias
 
-from rcsc.emit.ctext import type_bounds
+from rcsc.emit.code_tree import type_bounds
 from rcsc.run.description import Description
 from rcsc.run.signature import Leaf, Signature, Value, Values
 

@@ -22,9 +22,10 @@ from rcsc.emit.code_tree import (
     Stmt,
     infix,
     repeated,
+    type_bounds,
     when,
 )
-from rcsc.emit.ctext import c_type, type_bounds
+from rcsc.emit.ctext import c_type
 from rcsc.emit.identifiers import TRACE, comment, constant_word, guard
 from rcsc.emit.rendering import render
 from rcsc.emit.translate import constant
