@@ -63,7 +63,7 @@ MODULES = tuple(
 TESTS = tuple(
     f"tests/{name}.py"
     for name in """
-    table/test_checker_figures table/test_told lang/test_nodes compose/test_figures
+    table/test_checker_figures diagnostics/test_told lang/test_nodes compose/test_figures
     table/test_boxes lang/test_operators lang/test_bounds table/test_regions table/test_obligations table/test_invariants
     lang/test_interpret table/test_proofs table/test_certify table/test_verdicts table/test_stops compose/test_properties_language
     compose/test_composed_sound compose/test_composed_search compose/test_endings compose/test_standing compose/test_hierarchies

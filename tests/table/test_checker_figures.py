@@ -17,8 +17,8 @@ from rcsc.certify.values import BOOL, FREE, INT, REAL, TRUTHS, Term, Terms, part
 from rcsc.lang.model import Bool, Int, Program, Real
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
+from tests.diagnostics.test_told import FAULTY
 from tests.support.programs.stages import program_of
-from tests.table.test_told import FAULTY
 
 TERMS = Terms()
 MAKE = TERMS.make
