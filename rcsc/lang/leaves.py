@@ -30,14 +30,19 @@ from rcsc.lang.model import (
 def parts(expr: Expr) -> Iterator[Expr]:
     """The expression and all below it, wholes before parts."""
     yield expr
+    for operand in operands(expr):
+        yield from parts(operand)
+
+
+def operands(expr: Expr) -> tuple[Expr, ...]:
+    """The expressions directly below it."""
     match expr:
         case Apply(args=args):
-            for part in args:
-                yield from parts(part)
-        case Among(subject=part) | Select(index=part):
-            yield from parts(part)
+            return args
+        case Among(subject=operand) | Select(index=operand):
+            return (operand,)
         case Literal() | Read() | ReadLocal():
-            return
+            return ()
         case _:
             assert_never(expr)
 

@@ -7,10 +7,10 @@ what it does not answer leaves the witness as it was.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import reduce
 
 from rcsc.lang.interval_sets import holds
-from rcsc.lang.model import Apply, Bool, Expr, Op, Program, Table, key_of
+from rcsc.lang.model import Expr, Program, Table, key_of
+from rcsc.lang.questions import conjunction, negation
 from rcsc.solvers.options import Options
 from rcsc.symbolic.encode import least_where
 from rcsc.table.verdict import Gap, Overlap, Region, TableFinding, Witness
@@ -60,7 +60,7 @@ def _likely_overlap(
 def _likely_gap(program: Program, table: Table, gap: Gap, facts: Sequence[Expr], options: Options) -> Gap:
     """The gap, with the region first that such an input lies in."""
     here = [
-        Apply(Op.NOT, (reduce(_both, (test.condition for test in line.tests if test is not None)),), Bool())
+        negation(conjunction(test.condition for test in line.tests if test is not None))
         for line in table.lines
         if any(line.tests)
     ]
@@ -74,10 +74,6 @@ def _likely_gap(program: Program, table: Table, gap: Gap, facts: Sequence[Expr],
     order = [at, *(other for other in range(len(gap.regions)) if other != at)]
     witnesses = (witness, *(gap.witnesses[other] for other in order[1:]))
     return replace(gap, witnesses=witnesses, regions=tuple(gap.regions[other] for other in order))
-
-
-def _both(left: Expr, right: Expr) -> Expr:
-    return Apply(Op.AND, (left, right), Bool())
 
 
 def _inside(program: Program, region: Region | None, witness: Witness) -> bool:

@@ -14,8 +14,8 @@ from itertools import pairwise
 from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.words import Field, Mask, field_of, mask_of
 from rcsc.lang.interval_sets import joined, meet
+from rcsc.lang.leaves import operands, rebuilt
 from rcsc.lang.leaves import parts as every_part
-from rcsc.lang.leaves import rebuilt
 from rcsc.lang.model import (
     Apply,
     Box,
@@ -199,19 +199,8 @@ def _fields(condition: Expr) -> Iterator[Field]:
     if part is not None:
         yield part
     else:
-        for inner in _operands(condition):
+        for inner in operands(condition):
             yield from _fields(inner)
-
-
-def _operands(expr: Expr) -> list[Expr]:
-    operands: list[Expr] = []
-
-    def seen(operand: Expr) -> Expr:
-        operands.append(operand)
-        return operand
-
-    rebuilt(expr, seen)
-    return operands
 
 
 def _of_mask(mask: Mask, parts: Sequence[Part]) -> dict[str, Box]:
