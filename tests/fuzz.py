@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.emit.c99 import emit_c
+from rcsc.emit.c.c99 import emit_c
 from rcsc.emit.lower import lower
 from rcsc.emit.python import emit_python
 from rcsc.lang import reserved

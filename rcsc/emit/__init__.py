@@ -27,16 +27,16 @@ bytes on every machine: no time, version or absolute path is in them. Trusted: a
 `rcsc test` compares them with the interpreter, and with `--deep` has the C proved.
 
 Modules, in the order the data flows: `lower` makes a `plan`; `identifiers` spells every name; `code_tree` is a small tree
-of code, which C and Python share, and its spelling in each; `translate` and `ctext` make it of expressions and statements,
-`c99` and `python` of whole files, by the templates of `rendering`; `symbols` makes the symbol file; `generated` writes
-them or says whether they are fresh. `TARGETS` names the languages: a new one is a module and its line here.
+of code, which C and Python share, and its spelling in each; `translate` makes it of expressions and statements,
+the room `c` and `python` of whole files, by the templates of `rendering`; `generated`
+writes them or says whether they are fresh. `TARGETS` names the languages: a new one is a module and its line here.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from rcsc.emit.c99 import emit_c, outward
+from rcsc.emit.c.c99 import emit_c, outward
 from rcsc.emit.plan import Plan
 from rcsc.emit.python import emit_python
 

@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias, assert_never
 
-from rcsc.emit.c99 import range_text
+from rcsc.emit.c.c99 import range_text
+from rcsc.emit.c.ctext import c_type
 from rcsc.emit.code_tree import (
     Body,
     Cast,
@@ -25,7 +26,6 @@ from rcsc.emit.code_tree import (
     type_bounds,
     when,
 )
-from rcsc.emit.ctext import c_type
 from rcsc.emit.identifiers import TRACE, comment, constant_word, guard
 from rcsc.emit.rendering import render
 from rcsc.emit.translate import constant

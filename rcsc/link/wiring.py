@@ -8,7 +8,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rcsc.emit.ctext import declared
+from rcsc.emit.c.ctext import declared
+from rcsc.emit.c.symbols import symbols
 from rcsc.emit.identifiers import (
     Names,
     NameScope,
@@ -20,7 +21,6 @@ from rcsc.emit.identifiers import (
     plain_word,
 )
 from rcsc.emit.plan import Plan
-from rcsc.emit.symbols import symbols
 from rcsc.host.files.read import CheckedFields, json_of
 from rcsc.lang.model import Array, Record, Type
 from rcsc.run.description import Description, LevelSpec, Wire

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rcsc.emit import emit_c, emit_python
+from rcsc.emit.c.ctext import CText
 from rcsc.emit.code_tree import IN_C
-from rcsc.emit.ctext import CText
 from rcsc.emit.identifiers import names_of
 from rcsc.emit.lower import lower
 from rcsc.lang.model import Box, Program, ProvedProgram, Value, key_bounds, seal_of_proof, value_of_key

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.certify import check_certificate
-from rcsc.emit.c99 import emit_c
+from rcsc.emit.c.c99 import emit_c
 from rcsc.emit.lower import lower
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import holds

@@ -17,7 +17,7 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun
 from rcsc.compose.counterexample.finding import Finding, rows
 from rcsc.emit import emitted
-from rcsc.emit.ctext import c_type, wide_type
+from rcsc.emit.c.ctext import c_type, wide_type
 from rcsc.emit.lower import lower, lower_by_force
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Kind as VariableKind

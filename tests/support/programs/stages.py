@@ -9,7 +9,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
 from rcsc.emit import TARGETS
-from rcsc.emit.c99 import emit_c
+from rcsc.emit.c.c99 import emit_c
 from rcsc.emit.lower import lower
 from rcsc.emit.python import emit_python
 from rcsc.lang.model import Program, ProvedProgram, seal_of_proof

@@ -4,6 +4,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import product
 from typing import TypeAlias, assert_never
 
+from rcsc.emit.c.ctext import (
+    SHORT,
+    CText,
+    c_type,
+    declared,
+    local_type,
+    locals_of,
+    wide_type,
+    word_type,
+)
+from rcsc.emit.c.symbols import symbols, unit_text
 from rcsc.emit.code_tree import (
     IN_C,
     Body,
@@ -34,16 +45,6 @@ from rcsc.emit.code_tree import (
     type_bounds,
     when,
 )
-from rcsc.emit.ctext import (
-    SHORT,
-    CText,
-    c_type,
-    declared,
-    local_type,
-    locals_of,
-    wide_type,
-    word_type,
-)
 from rcsc.emit.identifiers import (
     FAILED_BITS,
     NameScope,
@@ -69,7 +70,6 @@ from rcsc.emit.plan import (
     table_position,
 )
 from rcsc.emit.rendering import render
-from rcsc.emit.symbols import symbols, unit_text
 from rcsc.emit.translate import FAULT, FAULT_AT, LINE, STATE, constant, local
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault

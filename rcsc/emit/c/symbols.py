@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 
-from rcsc.emit.ctext import c_type
+from rcsc.emit.c.ctext import c_type
 from rcsc.emit.identifiers import Names
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import (
