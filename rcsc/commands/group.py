@@ -32,6 +32,7 @@ COMMANDS = {
     "completion": "Print a shell's completion script.",
     "systems.db": "Build, check and show the cell's database.",
     "tables.diff": "Show what changed in meaning, and prove that nothing else did.",
+    "tables.evidence": "Make what a safety case asks of the generated C.",
     "explain": "Say what a code means.",
     "tables.fmt": "Align tables.",
     "tables.graph": "Draw a table's state graph.",

@@ -1376,6 +1376,12 @@ class Code(StrEnum):
     that a C function does what the tables say. What a tool could not decide is a figure of `rcsc test`, and no finding. Please report
     it: this is a bug in rcsc.
     """
+    EVIDENCE_LACKS = """RCS605: evidence is not whole
+
+    `rcsc evidence` makes what a safety case asks of the generated C. Each note names what a kind of evidence does not show, with its
+    place and its reason; the files that were made say the same. Where a tool is not installed, the kind shows nothing: install it, or
+    leave the kind out with `--only`, and the index does not list it.
+    """
     LOG_UNREADABLE = """RCS701: a log cannot be read
 
     The file is not there, is no MCAP file, or holds no run that rcsc recorded: a name in it is none, or it unpacks to more than a log

@@ -1,0 +1,9 @@
+"""The kinds of evidence, by the names that `rcsc evidence --only` takes."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from rcsc.evidence.kind import Kind
+
+KINDS: Mapping[str, Kind] = MappingProxyType({})
+"""In the order in which they are made and listed. A new one is a module and its line here."""
