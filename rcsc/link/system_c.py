@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias, assert_never
 
-from rcsc.emit.c.c99 import range_text
 from rcsc.emit.c.ctext import c_type
+from rcsc.emit.c.declarations import range_text
 from rcsc.emit.code_tree import (
     Body,
     Cast,

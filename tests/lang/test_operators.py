@@ -20,8 +20,8 @@ from rcsc.certify.settle import script, values_in
 from rcsc.certify.values import Term, Terms, sort_of
 from rcsc.diagnostics.codes import Code
 from rcsc.diff.changes.value_text import in_words
-from rcsc.emit.c.c99 import helper
 from rcsc.emit.c.ctext import CText, wide_type
+from rcsc.emit.c.helpers import helper
 from rcsc.emit.code_tree import IN_C, IN_PYTHON, Invoke, read
 from rcsc.emit.identifiers import names_of
 from rcsc.emit.translate import PyText

@@ -1,0 +1,150 @@
+"""Admission of inputs and of results, and the check of a state that comes from outside."""
+
+from collections.abc import Iterator
+
+from rcsc.emit.c.cprogram import AT, NONE, CProgram, discarded, fault_name, first_of, on_state, run_on_state
+from rcsc.emit.c.ctext import c_type
+from rcsc.emit.code_tree import (
+    Body,
+    Branch,
+    Cast,
+    Code,
+    Constant,
+    Function,
+    Invoke,
+    Leave,
+    Let,
+    Name,
+    Place,
+    Prefix,
+    Set,
+    Stmt,
+    infix,
+    type_bounds,
+    when,
+)
+from rcsc.emit.translate import FAULT, FAULT_AT, STATE, constant
+from rcsc.lang import model
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import Bool, Enum, Int, Real, Variable, key_bounds
+
+
+def trace(c: CProgram, fault: Code, at: Code) -> Body:
+    """The trace of a cycle that has run no line."""
+    told = {"line": NONE, "fault": fault, "fault_at": at} | dict.fromkeys(c.names.failed, Constant(0))
+    return tuple(Set(Place((name,)), value) for name, value in told.items())
+
+
+def admit_function(c: CProgram, reals: bool) -> Function:
+    """Refuses first, then admits: a refused cycle changes nothing but its trace."""
+    inputs = [v for v in c.program.variables if v.kind is model.Kind.INPUT]
+    tests = [(Name(c.names.leaves[v.name]), refusal(c, v, c.text.place(v.name))) for v in inputs]
+    asked = [(leaf, test) for leaf, test in tests if test is not None]
+    taken = tuple(s for v in inputs for s in admitted(c, v, c.text.place(v.name)))
+    told = Set(FAULT, fault_name(c, Fault.ADMIT)), Set(FAULT_AT, AT)
+    body: Body = taken
+    if asked:
+        branch = Branch(((infix(">=", AT, Constant(0)), told),), taken or None)
+        body = (Let("int32_t", "at", NONE), *first_of(asked), branch)
+    if reals:
+        inexact = Prefix("!", Invoke(f"{c.p}_exact"))
+        body = (Branch(((inexact, (Set(FAULT, fault_name(c, Fault.ARITHMETIC)),)),), body or None),)
+    return on_state(
+        c,
+        "Admits every input; a refused one leaves everything else as it was.",
+        "admit",
+        *trace(c, fault_name(c, Fault.OK), NONE),
+        *body,
+    )
+
+
+def refusal(c: CProgram, variable: Variable, place: Code) -> Code | None:
+    """A condition that a value is refused; None where none can be. A NaN satisfies no comparison."""
+    kind, clamped = variable.type, variable.admit is model.Admit.CLAMP
+    if isinstance(kind, Real):
+        if not clamped:
+            return _beyond(c, kind, place)
+        name = "number_f64"
+        return Prefix("!", Invoke(f"{c.p}_{name}", (place,), "bool", helper=name))
+    if isinstance(kind, Bool) or clamped:
+        return None
+    outside = [test for test, _ in _outside(c, kind, place)]
+    return infix("||", *outside) if outside else None
+
+
+def admitted(c: CProgram, variable: Variable, place: Code) -> Iterator[Stmt]:
+    """What admission makes of a value that is not refused: clamped, and no -0.0."""
+    kind, clamped = variable.type, variable.admit is model.Admit.CLAMP
+    if isinstance(kind, Real):
+        if clamped:
+            low, high = (c.text.constant(kind, end) for end in (kind.low, kind.high))
+            yield when(infix("<", place, low), Set(place, low))
+            yield when(infix(">", place, high), Set(place, high))
+        yield Set(place, infix("+", place, constant(kind, 0)))
+    elif clamped and not isinstance(kind, Bool):
+        yield from (when(test, Set(place, end)) for test, end in _outside(c, kind, place))
+
+
+def _beyond(c: CProgram, kind: Real, place: Code) -> Code:
+    """A condition that a real is outside its range, or no number."""
+    low, high = (c.text.constant(kind, end) for end in (kind.low, kind.high))
+    return Prefix("!", infix("&&", infix(">=", place, low), infix("<=", place, high)))
+
+
+def _outside(c: CProgram, kind: Int | Enum, place: Code) -> list[tuple[Code, Code]]:
+    """For each end of the range that the C type passes: the test that a value is beyond it, and the end."""
+    low, high = key_bounds(kind)
+    least, greatest = type_bounds(c_type(kind))
+    ends = ((least < low, "<", low), (greatest > high, ">", high))
+    shown = ((op, c.text.constant(kind, end)) for passed, op, end in ends if passed)
+    return [(infix(op, place, end), end) for op, end in shown]
+
+
+def check_function(c: CProgram) -> Function:
+    """Checks all states and outputs, and the representation of every bool; then the invariants over them."""
+    tests = [(Name(c.names.leaves[v.name]), _unfit(c, v)) for v in c.program.variables]
+    tests += [
+        (Name(name), Prefix("!", c.text.expr(invariant.condition)))
+        for name, invariant in zip(c.names.invariants, c.program.invariants, strict=True)
+    ]
+    asked = [(at, test) for at, test in tests if test is not None]
+    doc = (
+        "Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after "
+        "the variables, of the first invariant that does not hold. Call it on every state that comes from outside."
+    )
+    body = (
+        Let("int32_t" if asked else "const int32_t", "at", NONE),
+        *(() if asked else (discarded(STATE),)),
+        *first_of(asked),
+        Leave(AT),
+    )
+    return Function(doc, f"int32_t {c.p}_check(const {c.p}_t *s)", body)
+
+
+def _unfit(c: CProgram, variable: Variable) -> Code | None:
+    """A condition that the place holds no value of its type; None where its C type or admission rules that out."""
+    kind, place = variable.type, c.text.place(variable.name)
+    if isinstance(kind, Bool):  # read as a byte: as a bool, another than 0 and 1 means nothing
+        byte = Prefix("*", Cast("const uint8_t *", Prefix("&", place)))
+        return infix(">", byte, Constant(1, "uint32_t"))
+    if variable.kind is model.Kind.INPUT:
+        return None
+    if isinstance(kind, Real):
+        return _beyond(c, kind, place)
+    outside = [test for test, _ in _outside(c, kind, place)]
+    return infix("||", *outside) if outside else None
+
+
+def begin_functions(c: CProgram) -> Iterator[Function]:
+    """Begin a cycle of a program that trusts no state: check, then admit."""
+    if c.plan.defensive:
+        yield on_state(
+            c,
+            "Checks the state, then admits every input.",
+            "begin",
+            Let("const int32_t", "at", Invoke(f"{c.p}_check", (STATE,))),
+            Branch(
+                ((infix("<", AT, Constant(0)), (run_on_state(c, "admit"),)),),
+                trace(c, fault_name(c, Fault.STATE), AT),
+            ),
+        )

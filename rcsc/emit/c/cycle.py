@@ -1,0 +1,206 @@
+"""What a cycle does: settles, checks assumptions, runs the line that matches, and what goes before and after."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+from rcsc.emit.c.admission import trace
+from rcsc.emit.c.cprogram import (
+    NONE,
+    ONE,
+    CProgram,
+    assigned,
+    discarded,
+    fault_name,
+    on_state,
+    run_on_state,
+    touches_state,
+)
+from rcsc.emit.c.ctext import c_type, local_type
+from rcsc.emit.code_tree import (
+    Body,
+    Branch,
+    Cast,
+    Constant,
+    Do,
+    Frame,
+    Function,
+    Infix,
+    Invoke,
+    Leave,
+    Let,
+    Line,
+    Name,
+    Place,
+    Prefix,
+    Round,
+    Set,
+    Stmt,
+    infix,
+    when,
+)
+from rcsc.emit.identifiers import FAILED_BITS, comment
+from rcsc.emit.plan import PlanTable
+from rcsc.emit.translate import FAULT, FAULT_AT, LINE, STATE
+from rcsc.lang import model
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import pending
+
+
+def settle_function(c: CProgram) -> Function:
+    """Give the function that moves deferred values in."""
+    deferred = [(v, v.deferred_until) for v in c.program.variables if v.deferred_until is not None]
+    ready = [Name(f"ready{at}") for at, _ in enumerate(deferred)]
+    pairs = list(zip(ready, deferred, strict=True))
+    lets = (Let("const bool", flag.text, c.text.expr(until)) for flag, (_, until) in pairs)
+    sets = (when(flag, Set(c.text.place(v.name), c.text.place(pending(v.name)))) for flag, (v, _) in pairs)
+    doc = "Deferred variables take their next values, all at once."
+    none = [assigned(c, c.program.variable(leaf), 0) for leaf in c.program.line_leaves.values()]
+    unread = () if deferred or none else (discarded(STATE),)
+    return on_state(c, doc, "settle", *lets, *sets, *none, *unread)
+
+
+def safe_functions(c: CProgram) -> Iterator[Function]:
+    """Give the function that shows safe outputs, where any is declared."""
+    shown = [
+        assigned(c, variable, variable.safe) for variable in c.program.variables if variable.safe is not None
+    ]
+    if shown:
+        yield on_state(c, "After a fault: outputs that have a safe value show it.", "safe", *shown)
+
+
+def action_functions(c: CProgram) -> Iterator[Function]:
+    """One function a table: a match that runs the line's actions."""
+    for table in c.plan.tables:
+        name = c.names.tables[table.table.name]
+        told = [stmt for place in table.monitored for stmt in _told(c, place, stops=place in table.stops)]
+        matched = _matched(c, table, name)
+        run = (when(c.text.faultless, *matched),) if table.stops else matched
+        doc = f"Matches table {table.table.name} and runs the line."
+        yield on_state(c, doc, f"run_{name}", *told, *run)
+
+
+def assumption_functions(c: CProgram) -> Iterator[Function]:
+    """One function for each assumption that is checked."""
+    told = {place for table in c.plan.tables for place in table.monitored}
+    for place in sorted(told):
+        name, assumption = c.names.holding[place], c.program.assumptions[c.plan.monitored[place]]
+        words = comment(assumption.doc)
+        doc = f"Assumption {assumption.name}{f': {words}' if words else ' holds.'}"
+        body: Body = (Leave(c.text.expr(assumption.condition)),)
+        unread = () if touches_state(body) else (discarded(STATE),)
+        yield Function(doc, f"bool {name}(const {c.p}_t *s)", (*unread, *body))
+
+
+def _told(c: CProgram, place: int, *, stops: bool) -> Body:
+    """Marks an assumption that fails; one that stops ends the cycle."""
+    word, bit = divmod(place, FAILED_BITS)
+    failed = Place((c.names.failed[word],))
+    shift = Constant(bit, "uint32_t") if word else Cast("uint32_t", Name(c.names.assumptions[place]))
+    mark = Set(failed, infix("|", failed, infix("<<", ONE, shift)))
+    name = Name(c.names.assumptions[place])
+    end = Set(FAULT, fault_name(c, Fault.ASSUMPTION)), Set(FAULT_AT, name)
+    ended = (when(c.text.faultless, *end),) if stops else ()
+    test = Prefix("!", Invoke(c.names.holding[place], (STATE,)))
+    return (when(test, mark, *ended),)
+
+
+def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
+    """Finds the line and runs its actions."""
+    cases: list[Stmt] = []
+    named = zip(c.names.lines[table.table.name], table.lines, strict=True)
+    for number, (line_name, line) in enumerate(named, 1):
+        body = c.text.block([action.statement for action in line.actions])
+        head = (f"case {line_name}: /* {comment(line.told)} */",)
+        cases.append(Frame(head, (*_kept(c, table, number), *body, Line("break;"))))
+    none, several = (Set(FAULT, fault_name(c, fault)) for fault in (Fault.NO_LINE, Fault.SEVERAL_LINES))
+    return (
+        Set(LINE, Invoke(f"{c.p}_{name}_line", (STATE,))),
+        Frame(("switch (", LINE, ") {")),
+        *cases,
+        Frame(("case ", Round(NONE), ":"), (none, Line("break;"))),
+        Frame(("default:",), (Set(LINE, NONE), several, Line("break;"))),
+        Line("}"),
+    )
+
+
+def _kept(c: CProgram, table: PlanTable, line: int) -> Body:
+    """Keeps the line of a table that others follow in a cycle."""
+    leaf = c.program.line_leaves.get(table.table.name)
+    return () if leaf is None else (assigned(c, c.program.variable(leaf), line),)
+
+
+def _cycle(c: CProgram, doc: str, name: str, *body: Stmt) -> Function:
+    """The frame of every step and cycle."""
+    begin = run_on_state(c, "begin" if c.plan.defensive else "admit")
+    shown = any(variable.safe is not None for variable in c.program.variables)
+    safe = (when(c.text.faulted, run_on_state(c, "safe")),) if shown else ()
+    run = when(c.text.faultless, run_on_state(c, "settle"), *body)
+    return on_state(c, doc, name, begin, run, *safe, Leave(FAULT), gives="int32_t")
+
+
+def step_functions(c: CProgram) -> Iterator[Function]:
+    """Give the step of each table."""
+    for table in c.plan.tables:
+        name = c.names.tables[table.table.name]
+        doc = f"One step of table {table.table.name}: admits, settles, matches, acts; returns the fault, 0 for none."
+        yield _cycle(c, doc, f"{name}_step", run_on_state(c, f"run_{name}"))
+
+
+def cycle_function(c: CProgram, level: model.Level) -> Function:
+    """Give the cycle of a level."""
+    before = (when(c.text.faultless, Do(c.text.call(name))) for name in level.preprocess)
+    stages = (when(c.text.faultless, *_chosen(c, stage, partial(_stage, c))) for stage in level.stages)
+    after = (when(c.text.faultless, Do(c.text.call(name))) for name in level.postprocess)
+    doc = f"One cycle of level {level.name}, every {level.period_ms} ms: returns the fault, 0 for none.{_order(c, level)}"
+    name = f"{c.names.levels[level.name]}_cycle"
+    last = when(c.text.faultless, *_chosen(c, level.tables, lambda table: (_table_run(c, table),)))
+    return _cycle(c, doc, name, *before, *stages, last, *after)
+
+
+def _order(c: CProgram, level: model.Level) -> str:
+    """The order of several tables, and how a fault tells one before the last."""
+    if not level.stages:
+        return ""
+    places = (f"{name} ({c.names.places[name]})" for name in level.staged)
+    order = ", ".join((*places, " or ".join(level.tables.names)))
+    return (
+        f" Its tables run in this order: {order}; where one before the last has no line, or several, `fault_at` is the constant "
+        "given here."
+    )
+
+
+def _table_run(c: CProgram, table: str) -> Do:
+    return run_on_state(c, f"run_{c.names.tables[table]}")
+
+
+def _stage(c: CProgram, table: str) -> Body:
+    """Runs a table that others follow: the trace's line is the last one's, a fault for want of a line names the table."""
+    unmatched = Infix(
+        "||",
+        tuple(infix("==", FAULT, fault_name(c, end)) for end in (Fault.NO_LINE, Fault.SEVERAL_LINES)),
+    )
+    named = when(unmatched, Set(FAULT_AT, Name(c.names.places[table])))
+    return _table_run(c, table), Set(LINE, NONE), named
+
+
+def _chosen(c: CProgram, choice: model.TableChoice, run: Callable[[str], Body]) -> Iterator[Stmt]:
+    """Runs the table of a choice."""
+    if isinstance(choice, model.OneTable):
+        yield from run(choice.table)
+        return
+    kind, given = choice.selector.type, c.text.whole(choice.selector)
+    chosen = Name("chosen")
+    yield Let(f"const {c_type(kind) if isinstance(given, Place) else local_type(kind)}", "chosen", given)
+    arms = ((infix("==", chosen, c.text.constant(kind, value)), run(name)) for value, name in choice.tables)
+    yield Branch(
+        tuple(arms),
+        (Frame((FAULT, " = ", fault_name(c, Fault.NO_LINE), "; /* no table for it: proved impossible */")),),
+    )
+
+
+def init_function(c: CProgram) -> Function:
+    """Give the function that makes the initial state."""
+    values = (assigned(c, variable, variable.initial) for variable in c.program.variables)
+    return on_state(
+        c, "Every variable's initial value.", "init", *trace(c, fault_name(c, Fault.OK), NONE), *values
+    )

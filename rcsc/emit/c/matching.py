@@ -1,0 +1,294 @@
+"""The function that finds the line of a table: masks, the classes that choose among them, the bit that is left."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
+from typing import assert_never
+
+from rcsc.emit.c.cprogram import AT, NONE, ONE, CProgram, counted_loop, discarded, touches_state
+from rcsc.emit.c.ctext import c_type, word_type
+from rcsc.emit.code_tree import (
+    IN_C,
+    Body,
+    Cast,
+    Choice,
+    Code,
+    Constant,
+    Element,
+    Frame,
+    Function,
+    Infix,
+    Invoke,
+    Items,
+    Leave,
+    Let,
+    Line,
+    Name,
+    Place,
+    Prefix,
+    Round,
+    Set,
+    Stmt,
+    infix,
+)
+from rcsc.emit.identifiers import comment
+from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, PlanTable, Truth, joined
+from rcsc.emit.translate import STATE
+from rcsc.lang import model
+from rcsc.lang.model import Bool, key_bounds, spell, value_of_key
+
+MOST_TOLD = 32
+"""Masks in a table up to which each stands in a line of its own, with its class."""
+MOST_NAMED = 72
+"""Characters up to which the lines that a mask leaves are named."""
+SEVERAL = Constant(-2)
+NOTHING = Constant(0, "uint64_t")
+FOUND, M = Name("line"), Name("m")
+
+
+def match_functions(c: CProgram, table: PlanTable) -> Iterator[Function]:
+    """Give the function that finds the line of a table for one state, and the one for many."""
+    name = c.names.tables[table.table.name]
+    doc = f"The line of table {table.table.name} that matches admitted inputs{table.where}: its position; -1 none, -2 several."
+    body = tuple(_match(c, table, name))
+    unread = () if touches_state(body) else (discarded(STATE),)
+    yield Function(doc, f"int32_t {c.p}_{name}_line(const {c.p}_t *s)", (*unread, *body))
+    i, n = Name("i"), Name("n")
+    line = Invoke(f"{c.p}_{name}_line", (Prefix("&", Element(Name("in"), i)),))
+    each = counted_loop(i, n, Set(Element(Name("out"), i), line))
+    head = f"void {c.p}_{name}_lines(const {c.p}_t *in, int32_t *out, uint32_t n)"
+    doc = f"The same for n inputs at once, table {table.table.name}."
+    yield Function(doc, head, (Let("uint32_t", "i"), each))
+
+
+def _match(c: CProgram, table: PlanTable, name: str) -> Iterator[Stmt]:
+    matcher = table.matcher
+    if matcher.groups:
+        yield Line("/* The masks: bit k of an entry is set where line k does not exclude that class. */")
+        yield from _masks(matcher, [line.name for line in table.lines])
+    indices = [_index(c, group, f"{name}_{at}") for at, group in enumerate(matcher.groups)]
+    masks = [Element(Name(f"t.t{at}"), index) for at, index in enumerate(indices)]
+    yield from (_one_word if matcher.words <= 1 else _many_words)(c, matcher, masks)
+
+
+def _index(c: CProgram, group: Group, name: str) -> Code:
+    index: Code | None = None
+    for number, probe in enumerate(group):
+        leaf_class = _class(c, probe.index, f"{name}_{number}")
+        moved = index and Round(infix("*", Round(index), Constant(probe.index.count, "uint32_t")))
+        index = Round(infix("+", moved, leaf_class)) if moved else leaf_class
+    assert index is not None
+    return index
+
+
+def _class(c: CProgram, index: Index, name: str) -> Code:
+    match index:
+        case Direct(leaf=leaf, type=Bool()):
+            return Round(_bit(c.text.place(leaf)))
+        case Direct(leaf=leaf, low=0):
+            return c.text.place(leaf)
+        case Direct(leaf=leaf, type=kind, low=low):
+            return _above(c, kind, c.text.place(leaf), low)
+        case Truth(condition=condition):
+            return Round(_bit(c.text.expr(condition)))
+        case Coded(leaf=leaf, type=kind, low=low):
+            above = _above(c, kind, c.text.place(leaf), low)
+            return _classify(c, name, "The class of the value.", above, "uint32_t", _codes(index))
+        case Cuts(leaf=leaf, type=kind, cuts=cuts):
+            held, place = c_type(kind), c.text.place(leaf)
+            if not cuts:
+                return Constant(0, "uint32_t")
+            if len(cuts) <= 6:
+                tests = (_bit(infix(">=", place, c.text.constant(kind, cut))) for cut in cuts)
+                return Round(Infix("+", tuple(tests)))
+            return _classify(
+                c, name, "How many cuts are at most the value.", place, held, tuple(_search(index, held))
+            )
+        case _:
+            assert_never(index)
+
+
+def _above(c: CProgram, kind: model.Scalar, place: Place, low: int) -> Code:
+    """How far a value is above the least that has a class."""
+    if low == 0:
+        return place
+    word, sign = word_type(*key_bounds(kind)), "+" if low < 0 else "-"
+    return c.text.converted(Round(infix(sign, Cast(word, place), Constant(abs(low), word))), word, "uint32_t")
+
+
+def _classify(c: CProgram, name: str, doc: str, value: Code, kind: str, body: Body) -> Code:
+    """A call of a function of its own, which finds the class of a value."""
+    function = c.names.c.fresh(f"{c.p}_class_{name}")
+    c.classifiers.append(Function(doc, f"uint32_t {function}({kind} value)", body))
+    return Invoke(function, (value.inner if isinstance(value, Round) else value,))
+
+
+def _lowest(c: CProgram, bits: int, mask: Code) -> Code:
+    return Invoke(f"{c.p}_bit{bits}", (mask,), helper=f"bit{bits}")
+
+
+def _one_word(c: CProgram, matcher: Matcher, masks: list[Element]) -> Iterator[Stmt]:
+    bits = max(_width(matcher.lines), 32)
+    word, none = f"uint{bits}_t", infix("==", M, _word(0, bits))
+    every = Round(Name(f"{2**matcher.lines - 1:#x}{'ull' if bits == 64 else 'u'}"))
+    yield Let(f"const {word}", "m", Infix("&", tuple(Cast(word, mask) for mask in masks)) if masks else every)
+    several = infix("!=", infix("&", M, infix("-", M, _word(1, bits))), _word(0, bits))
+    yield Let("const bool", "several", several)
+    if not masks:
+        yield discarded(STATE)
+    first = _lowest(c, bits, M)
+    if matcher.lines < bits:
+        first = _lowest(c, bits, infix("|", M, _word(1 << matcher.lines, bits)))
+    else:
+        first = Choice(none, Constant(matcher.lines), first)
+    yield Let("int32_t", "line", first)
+    if not matcher.default:
+        yield Set(FOUND, Choice(none, Round(NONE), FOUND))
+    yield Set(FOUND, Choice(Name("several"), Round(SEVERAL), FOUND))
+    yield Leave(FOUND)
+
+
+def _many_words(c: CProgram, matcher: Matcher, masks: list[Element]) -> Iterator[Stmt]:
+    rows = [Name(f"r{at}") for at, _ in enumerate(masks)]
+    for row, mask in zip(rows, masks, strict=True):
+        yield Let("const uint64_t * const", row.text, mask)
+    zero, several, seen, some, w = Constant(0, "uint32_t"), *map(Name, ("several", "seen", "some", "w"))
+    yield from (Let("uint64_t", "several", zero), Let("uint64_t", "seen", zero))
+    yield from (Let("int32_t", "line", Constant(0)), Let("int32_t", "none"), Let("uint32_t", "w"))
+    nonzero = infix("!=", M, zero)
+    at = infix("+", infix("*", Cast("int32_t", w), Constant(WORD)), _lowest(c, WORD, M))
+    body = (
+        Let("const uint64_t", "m", Infix("&", tuple(Element(row, w) for row in rows))),
+        Let("const uint64_t", "some", Choice(nonzero, ONE, NOTHING)),
+        Set(several, infix("|", several, infix("&", M, infix("-", M, ONE)), infix("&", some, seen))),
+        Set(seen, infix("|", seen, some)),
+        Set(FOUND, Choice(nonzero, at, FOUND)),
+    )
+    yield counted_loop(w, Constant(matcher.words, "uint32_t"), *body)
+    yield Set(Name("none"), Constant(matcher.lines) if matcher.default else Round(NONE))
+    yield Set(FOUND, Choice(infix("==", seen, zero), Name("none"), FOUND))
+    yield Set(FOUND, Choice(infix("!=", several, zero), Round(SEVERAL), FOUND))
+    yield Leave(FOUND)
+
+
+def _bit(condition: Code) -> Code:
+    return Choice(condition, Constant(1, "uint32_t"), Constant(0, "uint32_t"))
+
+
+def _word(value: int, bits: int) -> Name:
+    """A mask, as wide as 32 bits or 64."""
+    return Name(f"{value:#x}{'ull' if bits == 64 else 'u'}")
+
+
+def _width(lines: int) -> int:
+    return next(bits for bits in (8, 16, 32, 64) if lines < bits or bits == 64)
+
+
+def _masks(matcher: Matcher, lines: Sequence[str]) -> Iterator[Stmt]:
+    """All tables of masks as one object: one address to load."""
+    bits = _width(matcher.lines) if matcher.words <= 1 else WORD
+    words = "" if matcher.words <= 1 else f"[{matcher.words}]"
+    masks = [joined(group) for group in matcher.groups]
+    masks = [joined(group) for group in matcher.groups]
+    members = (Line(f"uint{bits}_t t{at}[{len(entries)}]{words};") for at, entries in enumerate(masks))
+    yield Frame(("static const struct {",), tuple(members))
+    rows = (
+        Frame(
+            (f"{{ /* {_leaves(group)} */",),
+            tuple(_rows(entries, matcher.words, bits, _told(group, entries, lines))),
+            "},",
+        )
+        for group, entries in zip(matcher.groups, masks, strict=True)
+    )
+    yield Frame(("} t = {",), tuple(rows), "};")
+
+
+def _leaves(group: Group) -> str:
+    """What the classes of a group are of, in words."""
+    return comment(
+        " by ".join(
+            probe.index.text if isinstance(probe.index, Truth) else probe.index.leaf for probe in group
+        )
+    )
+
+
+def _rows(entries: tuple[int, ...], words: int, bits: int, told: Sequence[str]) -> Iterator[Line]:
+    """Masks, or the words of each, from the lowest; each in a line with what is told of it, if anything is."""
+    if words <= 1 and not told:
+        yield from _wrapped([_word(mask, bits) for mask in entries], 84)
+        return
+    ends = [f" /* {comment(text)} */" for text in told] or [""] * len(entries)
+    for at, (mask, end) in enumerate(zip(entries, ends, strict=True), 1):
+        parts = Items(tuple(_word(mask >> (WORD * w) & (2**WORD - 1), WORD) for w in range(words)))
+        code = IN_C.code(parts if words > 1 else _word(mask, bits))
+        yield Line(f"{code}{',' if words > 1 or at < len(entries) else ''}{end}")
+
+
+def _told(group: Group, entries: Sequence[int], lines: Sequence[str]) -> list[str]:
+    """Of each mask its class and the lines that it leaves, by name, where that is short; nothing of many masks."""
+    if len(entries) > MOST_TOLD:
+        return []
+    left = ([line for at, line in enumerate(lines) if mask >> at & 1] for mask in entries)
+    named = (
+        "every line" if len(some) == len(lines) else f"lines {', '.join(some)}" if some else "no line"
+        for some in left
+    )
+    return [
+        f"{words}: {names}" if len(names) <= MOST_NAMED else words
+        for words, names in zip(_classes(group), named, strict=True)
+    ]
+
+
+def _classes(group: Group) -> list[str]:
+    """The words of each combination of classes, the last leaf's fastest."""
+    return [", ".join(words) for words in product(*(_class_words(probe.index) for probe in group))]
+
+
+def _class_words(index: Index) -> list[str]:
+    """The values of each class."""
+    match index:
+        case Truth():
+            return ["false", "true"]
+        case Direct(type=kind, low=low, count=count):
+            return [spell(kind, value_of_key(kind, key)) for key in range(low, low + count)]
+        case Cuts(type=kind, cuts=cuts):
+            spelled = [spell(kind, cut) for cut in cuts]
+            return [f"below {spelled[0]}", *(f"{cut} and above" for cut in spelled)] if cuts else ["any"]
+        case Coded(low=low, classes=classes):
+            starts = [low + classes.index(number) for number in range(index.count)]
+            return [f"{spell(index.type, start)} and above" for start in starts]
+        case _:
+            assert_never(index)
+
+
+def _wrapped(values: Iterable[Code], width: int = 88) -> Iterator[Line]:
+    """Values of an initialiser, as many in a line as it takes."""
+    text = ""
+    for word in map(IN_C.code, values):
+        if text and len(text) + len(word) > width:
+            yield Line(text.rstrip())
+            text = ""
+        text += f"{word}, "
+    yield Line(text.removesuffix(", "))
+
+
+def _codes(index: Coded) -> Body:
+    """The class of `value`, looked up."""
+    head = f"static const uint{8 if index.count <= 256 else 16}_t classes[{len(index.classes)}] = {{"
+    rows = tuple(_wrapped(Constant(number, "uint32_t") for number in index.classes))
+    return Frame((head,), rows, "};"), Leave(Element(Name("classes"), Name("value")))
+
+
+def _search(index: Cuts, wide: str) -> Iterator[Stmt]:
+    """How many cuts are at most `value`, in a number of steps that depends on nothing."""
+    count, cuts = Constant(len(index.cuts), "uint32_t"), Name("cuts")
+    rows = tuple(_wrapped(Constant(cut, wide) for cut in index.cuts))
+    yield Frame((f"static const {wide} cuts[{len(index.cuts)}] = {{",), rows, "};")
+    yield Let("uint32_t", "at", Constant(0, "uint32_t"))
+    step = 1 << len(index.cuts).bit_length() - 1
+    while step:
+        ahead, last = (infix("+", AT, Constant(by, "uint32_t")) for by in (step, step - 1))
+        reached = infix(">=", Name("value"), Element(cuts, infix("%", last, count)))
+        taken = infix("&&", infix("<=", ahead, count), reached)
+        yield Set(AT, infix("+", AT, Choice(taken, Constant(step, "uint32_t"), Constant(0, "uint32_t"))))
+        step >>= 1
+    yield Leave(AT)
