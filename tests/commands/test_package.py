@@ -52,7 +52,7 @@ def test_the_wheel_has_the_grammar_the_types_and_all_data(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         metadata = archive.read(next(name for name in names if name.endswith("METADATA"))).decode()
-    assert "rcsc/_data/grammar/rcs.lark" in names
+    assert {"rcsc/_data/grammar/rcs.lark", "rcsc/_data/grammar/rcs.tables.json"} <= set(names)
     assert {"rcsc/py.typed", "rcsc/diagnostics/schema/report.schema.json"} <= names
     templates = {path.name for path in (REPO / "rcsc" / "emit" / "templates").iterdir()}
     assert {name.rsplit("/", 1)[1] for name in names if name.startswith("rcsc/emit/templates/")} == templates

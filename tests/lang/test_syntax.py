@@ -1,6 +1,8 @@
 """Text to tree and back: round trips, errors with a place, nothing that makes the parser raise."""
 
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -15,8 +17,8 @@ from rcsc.diagnostics.source import Source, Span
 from rcsc.lang.digest import Digests
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
-from rcsc.lang.syntax.lalr import ParseNode, Tables
-from rcsc.lang.syntax.parse import MOST_ERRORS, parse
+from rcsc.lang.syntax.lalr import ParseNode, Tables, grammar_of_json
+from rcsc.lang.syntax.parse import MOST_ERRORS, made_tables, parse
 from rcsc.lang.syntax.rows import PIECES
 from rcsc.lang.syntax.spell import spell_expr
 from rcsc.solvers.options import Options
@@ -431,7 +433,8 @@ def test_trees_are_those_of_lark_and_texts_are_refused_where_lark_refuses_them()
     grammar = (REPO / "grammar" / "rcs.lark").read_text(encoding="utf-8")
     starts = ["file", "cell", "when", "heading", "actions"]
     parser = lark.Lark(grammar, parser="lalr", start=starts, propagate_positions=True)
-    tables, rng = Tables(parser), Random(20261122)  # noqa: S311  # texts to try
+    kept = (REPO / "grammar" / "rcs.tables.json").read_text(encoding="utf-8")
+    tables, rng = Tables(grammar_of_json(kept)), Random(20261122)  # noqa: S311  # texts to try
     texts = [path.read_text(encoding="utf-8") for path in SHIPPED]
     asked = [(text, "file") for text in texts]
     for _ in range(400):  # pieces of texts, and texts with a slip
@@ -452,3 +455,40 @@ def test_trees_are_those_of_lark_and_texts_are_refused_where_lark_refuses_them()
         assert (None if found is None else by_tables(found)) == wanted, (start, text)
         right += found is not None
     assert 100 < right < len(asked) - 500
+
+
+def test_the_kept_tables_are_what_lark_makes_of_the_grammar() -> None:
+    kept = (REPO / "grammar" / "rcs.tables.json").read_text(encoding="utf-8")
+    assert kept == made_tables().to_json(), "make them anew: python -m rcsc.lang.syntax.parse"
+
+
+LARK_COUNTED = """
+import lark
+from rcsc.diagnostics.source import Source
+from rcsc.lang.syntax import parse as module
+made, whole = [], lark.Lark
+lark.Lark = lambda *args, **options: made.append(args) or whole(*args, **options)
+{before}
+tree = module.parse(Source("a.rcs", {text!r}))
+print(len(made), type(tree).__name__)
+"""
+RIGHT = "input a : bool\ntable t {\n| line | a ||\n|---|---||\n| 1 | - ||\n}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "before", "printed"),
+    [
+        (RIGHT, "", "0 File"),
+        ("input a : : bool\n", "", "1 tuple"),
+        (RIGHT, "module._grammar_text = lambda of=module._grammar_text(): of + '\\n'", "1 File"),
+    ],
+    ids=[
+        "a right text needs no Lark",
+        "Lark says what is wrong",
+        "another grammar is not taken for this one",
+    ],
+)
+def test_lark_is_asked_only_where_it_must_be(text: str, before: str, printed: str) -> None:
+    program = LARK_COUNTED.format(text=text, before=before)
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == printed

@@ -1,14 +1,16 @@
-"""Runs the LALR tables that Lark makes of a grammar, in a third of its time: text to parse tree, or None where the text is wrong.
+"""Runs LALR tables: text to parse tree, or None where the text is wrong.
 
-In: a Lark parser, whose terminals, tables and rules are read once. Out: nodes with positions. The trees are Lark's: rules whose names
-begin with `_` are part of their parent, `?` rules of one child are that child, and a node's span includes the parentheses around its
-parts, not those around itself. What a text should have been only Lark says.
+In: the tables of a grammar, which Lark made and a file keeps: Lark takes longer to make them than a small file takes to be proved.
+Out: nodes with positions. The trees are Lark's: rules whose names begin with `_` are part of their parent, `?` rules of one child are
+that child, and a node's span includes the parentheses around its parts, not those around itself. What a text should have been only
+Lark says.
 """
 
+import json
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 END = "$END"
 
@@ -32,8 +34,7 @@ class ParseNode:
     end_pos: int
 
 
-@dataclass(frozen=True, slots=True)
-class _Reduction:
+class _Reduction(NamedTuple):
     """A rule as its reduction needs it.
 
     Attributes:
@@ -53,6 +54,125 @@ class _Reduction:
     handed: bool
 
 
+class _Terminal(NamedTuple):
+    """What a word is: a pattern, or a text that stands for itself."""
+
+    name: str
+    regexp: str
+    text: str
+    priority: int
+
+
+class Grammar(NamedTuple):
+    """The tables of one grammar, as plain values.
+
+    Attributes:
+        of: The SHA-256 of the grammar's text.
+        starts: The state that each start rule begins in.
+        ends: The state that it ends in.
+        terminals: In the order in which they are tried.
+        skipped: The pattern of what stands between words.
+        rules: What a reduction does.
+        states: For each state what each symbol leads to: a state, or -1 - the position of a rule.
+    """
+
+    of: str
+    starts: Mapping[str, int]
+    ends: Mapping[str, int]
+    terminals: Sequence[_Terminal]
+    skipped: str
+    rules: Sequence[_Reduction]
+    states: Sequence[Mapping[str, int]]
+
+    def to_json(self) -> str:
+        """One line a state, so that a change of the grammar can be seen in a diff; symbols by their positions."""
+        symbols = sorted({symbol for state in self.states for symbol in state})
+        at = {symbol: place for place, symbol in enumerate(symbols)}
+        states = [[n for symbol, to in state.items() for n in (at[symbol], to)] for state in self.states]
+        parts: dict[str, Sequence[object]] = {
+            "terminals": self.terminals,
+            "rules": self.rules,
+            "states": states,
+        }
+        whole = {
+            "of": self.of,
+            "starts": self.starts,
+            "ends": self.ends,
+            "skipped": self.skipped,
+            "symbols": symbols,
+        }
+        lines = [f"{_dense(name)}: {_dense(value)}" for name, value in whole.items()]
+        lines += [
+            f"{_dense(name)}: [" + ",".join(f"\n{_dense(row)}" for row in part) + "\n]"
+            for name, part in parts.items()
+        ]
+        return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _dense(value: object) -> str:
+    return json.dumps(value, separators=(",", ":"))
+
+
+def grammar_of_json(text: str) -> Grammar:
+    """The tables that `Grammar.to_json` wrote."""
+    read = json.loads(text)
+    symbols = read["symbols"]
+    return Grammar(
+        read["of"],
+        read["starts"],
+        read["ends"],
+        [_Terminal(*terminal) for terminal in read["terminals"]],
+        read["skipped"],
+        [_Reduction(*rule) for rule in read["rules"]],
+        [{symbols[at]: to for at, to in zip(row[::2], row[1::2], strict=True)} for row in read["states"]],
+    )
+
+
+def grammar_of_lark(parser: Any, of: str) -> Grammar:
+    """The tables that Lark made, the states numbered as one meets them from the start rules, so that they are the same in every run.
+
+    Args:
+        parser: A `lark.Lark` for LALR.
+        of: The SHA-256 of the grammar's text.
+    """
+    table = parser.parser.parser.parser.parse_table
+    ignored = (t.pattern.to_regexp() for t in parser.terminals if t.name in parser.ignore_tokens)
+    terminals = [
+        _Terminal(
+            t.name, t.pattern.to_regexp(), t.pattern.value if t.pattern.type == "str" else "", t.priority
+        )
+        for t in sorted(parser.terminals, key=_rank)
+    ]
+    numbers = {state: number for number, state in enumerate(_met(table))}
+    rules: dict[_Reduction, int] = {}
+    states = [
+        {
+            symbol: numbers[arg]
+            if isinstance(arg, int)
+            else -1 - rules.setdefault(_reduction(arg), len(rules))
+            for symbol, (_, arg) in sorted(table.states[state].items())
+        }
+        for state in numbers
+    ]
+    starts, ends = (
+        {start: numbers[state] for start, state in sorted(which.items())}
+        for which in (table.start_states, table.end_states)
+    )
+    return Grammar(of, starts, ends, terminals, f"(?:{'|'.join(sorted(ignored))})*+", list(rules), states)
+
+
+def _met(table: Any) -> Iterator[int]:
+    """Each state once, in the order in which it is met from the start rules."""
+    waiting = [state for _, state in sorted(table.start_states.items())]
+    met = set(waiting)
+    for state in waiting:
+        yield state
+        for _, (_, arg) in sorted(table.states[state].items()):
+            if isinstance(arg, int) and arg not in met:
+                met.add(arg)
+                waiting.append(arg)
+
+
 @dataclass(frozen=True, slots=True)
 class _Words:
     """The terminals that some state takes: how to match one, and names of words that look like another terminal."""
@@ -62,33 +182,18 @@ class _Words:
 
 
 class Tables:
-    """The tables of one grammar.
+    """The tables of one grammar, ready to run."""
 
-    Args:
-        parser: A `lark.Lark` for LALR.
-    """
-
-    def __init__(self, parser: Any) -> None:
-        table = parser.parser.parser.parser.parse_table
-        self._starts: Mapping[str, int] = table.start_states
-        self._ends: Mapping[str, int] = table.end_states
-        reductions: dict[int, _Reduction] = {}
-        self._states: dict[int, dict[str, int | _Reduction]] = {
-            state: {
-                symbol: arg if isinstance(arg, int) else reductions.setdefault(id(arg), _reduction(arg))
-                for symbol, (_, arg) in actions.items()
-            }
-            for state, actions in table.states.items()
-        }
-        self._terminals = sorted(parser.terminals, key=_rank)
+    def __init__(self, grammar: Grammar) -> None:
+        self._starts, self._ends = grammar.starts, grammar.ends
+        self._states: list[dict[str, int | _Reduction]] = [
+            {symbol: to if to >= 0 else grammar.rules[-1 - to] for symbol, to in state.items()}
+            for state in grammar.states
+        ]
+        self._terminals = grammar.terminals
         self._words: dict[frozenset[str], _Words] = {}
         self._words_of: dict[int, _Words] = {}
-        ignored = (
-            terminal.pattern.to_regexp()
-            for terminal in parser.terminals
-            if terminal.name in parser.ignore_tokens
-        )
-        self._skipped = f"(?:{'|'.join(ignored)})*+"
+        self._skipped = grammar.skipped
         self._skip = re.compile(self._skipped).match
 
     def parse(self, text: str, start: str) -> ParseNode | None:
@@ -142,24 +247,18 @@ def _rank(terminal: Any) -> tuple[int, int, int, str]:
     return -terminal.priority, -pattern.max_width, -len(pattern.value), terminal.name
 
 
-def _words(skipped: str, terminals: Sequence[Any]) -> _Words:
+def _words(skipped: str, terminals: Sequence[_Terminal]) -> _Words:
     """Build one pattern of what is skipped and these terminals; words that a pattern of their priority matches are told by text."""
     special: dict[str, dict[str, str]] = {}
-    for wide in (terminal for terminal in terminals if terminal.pattern.type == "re"):
-        whole = re.compile(wide.pattern.to_regexp()).fullmatch
-        words = (
-            terminal
-            for terminal in terminals
-            if terminal.pattern.type == "str" and terminal.priority == wide.priority
-        )
-        names = {word.pattern.value: word.name for word in words if whole(word.pattern.value)}
+    for wide in (terminal for terminal in terminals if not terminal.text):
+        whole = re.compile(wide.regexp).fullmatch
+        words = (terminal for terminal in terminals if terminal.text and terminal.priority == wide.priority)
+        names = {word.text: word.name for word in words if whole(word.text)}
         if names:
             special[wide.name] = names
     inside = {name for names in special.values() for name in names.values()}
     parts = (
-        f"(?P<{terminal.name}>{terminal.pattern.to_regexp()})"
-        for terminal in terminals
-        if terminal.name not in inside
+        f"(?P<{terminal.name}>{terminal.regexp})" for terminal in terminals if terminal.name not in inside
     )
     return _Words(re.compile(f"{skipped}(?:{'|'.join(parts) or '(?!)'})").match, special)
 

@@ -3,10 +3,10 @@
 In: a `Source`. Out: a `tree.File`, or every syntax error that was found. No text makes it raise.
 """
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
-from importlib.resources import files as package_files
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,7 +19,7 @@ from rcsc.lang.syntax import screen, tree
 from rcsc.lang.syntax.build import Build
 from rcsc.lang.syntax.comments import Comments, words
 from rcsc.lang.syntax.expected import ELSEWHERE, expected, missing_word, operator_meant, word_meant
-from rcsc.lang.syntax.lalr import ParseLeaf, ParseNode, Tables
+from rcsc.lang.syntax.lalr import Grammar, ParseLeaf, ParseNode, Tables, grammar_of_json, grammar_of_lark
 from rcsc.lang.syntax.rows import (
     ACTION_WORDS,
     BITS,
@@ -49,19 +49,45 @@ from rcsc.lang.syntax.rows import (
 MOST_ERRORS = 20
 
 
+_TABLES = "rcs.tables.json"
+"""What Lark makes of the grammar; `python -m rcsc.lang.syntax.parse` makes it anew after a change of the grammar."""
+
+
+def _grammar_folder() -> Path:
+    """Where the grammar is: inside the wheel's package, or beside it."""
+    packaged = Path(__file__).parents[2] / "_data" / "grammar"
+    return packaged if packaged.is_dir() else Path(__file__).parents[3] / "grammar"
+
+
+@cache
+def _grammar_text() -> str:
+    return (_grammar_folder() / "rcs.lark").read_text(encoding="utf-8")
+
+
 @cache
 def _parser() -> lark.Lark:
-    """The LALR parser of the grammar, which stands beside the package or inside its wheel."""
-    packaged = package_files("rcsc") / "_data" / "grammar" / "rcs.lark"
-    beside = Path(__file__).parents[3] / "grammar" / "rcs.lark"
-    text = (packaged if packaged.is_file() else beside).read_text(encoding="utf-8")
+    """The LALR parser of the grammar, as Lark makes it: it says what is wrong with a text."""
     starts = ["file", "cell", "when", "heading", "actions"]
-    return lark.Lark(text, parser="lalr", start=starts)
+    return lark.Lark(_grammar_text(), parser="lalr", start=starts)
 
 
 @cache
 def _tables() -> Tables:
-    return Tables(_parser())
+    """The tables that are kept beside the grammar; from Lark where they are of another text of it."""
+    kept = _grammar_folder() / _TABLES
+    grammar = grammar_of_json(kept.read_text(encoding="utf-8")) if kept.is_file() else None
+    if grammar is None or grammar.of != _digest():
+        grammar = made_tables()
+    return Tables(grammar)
+
+
+def made_tables() -> Grammar:
+    """The tables of the grammar, made by Lark."""
+    return grammar_of_lark(_parser(), _digest())
+
+
+def _digest() -> str:
+    return hashlib.sha256(_grammar_text().encode()).hexdigest()
 
 
 def _parsed(text: str, start: str) -> ParseNode:
@@ -410,3 +436,7 @@ class _Rows:
 
     def _report(self, code: Code, message: str, cell: Cell, *helps: str) -> None:
         self.diagnostics.append(_error(code, message, cell.span, *helps))
+
+
+if __name__ == "__main__":
+    (_grammar_folder() / _TABLES).write_text(made_tables().to_json(), "utf-8")
