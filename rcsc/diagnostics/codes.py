@@ -611,6 +611,21 @@ class Code(StrEnum):
           | runs             | false | false || true  |
         }
     """
+    REQUIREMENT_NAME = """RCS218: a requirement whose name cannot be
+
+    The name of a requirement stands in quotes after `req`, or under the heading `req` of a table. It has 1 to 80 characters that print;
+    `|`, `#` and `\\` are not among them, for a row of a table could not hold them. One place names a requirement once.
+
+        input ready : bool
+        output go : bool
+        invariant off req "SR-12", "SR-12" : go in {true, false}
+
+    error: requirement `SR-12` is named twice
+
+        input ready : bool
+        output go : bool
+        invariant off req "SR-12", "SR-13" : go in {true, false}
+    """
     KIND = """RCS301: the wrong kind of value
 
     A bool, a number, a member of an enumeration stands where another kind is wanted. Nothing converts by itself: compare (`n > 0`) to

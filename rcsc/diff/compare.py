@@ -10,6 +10,7 @@ from rcsc.diff.changes import parts
 from rcsc.diff.changes.align import aligned
 from rcsc.diff.changes.difference import ComparedPart, Difference, ProgramDifference, Traces
 from rcsc.diff.changes.follows import follows
+from rcsc.diff.changes.requirements import named_otherwise
 from rcsc.diff.changes.tables import table_part
 from rcsc.diff.changes.traces import traces
 from rcsc.diff.changes.versions import Versions
@@ -63,7 +64,14 @@ def compare(
         else ()
     )
     return ProgramDifference(
-        name, alignment.changes, tuple(compared), seen, tuple(undecided), pairs, dict(versions.kinds)
+        name,
+        alignment.changes,
+        tuple(compared),
+        seen,
+        tuple(undecided),
+        pairs,
+        dict(versions.kinds),
+        tuple(named_otherwise(before, after)),
     )
 
 

@@ -49,6 +49,7 @@ def _program_json(program: ProgramDifference) -> Json:
             for t in program.traces
         ],
         "follows": [_follows_json(follow) for follow in program.follows],
+        "requirements": list(program.requirements),
     }
 
 

@@ -137,11 +137,17 @@ def rows(difference: Difference, *, quiet: bool = False) -> Iterator[Row]:
     for note in difference.notes:
         yield (TextPiece(f"  {escape(note)}", Style.WARNING),)
     for program in difference.programs:
-        if program.changed or program.undecided or any(_shown(part) for part in program.parts):
+        if _told(program):
             yield from _program(program)
     if not quiet:
         style = Style.ERROR if difference.undecided else Style.WARNING if difference.changed else Style.HELP
         yield (TextPiece(escape(headline(difference)), style),)
+
+
+def _told(program: ProgramDifference) -> bool:
+    """Whether anything is to be said of a program."""
+    shown = any(_shown(part) for part in program.parts)
+    return bool(program.changed or program.undecided or program.requirements or shown)
 
 
 def _program(program: ProgramDifference) -> Iterator[Row]:
@@ -155,6 +161,8 @@ def _program(program: ProgramDifference) -> Iterator[Row]:
         yield from _traced(traces)
     for follows in program.follows:
         yield from _followed(follows)
+    for place in program.requirements:
+        yield (TextPiece(f"  requirements of {escape(place)}", Style.WARNING),)
     for what in program.undecided:
         yield (TextPiece(f"  not decided: {what}", Style.ERROR),)
 
@@ -255,7 +263,7 @@ def markdown(difference: Difference) -> str:
     ]
     lines += [f"- {_cell(note)}" for note in difference.notes] + ([""] if difference.notes else [])
     for program in difference.programs:
-        if program.changed or program.undecided or any(_shown(part) for part in program.parts):
+        if _told(program):
             lines += _program_marked(program)
     return "\n".join(lines).rstrip() + "\n"
 
@@ -278,6 +286,8 @@ def _program_marked(program: ProgramDifference) -> Iterator[str]:
         yield from _traces_marked(traces)
     for follows in program.follows:
         yield from _follows_marked(follows)
+    yield from (f"- requirements of {_cell(place)}" for place in program.requirements)
+    yield from [""] if program.requirements else []
 
 
 def _part_marked(part: ComparedPart) -> Iterator[str]:

@@ -83,12 +83,19 @@ def _place(file: str, root: str) -> str:
 
 def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str) -> PlanTable:
     lines = [
-        PlanLine(line.name, line.actions, f"{file} line {line.name}", _conditions(table, line))
+        PlanLine(
+            line.name,
+            line.actions,
+            f"{file} line {line.name}",
+            _conditions(table, line),
+            line.requirements,
+        )
         for line in table.lines
     ]
     if table.default is not None:
-        name = table.default.name
-        lines.append(PlanLine(name, table.default.actions, f"{file} line {name}", ("no other line matches",)))
+        name, last = table.default.name, table.default
+        when = ("no other line matches",)
+        lines.append(PlanLine(name, last.actions, f"{file} line {name}", when, last.requirements))
     named = [(place, program.assumptions[at]) for place, at in enumerate(monitored)]
     stops = tuple(place for place, assumption in named if assumption.name in table.stops)
     relied = tuple(

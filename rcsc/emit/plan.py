@@ -10,7 +10,7 @@ from math import prod
 from typing import TypeAlias
 
 from rcsc.host.files.write import UNPROVED
-from rcsc.lang.model import Action, Expr, LineName, Program, Scalar, Table, TableName, VariableName
+from rcsc.lang.model import Action, Expr, LineName, Procedure, Program, Scalar, Table, TableName, VariableName
 
 WORD = 64
 
@@ -134,17 +134,35 @@ class PlanLine:
     Attributes:
         source: The file, and the line's name.
         conditions: What it states, heading by heading.
+        requirements: Names of those that it answers.
     """
 
     name: LineName
     actions: tuple[Action, ...]
     source: str
     conditions: tuple[str, ...] = ()
+    requirements: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """Where it stands, and what for: `task/release.rcs line 4 [SR-12]`."""
+        return f"{self.source}{answering(self.requirements)}"
 
     @property
     def told(self) -> str:
-        """Where it stands, and when it runs, in words."""
-        return f"{self.source}: {'; '.join(self.conditions)}" if self.conditions else self.source
+        """Where it stands, what for, and when it runs, in words."""
+        return f"{self.place}: {'; '.join(self.conditions)}" if self.conditions else self.place
+
+
+def answering(requirements: Iterable[str]) -> str:
+    """Names of requirements, in brackets after a blank; empty for none."""
+    names = ", ".join(requirements)
+    return f" [{names}]" if names else ""
+
+
+def stated(procedure: Procedure) -> str:
+    """What a procedure is, in words, and what for."""
+    return (procedure.doc or f"Procedure {procedure.name}.") + answering(procedure.requirements)
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,7 +41,9 @@ from rcsc.emit.plan import (
     Plan,
     PlanTable,
     Truth,
+    answering,
     grouped,
+    stated,
     table_position,
 )
 from rcsc.emit.rendering import render
@@ -117,7 +119,7 @@ class _Maker:
         params = ", ".join(["s", *(f"v_{p.name}" for p in procedure.params)])
         body = self._extern(procedure) if procedure.extern is not None else self.text.block(procedure.body)
         head = f"_do_{self.names.procedures[procedure.name]}({params})"
-        return Function(comment(procedure.doc) or f"Procedure {procedure.name}.", head, tuple(body))
+        return Function(comment(stated(procedure)), head, tuple(body))
 
     def _extern(self, procedure: Procedure) -> Iterator[Stmt]:
         assert procedure.extern is not None
@@ -233,12 +235,12 @@ class _Maker:
         yield Function(
             f"The same for many inputs, table {table.table.name}.", f"{name}_lines(states)", (many,)
         )
-        doc = f"Matches table {table.table.name} and runs the line."
+        doc = f"Matches table {table.table.name} and runs the line.{comment(answering(table.table.requirements))}"
         yield _on_state(doc, f"_run_{name}", *self._run(table, name, actions))
         acts = tuple(self.names.module.fresh(f"_{name}_{number}") for number, _ in enumerate(table.lines))
         for act, line in zip(acts, table.lines, strict=True):
             body = self.text.block([action.statement for action in line.actions])
-            yield _on_state(comment(line.source), act, *body)
+            yield _on_state(comment(line.place), act, *body)
         self.lines.append((actions, acts))
         lines = self.names.module.fresh(f"{name.upper()}_LINES")
         self.lines.append((lines, tuple(f'"{line.name}"' for line in table.lines)))

@@ -479,6 +479,7 @@ class Procedure:
     extern: Extern | None = None
     doc: str = ""
     span: Span = at()
+    requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 # --- assumptions, invariants, properties ---------------------------------------------
@@ -512,6 +513,7 @@ class Assumption:
     condition: Expr
     doc: str = ""
     span: Span = at()
+    requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -525,6 +527,7 @@ class Invariant:
     condition: Expr
     doc: str = ""
     span: Span = at()
+    requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -546,6 +549,7 @@ class Property:
     doc: str = ""
     span: Span = at()
     standard: bool = field(default=False, compare=False)
+    requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 # --- tables --------------------------------------------------------------------------
@@ -605,6 +609,7 @@ class Line:
         bounds: Start and end offsets of each cell, flattened; see `cell_span`.
         below: The lines that run instead where both match: they stand `above`. Its tests say so.
         same: Those earlier ones that do the same where both match, and run then. Its tests say so, too.
+        requirements: Names of those that it answers; here and elsewhere they mean nothing to a proof.
     """
 
     name: LineName
@@ -614,6 +619,7 @@ class Line:
     bounds: tuple[int, ...] = field(default=(), compare=False, repr=False)
     below: tuple[LineName, ...] = field(default=(), compare=False)
     same: tuple[LineName, ...] = field(default=(), compare=False)
+    requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def cell_span(self, column: int) -> Span:
         """The span of the condition cell in `column` (the row's if unknown)."""
@@ -631,6 +637,7 @@ class Default:
     actions: tuple[Action, ...]
     unreachable: bool
     span: Span = at()
+    requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -672,6 +679,7 @@ class Table:
     file: str = field(default="", compare=False)
     stops: tuple[AssumptionName, ...] = ()
     meetings: tuple[Meeting, ...] = ()
+    requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def added(self, line: Line) -> str:
         """What `above` and `same` add to the conditions of one of its lines, in words; empty for nothing."""

@@ -95,6 +95,18 @@ CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
         "input a : bool\ntable t {\n| line | a ||\n| x above y | true ||\n| y above x | true ||\n}",
         [(4, "RCS217", "y")],
     ),
+    "requirement named twice": (
+        'state n : bool\ninvariant i req "A", "A" : n',
+        [(2, "RCS218", "A")],
+    ),
+    "requirement with a bar": (
+        'state n : bool\nproperty p req "A|B", "", " a", "a  b" : n',
+        [(2, "RCS218", "A|B"), (2, "RCS218", ""), (2, "RCS218", " a"), (2, "RCS218", "a  b")],
+    ),
+    "long requirement of a line": (
+        f'input a : bool\ntable t {{\n| line | a || req |\n| x | DEFAULT || "{"x" * 81}" |\n}}',
+        [(4, "RCS218", "x" * 81)],
+    ),
     "owner cycle": ("owner a { b }\nowner b { a }", [(2, "RCS213", "a")]),
     "bool and int": ("state n : int 0 .. 3\ninvariant i : n = true", [(2, "RCS301", "n = true")]),
     "two enumerations": (

@@ -18,6 +18,6 @@ question a line pair whose regions meet; parts whose digests agree are not asked
 
 Modules, in the order the data flows: `align` puts both over one set of variables, `versions` under one solver.
 `tables` compares tables, `parts` what is none, `follows` which line follows which, `traces` the state graph;
-`contrast` says where two effects differ, `value_text` gives values in the language's words. What is found is a
-`difference`.
+`requirements` compares what parts are for, which is no meaning; `contrast` says where two effects differ,
+`value_text` gives values in the language's words. What is found is a `difference`.
 """

@@ -174,6 +174,7 @@ class ProgramDifference:
         undecided: What the solver gave up on: nothing is proved of the program then.
         follows: Of tables whose lines can follow otherwise than before; only where it was asked for.
         kinds: What regions count values by, for each leaf.
+        requirements: Which places name other requirements than before; no meaning changes with that.
     """
 
     name: str
@@ -183,6 +184,7 @@ class ProgramDifference:
     undecided: tuple[str, ...] = ()
     follows: tuple[Follows, ...] = ()
     kinds: Mapping[str, Scalar] = field(default_factory=dict, compare=False, repr=False)
+    requirements: tuple[str, ...] = ()
 
     @property
     def changed(self) -> bool:

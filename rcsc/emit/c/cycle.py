@@ -39,7 +39,7 @@ from rcsc.emit.code_tree import (
     when,
 )
 from rcsc.emit.identifiers import FAILED_BITS, comment
-from rcsc.emit.plan import PlanTable
+from rcsc.emit.plan import PlanTable, answering
 from rcsc.emit.translate import FAULT, FAULT_AT, LINE, STATE
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
@@ -75,7 +75,7 @@ def action_functions(c: CProgram) -> Iterator[Function]:
         told = [stmt for place in table.monitored for stmt in _told(c, place, stops=place in table.stops)]
         matched = _matched(c, table, name)
         run = (when(c.text.faultless, *matched),) if table.stops else matched
-        doc = f"Matches table {table.table.name} and runs the line."
+        doc = f"Matches table {table.table.name} and runs the line.{comment(answering(table.table.requirements))}"
         yield on_state(c, doc, f"run_{name}", *told, *run)
 
 
@@ -84,7 +84,7 @@ def assumption_functions(c: CProgram) -> Iterator[Function]:
     told = {place for table in c.plan.tables for place in table.monitored}
     for place in sorted(told):
         name, assumption = c.names.holding[place], c.program.assumptions[c.plan.monitored[place]]
-        words = comment(assumption.doc)
+        words = comment(f"{assumption.doc}{answering(assumption.requirements)}".strip())
         doc = f"Assumption {assumption.name}{f': {words}' if words else ' holds.'}"
         body: Body = (Leave(c.text.expr(assumption.condition)),)
         unread = () if touches_state(body) else (discarded(STATE),)

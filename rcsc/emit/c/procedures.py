@@ -7,6 +7,7 @@ from rcsc.emit.c.cprogram import CProgram, discarded, fault_name, touches_state
 from rcsc.emit.c.ctext import c_type, local_type, locals_of, wide_type
 from rcsc.emit.code_tree import Branch, Code, Do, Function, Invoke, Let, Name, Prefix, Set, Stmt, read, when
 from rcsc.emit.identifiers import comment
+from rcsc.emit.plan import stated
 from rcsc.emit.translate import FAULT, FAULT_AT, STATE, local
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
@@ -19,7 +20,7 @@ def procedure_function(c: CProgram, procedure: Procedure) -> Function:
     params = [f"{c.p}_t *s", *(f"{_held(c, p.type)} v_{p.name}" for p in procedure.params)]
     head = f"void {c.p}_do_{c.names.procedures[procedure.name]}({', '.join(params)})"
     body = _extern_body(c, procedure) if procedure.extern else _body(c, procedure)
-    return Function(comment(procedure.doc) or f"Procedure {procedure.name}.", head, tuple(body))
+    return Function(comment(stated(procedure)), head, tuple(body))
 
 
 def _body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:

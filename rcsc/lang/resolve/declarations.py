@@ -3,13 +3,45 @@
 Constants and types may be declared in any order: one that is asked for before its turn is resolved then.
 """
 
+from collections.abc import Iterable
+
 from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Label
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.model import Enum
 from rcsc.lang.resolve import variables
 from rcsc.lang.syntax import tree
 
 MOST_LINKS = 100
+MOST_REQUIREMENT = 80
+"""Characters of the name of a requirement."""
+_NOT_IN_REQUIREMENT = frozenset("|#\\")
+
+
+def requirements(scope: Scope, written: Iterable[tree.Name]) -> tuple[str, ...]:
+    """The names of requirements, each once; one that cannot be is reported."""
+    known: dict[str, tree.Name] = {}
+    for name in written:
+        wrong = _wrong(name.text)
+        if wrong:
+            scope.report(Code.REQUIREMENT_NAME, f"the name of a requirement {wrong}", name.span)
+        elif name.text in known:
+            message = f"requirement `{name.text}` is named twice"
+            first = Label(known[name.text].span, "the first")
+            scope.report(Code.REQUIREMENT_NAME, message, name.span, related=(first,))
+        known.setdefault(name.text, name)
+    return tuple(known)
+
+
+def _wrong(name: str) -> str:
+    """What is wrong with the name of a requirement; empty for nothing."""
+    if not name or name != name.strip() or "  " in name:
+        return "is empty, or has blanks around it or two together"
+    if len(name) > MOST_REQUIREMENT:
+        return f"has {len(name)} characters, more than {MOST_REQUIREMENT}"
+    if not name.isprintable() or _NOT_IN_REQUIREMENT & set(name):
+        return "has a character that does not print, or one of `|`, `#` and `\\`"
+    return ""
 
 
 class Names:

@@ -27,6 +27,7 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.protocol.written import AFTER, BEFORE
 from rcsc.lang.reserved import C_COMPOSED, C_KEYWORDS, C_MACROS
+from rcsc.lang.resolve.declarations import requirements
 from rcsc.lang.resolve.statements import MOST_STATEMENTS, Statements, below, cost
 from rcsc.lang.syntax import tree
 
@@ -134,6 +135,7 @@ def _procedure(
         named,
         " ".join(written.doc),
         written.name.span,
+        requirements(scope, written.requirements),
     )
 
 

@@ -27,7 +27,7 @@ from rcsc.lang.model import (
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.protocol import declared, expanded
 from rcsc.lang.resolve import procedures as calls
-from rcsc.lang.resolve.declarations import Names
+from rcsc.lang.resolve.declarations import Names, requirements
 from rcsc.lang.resolve.levels import Declarations, level, lines_kept, periods
 from rcsc.lang.resolve.owners import Owners
 from rcsc.lang.resolve.properties import resolve_property
@@ -172,9 +172,8 @@ class _Resolver:
                 if condition is not None:
                     standing = Standing(assume.state or "assumed")
                     name = AssumptionName(assume.name.text)
-                    assumptions.append(
-                        Assumption(name, standing, condition, " ".join(assume.doc), assume.name.span)
-                    )
+                    doc, named = " ".join(assume.doc), requirements(self.scope, assume.requirements)
+                    assumptions.append(Assumption(name, standing, condition, doc, assume.name.span, named))
         return tuple(assumptions)
 
     def _invariants(self, all_: list[tree.Declaration]) -> tuple[Invariant, ...]:
@@ -198,9 +197,9 @@ class _Resolver:
                     invariant.condition.span,
                     "an assumption can be about inputs",
                 )
-            invariants.append(
-                Invariant(invariant.name.text, condition, " ".join(invariant.doc), invariant.name.span)
-            )
+            name, doc = invariant.name, " ".join(invariant.doc)
+            named = requirements(self.scope, invariant.requirements)
+            invariants.append(Invariant(name.text, condition, doc, name.span, named))
         return tuple(invariants)
 
     def _properties(self, all_: list[tree.Declaration]) -> tuple[Property, ...]:

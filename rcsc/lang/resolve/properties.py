@@ -18,6 +18,7 @@ from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean, without_before
 from rcsc.lang.leaves import one_earlier, read_by
 from rcsc.lang.model import Apply, Bool, Expr, Op, Property
+from rcsc.lang.resolve.declarations import requirements
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr
 
@@ -35,7 +36,14 @@ def resolve_property(scope: Scope, written: tree.PropertyDecl) -> Property | Non
         condition = None if first is None or other is None else form.condition(first, other)
     if condition is None:
         return None
-    return Property(written.name.text, condition, text, " ".join(written.doc), written.name.span)
+    return Property(
+        written.name.text,
+        condition,
+        text,
+        " ".join(written.doc),
+        written.name.span,
+        requirements=requirements(scope, written.requirements),
+    )
 
 
 def _condition(scope: Scope, written: tree.Expr, why_no_before: str) -> Expr | None:

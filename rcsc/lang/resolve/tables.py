@@ -21,6 +21,7 @@ from rcsc.lang.model import (
     Test,
     VariableName,
 )
+from rcsc.lang.resolve.declarations import requirements
 from rcsc.lang.resolve.precedence import with_precedence
 from rcsc.lang.resolve.statements import Statements
 from rcsc.lang.syntax import tree
@@ -50,12 +51,25 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
         names.setdefault(row.name, row)
         if not row.default:
             lines.append(
-                Line(LineName(row.name), cells.tests(row), cells.actions(row), row.span, _bounds(row))
+                Line(
+                    LineName(row.name),
+                    cells.tests(row),
+                    cells.actions(row),
+                    row.span,
+                    _bounds(row),
+                    requirements=requirements(scope, row.requirements),
+                )
             )
         elif default is not None:
             scope.report(Code.SEVERAL_DEFAULTS, "a table has at most one DEFAULT line", name_span)
         else:
-            default = Default(LineName(row.name), cells.actions(row), row.unreachable, row.cells[1].span)
+            default = Default(
+                LineName(row.name),
+                cells.actions(row),
+                row.unreachable,
+                row.cells[1].span,
+                requirements(scope, row.requirements),
+            )
     columns, resolved, meetings = with_precedence(scope, written, columns, tuple(lines))
     read = {name for line in resolved for test in line.tests if test is not None for name in test.variables}
     return Table(
@@ -69,6 +83,7 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
         written.name.span,
         written.span.file,
         meetings=meetings,
+        requirements=requirements(scope, written.requirements),
     )
 
 

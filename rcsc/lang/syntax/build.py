@@ -15,7 +15,7 @@ class Rows(Protocol):
 
     def table(
         self, rows: list[Any]
-    ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...]]: ...
+    ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...], bool]: ...
 
 
 class Build:
@@ -43,6 +43,18 @@ class Build:
         """Span, comments and doc lines of a declaration."""
         plain, doc = split(self.comments.take(node.start_pos))
         return {"span": self._span(node), "comments": plain, "doc": doc}
+
+    def _quoted(self, node: ParseNode | None) -> tuple[tree.Name, ...]:
+        """Names in quotes."""
+        strings = [] if node is None else [item for item in node.children if item.type == "STRING"]
+        return tuple(
+            tree.Name(str(token)[1:-1], Span(self.file, token.start_pos + 1, token.end_pos - 1))
+            for token in strings
+        )
+
+    def _required(self, node: ParseNode) -> dict[str, Any]:
+        """Span, comments, doc lines and requirements of a declaration."""
+        return {**self._head(node), "requirements": self._quoted(self._find(node.children, "req"))}
 
     def _above(self, node: ParseNode) -> dict[str, Any]:
         """Span and comments of a statement or an arm."""
@@ -126,7 +138,7 @@ class Build:
         )
 
     def _assume_decl(self, node: ParseNode) -> tree.AssumeDecl:
-        head = self._head(node)
+        head = self._required(node)
         standing = self._kind(node.children, "STANDING")
         return tree.AssumeDecl(
             self._name(node.children[0]),
@@ -136,12 +148,12 @@ class Build:
         )
 
     def _invariant_decl(self, node: ParseNode) -> tree.InvariantDecl:
-        head = self._head(node)
-        return tree.InvariantDecl(self._name(node.children[0]), self.expr(node.children[1]), **head)
+        head = self._required(node)
+        return tree.InvariantDecl(self._name(node.children[0]), self.expr(node.children[-1]), **head)
 
     def _property_decl(self, node: ParseNode) -> tree.PropertyDecl:
-        head = self._head(node)
-        name, condition, *last = node.children
+        head = self._required(node)
+        name, condition, *last = (part for part in node.children if self._rule(part) != "req")
         word = self._rule(last[0]) if last else ""  # the rule is called as the word is
         other = self.expr(last[0].children[0]) if last else None
         return tree.PropertyDecl(self._name(name), self.expr(condition), word, other, **head)
@@ -156,7 +168,7 @@ class Build:
         return self._procedure(node, "extern")
 
     def _procedure(self, node: ParseNode, kind: str) -> tree.ProcedureDecl:
-        head = self._head(node)
+        head = self._required(node)
         parts = node.children[1:]
         params, body = self._find(parts, "parameters"), self._find(parts, "block")
         reads, writes = self._find(parts, "reads"), self._find(parts, "writes")
@@ -183,12 +195,13 @@ class Build:
         )
 
     def _table_decl(self, node: ParseNode) -> tree.TableDecl:
-        head = self._head(node)
+        head = self._required(node)
         assuming = self._names(self._find(node.children, "names"))
         assert self.rows is not None
         rows = [item for item in node.children if getattr(item, "type", None) == "ROW"]
-        conditions, actions, lines = self.rows.table(rows)
-        return tree.TableDecl(self._name(node.children[0]), assuming, conditions, actions, lines, **head)
+        conditions, actions, lines, traced = self.rows.table(rows)
+        name = self._name(node.children[0])
+        return tree.TableDecl(name, assuming, conditions, actions, lines, traced, **head)
 
     def _link_decl(self, node: ParseNode) -> tree.LinkDecl:
         head = self._head(node)
@@ -407,11 +420,13 @@ class Build:
     # --- cells ---
 
     def cell(self, node: ParseNode) -> Any:
-        """A condition, an expression or a list of actions, by the start rule that parsed it."""
+        """A condition, an expression, requirements or a list of actions, by the start rule that parsed it."""
         part = node.children[0]
         match node.data:
             case "cell":
                 return self._condition(part)
+            case "requirements":
+                return self._quoted(node)
             case "actions":
                 return tuple(self.statement(item) for item in node.children if isinstance(item, ParseNode))
             case _:

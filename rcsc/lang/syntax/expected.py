@@ -48,6 +48,7 @@ _WORDS = {
     "_INT": "`int`",
     "_REAL": "`real`",
     "_SET": "`set`",
+    "_REQ": "`req`",
 }
 _MOST = 6
 _CLASSES = {

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from rcsc.lang.operator_table import SUM
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.layout import WIDTH, table_rows
-from rcsc.lang.syntax.spell import spell_expr, spell_set, spell_statement, spell_type
+from rcsc.lang.syntax.spell import spell_expr, spell_req, spell_set, spell_statement, spell_type
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.SetDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
          tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl, tree.AdoptDecl)  # fmt: skip
@@ -88,14 +88,14 @@ def _type(one: tree.UnitDecl | tree.ConstDecl | tree.SetDecl | tree.EnumDecl | t
 
 
 def _claim(claim: tree.AssumeDecl | tree.InvariantDecl | tree.PropertyDecl) -> str:
-    condition = spell_expr(claim.condition)
+    condition, req = spell_expr(claim.condition), spell_req(claim)
     match claim:
         case tree.AssumeDecl(name, _, state):
-            return f"assume {name.text}{f' {state}' if state else ''} : {condition}"
+            return f"assume {name.text}{f' {state}' if state else ''}{req} : {condition}"
         case tree.InvariantDecl(name):
-            return f"invariant {name.text} : {condition}"
+            return f"invariant {name.text}{req} : {condition}"
         case tree.PropertyDecl(name, _, word, other):
-            return f"property {name.text} : {condition}" + (
+            return f"property {name.text}{req} : {condition}" + (
                 f" {word} {spell_expr(other)}" if other is not None else ""
             )
 
@@ -157,6 +157,7 @@ def _procedure(procedure: tree.ProcedureDecl) -> Iterator[str]:
     head = f"{word} {procedure.name.text}" + (f"({params})" if params else "")
     head += f" reads {', '.join(spell_expr(r) for r in procedure.reads)}" if procedure.reads else ""
     head += f" writes {', '.join(spell_expr(w) for w in procedure.writes)}" if procedure.writes else ""
+    head += spell_req(procedure)
     if procedure.kind == "extern":
         head += f' python "{procedure.python}"' if procedure.python else ""
         yield head + (f' c "{procedure.c}"' if procedure.c else "")
@@ -221,7 +222,7 @@ def _if(branch: tree.If, depth: int, lead: str) -> Iterator[str]:
 
 def _table(table: tree.TableDecl, width: int) -> Iterator[str]:
     assuming = f" assuming {', '.join(name.text for name in table.assuming)}" if table.assuming else ""
-    yield f"table {table.name.text}{assuming} {{"
+    yield f"table {table.name.text}{assuming}{spell_req(table)} {{"
     for row, text in table_rows(table, width):
         if row is not None:
             yield from _above(row.comments, (), "  ")

@@ -15,13 +15,14 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.lang.syntax import tree
-from rcsc.lang.syntax.rows import ACTION_WORDS
-from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_statement
+from rcsc.lang.syntax.rows import ACTION_WORDS, REQUIREMENTS
+from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_names, spell_statement
 
 WIDTH = 110
 _INDENT = 2
 _IN_NAMES = re.compile(r"(?<=[A-Za-z0-9]_)(?=[A-Za-z])|(?<=[A-Za-z0-9_\])]\.)(?=[A-Za-z_])")
 """Where a name in a heading may be broken: after `_` and `.`, so that no blank comes in."""
+_QUOTED = re.compile(r'"[^"]*"(?:, )?')
 _BLANK = re.compile(r"(?<=[^_.]) ")
 _OPERATORS = frozenset("= /= < <= > >= + - * / mod .. :=".split())
 _BEFORE = _OPERATORS | frozenset("in not was when for next and or xor implies".split())
@@ -88,7 +89,11 @@ def _atoms(text: str, *, heading: bool) -> list[str]:
     ['/= vis_reqd ', 'or width - wanted > 2 [mm]']
     >>> _atoms("move(target_mm := far_mm, speed := 3)", heading=False)
     ['move(target_mm := ', 'far_mm, ', 'speed := 3)']
+    >>> _atoms('"SR-12", "the door"', heading=False)
+    ['"SR-12", ', '"the door"']
     """
+    if text.startswith('"'):  # requirements, each whole
+        return _QUOTED.findall(text)
     atoms: list[str] = []
     words = _BLANK.split(text)
     for at, word in enumerate(words):
@@ -144,12 +149,14 @@ def table_rows(table: tree.TableDecl, width: int) -> Iterator[tuple[tree.Row | N
 
 def _columns(table: tree.TableDecl) -> list[_Column]:
     left = [[_heading(heading, {"when"})] for heading in table.conditions]
-    right = [[_heading(heading, ACTION_WORDS)] for heading in table.actions]
+    right = [[_heading(heading, {*ACTION_WORDS, REQUIREMENTS})] for heading in table.actions]
     for row in table.rows:
         for texts, text in zip(left, _conditions(row, table), strict=True):
             texts.append(text)
         for texts, cell in zip(right, row.actions, strict=True):
             texts.append(_action(cell))
+    if table.traced:
+        right.append([REQUIREMENTS, *(spell_names(row.requirements) for row in table.rows)])
     return [_Column(texts, at < len(left)) for at, texts in enumerate((*left, *right))]
 
 

@@ -26,6 +26,7 @@ from rcsc.lang.syntax.rows import (
     CALL,
     CALL_UNDER,
     EMPTY_CELL,
+    IN_QUOTES,
     MARKS,
     NAMED_FIELDS,
     NEW_PART,
@@ -35,6 +36,7 @@ from rcsc.lang.syntax.rows import (
     PARTED,
     PIECES,
     PLAIN,
+    REQUIREMENTS,
     SAME_LINES,
     STUB,
     TO_WHOM,
@@ -67,7 +69,7 @@ def _grammar_text() -> str:
 @cache
 def _parser() -> lark.Lark:
     """The LALR parser of the grammar, as Lark makes it: it says what is wrong with a text."""
-    starts = ["file", "cell", "when", "heading", "actions"]
+    starts = ["file", "cell", "when", "heading", "requirements", "actions"]
     return lark.Lark(_grammar_text(), parser="lalr", start=starts)
 
 
@@ -237,16 +239,26 @@ class _Rows:
 
     def table(
         self, rows: list[ParseLeaf]
-    ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...]]:
-        """Condition headings, action headings and lines of a table."""
+    ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...], bool]:
+        """Condition headings, action headings and lines of a table, and whether it has a column of requirements."""
         read = [self._part(groups[0], groups[1:]) for groups in parts(rows)]
         heads = [part[0] for part in read if part is not None]
         if len(heads) < len(read):
-            return (), (), ()
+            return (), (), (), False
         conditions = tuple(self._heading(cell, "when") for head in heads for cell in head.conditions[1:])
-        actions = tuple(self._heading(cell, "") for head in heads for cell in head.actions)
+        headings = [cell for head in heads for cell in head.actions]
+        traced = self._traced(headings)
+        actions = tuple(self._heading(cell, "") for at, cell in enumerate(headings) if at != traced)
         lines = self._across([part[1] for part in read if part is not None], heads)
-        return conditions, actions, tuple(self._row(line, conditions, actions) for line in lines)
+        named = tuple(self._row(line, conditions, actions, traced) for line in lines)
+        return conditions, actions, named, traced is not None
+
+    def _traced(self, headings: Sequence[Cell]) -> int | None:
+        """The position of the column of requirements among those after `||`."""
+        traced = [at for at, cell in enumerate(headings) if cell.text == REQUIREMENTS]
+        for at in traced[1:]:
+            self._report(Code.SYNTAX, "a table has at most one column `req`", headings[at], IN_QUOTES)
+        return traced[0] if traced else None
 
     def _part(self, head: list[ParseLeaf], groups: list[list[ParseLeaf]]) -> tuple[Cells, list[_Line]] | None:
         """The heading of a part, and its lines."""
@@ -339,7 +351,11 @@ class _Rows:
         return tree.Heading(subject, "", cell)
 
     def _row(
-        self, line: _Line, conditions: tuple[tree.Heading, ...], actions: tuple[tree.Heading, ...]
+        self,
+        line: _Line,
+        conditions: tuple[tree.Heading, ...],
+        actions: tuple[tree.Heading, ...],
+        traced: int | None,
     ) -> tree.Row:
         first, *tests = (cell.blank() for cell in line.cells.conditions)
         stub = stub_of(first)
@@ -355,21 +371,27 @@ class _Rows:
             None if default else self._condition(cell, heading)
             for cell, heading in zip(tests, conditions, strict=True)
         )
+        does = [cell for at, cell in enumerate(line.cells.actions) if at != traced]
         return tree.Row(
             stub.name.text,
             parsed,
             tuple(
                 self._action(cell.blank(), heading)
-                for cell, heading in zip(line.cells.actions, actions, strict=True)
+                for cell, heading in zip(does, actions, strict=False)  # a second `req` is reported
             ),
             default,
             default and tests[0].text.endswith("unreachable"),
             Span(self.source.name, line.start, line.end),
-            (stub.name, *line.cells.all[1:]),
+            (stub.name, *line.cells.conditions[1:], *does),
             line.comments,
             tuple(tree.Name(lower.text, lower.span) for lower in stub.above),
             tuple(tree.Name(other.text, other.span) for other in stub.same),
+            () if traced is None else self._requirements(line.cells.actions[traced].blank()),
         )
+
+    def _requirements(self, cell: Cell) -> tuple[tree.Name, ...]:
+        names = self._parse("requirements", cell, IN_QUOTES) if cell.text else None
+        return tuple(replace(name, span=tree.absolute(name.span, cell)) for name in names or ())
 
     def _even(self, row: ParseLeaf, cells: Cells, other: Cells, called: str) -> bool:
         """Whether a row has as many cells as another that it stands below."""

@@ -14,6 +14,8 @@ from typing import TypeVar
 from rcsc.diagnostics.source import Span
 
 ACTION_WORDS = frozenset({"procedures", "command_out", "status_out"})
+REQUIREMENTS = "req"
+"""The heading of the column of requirements, which is neither a condition nor an action."""
 SEPARATOR = re.compile(r"\|[\s|:-]*-[\s|:-]*$")
 GOES_ON = re.compile(r"\|[ \t]*\|")
 AGAIN = re.compile(r"\|[ \t]*line[ \t]*\|")
@@ -24,6 +26,9 @@ MARKS = "after a line's name may stand `above LINE, LINE`, or `above all`, and `
 CALL = re.compile(r"(?!(?:abs|min|max|int|real|not)\b)[A-Za-z_][A-Za-z0-9_]*\s*\(|[^=]*:=")
 """What looks like a call or an assignment, and stands perhaps where a value should."""
 CALL_UNDER = "a call or an assignment stands under `procedures`, `command_out` or `status_out`"
+IN_QUOTES = (
+    'under `req` stand requirements in quotes: `"SR-12", "SR-13"`; a variable of that name is headed `(req)`'
+)
 ORDER = re.compile(r"(\w+)\s*\(")
 """What begins as an order does that has fields."""
 NAMED_FIELDS = "an order to a subordinate names its fields: `{}(FIELD := VALUE)`"

@@ -1,5 +1,6 @@
 """Expressions, types and conditions as text, with no more parentheses than are needed."""
 
+from collections.abc import Iterable
 from typing import assert_never
 
 from rcsc.lang.operator_table import (
@@ -15,6 +16,16 @@ from rcsc.lang.operator_table import (
     Op,
 )
 from rcsc.lang.syntax import tree
+
+
+def spell_names(names: Iterable[tree.Name]) -> str:
+    """Names of requirements, each in quotes."""
+    return ", ".join(f'"{name.text}"' for name in names)
+
+
+def spell_req(declaration: tree.Required) -> str:
+    """The requirements of a declaration, with a blank before them; empty for none."""
+    return f" req {spell_names(declaration.requirements)}" if declaration.requirements else ""
 
 
 def spell_expr(expr: tree.Expr, least: int = 0) -> str:

@@ -37,10 +37,17 @@ class Documented(Commented):
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """An identifier as written."""
+    """An identifier as written, or the name of a requirement, without its quotes."""
 
     text: str
     span: Span = at()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Required(Documented):
+    """A declaration that may name the requirements it answers: `req "SR-12", "SR-13"`."""
+
+    requirements: tuple["Name", ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -447,6 +454,7 @@ class Row:
         unreachable: `DEFAULT unreachable`.
         above: The lines before which it goes where both match; `all` is every other.
         same: Those that do the same where both match.
+        requirements: What stands under the heading `req`; `cells` leaves it out.
     """
 
     name: str
@@ -459,6 +467,7 @@ class Row:
     comments: tuple[str, ...] = ()
     above: tuple[Name, ...] = ()
     same: tuple[Name, ...] = ()
+    requirements: tuple[Name, ...] = ()
 
     @property
     def stub(self) -> str:
@@ -569,8 +578,8 @@ class VariableDecl(Documented):
 
 
 @dataclass(frozen=True, slots=True)
-class AssumeDecl(Documented):
-    """`assume name [assumed|monitored|assumed monitored|proved] : expr`; "" is `assumed`."""
+class AssumeDecl(Required):
+    """`assume name [assumed|monitored|assumed monitored|proved] [req ..] : expr`; "" is `assumed`."""
 
     name: Name
     condition: Expr
@@ -578,16 +587,16 @@ class AssumeDecl(Documented):
 
 
 @dataclass(frozen=True, slots=True)
-class InvariantDecl(Documented):
-    """`invariant name : expr`."""
+class InvariantDecl(Required):
+    """`invariant name [req ..] : expr`."""
 
     name: Name
     condition: Expr
 
 
 @dataclass(frozen=True, slots=True)
-class PropertyDecl(Documented):
-    """`property name : expr [then|until|upon expr]`.
+class PropertyDecl(Required):
+    """`property name [req ..] : expr [then|until|upon expr]`.
 
     `word` is "" or the word between the two; `other` stands after it.
     """
@@ -608,8 +617,8 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class ProcedureDecl(Documented):
-    """`procedure name(params) { ... }`, or `module name reads a writes b { ... }`.
+class ProcedureDecl(Required):
+    """`procedure name(params) [req ..] { ... }`, or `module name reads a writes b [req ..] { ... }`.
 
     A module declares what it reads and writes, and the declaration is checked. An
     `extern procedure` has no body but names its Python (`"pkg.module:function"`) and C
@@ -635,14 +644,19 @@ class OwnerDecl(Documented):
 
 
 @dataclass(frozen=True, slots=True)
-class TableDecl(Documented):
-    """`table name assuming a, b { rows }`."""
+class TableDecl(Required):
+    """`table name assuming a, b [req ..] { rows }`.
+
+    Attributes:
+        traced: Whether it has a column `req`.
+    """
 
     name: Name
     assuming: tuple[Name, ...]
     conditions: tuple[Heading, ...]
     actions: tuple[Heading, ...]
     rows: tuple[Row, ...]
+    traced: bool = False
 
 
 @dataclass(frozen=True, slots=True)

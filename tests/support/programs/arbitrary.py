@@ -195,6 +195,9 @@ def _cells() -> SearchStrategy[tuple[tree.Statement, ...]]:
 
 ACTIONS = st.lists(st.sampled_from(["procedures", "command_out", "status_out", "place"]), max_size=3)
 FEW = st.lists(NAMES, max_size=2).map(tuple)
+REQUIREMENTS = st.lists(
+    st.sampled_from(["SR-12", "req", "the door, shut", "§ 7.4 */"]).map(tree.Name), max_size=2
+).map(tuple)
 
 
 @st.composite
@@ -216,9 +219,18 @@ def tables(draw: st.DrawFn) -> tree.TableDecl:
         unreachable = default and draw(st.booleans())
         row = tree.Row(f"l{number}", conditions_, done, default, unreachable, comments=draw(WORDS))
         rows.append(replace(row, above=draw(FEW), same=draw(FEW)))
-    assuming = draw(FEW)
+    if traced := draw(st.booleans()):
+        rows = [replace(row, requirements=draw(REQUIREMENTS)) for row in rows]
     return tree.TableDecl(
-        draw(NAMES), assuming, headings, actions, tuple(rows), comments=draw(WORDS), doc=draw(DOCS)
+        draw(NAMES),
+        draw(FEW),
+        headings,
+        actions,
+        tuple(rows),
+        traced,
+        comments=draw(WORDS),
+        doc=draw(DOCS),
+        requirements=draw(REQUIREMENTS),
     )
 
 
@@ -268,6 +280,7 @@ def levels(draw: st.DrawFn) -> tree.LevelDecl:
 
 
 _HEAD: dict[str, SearchStrategy[tuple[str, ...]]] = {"comments": WORDS, "doc": DOCS}
+_REQUIRED: dict[str, SearchStrategy[tuple[object, ...]]] = {**_HEAD, "requirements": REQUIREMENTS}
 
 
 def _names_of_things() -> SearchStrategy[tree.Declaration]:
@@ -321,10 +334,10 @@ def _variables_and_claims() -> SearchStrategy[tree.Declaration]:
             restart=may_be,
             **_HEAD,
         ),
-        st.builds(tree.AssumeDecl, NAMES, expressions(), standings, **_HEAD),
-        st.builds(tree.InvariantDecl, NAMES, expressions(), **_HEAD),
-        st.builds(tree.PropertyDecl, NAMES, expressions(), **_HEAD),
-        st.builds(tree.PropertyDecl, NAMES, expressions(), words, expressions(), **_HEAD),
+        st.builds(tree.AssumeDecl, NAMES, expressions(), standings, **_REQUIRED),
+        st.builds(tree.InvariantDecl, NAMES, expressions(), **_REQUIRED),
+        st.builds(tree.PropertyDecl, NAMES, expressions(), **_REQUIRED),
+        st.builds(tree.PropertyDecl, NAMES, expressions(), words, expressions(), **_REQUIRED),
     )
 
 
@@ -336,9 +349,9 @@ def _procedures() -> SearchStrategy[tree.Declaration]:
     module = {"reads": touched, "writes": touched, "body": body}
     code = st.sampled_from(["", "pkg.mod:fn"]), st.sampled_from(["", "c_fn"])
     return st.one_of(
-        st.builds(tree.ProcedureDecl, st.just("procedure"), NAMES, params, body=body, **_HEAD),
-        st.builds(tree.ProcedureDecl, st.just("module"), NAMES, **module, **_HEAD),
-        st.builds(tree.ProcedureDecl, st.just("extern"), NAMES, params, touched, touched, *code, **_HEAD),
+        st.builds(tree.ProcedureDecl, st.just("procedure"), NAMES, params, body=body, **_REQUIRED),
+        st.builds(tree.ProcedureDecl, st.just("module"), NAMES, **module, **_REQUIRED),
+        st.builds(tree.ProcedureDecl, st.just("extern"), NAMES, params, touched, touched, *code, **_REQUIRED),
     )
 
 
