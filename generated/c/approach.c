@@ -184,6 +184,7 @@ static void approach_run_approach(approach_t *s)
 /* Every variable's initial value. */
 void approach_init(approach_t *s)
 {
+    s->digest = APPROACH_DIGEST;
     s->line = -1;
     s->fault = APPROACH_FAULT_NONE;
     s->fault_at = -1;
@@ -199,13 +200,15 @@ void approach_init(approach_t *s)
     s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_DONE;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: APPROACH_CHECK_OK; APPROACH_CHECK_FOREIGN where other tables made
+   it; else the position of the first variable outside its range or, counted after the variables, of the
+   first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t approach_check(const approach_t *s)
 {
-    int32_t at = -1;
-    if (!((s->smooth_n >= 0.0) && (s->smooth_n <= 500.0))) {
+    int32_t at = APPROACH_CHECK_OK;
+    if (s->digest != APPROACH_DIGEST) {
+        at = APPROACH_CHECK_FOREIGN;
+    } else if (!((s->smooth_n >= 0.0) && (s->smooth_n <= 500.0))) {
         at = APPROACH_LEAF_SMOOTH_N;
     } else if (s->settled > 25u) {
         at = APPROACH_LEAF_SETTLED;

@@ -32,6 +32,13 @@ enum {
     APPROACH_LEAF_STATUS_REPORT = 8
 };
 
+/* What else `check` gives. */
+enum {
+    APPROACH_CHECK_OK = -1, /* the state may be gone on from */
+    /* its `digest` is not APPROACH_DIGEST: other tables made it, or an older version of these */
+    APPROACH_CHECK_FOREIGN = 9
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     APPROACH_FAULT_NONE = 0,
@@ -47,6 +54,10 @@ enum {
     APPROACH_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
+/* Digests of what the tables mean, 373eb74c1d0b3dff, and of how the state is laid out, e8ab288bfc8e2ce5:
+   comments, and names of files, change neither. The number is made of both. */
+#define APPROACH_DIGEST UINT32_C(0x6ca7d61d)
+
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.
    After APPROACH_FAULT_ADMIT nothing has changed but the trace below.
@@ -56,6 +67,7 @@ enum {
    compiler's own: memcpy and memset, operations on doubles, bit counting and division
    where the processor has none. */
 typedef struct {
+    uint32_t digest; /* APPROACH_DIGEST, by `init`: which tables the state is of */
     /* 0: input; 0 .. 2000 mm; Distance left to the goal point; the controller overshoots, so it is
        clamped. */
     uint16_t distance_mm;
@@ -75,12 +87,18 @@ typedef struct {
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } approach_t;
 
+/* 72 bytes, or 64, 60, 57 where members are aligned to less than their size; with any other size this does
+   not compile. */
+typedef char approach_layout_holds[((sizeof(approach_t) == 72u) || (sizeof(approach_t) == 64u) ||
+    (sizeof(approach_t) == 60u) || (sizeof(approach_t) == 57u)) ?
+        1 : -1];
+
 /* Every variable's initial value. */
 void approach_init(approach_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: APPROACH_CHECK_OK; APPROACH_CHECK_FOREIGN where other tables made
+   it; else the position of the first variable outside its range or, counted after the variables, of the
+   first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t approach_check(const approach_t *s);
 
 /* The line of table approach that matches admitted inputs: its position; -1 none, -2 several. */

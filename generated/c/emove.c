@@ -1128,6 +1128,7 @@ static void emove_run_release_part(emove_t *s)
 /* Every variable's initial value. */
 void emove_init(emove_t *s)
 {
+    s->digest = EMOVE_DIGEST;
     s->line = -1;
     s->fault = EMOVE_FAULT_NONE;
     s->fault_at = -1;
@@ -1245,13 +1246,15 @@ void emove_init(emove_t *s)
     s->echoed = false;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: EMOVE_CHECK_OK; EMOVE_CHECK_FOREIGN where other tables made it;
+   else the position of the first variable outside its range or, counted after the variables, of the first
+   invariant that does not hold. Call it on every state that comes from outside. */
 int32_t emove_check(const emove_t *s)
 {
-    int32_t at = -1;
-    if ((*(const uint8_t *)&s->task.apoint_pos_flag) > 1u) {
+    int32_t at = EMOVE_CHECK_OK;
+    if (s->digest != EMOVE_DIGEST) {
+        at = EMOVE_CHECK_FOREIGN;
+    } else if ((*(const uint8_t *)&s->task.apoint_pos_flag) > 1u) {
         at = EMOVE_LEAF_TASK_APOINT_POS_FLAG;
     } else if (s->to_task.ref_command_echo > VOCABULARY_EMOVE_COMMAND_RELEASE) {
         at = EMOVE_LEAF_TO_TASK_REF_COMMAND_ECHO;
@@ -1369,13 +1372,13 @@ int32_t emove_check(const emove_t *s)
         at = EMOVE_LEAF_DISPLACED_HERE_X;
     } else if (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0))) {
         at = EMOVE_LEAF_DISPLACED_HERE_Y;
-    } else if (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0))) {
-        at = EMOVE_LEAF_DISPLACED_HERE_Z;
     } else {
         /* none of these */
     }
     if (at < 0) {
-        if (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0))) {
+        if (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0))) {
+            at = EMOVE_LEAF_DISPLACED_HERE_Z;
+        } else if (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0))) {
             at = EMOVE_LEAF_DISPLACED_HERE_C;
         } else if (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0))) {
             at = EMOVE_LEAF_DISPLACED_HERE_S;

@@ -224,6 +224,13 @@ enum {
     EMOVE_LEAF_ECHOED = 110
 };
 
+/* What else `check` gives. */
+enum {
+    EMOVE_CHECK_OK = -1, /* the state may be gone on from */
+    /* its `digest` is not EMOVE_DIGEST: other tables made it, or an older version of these */
+    EMOVE_CHECK_FOREIGN = 111
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     EMOVE_FAULT_NONE = 0,
@@ -239,6 +246,10 @@ enum {
     EMOVE_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
+/* Digests of what the tables mean, 9b385fe4bc08e20d, and of how the state is laid out, ddf7c673791a25cd:
+   comments, and names of files, change neither. The number is made of both. */
+#define EMOVE_DIGEST UINT32_C(0x38ef7723)
+
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.
    After EMOVE_FAULT_ADMIT nothing has changed but the trace below.
@@ -248,6 +259,7 @@ enum {
    compiler's own: memcpy and memset, operations on doubles, bit counting and division
    where the processor has none. */
 typedef struct {
+    uint32_t digest; /* EMOVE_DIGEST, by `init`: which tables the state is of */
     vocabulary_emove_order_t task; /* 0 to 7: input; Orders of task. */
     vocabulary_emove_report_t to_task; /* 8 to 11: output; Reports to task. */
     /* 12: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
@@ -309,12 +321,18 @@ typedef struct {
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } emove_t;
 
+/* 456 bytes, or 436, 424, 410 where members are aligned to less than their size; with any other size this
+   does not compile. */
+typedef char emove_layout_holds[((sizeof(emove_t) == 456u) || (sizeof(emove_t) == 436u) ||
+    (sizeof(emove_t) == 424u) || (sizeof(emove_t) == 410u)) ?
+        1 : -1];
+
 /* Every variable's initial value. */
 void emove_init(emove_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: EMOVE_CHECK_OK; EMOVE_CHECK_FOREIGN where other tables made it;
+   else the position of the first variable outside its range or, counted after the variables, of the first
+   invariant that does not hold. Call it on every state that comes from outside. */
 int32_t emove_check(const emove_t *s);
 
 /* The line of table locate that matches admitted inputs: its position; -1 none, -2 several. */

@@ -26,6 +26,7 @@ enum {
     EMOVE_COMMON_EMOVE_STATE_RELEASING = 13
 };
 
+/* record path, 10 bytes */
 typedef struct {
     bool known;
     uint16_t depart_first; /* 0 .. 9999 */
@@ -34,6 +35,7 @@ typedef struct {
     uint8_t approach_count; /* 0 .. 31 */
 } emove_common_path_t;
 
+/* record spot, 8 bytes */
 typedef struct {
     bool known;
     uint16_t hover_point; /* 0 .. 9999 */
@@ -41,6 +43,7 @@ typedef struct {
     uint16_t view_point; /* 0 .. 9999 */
 } emove_common_spot_t;
 
+/* record part, 56 bytes */
 typedef struct {
     bool known;
     double expected_range_mm; /* 0.0 .. 2000.0 mm */
@@ -49,6 +52,7 @@ typedef struct {
     vocabulary_direction_t normal;
 } emove_common_part_t;
 
+/* record primitive_held, 4 bytes */
 typedef struct {
     vocabulary_primitive_command_t command;
     vocabulary_level_status_t status;
@@ -56,6 +60,7 @@ typedef struct {
     vocabulary_reason_t failure;
 } emove_common_primitive_held_t;
 
+/* record primitive_last, 48 bytes */
 typedef struct {
     vocabulary_primitive_command_t input_command;
     vocabulary_object_t obj_ptr;
@@ -64,6 +69,7 @@ typedef struct {
     vocabulary_shift_t displaced;
 } emove_common_primitive_last_t;
 
+/* record vision_held, 4 bytes */
 typedef struct {
     vocabulary_vision_command_t command;
     vocabulary_level_status_t status;
@@ -71,6 +77,7 @@ typedef struct {
     vocabulary_reason_t failure;
 } emove_common_vision_held_t;
 
+/* record vision_last, 2 bytes */
 typedef struct {
     vocabulary_vision_command_t input_command;
     vocabulary_object_t obj_ptr;

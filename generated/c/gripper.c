@@ -347,6 +347,7 @@ static void gripper_run_pause_gripper(gripper_t *s)
 /* Every variable's initial value. */
 void gripper_init(gripper_t *s)
 {
+    s->digest = GRIPPER_DIGEST;
     s->line = -1;
     s->fault = GRIPPER_FAULT_NONE;
     s->fault_at = -1;
@@ -378,13 +379,15 @@ void gripper_init(gripper_t *s)
     s->to_hand.speed_mm_s = 0.0;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: GRIPPER_CHECK_OK; GRIPPER_CHECK_FOREIGN where other tables made
+   it; else the position of the first variable outside its range or, counted after the variables, of the
+   first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t gripper_check(const gripper_t *s)
 {
-    int32_t at = -1;
-    if (s->to_primitive.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP) {
+    int32_t at = GRIPPER_CHECK_OK;
+    if (s->digest != GRIPPER_DIGEST) {
+        at = GRIPPER_CHECK_FOREIGN;
+    } else if (s->to_primitive.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP) {
         at = GRIPPER_LEAF_TO_PRIMITIVE_REF_COMMAND_ECHO;
     } else if (s->to_primitive.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = GRIPPER_LEAF_TO_PRIMITIVE_STATUS_REPORT;

@@ -67,6 +67,13 @@ enum {
     GRIPPER_LEAF_TO_HAND_SPEED_MM_S = 24
 };
 
+/* What else `check` gives. */
+enum {
+    GRIPPER_CHECK_OK = -1, /* the state may be gone on from */
+    /* its `digest` is not GRIPPER_DIGEST: other tables made it, or an older version of these */
+    GRIPPER_CHECK_FOREIGN = 25
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     GRIPPER_FAULT_NONE = 0,
@@ -82,6 +89,10 @@ enum {
     GRIPPER_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
+/* Digests of what the tables mean, 0458c475cfdbeb84, and of how the state is laid out, 92532993683eda41:
+   comments, and names of files, change neither. The number is made of both. */
+#define GRIPPER_DIGEST UINT32_C(0x96a9c44c)
+
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.
    After GRIPPER_FAULT_ADMIT nothing has changed but the trace below.
@@ -91,6 +102,7 @@ enum {
    compiler's own: memcpy and memset, operations on doubles, bit counting and division
    where the processor has none. */
 typedef struct {
+    uint32_t digest; /* GRIPPER_DIGEST, by `init`: which tables the state is of */
     vocabulary_gripper_order_t primitive; /* 0 to 4: input; Orders of primitive. */
     vocabulary_gripper_report_t to_primitive; /* 5 to 9: output; Reports to primitive. */
     /* 10: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
@@ -116,12 +128,18 @@ typedef struct {
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } gripper_t;
 
+/* 144 bytes, or 128, 120, 115 where members are aligned to less than their size; with any other size this
+   does not compile. */
+typedef char gripper_layout_holds[((sizeof(gripper_t) == 144u) || (sizeof(gripper_t) == 128u) ||
+    (sizeof(gripper_t) == 120u) || (sizeof(gripper_t) == 115u)) ?
+        1 : -1];
+
 /* Every variable's initial value. */
 void gripper_init(gripper_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: GRIPPER_CHECK_OK; GRIPPER_CHECK_FOREIGN where other tables made
+   it; else the position of the first variable outside its range or, counted after the variables, of the
+   first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t gripper_check(const gripper_t *s);
 
 /* The line of table position that matches admitted inputs: its position; -1 none, -2 several. */

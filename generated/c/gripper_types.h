@@ -13,11 +13,13 @@ enum {
     GRIPPER_GRIPPER_STATE_MOVING = 2
 };
 
+/* record hand_report, 16 bytes */
 typedef struct {
     double opening_mm; /* 0.0 .. 200.0 mm */
     double force_n; /* 0.0 .. 1000.0 N */
 } gripper_hand_report_t;
 
+/* record hand_order, 32 bytes */
 typedef struct {
     bool drive;
     double opening_mm; /* 0.0 .. 200.0 mm */

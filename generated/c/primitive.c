@@ -971,6 +971,7 @@ static void primitive_run_pause_primitive(primitive_t *s)
 /* Every variable's initial value. */
 void primitive_init(primitive_t *s)
 {
+    s->digest = PRIMITIVE_DIGEST;
     s->line = -1;
     s->fault = PRIMITIVE_FAULT_NONE;
     s->fault_at = -1;
@@ -1096,13 +1097,15 @@ void primitive_init(primitive_t *s)
     s->echoed = false;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: PRIMITIVE_CHECK_OK; PRIMITIVE_CHECK_FOREIGN where other tables
+   made it; else the position of the first variable outside its range or, counted after the variables, of
+   the first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t primitive_check(const primitive_t *s)
 {
-    int32_t at = -1;
-    if (s->to_emove.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
+    int32_t at = PRIMITIVE_CHECK_OK;
+    if (s->digest != PRIMITIVE_DIGEST) {
+        at = PRIMITIVE_CHECK_FOREIGN;
+    } else if (s->to_emove.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = PRIMITIVE_LEAF_TO_EMOVE_REF_COMMAND_ECHO;
     } else if (s->to_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = PRIMITIVE_LEAF_TO_EMOVE_STATUS_REPORT;
@@ -1220,13 +1223,13 @@ int32_t primitive_check(const primitive_t *s)
         at = PRIMITIVE_LEAF_LENGTH_MM;
     } else if (!((s->travelled_mm >= 0.0) && (s->travelled_mm <= 30000.0))) {
         at = PRIMITIVE_LEAF_TRAVELLED_MM;
-    } else if (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0))) {
-        at = PRIMITIVE_LEAF_SPEED_MM_S;
     } else {
         /* none of these */
     }
     if (at < 0) {
-        if ((*(const uint8_t *)&s->near_) > 1u) {
+        if (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0))) {
+            at = PRIMITIVE_LEAF_SPEED_MM_S;
+        } else if ((*(const uint8_t *)&s->near_) > 1u) {
             at = PRIMITIVE_LEAF_NEAR;
         } else if ((*(const uint8_t *)&s->there) > 1u) {
             at = PRIMITIVE_LEAF_THERE;

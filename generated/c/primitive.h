@@ -217,6 +217,13 @@ enum {
     PRIMITIVE_LEAF_ECHOED = 118
 };
 
+/* What else `check` gives. */
+enum {
+    PRIMITIVE_CHECK_OK = -1, /* the state may be gone on from */
+    /* its `digest` is not PRIMITIVE_DIGEST: other tables made it, or an older version of these */
+    PRIMITIVE_CHECK_FOREIGN = 119
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     PRIMITIVE_FAULT_NONE = 0,
@@ -232,6 +239,10 @@ enum {
     PRIMITIVE_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
+/* Digests of what the tables mean, 5821c84033322e76, and of how the state is laid out, 6de1bf06a8220667:
+   comments, and names of files, change neither. The number is made of both. */
+#define PRIMITIVE_DIGEST UINT32_C(0x6aaffae0)
+
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.
    After PRIMITIVE_FAULT_ADMIT nothing has changed but the trace below.
@@ -241,6 +252,7 @@ enum {
    compiler's own: memcpy and memset, operations on doubles, bit counting and division
    where the processor has none. */
 typedef struct {
+    uint32_t digest; /* PRIMITIVE_DIGEST, by `init`: which tables the state is of */
     vocabulary_primitive_order_t emove; /* 0 to 9: input; Orders of emove. */
     vocabulary_primitive_report_t to_emove; /* 10 to 14: output; Reports to emove. */
     /* 15: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
@@ -291,12 +303,18 @@ typedef struct {
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } primitive_t;
 
+/* 704 bytes, or 664, 652, 641 where members are aligned to less than their size; with any other size this
+   does not compile. */
+typedef char primitive_layout_holds[((sizeof(primitive_t) == 704u) || (sizeof(primitive_t) == 664u) ||
+    (sizeof(primitive_t) == 652u) || (sizeof(primitive_t) == 641u)) ?
+        1 : -1];
+
 /* Every variable's initial value. */
 void primitive_init(primitive_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: PRIMITIVE_CHECK_OK; PRIMITIVE_CHECK_FOREIGN where other tables
+   made it; else the position of the first variable outside its range or, counted after the variables, of
+   the first invariant that does not hold. Call it on every state that comes from outside. */
 int32_t primitive_check(const primitive_t *s);
 
 /* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2

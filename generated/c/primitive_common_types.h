@@ -23,6 +23,7 @@ enum {
     PRIMITIVE_COMMON_DISPLAY_FINGERS = 1
 };
 
+/* record goal_point, 112 bytes */
 typedef struct {
     bool known;
     double plate[9]; /* -4000.0 .. 4000.0 mm */
@@ -32,6 +33,7 @@ typedef struct {
     double breakpoint_mm; /* 0.0 .. 500.0 mm */
 } primitive_common_goal_point_t;
 
+/* record end_effector, 56 bytes */
 typedef struct {
     bool known;
     double approach_mm; /* 0.0 .. 200.0 mm */
@@ -42,6 +44,7 @@ typedef struct {
     double speed_mm_s; /* 0.0 .. 500.0 mm*s^-1 */
 } primitive_common_end_effector_t;
 
+/* record robot_held, 4 bytes */
 typedef struct {
     vocabulary_robot_command_t command;
     vocabulary_level_status_t status;
@@ -49,10 +52,12 @@ typedef struct {
     vocabulary_reason_t failure;
 } primitive_common_robot_held_t;
 
+/* record robot_last, 1 byte */
 typedef struct {
     vocabulary_robot_command_t input_command;
 } primitive_common_robot_last_t;
 
+/* record gripper_held, 4 bytes */
 typedef struct {
     vocabulary_gripper_command_t command;
     vocabulary_level_status_t status;
@@ -60,6 +65,7 @@ typedef struct {
     vocabulary_reason_t failure;
 } primitive_common_gripper_held_t;
 
+/* record gripper_last, 32 bytes */
 typedef struct {
     vocabulary_gripper_command_t input_command;
     double opening_mm; /* 0.0 .. 200.0 mm */

@@ -1344,6 +1344,7 @@ static void task_run_transfer(task_t *s)
 /* Every variable's initial value. */
 void task_init(task_t *s)
 {
+    s->digest = TASK_DIGEST;
     s->line = -1;
     s->fault = TASK_FAULT_NONE;
     s->fault_at = -1;
@@ -1430,13 +1431,15 @@ void task_init(task_t *s)
     s->echoed = false;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: TASK_CHECK_OK; TASK_CHECK_FOREIGN where other tables made it;
+   else the position of the first variable outside its range or, counted after the variables, of the first
+   invariant that does not hold. Call it on every state that comes from outside. */
 int32_t task_check(const task_t *s)
 {
-    int32_t at = -1;
-    if (s->to_workstation.ref_command_echo > VOCABULARY_TASK_COMMAND_CLEAR) {
+    int32_t at = TASK_CHECK_OK;
+    if (s->digest != TASK_DIGEST) {
+        at = TASK_CHECK_FOREIGN;
+    } else if (s->to_workstation.ref_command_echo > VOCABULARY_TASK_COMMAND_CLEAR) {
         at = TASK_LEAF_TO_WORKSTATION_REF_COMMAND_ECHO;
     } else if (s->to_workstation.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = TASK_LEAF_TO_WORKSTATION_STATUS_REPORT;

@@ -223,6 +223,13 @@ enum {
     TASK_LEAF_ECHOED = 79
 };
 
+/* What else `check` gives. */
+enum {
+    TASK_CHECK_OK = -1, /* the state may be gone on from */
+    /* its `digest` is not TASK_DIGEST: other tables made it, or an older version of these */
+    TASK_CHECK_FOREIGN = 80
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     TASK_FAULT_NONE = 0,
@@ -238,6 +245,10 @@ enum {
     TASK_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
+/* Digests of what the tables mean, 3694b2b7e7d1eacd, and of how the state is laid out, 1442776d32304a46:
+   comments, and names of files, change neither. The number is made of both. */
+#define TASK_DIGEST UINT32_C(0xef34c29e)
+
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.
    After TASK_FAULT_ADMIT nothing has changed but the trace below.
@@ -247,6 +258,7 @@ enum {
    compiler's own: memcpy and memset, bit counting and division
    where the processor has none. */
 typedef struct {
+    uint32_t digest; /* TASK_DIGEST, by `init`: which tables the state is of */
     vocabulary_task_order_t workstation; /* 0 to 7: input; Orders of workstation. */
     vocabulary_task_report_t to_workstation; /* 8 to 13: output; Reports to workstation. */
     /* 14: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
@@ -297,12 +309,18 @@ typedef struct {
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } task_t;
 
+/* 120 bytes, or 116, 114, 109 where members are aligned to less than their size; with any other size this
+   does not compile. */
+typedef char task_layout_holds[((sizeof(task_t) == 120u) || (sizeof(task_t) == 116u) ||
+    (sizeof(task_t) == 114u) || (sizeof(task_t) == 109u)) ?
+        1 : -1];
+
 /* Every variable's initial value. */
 void task_init(task_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: TASK_CHECK_OK; TASK_CHECK_FOREIGN where other tables made it;
+   else the position of the first variable outside its range or, counted after the variables, of the first
+   invariant that does not hold. Call it on every state that comes from outside. */
 int32_t task_check(const task_t *s);
 
 /* The line of table acquire that matches admitted inputs: its position; -1 none, -2 several. */

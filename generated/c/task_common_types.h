@@ -28,6 +28,7 @@ enum {
     TASK_COMMON_LOCATING_KNOWN = 1
 };
 
+/* record place, 5 bytes */
 typedef struct {
     bool known;
     bool vision;
@@ -36,6 +37,7 @@ typedef struct {
     uint8_t safe; /* 0 .. 255 */
 } task_common_place_t;
 
+/* record emove_held, 4 bytes */
 typedef struct {
     vocabulary_emove_command_t command;
     vocabulary_level_status_t status;
@@ -43,6 +45,7 @@ typedef struct {
     vocabulary_reason_t failure;
 } task_common_emove_held_t;
 
+/* record emove_last, 5 bytes */
 typedef struct {
     vocabulary_emove_command_t input_command;
     vocabulary_object_t obj_ptr;

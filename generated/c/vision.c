@@ -392,6 +392,7 @@ static void vision_run_pause_vision(vision_t *s)
 /* Every variable's initial value. */
 void vision_init(vision_t *s)
 {
+    s->digest = VISION_DIGEST;
     s->line = -1;
     s->fault = VISION_FAULT_NONE;
     s->fault_at = -1;
@@ -436,13 +437,15 @@ void vision_init(vision_t *s)
     s->to_camera.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
 }
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: VISION_CHECK_OK; VISION_CHECK_FOREIGN where other tables made it;
+   else the position of the first variable outside its range or, counted after the variables, of the first
+   invariant that does not hold. Call it on every state that comes from outside. */
 int32_t vision_check(const vision_t *s)
 {
-    int32_t at = -1;
-    if (s->to_emove.ref_command_echo > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
+    int32_t at = VISION_CHECK_OK;
+    if (s->digest != VISION_DIGEST) {
+        at = VISION_CHECK_FOREIGN;
+    } else if (s->to_emove.ref_command_echo > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
         at = VISION_LEAF_TO_EMOVE_REF_COMMAND_ECHO;
     } else if (s->to_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = VISION_LEAF_TO_EMOVE_STATUS_REPORT;

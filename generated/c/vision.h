@@ -82,6 +82,13 @@ enum {
     VISION_LEAF_TO_CAMERA_OBJ_PTR = 37
 };
 
+/* What else `check` gives. */
+enum {
+    VISION_CHECK_OK = -1, /* the state may be gone on from */
+    /* its `digest` is not VISION_DIGEST: other tables made it, or an older version of these */
+    VISION_CHECK_FOREIGN = 38
+};
+
 /* `fault`, and what a cycle returns. */
 enum {
     VISION_FAULT_NONE = 0,
@@ -97,6 +104,10 @@ enum {
     VISION_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
+/* Digests of what the tables mean, 523a56f6445ac47e, and of how the state is laid out, 7cab78c68f2bad23:
+   comments, and names of files, change neither. The number is made of both. */
+#define VISION_DIGEST UINT32_C(0x09cf2cfa)
+
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.
    After VISION_FAULT_ADMIT nothing has changed but the trace below.
@@ -106,6 +117,7 @@ enum {
    compiler's own: memcpy and memset, operations on doubles, bit counting and division
    where the processor has none. */
 typedef struct {
+    uint32_t digest; /* VISION_DIGEST, by `init`: which tables the state is of */
     vocabulary_vision_order_t emove; /* 0 to 6: input; Orders of emove. */
     vocabulary_vision_report_t to_emove; /* 7 to 15: output; Reports to emove. */
     /* 16: state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
@@ -128,12 +140,18 @@ typedef struct {
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } vision_t;
 
+/* 208 bytes, or 196, 190, 186 where members are aligned to less than their size; with any other size this
+   does not compile. */
+typedef char vision_layout_holds[((sizeof(vision_t) == 208u) || (sizeof(vision_t) == 196u) ||
+    (sizeof(vision_t) == 190u) || (sizeof(vision_t) == 186u)) ?
+        1 : -1];
+
 /* Every variable's initial value. */
 void vision_init(vision_t *s);
 
-/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or,
-   counted after the variables, of the first invariant that does not hold. Call it on every state that
-   comes from outside. */
+/* Whether the state may be gone on from: VISION_CHECK_OK; VISION_CHECK_FOREIGN where other tables made it;
+   else the position of the first variable outside its range or, counted after the variables, of the first
+   invariant that does not hold. Call it on every state that comes from outside. */
 int32_t vision_check(const vision_t *s);
 
 /* The line of table flood_flash that matches admitted inputs: its position; -1 none, -2 several. */

@@ -23,6 +23,7 @@ enum {
     VISION_FLASH_LINE = 2
 };
 
+/* record picture, 72 bytes */
 typedef struct {
     uint16_t number; /* 0 .. 65535 */
     bool matched;
@@ -34,6 +35,7 @@ typedef struct {
     vocabulary_direction_t normal;
 } vision_picture_t;
 
+/* record camera_order, 4 bytes */
 typedef struct {
     uint16_t number; /* 0 .. 65535 */
     vision_flash_t fire;

@@ -105,6 +105,7 @@ enum {
     VOCABULARY_REASON_NO_PICTURE = 17
 };
 
+/* record task_order, 10 bytes */
 typedef struct {
     uint16_t inc_command; /* 0 .. 65535 */
     vocabulary_task_command_t input_command;
@@ -116,6 +117,7 @@ typedef struct {
     uint8_t sector; /* 0 .. 99 */
 } vocabulary_task_order_t;
 
+/* record task_report, 8 bytes */
 typedef struct {
     uint16_t inc_command_echo; /* 0 .. 65535 */
     vocabulary_task_command_t ref_command_echo;
@@ -125,6 +127,7 @@ typedef struct {
     vocabulary_reason_t cause;
 } vocabulary_task_report_t;
 
+/* record emove_order, 10 bytes */
 typedef struct {
     uint16_t inc_command; /* 0 .. 65535 */
     vocabulary_emove_command_t input_command;
@@ -136,6 +139,7 @@ typedef struct {
     vocabulary_object_t gripped_obj_ptr;
 } vocabulary_emove_order_t;
 
+/* record emove_report, 6 bytes */
 typedef struct {
     uint16_t inc_command_echo; /* 0 .. 65535 */
     vocabulary_emove_command_t ref_command_echo;
@@ -143,6 +147,7 @@ typedef struct {
     vocabulary_reason_t failure;
 } vocabulary_emove_report_t;
 
+/* record shift, 40 bytes */
 typedef struct {
     double x; /* -500.0 .. 500.0 mm */
     double y; /* -500.0 .. 500.0 mm */
@@ -151,6 +156,7 @@ typedef struct {
     double s; /* -1.0 .. 1.0 */
 } vocabulary_shift_t;
 
+/* record primitive_order, 48 bytes */
 typedef struct {
     uint16_t inc_command; /* 0 .. 65535 */
     vocabulary_primitive_command_t input_command;
@@ -160,6 +166,7 @@ typedef struct {
     vocabulary_shift_t displaced;
 } vocabulary_primitive_order_t;
 
+/* record primitive_report, 6 bytes */
 typedef struct {
     uint16_t inc_command_echo; /* 0 .. 65535 */
     vocabulary_primitive_command_t ref_command_echo;
@@ -168,12 +175,14 @@ typedef struct {
     bool holds;
 } vocabulary_primitive_report_t;
 
+/* record direction, 24 bytes */
 typedef struct {
     double x; /* -1.0 .. 1.0 */
     double y; /* -1.0 .. 1.0 */
     double z; /* -1.0 .. 1.0 */
 } vocabulary_direction_t;
 
+/* record vision_order, 40 bytes */
 typedef struct {
     uint16_t inc_command; /* 0 .. 65535 */
     vocabulary_vision_command_t input_command;
@@ -182,6 +191,7 @@ typedef struct {
     vocabulary_direction_t expected_normal;
 } vocabulary_vision_order_t;
 
+/* record vision_report, 48 bytes */
 typedef struct {
     uint16_t inc_command_echo; /* 0 .. 65535 */
     vocabulary_vision_command_t ref_command_echo;
@@ -194,6 +204,7 @@ typedef struct {
     double range_mm; /* 0.0 .. 2000.0 mm */
 } vocabulary_vision_report_t;
 
+/* record gripper_order, 32 bytes */
 typedef struct {
     uint16_t inc_command; /* 0 .. 65535 */
     vocabulary_gripper_command_t input_command;
@@ -202,6 +213,7 @@ typedef struct {
     double speed_mm_s; /* 0.0 .. 500.0 mm*s^-1 */
 } vocabulary_gripper_order_t;
 
+/* record gripper_report, 16 bytes */
 typedef struct {
     uint16_t inc_command_echo; /* 0 .. 65535 */
     vocabulary_gripper_command_t ref_command_echo;
@@ -210,12 +222,14 @@ typedef struct {
     double opening_mm; /* 0.0 .. 200.0 mm */
 } vocabulary_gripper_report_t;
 
+/* record robot_order, 80 bytes */
 typedef struct {
     uint16_t inc_command; /* 0 .. 65535 */
     vocabulary_robot_command_t input_command;
     double plate[9]; /* -4000.0 .. 4000.0 mm */
 } vocabulary_robot_order_t;
 
+/* record robot_report, 80 bytes */
 typedef struct {
     uint16_t inc_command_echo; /* 0 .. 65535 */
     vocabulary_robot_command_t ref_command_echo;

@@ -91,6 +91,12 @@ class reason(IntEnum):
     buf = 6
 
 
+DIGEST = 0x6ca7d61d
+"""Which tables a state is of: what they mean, and how the state is laid out; as in C."""
+FOREIGN = 9
+"""What `check` gives of a state that other tables made."""
+
+
 class _Refused(Exception):
     """An extern procedure gave a value outside its declared range."""
 
@@ -108,6 +114,7 @@ class State:
     """
 
     __slots__ = (
+        "digest",
         "distance_mm",
         "braking_mm",
         "tolerance_mm",
@@ -124,6 +131,7 @@ class State:
     )
 
     def __init__(self):
+        self.digest = DIGEST
         self.distance_mm = 0  # Distance left to the goal point; the controller overshoots, so it is clamped.
         self.braking_mm = 0  # Distance needed to stop from the present speed.
         self.tolerance_mm = 1  # How near is near enough.
@@ -265,7 +273,9 @@ def _do_stop(s):
 
 
 def check(s):
-    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    """Whether the state may be gone on from: -1; FOREIGN where other tables made it; else the position of the first variable outside its range or, counted after the variables, of the first invariant that does not hold."""
+    if s.digest != DIGEST:
+        return FOREIGN
     if not (isinstance(s.smooth_n, (int, float)) and 0.0 <= s.smooth_n <= 500.0):
         return 5
     if not (isinstance(s.settled, int) and 0 <= s.settled <= 25):

@@ -128,6 +128,12 @@ class emove_state(IntEnum):
     releasing = 13
 
 
+DIGEST = 0x38ef7723
+"""Which tables a state is of: what they mean, and how the state is laid out; as in C."""
+FOREIGN = 111
+"""What `check` gives of a state that other tables made."""
+
+
 class _Refused(Exception):
     """An extern procedure gave a value outside its declared range."""
 
@@ -152,6 +158,7 @@ class State:
     """
 
     __slots__ = (
+        "digest",
         "task_inc_command",
         "task_input_command",
         "task_obj_ptr",
@@ -270,6 +277,7 @@ class State:
     )
 
     def __init__(self):
+        self.digest = DIGEST
         self.task_inc_command = 0  # Orders of task.
         self.task_input_command = 0  # Orders of task.
         self.task_obj_ptr = 0  # Orders of task.
@@ -1133,7 +1141,9 @@ def _do_failed(s):
 
 
 def check(s):
-    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    """Whether the state may be gone on from: -1; FOREIGN where other tables made it; else the position of the first variable outside its range or, counted after the variables, of the first invariant that does not hold."""
+    if s.digest != DIGEST:
+        return FOREIGN
     if not (isinstance(s.task_apoint_pos_flag, int) and 0 <= s.task_apoint_pos_flag <= 1):
         return 6
     if not (isinstance(s.to_task_inc_command_echo, int) and 0 <= s.to_task_inc_command_echo <= 65535):

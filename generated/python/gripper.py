@@ -117,6 +117,12 @@ class gripper_state(IntEnum):
     moving = 2
 
 
+DIGEST = 0x96a9c44c
+"""Which tables a state is of: what they mean, and how the state is laid out; as in C."""
+FOREIGN = 25
+"""What `check` gives of a state that other tables made."""
+
+
 class _Refused(Exception):
     """An extern procedure gave a value outside its declared range."""
 
@@ -134,6 +140,7 @@ class State:
     """
 
     __slots__ = (
+        "digest",
         "primitive_inc_command",
         "primitive_input_command",
         "primitive_opening_mm",
@@ -166,6 +173,7 @@ class State:
     )
 
     def __init__(self):
+        self.digest = DIGEST
         self.primitive_inc_command = 0  # Orders of primitive.
         self.primitive_input_command = 0  # Orders of primitive.
         self.primitive_opening_mm = 0.0  # Orders of primitive.
@@ -695,7 +703,9 @@ def _do_failed(s):
 
 
 def check(s):
-    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    """Whether the state may be gone on from: -1; FOREIGN where other tables made it; else the position of the first variable outside its range or, counted after the variables, of the first invariant that does not hold."""
+    if s.digest != DIGEST:
+        return FOREIGN
     if not (isinstance(s.to_primitive_inc_command_echo, int) and 0 <= s.to_primitive_inc_command_echo <= 65535):
         return 5
     if not (isinstance(s.to_primitive_ref_command_echo, int) and 0 <= s.to_primitive_ref_command_echo <= 2):

@@ -125,6 +125,12 @@ class display(IntEnum):
     fingers = 1
 
 
+DIGEST = 0x6aaffae0
+"""Which tables a state is of: what they mean, and how the state is laid out; as in C."""
+FOREIGN = 119
+"""What `check` gives of a state that other tables made."""
+
+
 class _Refused(Exception):
     """An extern procedure gave a value outside its declared range."""
 
@@ -149,6 +155,7 @@ class State:
     """
 
     __slots__ = (
+        "digest",
         "emove_inc_command",
         "emove_input_command",
         "emove_obj_ptr",
@@ -275,6 +282,7 @@ class State:
     )
 
     def __init__(self):
+        self.digest = DIGEST
         self.emove_inc_command = 0  # Orders of emove.
         self.emove_input_command = 0  # Orders of emove.
         self.emove_obj_ptr = 0  # Orders of emove.
@@ -1086,7 +1094,9 @@ def _do_failed(s):
 
 
 def check(s):
-    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    """Whether the state may be gone on from: -1; FOREIGN where other tables made it; else the position of the first variable outside its range or, counted after the variables, of the first invariant that does not hold."""
+    if s.digest != DIGEST:
+        return FOREIGN
     if not (isinstance(s.to_emove_inc_command_echo, int) and 0 <= s.to_emove_inc_command_echo <= 65535):
         return 10
     if not (isinstance(s.to_emove_ref_command_echo, int) and 0 <= s.to_emove_ref_command_echo <= 5):

@@ -130,6 +130,12 @@ class locating(IntEnum):
     known = 1
 
 
+DIGEST = 0xef34c29e
+"""Which tables a state is of: what they mean, and how the state is laid out; as in C."""
+FOREIGN = 80
+"""What `check` gives of a state that other tables made."""
+
+
 class _Refused(Exception):
     """An extern procedure gave a value outside its declared range."""
 
@@ -159,6 +165,7 @@ class State:
     """
 
     __slots__ = (
+        "digest",
         "workstation_inc_command",
         "workstation_input_command",
         "workstation_obj",
@@ -246,6 +253,7 @@ class State:
     )
 
     def __init__(self):
+        self.digest = DIGEST
         self.workstation_inc_command = 0  # Orders of workstation.
         self.workstation_input_command = 0  # Orders of workstation.
         self.workstation_obj = 0  # Orders of workstation.
@@ -1003,7 +1011,9 @@ def _do_pause(s):
 
 
 def check(s):
-    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    """Whether the state may be gone on from: -1; FOREIGN where other tables made it; else the position of the first variable outside its range or, counted after the variables, of the first invariant that does not hold."""
+    if s.digest != DIGEST:
+        return FOREIGN
     if not (isinstance(s.to_workstation_inc_command_echo, int) and 0 <= s.to_workstation_inc_command_echo <= 65535):
         return 8
     if not (isinstance(s.to_workstation_ref_command_echo, int) and 0 <= s.to_workstation_ref_command_echo <= 5):

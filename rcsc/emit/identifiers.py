@@ -19,6 +19,8 @@ from rcsc.lang.interpret import Fault
 from rcsc.lang.meaning import checked
 from rcsc.lang.model import Array, Enum, Program, Record, Type, pending
 
+DIGEST = "digest"
+"""The member of the state that tells which tables it is of."""
 TRACE = ("line", "fault", "fault_at")
 """Members of the state that tell about the last cycle; the words of failed assumptions come after them."""
 C_WORDS = reserved.C_KEYWORDS | reserved.C_MACROS | reserved.C_COMPOSED | frozenset(TRACE)
@@ -32,7 +34,8 @@ _FILES = (
 )
 _MODULE = frozenset(
     """IntEnum State _Refused _bisect _reduce _product _and _div _mod _min _max _refused _line_of _one_of _joined _lines_of
-    _nan _whole _real _exactly _admit _settle _safe _begin check""".split()
+    _nan _whole _real _exactly _admit _settle _safe _begin check
+    DIGEST FOREIGN""".split()
 )
 """What the Python module calls its own."""
 OWN = ("t", "init", "check", "begin", "admit", "settle", "safe")
@@ -153,6 +156,9 @@ class Names:
         failed: Words of the trace for the monitored assumptions that failed.
         lines: For each table, the C constant of each line; `assumptions`, `faults`, `leaves` and `invariants` likewise.
         places: The C constant of each table that others follow in a cycle.
+        checks: The C constants that `check` gives of a state that may be gone on from, and of one that other tables made.
+        digest: The C macro of the number that tells which tables a state is of.
+        layout: The C type that is there where the state is laid out as was meant.
         c: What stands at file scope in C; `module` in the Python module.
     """
 
@@ -178,6 +184,9 @@ class Names:
     leaves: dict[str, str]
     invariants: tuple[str, ...]
     places: dict[str, str]
+    checks: tuple[str, str]
+    digest: str
+    layout: str
     c: NameScope
     module: NameScope
 
@@ -215,7 +224,7 @@ def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}))
     classes = module.all((enum.name, python_word(enum.name)) for enum in program.enums)
     return Names(
         file, p, _attributes(program, failed), paths, roots, members, tables, levels, procedures, units, types,
-        constants, classes, _class_members(program), failed, *_positions(program, p, c), c, module,
+        constants, classes, _class_members(program), failed, *_positions(program, p, c), *_state(p, c), c, module,
     )  # fmt: skip
 
 
@@ -304,8 +313,8 @@ def types_guard(unit: str) -> str:
 
 def _file_scope(program: Program, p: str) -> NameScope:
     externs = {procedure.extern.c for procedure in program.procedures if procedure.extern is not None}
-    own = {f"{p}_{end}" for end in (*OWN, "exact", "bit32", "bit64")}
-    return NameScope(set(reserved.C_COMPOSED | C_WORDS) | externs | own | {guard(p)})
+    own = {f"{p}_{end}" for end in (*OWN, "exact", "bit32", "bit64")} | {guard(p)}
+    return NameScope(set(reserved.C_COMPOSED | C_WORDS) | externs | own)
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,7 +348,7 @@ def _stem(name: str) -> str:
 
 
 def _attributes(program: Program, failed: tuple[str, ...]) -> dict[str, str]:
-    taken = NameScope({*TRACE, *failed, "copy_in", "copy_out"})
+    taken = NameScope({DIGEST, *TRACE, *failed, "copy_in", "copy_out"})
     flat = ((str(v.name), _flat(str(v.name))) for v in program.variables)
     return taken.all((name, _unlike(python_word(word), taken)) for name, word in flat)
 
@@ -407,6 +416,16 @@ def _positions(
     return lines, assumptions, holding, faults, leaves, invariants, places
 
 
+def _state(p: str, scope: NameScope) -> tuple[tuple[str, str], str, str]:
+    """What `check` gives beside positions, and what tells one program's state from another's."""
+    checks = (scope.fresh(constant_word(p, "check", word)) for word in ("ok", "foreign"))
+    return (
+        (next(checks), next(checks)),
+        scope.fresh(constant_word(p, DIGEST)),
+        scope.fresh(f"{p}_layout_holds"),
+    )
+
+
 def _class_members(program: Program) -> dict[str, tuple[str, ...]]:
     members = {}
     for enum in program.enums:
@@ -419,7 +438,7 @@ def _paths(
     program: Program, members: dict[str, dict[str, str]], failed: tuple[str, ...]
 ) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
     """What the struct calls each declared variable, and the place of each leaf; the pending leaf of `x` is `x_next`."""
-    taken = NameScope({*TRACE, *failed})
+    taken = NameScope({DIGEST, *TRACE, *failed})
     roots = taken.all((d.name, _unlike(c_word(d.name), taken)) for d in program.declared)
     variables = {str(v.name) for v in program.variables}
     paths: dict[str, tuple[str, ...]] = {}

@@ -5,6 +5,7 @@ from itertools import groupby
 from math import prod
 from typing import assert_never
 
+from rcsc.emit.c.layout import digest
 from rcsc.emit.code_tree import (
     IN_PYTHON,
     Body,
@@ -30,7 +31,7 @@ from rcsc.emit.code_tree import (
     infix,
     when,
 )
-from rcsc.emit.identifiers import FAILED_BITS, comment, names_of
+from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment, names_of
 from rcsc.emit.plan import (
     WORD,
     Coded,
@@ -97,6 +98,8 @@ class _Maker:
             ],
             "attributes": attributes,
             "failed": self.names.failed,
+            "digest": digest(self.program, self.names).state,
+            "foreign": len(self.program.variables) + len(self.program.invariants),
             "imports": self.modules.items(),
             "constants": self.constants,
             "functions": functions,
@@ -165,7 +168,7 @@ class _Maker:
 
     def _check(self) -> Function:
         """As in C."""
-        body = []
+        body = [when(infix("!=", Place((DIGEST,)), Name("DIGEST")), Leave(Name("FOREIGN")))]
         for at, variable in enumerate(self.program.variables):
             if variable.kind is not model.Kind.INPUT or isinstance(variable.type, Bool):
                 place = self.text.place(variable.name)
@@ -175,8 +178,8 @@ class _Maker:
         for at, invariant in enumerate(self.program.invariants, len(self.program.variables)):
             body.append(when(Prefix("not ", self.text.expr(invariant.condition)), Leave(Constant(at))))
         doc = (
-            "Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after "
-            "the variables, of the first invariant that does not hold."
+            "Whether the state may be gone on from: -1; FOREIGN where other tables made it; else the position of the first variable "
+            "outside its range or, counted after the variables, of the first invariant that does not hold."
         )
         return _on_state(doc, "check", *body, Leave(Constant(-1)))
 

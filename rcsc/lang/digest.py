@@ -1,6 +1,6 @@
 """A digest of all that a part of a program means, so that what did not change is known without a solver.
 
-In: a program and one of its parts. Out: text; equal texts mean the same. Positions, doc lines, comments and the words of a
+In: a program, or one of its parts. Out: text; equal texts mean the same. Positions, doc lines, comments and the words of a
 cell are left out; names of lines are not, since logs and executors show them.
 """
 
@@ -70,6 +70,25 @@ class Digests:
         conditions += [*tests.values(), *(invariant.condition for invariant in self.program.invariants)]
         hashed.update(self._rest(body, conditions).encode())
         return hashed.hexdigest()
+
+    def whole(self) -> str:
+        """Digest all that a cycle does with a state: variables, tables, procedures, levels; whatever the program's files are called.
+
+        Returns:
+            64 hexadecimal digits.
+        """
+        program = self.program
+        variables = [
+            (v.name, v.kind, v.type, v.initial, v.admit, v.deferred_until, v.safe) for v in program.variables
+        ]
+        procedures = [(p.name, p.params, p.body, p.extern) for p in program.procedures]
+        invariants = [(invariant.name, invariant.condition) for invariant in program.invariants]
+        levels = [
+            (level.name, level.period_ms, level.preprocess, level.choices, level.postprocess)
+            for level in program.levels
+        ]
+        tables = [(table.name, self.table(table), table.stops) for table in program.tables]
+        return hashlib.sha256(repr((variables, procedures, invariants, levels, tables)).encode()).hexdigest()
 
     def body(self, body: Iterable[Statement]) -> str:
         """Digest statements and all they call."""

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.emit.c.ctext import declared
+from rcsc.emit.c.layout import digest
 from rcsc.emit.c.symbols import symbols
 from rcsc.emit.identifiers import (
     Names,
@@ -228,7 +229,9 @@ def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linke
 
 def _program(plan: Plan) -> LevelProgram:
     names = names_of(plan.program, plan.places)
-    return LevelProgram(plan, names, signature_of(CheckedFields(json_of(symbols(plan, names)))))
+    return LevelProgram(
+        plan, names, signature_of(CheckedFields(json_of(symbols(plan, names, digest(plan.program, names)))))
+    )
 
 
 def _level(

@@ -293,6 +293,8 @@ class Signature:
 
     def unfit(self, at: int, values: Values) -> str:
         """What `check` found wrong with a state, in words: `width` = 300, or the invariant that does not hold."""
+        if at == len(self.leaves) + len(self.invariants):
+            return "it is of other tables"
         if at >= len(self.leaves):
             return f"invariant `{self._invariant(at)}` does not hold"
         return f"`{self.leaves[at].name}` = {self.leaves[at].shown(values[at])}"

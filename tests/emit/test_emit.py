@@ -183,12 +183,15 @@ enum State { one }
 enum IntEnum { s1 }
 enum tuple { t }
 enum do_x { z }
+enum check { ok, foreign }
+enum DIGEST { DIGEST }
 enum _do_x { z }
 record init { int : bool  int_ : bool  errno : bool  EOF : int 0 .. 3  EOF_ : int 0 .. 3  x : bool  X : bool }
 record x_line { f : array[2] of array[3] of init }
 input line_ : bool
 input line : bool
 input fault : int 0 .. 3
+input digest : bool
 input assumptions_failed : bool
 input copy_in : a
 input copy_out : a_b
@@ -246,7 +249,7 @@ def test_names_that_would_be_spelled_alike_stay_apart(cc: str, tmp_path: Path) -
     compiled(files, tmp_path, cc=cc)
     module = imported(files)
     state = module.State()
-    assert len(set(state.__slots__)) == len(state.__slots__) == len(program.variables) + 4
+    assert len(set(state.__slots__)) == len(state.__slots__) == len(program.variables) + 5
     for enum in program.enums:
         members = [value.__members__ for value in vars(module).values() if made_of(value, len(enum.members))]
         assert any(list(map(int, found.values())) == list(range(len(enum.members))) for found in members)
@@ -572,7 +575,7 @@ table T {
     files = emitted(program_of(text))
     compiled(files, tmp_path)
     state = imported(files).State()
-    assert len(set(state.__slots__)) == len(state.__slots__) == 7 + 4
+    assert len(set(state.__slots__)) == len(state.__slots__) == 7 + 5
 
 
 USE = '#include "case_.h"\nint main() { case__t s; case__init(&s); return s.fault; }\n'

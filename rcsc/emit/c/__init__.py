@@ -11,8 +11,8 @@ number that a table knows by a name has that name here.
 
 Trusted: all of it, for what the C does; `rcsc test` compares it with the interpreter, and with `--deep` has it proved.
 
-Modules: `ctext` spells expressions and statements. `cprogram` holds what the others make a program of; of it are made `helpers`
-(one operator or conversion), `declarations` (types, constants, the state), `admission` (inputs, results, the check), `procedures`,
-`matching` (the line of a table) and `cycle` (steps, levels). `c99` lays them out in files, with `symbols`, the file that tells
-other programs where everything is.
+Modules: `ctext` spells expressions and statements; `layout` says how the state lies in memory, and which tables it is of.
+`cprogram` holds what the others make a program of; of it are made `helpers` (one operator or conversion), `declarations` (types,
+constants, the state), `admission` (inputs, results, the check), `procedures`, `matching` (the line of a table) and `cycle` (steps,
+levels). `c99` lays them out in files, with `symbols`, the file that tells other programs where everything is.
 """

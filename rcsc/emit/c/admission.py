@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from rcsc.emit.c.cprogram import AT, NONE, CProgram, discarded, fault_name, first_of, on_state, run_on_state
+from rcsc.emit.c.cprogram import AT, NONE, CProgram, fault_name, first_of, on_state, run_on_state
 from rcsc.emit.c.ctext import c_type
 from rcsc.emit.code_tree import (
     Body,
@@ -23,6 +23,7 @@ from rcsc.emit.code_tree import (
     type_bounds,
     when,
 )
+from rcsc.emit.identifiers import DIGEST
 from rcsc.emit.translate import FAULT, FAULT_AT, STATE, constant
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
@@ -107,14 +108,15 @@ def check_function(c: CProgram) -> Function:
         (Name(name), Prefix("!", c.text.expr(invariant.condition)))
         for name, invariant in zip(c.names.invariants, c.program.invariants, strict=True)
     ]
-    asked = [(at, test) for at, test in tests if test is not None]
+    foreign = infix("!=", Place((DIGEST,)), Name(c.names.digest))
+    asked = [(Name(c.names.checks[1]), foreign), *((at, test) for at, test in tests if test is not None)]
     doc = (
-        "Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after "
-        "the variables, of the first invariant that does not hold. Call it on every state that comes from outside."
+        f"Whether the state may be gone on from: {c.names.checks[0]}; {c.names.checks[1]} where other tables made it; else the position "
+        "of the first variable outside its range or, counted after the variables, of the first invariant that does not hold. Call it on "
+        "every state that comes from outside."
     )
     body = (
-        Let("int32_t" if asked else "const int32_t", "at", NONE),
-        *(() if asked else (discarded(STATE),)),
+        Let("int32_t", "at", Name(c.names.checks[0])),
         *first_of(asked),
         Leave(AT),
     )

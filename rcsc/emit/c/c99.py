@@ -14,8 +14,18 @@ from rcsc.emit.c.cycle import (
     settle_function,
     step_functions,
 )
-from rcsc.emit.c.declarations import externs, fields, positions, shared, type_headers, user_functions
+from rcsc.emit.c.declarations import (
+    externs,
+    fields,
+    layout_condition,
+    positions,
+    shared,
+    size_text,
+    type_headers,
+    user_functions,
+)
 from rcsc.emit.c.helpers import helper
+from rcsc.emit.c.layout import digest
 from rcsc.emit.c.matching import match_functions
 from rcsc.emit.c.procedures import callees_first, failing, procedure_function
 from rcsc.emit.c.symbols import symbols
@@ -46,6 +56,10 @@ def _view(c: CProgram) -> dict[str, object]:
         "source": comment(c.plan.source),
         "includes": sorted({types_header(unit) for unit in c.names.units.values()}),
         "positions": list(positions(c)),
+        "digest": c.digest,
+        "names": c.names,
+        "sizes": size_text(c),
+        "layout": layout_condition(c),
         "fields": list(fields(c)),
         "failed": c.names.failed,
         "faults": c.names.faults,
@@ -66,7 +80,7 @@ def emit_c(plan: Plan) -> dict[str, str]:
         **type_headers(c),
         f"c/{name}.h": render("header.h.jinja", view),
         f"c/{name}.c": render("source.c.jinja", view),
-        f"c/{c.names.file}.json": symbols(plan, c.names),
+        f"c/{c.names.file}.json": symbols(plan, c.names, c.digest),
         f"c/{name}.cmake": render("target.cmake.jinja", view),
         f"c/{name}.pc": render("package.pc.jinja", view),
     }
@@ -77,7 +91,8 @@ def _program(plan: Plan) -> CProgram:
         str(procedure.name): tuple(p.type for p in procedure.params) for procedure in plan.program.procedures
     }
     names = names_of(plan.program, plan.places)
-    return CProgram(plan, names, CText(names, parameters, failing(plan.program)))
+    text = CText(names, parameters, failing(plan.program))
+    return CProgram(plan, names, text, digest(plan.program, names))
 
 
 def outward(plan: Plan) -> Iterator[tuple[str, str]]:
@@ -98,6 +113,9 @@ def outward(plan: Plan) -> Iterator[tuple[str, str]]:
         *names.leaves.values(),
         *names.invariants,
         *names.places.values(),
+        *names.checks,
+        names.digest,
+        names.layout,
     ]
     yield from ((name, f"a name of program `{plan.program.name}`") for name in own)
     for unit, declared in shared(c).items():

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.emit.c.ctext import CText
+from rcsc.emit.c.layout import Digest
 from rcsc.emit.code_tree import (
     Body,
     Branch,
@@ -47,12 +48,14 @@ class CProgram:
         plan: What is laid out.
         names: What everything is called.
         text: Expressions and statements.
+        digest: What tells its states from those of other tables.
         classifiers: Functions that find the class of a value, as matching asks for them.
     """
 
     plan: Plan
     names: Names
     text: CText
+    digest: Digest
     classifiers: list[Function] = field(default_factory=list)
 
     @property
@@ -64,6 +67,11 @@ class CProgram:
     def p(self) -> str:
         """The prefix of its C names."""
         return self.names.program
+
+    @property
+    def foreign(self) -> int:
+        """What `check` gives of a state that other tables made: the position after the last invariant's."""
+        return len(self.program.variables) + len(self.program.invariants)
 
 
 def on_state(c: CProgram, doc: str, name: str, *body: Stmt, gives: str = "void") -> Function:

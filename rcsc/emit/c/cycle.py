@@ -38,7 +38,7 @@ from rcsc.emit.code_tree import (
     infix,
     when,
 )
-from rcsc.emit.identifiers import FAILED_BITS, comment
+from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment
 from rcsc.emit.plan import PlanTable, answering
 from rcsc.emit.translate import FAULT, FAULT_AT, LINE, STATE
 from rcsc.lang import model
@@ -201,6 +201,12 @@ def _chosen(c: CProgram, choice: model.TableChoice, run: Callable[[str], Body]) 
 def init_function(c: CProgram) -> Function:
     """Give the function that makes the initial state."""
     values = (assigned(c, variable, variable.initial) for variable in c.program.variables)
+    digest = Set(Place((DIGEST,)), Name(c.names.digest))
     return on_state(
-        c, "Every variable's initial value.", "init", *trace(c, fault_name(c, Fault.OK), NONE), *values
+        c,
+        "Every variable's initial value.",
+        "init",
+        digest,
+        *trace(c, fault_name(c, Fault.OK), NONE),
+        *values,
     )

@@ -5,8 +5,9 @@ from typing import TypeAlias
 
 from rcsc.emit.c.cprogram import CProgram
 from rcsc.emit.c.ctext import c_type, declared, wide_type
+from rcsc.emit.c.layout import record_size, sizes
 from rcsc.emit.c.symbols import unit_text
-from rcsc.emit.identifiers import NameScope, comment, parameter_word, types_guard, types_header
+from rcsc.emit.identifiers import DIGEST, NameScope, comment, parameter_word, types_guard, types_header
 from rcsc.emit.plan import table_position
 from rcsc.emit.rendering import render
 from rcsc.lang import model
@@ -87,13 +88,18 @@ def _numbered(names: Iterable[str], docs: Iterable[str]) -> Fields:
     return tuple((f"{name} = {at}", comment(doc)) for at, (name, doc) in enumerate(pairs))
 
 
-def _record(c: CProgram, record: model.Record) -> tuple[str, Fields]:
+def _record(c: CProgram, record: model.Record) -> tuple[str, str, Fields]:
     names = c.names.members[record.name]
     docs = ("; ".join(word for word in (range_text(f.type), comment(f.doc)) if word) for f in record.fields)
     fields = tuple(
         (declared(c.names, names[f.name], f.type), doc) for f, doc in zip(record.fields, docs, strict=True)
     )
-    return c.names.types[record.name], fields
+    size = record_size(record)
+    return (
+        c.names.types[record.name],
+        f"record {comment(record.name)}, {size} byte{'s' if size > 1 else ''}",
+        fields,
+    )
 
 
 def positions(c: CProgram) -> Iterator[tuple[str, Fields]]:
@@ -112,6 +118,15 @@ def positions(c: CProgram) -> Iterator[tuple[str, Fields]]:
     positions = (f"{name} = {at}" for at, name in enumerate((*c.names.leaves.values(), *c.names.invariants)))
     doc = "`fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants"
     yield doc, tuple((position, "") for position in positions)
+    ok, foreign = c.names.checks
+    checks = (
+        (f"{ok} = -1", "the state may be gone on from"),
+        (
+            f"{foreign} = {c.foreign}",
+            f"its `{DIGEST}` is not {c.names.digest}: other tables made it, or an older version of these",
+        ),
+    )
+    yield "What else `check` gives", checks
     if c.names.places:
         doc = "`fault_at` where a table that others follow in a cycle has no line, or several"
         numbered = ((name, table_position(c.program, table)) for table, name in c.names.places.items())
@@ -138,6 +153,23 @@ def fields(c: CProgram) -> Iterator[tuple[str, str]]:
         if later in variables:
             doc = f"{position[later]}: state; the deferred next value of {root}"
             yield declared(c.names, "".join(c.names.paths[later]), variables[later].type), doc
+
+
+def size_text(c: CProgram) -> str:
+    """The bytes of the state, on each kind of target."""
+    most, *others = dict.fromkeys(sizes(c.program, c.names))
+    return f"{most} bytes" + (
+        f", or {', '.join(map(str, others))} where members are aligned to less than their size"
+        if others
+        else ""
+    )
+
+
+def layout_condition(c: CProgram) -> str:
+    """A C condition that the state has one of the sizes that are expected."""
+    held = dict.fromkeys(sizes(c.program, c.names))
+    tests = [f"(sizeof({c.p}_t) == {size}u)" for size in held]
+    return " || ".join(tests)
 
 
 def user_functions(c: CProgram) -> Iterator[tuple[str, tuple[str, ...]]]:

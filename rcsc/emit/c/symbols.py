@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator
 
 from rcsc.emit.c.ctext import c_type
+from rcsc.emit.c.layout import Digest
 from rcsc.emit.identifiers import Names
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import (
@@ -25,13 +26,14 @@ from rcsc.lang.model import (
 from rcsc.lang.restart import Adopted, After, Fixed, SameAs
 
 
-def symbols(plan: Plan, names: Names) -> str:
+def symbols(plan: Plan, names: Names, digest: Digest) -> str:
     """The symbol file: every name, for tools."""
     p = names.program
     document = {
         **({"unproved": plan.mark} if plan.mark else {}),
         "program": p,
         "struct": f"{p}_t",
+        "digest": {"meaning": digest.meaning, "layout": digest.layout, "state": digest.state},
         "header": f"{p}.h",
         "source": f"{p}.c",
         "init": f"{p}_init",
