@@ -100,7 +100,13 @@ static void approach_do_stop(approach_t *s)
     s->settled = 0u;
 }
 
-/* Admits every input; a refused one leaves everything else as it was. */
+/* Deferred variables take their next values, all at once. */
+static void approach_settle(approach_t *s)
+{
+    (void)s;
+}
+
+/* Admits every input, then settles; a refused one leaves everything else as it was. */
 static void approach_admit(approach_t *s)
 {
     s->line = -1;
@@ -131,18 +137,13 @@ static void approach_admit(approach_t *s)
             }
             s->force_n = s->force_n + 0.0;
             s->limit_n = s->limit_n + 0.0;
+            approach_settle(s);
         }
     }
 }
 
-/* Deferred variables take their next values, all at once. */
-static void approach_settle(approach_t *s)
-{
-    (void)s;
-}
-
-/* Matches table approach and runs the line. */
-static void approach_run_approach(approach_t *s)
+/* Matches table approach and runs the line; returns the fault, 0 for none. */
+static int32_t approach_run_approach(approach_t *s)
 {
     s->line = approach_approach_line(s);
     switch (s->line) {
@@ -179,6 +180,7 @@ static void approach_run_approach(approach_t *s)
         s->fault = APPROACH_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
 /* Every variable's initial value. */
@@ -227,46 +229,43 @@ int32_t approach_approach_line(const approach_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint8_t t0[2];
-        uint8_t t1[2];
-        uint8_t t2[2];
-        uint8_t t3[2];
-        uint8_t t4[2];
-        uint8_t t5[2];
+        uint8_t t0[16];
+        uint8_t t1[4];
     } t = {
-        { /* force_n > limit_n */
-            0xeu, /* false: lines arrived, brake, cruise */
-            0xfu /* true: every line */
+        /* force_n > limit_n by force_n <= limit_n by distance_mm - tolerance_mm <= 0 by distance_mm -
+           tolerance_mm > 0 */
+        {
+            0x0u, /* false, false, false, false: no line */
+            0x0u, /* false, false, false, true: no line */
+            0x0u, /* false, false, true, false: no line */
+            0x0u, /* false, false, true, true: no line */
+            0x0u, /* false, true, false, false: no line */
+            0xcu, /* false, true, false, true: lines brake, cruise */
+            0x2u, /* false, true, true, false: lines arrived */
+            0xeu, /* false, true, true, true: lines arrived, brake, cruise */
+            0x1u, /* true, false, false, false: lines blocked */
+            0x1u, /* true, false, false, true: lines blocked */
+            0x1u, /* true, false, true, false: lines blocked */
+            0x1u, /* true, false, true, true: lines blocked */
+            0x1u, /* true, true, false, false: lines blocked */
+            0xdu, /* true, true, false, true: lines blocked, brake, cruise */
+            0x3u, /* true, true, true, false: lines blocked, arrived */
+            0xfu /* true, true, true, true: every line */
         },
-        { /* force_n <= limit_n */
-            0x1u, /* false: lines blocked */
-            0xfu /* true: every line */
-        },
-        { /* distance_mm - tolerance_mm <= 0 */
-            0xdu, /* false: lines blocked, brake, cruise */
-            0xfu /* true: every line */
-        },
-        { /* distance_mm - tolerance_mm > 0 */
-            0x3u, /* false: lines blocked, arrived */
-            0xfu /* true: every line */
-        },
-        { /* distance_mm <= tolerance_mm + braking_mm */
-            0xbu, /* false: lines blocked, arrived, cruise */
-            0xfu /* true: every line */
-        },
-        { /* distance_mm > tolerance_mm + braking_mm */
-            0x7u, /* false: lines blocked, arrived, brake */
-            0xfu /* true: every line */
+        { /* distance_mm <= tolerance_mm + braking_mm by distance_mm > tolerance_mm + braking_mm */
+            0x3u, /* false, false: lines blocked, arrived */
+            0xbu, /* false, true: lines blocked, arrived, cruise */
+            0x7u, /* true, false: lines blocked, arrived, brake */
+            0xfu /* true, true: every line */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[((s->force_n > s->limit_n) ? 1u : 0u)] &
-            (uint32_t)t.t1[((s->force_n <= s->limit_n) ? 1u : 0u)] &
-            (uint32_t)t.t2[((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) <= 0) ? 1u : 0u)] &
-            (uint32_t)t.t3[((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) > 0) ? 1u : 0u)] &
-            (uint32_t)t.t4[((s->distance_mm <= ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u :
-                0u)] &
-            (uint32_t)t.t5[((s->distance_mm > ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u :
-                0u)];
+    const uint32_t m = (uint32_t)t.t0[(((((((s->force_n > s->limit_n) ? 1u : 0u) * 2u) +
+        ((s->force_n <= s->limit_n) ? 1u : 0u)) * 2u) +
+        ((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) <= 0) ? 1u : 0u)) * 2u) +
+        ((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) > 0) ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->distance_mm <= ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u :
+                0u) * 2u) +
+                ((s->distance_mm > ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = approach_bit32(m | 0x10u);
     line = (m == 0x0u) ? (-1) : line;
@@ -287,9 +286,5 @@ void approach_approach_lines(const approach_t *in, int32_t *out, uint32_t n)
 int32_t approach_approach_step(approach_t *s)
 {
     approach_admit(s);
-    if (s->fault == APPROACH_FAULT_NONE) {
-        approach_settle(s);
-        approach_run_approach(s);
-    }
-    return s->fault;
+    return (s->fault == APPROACH_FAULT_NONE) ? approach_run_approach(s) : s->fault;
 }

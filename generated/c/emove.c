@@ -420,7 +420,25 @@ static void emove_do_failed(emove_t *s)
     s->to_task.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
-/* Admits every input; a refused one leaves everything else as it was. */
+/* Deferred variables take their next values, all at once. */
+static void emove_settle(emove_t *s)
+{
+    const bool ready0 = (s->from_primitive.inc_command_echo == s->to_primitive.inc_command) &&
+            (s->from_vision.inc_command_echo == s->to_vision.inc_command);
+    const bool ready1 = s->from_primitive.inc_command_echo == s->to_primitive.inc_command;
+    const bool ready2 = s->from_primitive.inc_command_echo == s->to_primitive.inc_command;
+    if (ready0) {
+        s->cur_state = s->cur_state_next;
+    }
+    if (ready1) {
+        s->path_at = s->path_at_next;
+    }
+    if (ready2) {
+        s->here = s->here_next;
+    }
+}
+
+/* Admits every input, then settles; a refused one leaves everything else as it was. */
 static void emove_admit(emove_t *s)
 {
     s->line = -1;
@@ -526,25 +544,8 @@ static void emove_admit(emove_t *s)
             s->held_data.normal.x = s->held_data.normal.x + 0.0;
             s->held_data.normal.y = s->held_data.normal.y + 0.0;
             s->held_data.normal.z = s->held_data.normal.z + 0.0;
+            emove_settle(s);
         }
-    }
-}
-
-/* Deferred variables take their next values, all at once. */
-static void emove_settle(emove_t *s)
-{
-    const bool ready0 = (s->from_primitive.inc_command_echo == s->to_primitive.inc_command) &&
-            (s->from_vision.inc_command_echo == s->to_vision.inc_command);
-    const bool ready1 = s->from_primitive.inc_command_echo == s->to_primitive.inc_command;
-    const bool ready2 = s->from_primitive.inc_command_echo == s->to_primitive.inc_command;
-    if (ready0) {
-        s->cur_state = s->cur_state_next;
-    }
-    if (ready1) {
-        s->path_at = s->path_at_next;
-    }
-    if (ready2) {
-        s->here = s->here_next;
     }
 }
 
@@ -625,12 +626,11 @@ static bool emove_holds_release_part_in_step(const emove_t *s)
                 (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS));
 }
 
-/* Matches table locate and runs the line. */
-static void emove_run_locate(emove_t *s)
+/* Matches table locate and runs the line; returns the fault, 0 for none. */
+static int32_t emove_run_locate(emove_t *s)
 {
     if (!emove_holds_locate_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_LOCATE_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)EMOVE_ASSUMPTION_LOCATE_IN_STEP);
     }
     s->line = emove_locate_line(s);
     switch (s->line) {
@@ -742,22 +742,19 @@ static void emove_run_locate(emove_t *s)
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case (-1):
-        s->fault = EMOVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table move_to and runs the line. */
-static void emove_run_move_to(emove_t *s)
+/* Matches table move_to and runs the line; returns the fault, 0 for none. */
+static int32_t emove_run_move_to(emove_t *s)
 {
     if (!emove_holds_move_to_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_IN_STEP);
     }
     s->line = emove_move_to_line(s);
     switch (s->line) {
@@ -850,22 +847,20 @@ static void emove_run_move_to(emove_t *s)
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case (-1):
-        s->fault = EMOVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table move_to_obj and runs the line. */
-static void emove_run_move_to_obj(emove_t *s)
+/* Matches table move_to_obj and runs the line; returns the fault, 0 for none. */
+static int32_t emove_run_move_to_obj(emove_t *s)
 {
     if (!emove_holds_move_to_obj_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_OBJ_IN_STEP);
+                (1u << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_OBJ_IN_STEP);
     }
     s->line = emove_move_to_obj_line(s);
     switch (s->line) {
@@ -959,18 +954,16 @@ static void emove_run_move_to_obj(emove_t *s)
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case (-1):
-        s->fault = EMOVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table pause_emove and runs the line. */
-static void emove_run_pause_emove(emove_t *s)
+/* Matches table pause_emove and runs the line; returns the fault, 0 for none. */
+static int32_t emove_run_pause_emove(emove_t *s)
 {
     s->line = emove_pause_emove_line(s);
     switch (s->line) {
@@ -993,14 +986,14 @@ static void emove_run_pause_emove(emove_t *s)
         s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table pickup and runs the line. */
-static void emove_run_pickup(emove_t *s)
+/* Matches table pickup and runs the line; returns the fault, 0 for none. */
+static int32_t emove_run_pickup(emove_t *s)
 {
     if (!emove_holds_pickup_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_PICKUP_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)EMOVE_ASSUMPTION_PICKUP_IN_STEP);
     }
     s->line = emove_pickup_line(s);
     switch (s->line) {
@@ -1047,22 +1040,20 @@ static void emove_run_pickup(emove_t *s)
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case (-1):
-        s->fault = EMOVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table release_part and runs the line. */
-static void emove_run_release_part(emove_t *s)
+/* Matches table release_part and runs the line; returns the fault, 0 for none. */
+static int32_t emove_run_release_part(emove_t *s)
 {
     if (!emove_holds_release_part_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)EMOVE_ASSUMPTION_RELEASE_PART_IN_STEP);
+                (1u << (uint32_t)EMOVE_ASSUMPTION_RELEASE_PART_IN_STEP);
     }
     s->line = emove_release_part_line(s);
     switch (s->line) {
@@ -1115,14 +1106,12 @@ static void emove_run_release_part(emove_t *s)
         emove_do_pause(s);
         emove_do_failed(s);
         break;
-    case (-1):
-        s->fault = EMOVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = EMOVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
 /* Every variable's initial value. */
@@ -1400,50 +1389,12 @@ int32_t emove_locate_line(const emove_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint32_t t0[2];
-        uint32_t t1[6];
-        uint32_t t2[3];
-        uint32_t t3[3];
-        uint32_t t4[3];
-        uint32_t t5[2];
-        uint32_t t6[2];
-        uint32_t t7[14];
+        uint16_t t0[14];
+        uint16_t t1[24];
+        uint16_t t2[6];
+        uint16_t t3[3];
+        uint16_t t4[3];
     } t = {
-        { /* new_command */
-            0xfff8u, /* false: lines 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-            0x7u /* true: lines 0, 1, 2 */
-        },
-        { /* primitive.command */
-            0xfc57u, /* pause: lines 0, 1, 2, 4, 5, 9, 10, 11, 12, 13, 14 */
-            0xff77u, /* goto: lines 0, 1, 2, 4, 4a, 5, 7, 8, 9, 10, 11, 12, 13, 14 */
-            0xfc57u, /* gothru: lines 0, 1, 2, 4, 5, 9, 10, 11, 12, 13, 14 */
-            0xfcd7u, /* approach_position_fingers: lines 0, 1, 2, 4, 5, 6, 9, 10, 11, 12, 13, 14 */
-            0xfc5fu, /* departure_position_fingers: lines 0, 1, 2, 3, 4, 5, 9, 10, 11, 12, 13, 14 */
-            0xfc57u /* immed_grasp: lines 0, 1, 2, 4, 5, 9, 10, 11, 12, 13, 14 */
-        },
-        { /* primitive.status */
-            0xb7ffu, /* done: lines 0, 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 11, 12, 14 */
-            0xf457u, /* executing: lines 0, 1, 2, 4, 5, 9, 11, 12, 13, 14 */
-            0x2c07u /* failed: lines 0, 1, 2, 9, 10, 12 */
-        },
-        { /* vision.command */
-            0xffafu, /* pause: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-            0xffbfu, /* flood_flash: lines 0, 1, 2, 3, 4, 4a, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-            0xffefu /* line_flash: lines 0, 1, 2, 3, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-        },
-        { /* vision.status */
-            0x6fffu, /* done: lines 0, 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 12, 13 */
-            0xefafu, /* executing: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 12, 13, 14 */
-            0x7fafu /* failed: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 11, 12, 13 */
-        },
-        { /* target.known */
-            0xfffbu, /* false: lines 0, 1, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-            0xfffdu /* true: lines 0, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-        },
-        { /* idle */
-            0xfff9u, /* false: lines 0, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-            0xfffeu /* true: lines 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-        },
         { /* cur_state */
             0x407u, /* d_state: lines 0, 1, 2, 9 */
             0x2007u, /* f_state: lines 0, 1, 2, 12 */
@@ -1460,11 +1411,56 @@ int32_t emove_locate_line(const emove_t *s)
             0x7u, /* grasping: lines 0, 1, 2 */
             0x7u /* releasing: lines 0, 1, 2 */
         },
+        { /* primitive.command by new_command by target.known */
+            0xfc50u, /* pause, false, false: lines 4, 5, 9, 10, 11, 12, 13, 14 */
+            0xfc50u, /* pause, false, true: lines 4, 5, 9, 10, 11, 12, 13, 14 */
+            0x3u, /* pause, true, false: lines 0, 1 */
+            0x5u, /* pause, true, true: lines 0, 2 */
+            0xff70u, /* goto, false, false: lines 4, 4a, 5, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0xff70u, /* goto, false, true: lines 4, 4a, 5, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0x3u, /* goto, true, false: lines 0, 1 */
+            0x5u, /* goto, true, true: lines 0, 2 */
+            0xfc50u, /* gothru, false, false: lines 4, 5, 9, 10, 11, 12, 13, 14 */
+            0xfc50u, /* gothru, false, true: lines 4, 5, 9, 10, 11, 12, 13, 14 */
+            0x3u, /* gothru, true, false: lines 0, 1 */
+            0x5u, /* gothru, true, true: lines 0, 2 */
+            0xfcd0u, /* approach_position_fingers, false, false: lines 4, 5, 6, 9, 10, 11, 12, 13, 14 */
+            0xfcd0u, /* approach_position_fingers, false, true: lines 4, 5, 6, 9, 10, 11, 12, 13, 14 */
+            0x3u, /* approach_position_fingers, true, false: lines 0, 1 */
+            0x5u, /* approach_position_fingers, true, true: lines 0, 2 */
+            0xfc58u, /* departure_position_fingers, false, false: lines 3, 4, 5, 9, 10, 11, 12, 13, 14 */
+            0xfc58u, /* departure_position_fingers, false, true: lines 3, 4, 5, 9, 10, 11, 12, 13, 14 */
+            0x3u, /* departure_position_fingers, true, false: lines 0, 1 */
+            0x5u, /* departure_position_fingers, true, true: lines 0, 2 */
+            0xfc50u, /* immed_grasp, false, false: lines 4, 5, 9, 10, 11, 12, 13, 14 */
+            0xfc50u, /* immed_grasp, false, true: lines 4, 5, 9, 10, 11, 12, 13, 14 */
+            0x3u, /* immed_grasp, true, false: lines 0, 1 */
+            0x5u /* immed_grasp, true, true: lines 0, 2 */
+        },
+        { /* primitive.status by idle */
+            0xb7f9u, /* done, false: lines 0, 3, 4, 4a, 5, 6, 7, 8, 9, 11, 12, 14 */
+            0xb7feu, /* done, true: lines 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 11, 12, 14 */
+            0xf451u, /* executing, false: lines 0, 4, 5, 9, 11, 12, 13, 14 */
+            0xf456u, /* executing, true: lines 1, 2, 4, 5, 9, 11, 12, 13, 14 */
+            0x2c01u, /* failed, false: lines 0, 9, 10, 12 */
+            0x2c06u /* failed, true: lines 1, 2, 9, 10, 12 */
+        },
+        { /* vision.command */
+            0xffafu, /* pause: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0xffbfu, /* flood_flash: lines 0, 1, 2, 3, 4, 4a, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0xffefu /* line_flash: lines 0, 1, 2, 3, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
+        },
+        { /* vision.status */
+            0x6fffu, /* done: lines 0, 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 12, 13 */
+            0xefafu, /* executing: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 12, 13, 14 */
+            0x7fafu /* failed: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 11, 12, 13 */
+        },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
-            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[s->vision.command] &
-            (uint32_t)t.t4[s->vision.status] & (uint32_t)t.t5[(s->target.known ? 1u : 0u)] &
-            (uint32_t)t.t6[(s->idle ? 1u : 0u)] & (uint32_t)t.t7[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[s->cur_state] &
+            (uint32_t)t.t1[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->target.known ? 1u : 0u)] &
+            (uint32_t)t.t2[(s->primitive.status * 2u) + (s->idle ? 1u : 0u)] &
+            (uint32_t)t.t3[s->vision.command] & (uint32_t)t.t4[s->vision.status];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x10000u);
     line = several ? (-2) : line;
@@ -1485,41 +1481,20 @@ int32_t emove_move_to_line(const emove_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint16_t t0[2];
-        uint16_t t1[6];
-        uint16_t t2[3];
-        uint16_t t3[2];
+        uint16_t t0[63];
+        uint16_t t1[14];
+        uint16_t t2[24];
+        uint16_t t3[24];
         uint16_t t4[2];
-        uint16_t t5[14];
-        uint16_t t6[63];
-        uint16_t t7[2];
-        uint16_t t8[2];
-        uint16_t t9[2];
     } t = {
-        { /* new_command */
-            0x1fe0u, /* false: lines 5, 6, 7, 7a, 8, 9, 10, 11 */
-            0x1fu /* true: lines 0, 1, 2, 3, 4 */
-        },
-        { /* primitive.command */
-            0x1a1fu, /* pause: lines 0, 1, 2, 3, 4, 8, 10, 11 */
-            0x1f9fu, /* goto: lines 0, 1, 2, 3, 4, 7, 7a, 8, 9, 10, 11 */
-            0x1e7fu, /* gothru: lines 0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 11 */
-            0x1a1fu, /* approach_position_fingers: lines 0, 1, 2, 3, 4, 8, 10, 11 */
-            0x1a1fu, /* departure_position_fingers: lines 0, 1, 2, 3, 4, 8, 10, 11 */
-            0x1a1fu /* immed_grasp: lines 0, 1, 2, 3, 4, 8, 10, 11 */
-        },
-        { /* primitive.status */
-            0xbffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 10 */
-            0x1a1fu, /* executing: lines 0, 1, 2, 3, 4, 8, 10, 11 */
-            0xe1fu /* failed: lines 0, 1, 2, 3, 4, 8, 9, 10 */
-        },
-        { /* target.known */
-            0x1fe3u, /* false: lines 0, 1, 5, 6, 7, 7a, 8, 9, 10, 11 */
-            0x1ffdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11 */
-        },
-        { /* idle */
-            0x1fe1u, /* false: lines 0, 5, 6, 7, 7a, 8, 9, 10, 11 */
-            0x1ffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11 */
+        { /* path_length */
+            0x1fe7u, 0x1febu, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u
         },
         { /* cur_state */
             0x61fu, /* d_state: lines 0, 1, 2, 3, 4, 8, 9 */
@@ -1537,34 +1512,70 @@ int32_t emove_move_to_line(const emove_t *s)
             0x41fu, /* grasping: lines 0, 1, 2, 3, 4, 9 */
             0x41fu /* releasing: lines 0, 1, 2, 3, 4, 9 */
         },
-        { /* path_length */
-            0x1fe7u, 0x1febu, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u
+        { /* primitive.command by new_command by target.known */
+            0x1a00u, /* pause, false, false: lines 8, 10, 11 */
+            0x1a00u, /* pause, false, true: lines 8, 10, 11 */
+            0x3u, /* pause, true, false: lines 0, 1 */
+            0x1du, /* pause, true, true: lines 0, 2, 3, 4 */
+            0x1f80u, /* goto, false, false: lines 7, 7a, 8, 9, 10, 11 */
+            0x1f80u, /* goto, false, true: lines 7, 7a, 8, 9, 10, 11 */
+            0x3u, /* goto, true, false: lines 0, 1 */
+            0x1du, /* goto, true, true: lines 0, 2, 3, 4 */
+            0x1e60u, /* gothru, false, false: lines 5, 6, 8, 9, 10, 11 */
+            0x1e60u, /* gothru, false, true: lines 5, 6, 8, 9, 10, 11 */
+            0x3u, /* gothru, true, false: lines 0, 1 */
+            0x1du, /* gothru, true, true: lines 0, 2, 3, 4 */
+            0x1a00u, /* approach_position_fingers, false, false: lines 8, 10, 11 */
+            0x1a00u, /* approach_position_fingers, false, true: lines 8, 10, 11 */
+            0x3u, /* approach_position_fingers, true, false: lines 0, 1 */
+            0x1du, /* approach_position_fingers, true, true: lines 0, 2, 3, 4 */
+            0x1a00u, /* departure_position_fingers, false, false: lines 8, 10, 11 */
+            0x1a00u, /* departure_position_fingers, false, true: lines 8, 10, 11 */
+            0x3u, /* departure_position_fingers, true, false: lines 0, 1 */
+            0x1du, /* departure_position_fingers, true, true: lines 0, 2, 3, 4 */
+            0x1a00u, /* immed_grasp, false, false: lines 8, 10, 11 */
+            0x1a00u, /* immed_grasp, false, true: lines 8, 10, 11 */
+            0x3u, /* immed_grasp, true, false: lines 0, 1 */
+            0x1du /* immed_grasp, true, true: lines 0, 2, 3, 4 */
         },
-        { /* lost */
-            0x1effu, /* false: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 */
-            0x1f7fu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7a, 8, 9, 10, 11 */
-        },
-        { /* path_length - path_at > 2 */
-            0x1fdfu, /* false: lines 0, 1, 2, 3, 4, 6, 7, 7a, 8, 9, 10, 11 */
-            0x1fffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11 */
+        { /* primitive.status by idle by lost by path_length - path_at > 2 */
+            0xac1u, /* done, false, false, false: lines 0, 6, 7, 8, 10 */
+            0xae1u, /* done, false, false, true: lines 0, 5, 6, 7, 8, 10 */
+            0xb41u, /* done, false, true, false: lines 0, 6, 7a, 8, 10 */
+            0xb61u, /* done, false, true, true: lines 0, 5, 6, 7a, 8, 10 */
+            0xadeu, /* done, true, false, false: lines 1, 2, 3, 4, 6, 7, 8, 10 */
+            0xafeu, /* done, true, false, true: lines 1, 2, 3, 4, 5, 6, 7, 8, 10 */
+            0xb5eu, /* done, true, true, false: lines 1, 2, 3, 4, 6, 7a, 8, 10 */
+            0xb7eu, /* done, true, true, true: lines 1, 2, 3, 4, 5, 6, 7a, 8, 10 */
+            0x1a01u, /* executing, false, false, false: lines 0, 8, 10, 11 */
+            0x1a01u, /* executing, false, false, true: lines 0, 8, 10, 11 */
+            0x1a01u, /* executing, false, true, false: lines 0, 8, 10, 11 */
+            0x1a01u, /* executing, false, true, true: lines 0, 8, 10, 11 */
+            0x1a1eu, /* executing, true, false, false: lines 1, 2, 3, 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, false, true: lines 1, 2, 3, 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, true, false: lines 1, 2, 3, 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, true, true: lines 1, 2, 3, 4, 8, 10, 11 */
+            0xe01u, /* failed, false, false, false: lines 0, 8, 9, 10 */
+            0xe01u, /* failed, false, false, true: lines 0, 8, 9, 10 */
+            0xe01u, /* failed, false, true, false: lines 0, 8, 9, 10 */
+            0xe01u, /* failed, false, true, true: lines 0, 8, 9, 10 */
+            0xe1eu, /* failed, true, false, false: lines 1, 2, 3, 4, 8, 9, 10 */
+            0xe1eu, /* failed, true, false, true: lines 1, 2, 3, 4, 8, 9, 10 */
+            0xe1eu, /* failed, true, true, false: lines 1, 2, 3, 4, 8, 9, 10 */
+            0xe1eu /* failed, true, true, true: lines 1, 2, 3, 4, 8, 9, 10 */
         },
         { /* path_length - path_at <= 2 */
             0x1fbfu, /* false: lines 0, 1, 2, 3, 4, 5, 7, 7a, 8, 9, 10, 11 */
             0x1fffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
-            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->target.known ? 1u : 0u)] &
-            (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] &
-            (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[(s->lost ? 1u : 0u)] &
-            (uint32_t)t.t8[((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)] &
-            (uint32_t)t.t9[((((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->path_length] & (uint32_t)t.t1[s->cur_state] &
+            (uint32_t)t.t2[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->target.known ? 1u : 0u)] &
+            (uint32_t)t.t3[(((((s->primitive.status * 2u) + (s->idle ? 1u : 0u)) * 2u) +
+                (s->lost ? 1u : 0u)) * 2u) +
+                ((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)] &
+            (uint32_t)t.t4[(((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x2000u);
     line = several ? (-2) : line;
@@ -1585,40 +1596,19 @@ int32_t emove_move_to_obj_line(const emove_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint16_t t0[2];
-        uint16_t t1[6];
-        uint16_t t2[3];
-        uint16_t t3[2];
-        uint16_t t4[2];
-        uint16_t t5[14];
-        uint16_t t6[63];
-        uint16_t t7[2];
-        uint16_t t8[2];
+        uint16_t t0[63];
+        uint16_t t1[14];
+        uint16_t t2[24];
+        uint16_t t3[24];
     } t = {
-        { /* new_command */
-            0x1ff0u, /* false: lines 4, 5, 6, 7, 8, 9, 10, 11, 12 */
-            0xfu /* true: lines 0, 1, 2, 3 */
-        },
-        { /* primitive.command */
-            0x1a0fu, /* pause: lines 0, 1, 2, 3, 9, 11, 12 */
-            0x1f0fu, /* goto: lines 0, 1, 2, 3, 8, 9, 10, 11, 12 */
-            0x1ecfu, /* gothru: lines 0, 1, 2, 3, 6, 7, 9, 10, 11, 12 */
-            0x1e3fu, /* approach_position_fingers: lines 0, 1, 2, 3, 4, 5, 9, 10, 11, 12 */
-            0x1a0fu, /* departure_position_fingers: lines 0, 1, 2, 3, 9, 11, 12 */
-            0x1a0fu /* immed_grasp: lines 0, 1, 2, 3, 9, 11, 12 */
-        },
-        { /* primitive.status */
-            0xbffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 11 */
-            0x1a0fu, /* executing: lines 0, 1, 2, 3, 9, 11, 12 */
-            0xe0fu /* failed: lines 0, 1, 2, 3, 9, 10, 11 */
-        },
-        { /* target.known */
-            0x1ff3u, /* false: lines 0, 1, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
-            0x1ffdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
-        },
-        { /* idle */
-            0x1ff1u, /* false: lines 0, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
-            0x1ffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
+        { /* path_length */
+            0x1fd7u, 0x1fdbu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu
         },
         { /* cur_state */
             0x60fu, /* d_state: lines 0, 1, 2, 3, 9, 10 */
@@ -1636,30 +1626,65 @@ int32_t emove_move_to_obj_line(const emove_t *s)
             0x40fu, /* grasping: lines 0, 1, 2, 3, 10 */
             0x40fu /* releasing: lines 0, 1, 2, 3, 10 */
         },
-        { /* path_length */
-            0x1fd7u, 0x1fdbu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu
+        { /* primitive.command by new_command by target.known */
+            0x1a00u, /* pause, false, false: lines 9, 11, 12 */
+            0x1a00u, /* pause, false, true: lines 9, 11, 12 */
+            0x3u, /* pause, true, false: lines 0, 1 */
+            0xdu, /* pause, true, true: lines 0, 2, 3 */
+            0x1f00u, /* goto, false, false: lines 8, 9, 10, 11, 12 */
+            0x1f00u, /* goto, false, true: lines 8, 9, 10, 11, 12 */
+            0x3u, /* goto, true, false: lines 0, 1 */
+            0xdu, /* goto, true, true: lines 0, 2, 3 */
+            0x1ec0u, /* gothru, false, false: lines 6, 7, 9, 10, 11, 12 */
+            0x1ec0u, /* gothru, false, true: lines 6, 7, 9, 10, 11, 12 */
+            0x3u, /* gothru, true, false: lines 0, 1 */
+            0xdu, /* gothru, true, true: lines 0, 2, 3 */
+            0x1e30u, /* approach_position_fingers, false, false: lines 4, 5, 9, 10, 11, 12 */
+            0x1e30u, /* approach_position_fingers, false, true: lines 4, 5, 9, 10, 11, 12 */
+            0x3u, /* approach_position_fingers, true, false: lines 0, 1 */
+            0xdu, /* approach_position_fingers, true, true: lines 0, 2, 3 */
+            0x1a00u, /* departure_position_fingers, false, false: lines 9, 11, 12 */
+            0x1a00u, /* departure_position_fingers, false, true: lines 9, 11, 12 */
+            0x3u, /* departure_position_fingers, true, false: lines 0, 1 */
+            0xdu, /* departure_position_fingers, true, true: lines 0, 2, 3 */
+            0x1a00u, /* immed_grasp, false, false: lines 9, 11, 12 */
+            0x1a00u, /* immed_grasp, false, true: lines 9, 11, 12 */
+            0x3u, /* immed_grasp, true, false: lines 0, 1 */
+            0xdu /* immed_grasp, true, true: lines 0, 2, 3 */
         },
-        { /* path_length - path_at > 2 */
-            0x1fbfu, /* false: lines 0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12 */
-            0x1fffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
-        },
-        { /* path_length - path_at <= 2 */
-            0x1f7fu, /* false: lines 0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12 */
-            0x1fffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
+        { /* primitive.status by idle by path_length - path_at > 2 by path_length - path_at <= 2 */
+            0xb31u, /* done, false, false, false: lines 0, 4, 5, 8, 9, 11 */
+            0xbb1u, /* done, false, false, true: lines 0, 4, 5, 7, 8, 9, 11 */
+            0xb71u, /* done, false, true, false: lines 0, 4, 5, 6, 8, 9, 11 */
+            0xbf1u, /* done, false, true, true: lines 0, 4, 5, 6, 7, 8, 9, 11 */
+            0xb3eu, /* done, true, false, false: lines 1, 2, 3, 4, 5, 8, 9, 11 */
+            0xbbeu, /* done, true, false, true: lines 1, 2, 3, 4, 5, 7, 8, 9, 11 */
+            0xb7eu, /* done, true, true, false: lines 1, 2, 3, 4, 5, 6, 8, 9, 11 */
+            0xbfeu, /* done, true, true, true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 11 */
+            0x1a01u, /* executing, false, false, false: lines 0, 9, 11, 12 */
+            0x1a01u, /* executing, false, false, true: lines 0, 9, 11, 12 */
+            0x1a01u, /* executing, false, true, false: lines 0, 9, 11, 12 */
+            0x1a01u, /* executing, false, true, true: lines 0, 9, 11, 12 */
+            0x1a0eu, /* executing, true, false, false: lines 1, 2, 3, 9, 11, 12 */
+            0x1a0eu, /* executing, true, false, true: lines 1, 2, 3, 9, 11, 12 */
+            0x1a0eu, /* executing, true, true, false: lines 1, 2, 3, 9, 11, 12 */
+            0x1a0eu, /* executing, true, true, true: lines 1, 2, 3, 9, 11, 12 */
+            0xe01u, /* failed, false, false, false: lines 0, 9, 10, 11 */
+            0xe01u, /* failed, false, false, true: lines 0, 9, 10, 11 */
+            0xe01u, /* failed, false, true, false: lines 0, 9, 10, 11 */
+            0xe01u, /* failed, false, true, true: lines 0, 9, 10, 11 */
+            0xe0eu, /* failed, true, false, false: lines 1, 2, 3, 9, 10, 11 */
+            0xe0eu, /* failed, true, false, true: lines 1, 2, 3, 9, 10, 11 */
+            0xe0eu, /* failed, true, true, false: lines 1, 2, 3, 9, 10, 11 */
+            0xe0eu /* failed, true, true, true: lines 1, 2, 3, 9, 10, 11 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
-            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->target.known ? 1u : 0u)] &
-            (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] &
-            (uint32_t)t.t6[s->path_length] &
-            (uint32_t)t.t7[((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)] &
-            (uint32_t)t.t8[((((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->path_length] & (uint32_t)t.t1[s->cur_state] &
+            (uint32_t)t.t2[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->target.known ? 1u : 0u)] &
+            (uint32_t)t.t3[(((((s->primitive.status * 2u) + (s->idle ? 1u : 0u)) * 2u) +
+                ((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)) * 2u) +
+                ((((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x2000u);
     line = several ? (-2) : line;
@@ -1687,7 +1712,7 @@ int32_t emove_pause_emove_line(const emove_t *s)
             0x1u /* true: lines 1 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->idle ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x4u);
     line = (m == 0x0u) ? (-1) : line;
@@ -1709,33 +1734,10 @@ int32_t emove_pickup_line(const emove_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint8_t t0[2];
-        uint8_t t1[6];
+        uint8_t t0[14];
+        uint8_t t1[24];
         uint8_t t2[3];
-        uint8_t t3[2];
-        uint8_t t4[14];
     } t = {
-        { /* new_command */
-            0x7cu, /* false: lines 2, 3, 4, 5, 6 */
-            0x3u /* true: lines 0, 1 */
-        },
-        { /* primitive.command */
-            0x6bu, /* pause: lines 0, 1, 3, 5, 6 */
-            0x6bu, /* goto: lines 0, 1, 3, 5, 6 */
-            0x6bu, /* gothru: lines 0, 1, 3, 5, 6 */
-            0x6bu, /* approach_position_fingers: lines 0, 1, 3, 5, 6 */
-            0x6bu, /* departure_position_fingers: lines 0, 1, 3, 5, 6 */
-            0x7fu /* immed_grasp: lines 0, 1, 2, 3, 4, 5, 6 */
-        },
-        { /* primitive.status */
-            0x2fu, /* done: lines 0, 1, 2, 3, 5 */
-            0x6bu, /* executing: lines 0, 1, 3, 5, 6 */
-            0x3bu /* failed: lines 0, 1, 3, 4, 5 */
-        },
-        { /* idle */
-            0x7du, /* false: lines 0, 2, 3, 4, 5, 6 */
-            0x7eu /* true: lines 1, 2, 3, 4, 5, 6 */
-        },
         { /* cur_state */
             0xbu, /* d_state: lines 0, 1, 3 */
             0x23u, /* f_state: lines 0, 1, 5 */
@@ -1752,10 +1754,42 @@ int32_t emove_pickup_line(const emove_t *s)
             0x57u, /* grasping: lines 0, 1, 2, 4, 6 */
             0x3u /* releasing: lines 0, 1 */
         },
+        { /* primitive.command by new_command by idle */
+            0x68u, /* pause, false, false: lines 3, 5, 6 */
+            0x68u, /* pause, false, true: lines 3, 5, 6 */
+            0x1u, /* pause, true, false: lines 0 */
+            0x2u, /* pause, true, true: lines 1 */
+            0x68u, /* goto, false, false: lines 3, 5, 6 */
+            0x68u, /* goto, false, true: lines 3, 5, 6 */
+            0x1u, /* goto, true, false: lines 0 */
+            0x2u, /* goto, true, true: lines 1 */
+            0x68u, /* gothru, false, false: lines 3, 5, 6 */
+            0x68u, /* gothru, false, true: lines 3, 5, 6 */
+            0x1u, /* gothru, true, false: lines 0 */
+            0x2u, /* gothru, true, true: lines 1 */
+            0x68u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
+            0x68u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
+            0x1u, /* approach_position_fingers, true, false: lines 0 */
+            0x2u, /* approach_position_fingers, true, true: lines 1 */
+            0x68u, /* departure_position_fingers, false, false: lines 3, 5, 6 */
+            0x68u, /* departure_position_fingers, false, true: lines 3, 5, 6 */
+            0x1u, /* departure_position_fingers, true, false: lines 0 */
+            0x2u, /* departure_position_fingers, true, true: lines 1 */
+            0x7cu, /* immed_grasp, false, false: lines 2, 3, 4, 5, 6 */
+            0x7cu, /* immed_grasp, false, true: lines 2, 3, 4, 5, 6 */
+            0x1u, /* immed_grasp, true, false: lines 0 */
+            0x2u /* immed_grasp, true, true: lines 1 */
+        },
+        { /* primitive.status */
+            0x2fu, /* done: lines 0, 1, 2, 3, 5 */
+            0x6bu, /* executing: lines 0, 1, 3, 5, 6 */
+            0x3bu /* failed: lines 0, 1, 3, 4, 5 */
+        },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
-            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] &
-            (uint32_t)t.t4[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[s->cur_state] &
+            (uint32_t)t.t1[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->idle ? 1u : 0u)] &
+            (uint32_t)t.t2[s->primitive.status];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1776,34 +1810,10 @@ int32_t emove_release_part_line(const emove_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint16_t t0[2];
-        uint16_t t1[6];
-        uint16_t t2[3];
-        uint16_t t3[2];
-        uint16_t t4[14];
-        uint16_t t5[2];
+        uint8_t t0[14];
+        uint8_t t1[24];
+        uint8_t t2[6];
     } t = {
-        { /* new_command */
-            0xf8u, /* false: lines 2, 3, 4, 5, 6 */
-            0x7u /* true: lines 0, 1, 1a */
-        },
-        { /* primitive.command */
-            0xd7u, /* pause: lines 0, 1, 1a, 3, 5, 6 */
-            0xd7u, /* goto: lines 0, 1, 1a, 3, 5, 6 */
-            0xd7u, /* gothru: lines 0, 1, 1a, 3, 5, 6 */
-            0xd7u, /* approach_position_fingers: lines 0, 1, 1a, 3, 5, 6 */
-            0xffu, /* departure_position_fingers: lines 0, 1, 1a, 2, 3, 4, 5, 6 */
-            0xd7u /* immed_grasp: lines 0, 1, 1a, 3, 5, 6 */
-        },
-        { /* primitive.status */
-            0x5fu, /* done: lines 0, 1, 1a, 2, 3, 5 */
-            0xd7u, /* executing: lines 0, 1, 1a, 3, 5, 6 */
-            0x77u /* failed: lines 0, 1, 1a, 3, 4, 5 */
-        },
-        { /* idle */
-            0xf9u, /* false: lines 0, 2, 3, 4, 5, 6 */
-            0xfeu /* true: lines 1, 1a, 2, 3, 4, 5, 6 */
-        },
         { /* cur_state */
             0x17u, /* d_state: lines 0, 1, 1a, 3 */
             0x47u, /* f_state: lines 0, 1, 1a, 5 */
@@ -1820,14 +1830,45 @@ int32_t emove_release_part_line(const emove_t *s)
             0x7u, /* grasping: lines 0, 1, 1a */
             0xafu /* releasing: lines 0, 1, 1a, 2, 4, 6 */
         },
-        { /* lost */
-            0xfbu, /* false: lines 0, 1, 2, 3, 4, 5, 6 */
-            0xfdu /* true: lines 0, 1a, 2, 3, 4, 5, 6 */
+        { /* primitive.command by new_command by idle */
+            0xd0u, /* pause, false, false: lines 3, 5, 6 */
+            0xd0u, /* pause, false, true: lines 3, 5, 6 */
+            0x1u, /* pause, true, false: lines 0 */
+            0x6u, /* pause, true, true: lines 1, 1a */
+            0xd0u, /* goto, false, false: lines 3, 5, 6 */
+            0xd0u, /* goto, false, true: lines 3, 5, 6 */
+            0x1u, /* goto, true, false: lines 0 */
+            0x6u, /* goto, true, true: lines 1, 1a */
+            0xd0u, /* gothru, false, false: lines 3, 5, 6 */
+            0xd0u, /* gothru, false, true: lines 3, 5, 6 */
+            0x1u, /* gothru, true, false: lines 0 */
+            0x6u, /* gothru, true, true: lines 1, 1a */
+            0xd0u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
+            0xd0u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
+            0x1u, /* approach_position_fingers, true, false: lines 0 */
+            0x6u, /* approach_position_fingers, true, true: lines 1, 1a */
+            0xf8u, /* departure_position_fingers, false, false: lines 2, 3, 4, 5, 6 */
+            0xf8u, /* departure_position_fingers, false, true: lines 2, 3, 4, 5, 6 */
+            0x1u, /* departure_position_fingers, true, false: lines 0 */
+            0x6u, /* departure_position_fingers, true, true: lines 1, 1a */
+            0xd0u, /* immed_grasp, false, false: lines 3, 5, 6 */
+            0xd0u, /* immed_grasp, false, true: lines 3, 5, 6 */
+            0x1u, /* immed_grasp, true, false: lines 0 */
+            0x6u /* immed_grasp, true, true: lines 1, 1a */
+        },
+        { /* primitive.status by lost */
+            0x5bu, /* done, false: lines 0, 1, 2, 3, 5 */
+            0x5du, /* done, true: lines 0, 1a, 2, 3, 5 */
+            0xd3u, /* executing, false: lines 0, 1, 3, 5, 6 */
+            0xd5u, /* executing, true: lines 0, 1a, 3, 5, 6 */
+            0x73u, /* failed, false: lines 0, 1, 3, 4, 5 */
+            0x75u /* failed, true: lines 0, 1a, 3, 4, 5 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->primitive.command] &
-            (uint32_t)t.t2[s->primitive.status] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] &
-            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->lost ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->cur_state] &
+            (uint32_t)t.t1[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->idle ? 1u : 0u)] &
+            (uint32_t)t.t2[(s->primitive.status * 2u) + (s->lost ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = emove_bit32(m | 0x100u);
     line = several ? (-2) : line;
@@ -1847,66 +1888,42 @@ void emove_release_part_lines(const emove_t *in, int32_t *out, uint32_t n)
 int32_t emove_locate_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == EMOVE_FAULT_NONE) {
-        emove_settle(s);
-        emove_run_locate(s);
-    }
-    return s->fault;
+    return (s->fault == EMOVE_FAULT_NONE) ? emove_run_locate(s) : s->fault;
 }
 
 /* One step of table move_to: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t emove_move_to_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == EMOVE_FAULT_NONE) {
-        emove_settle(s);
-        emove_run_move_to(s);
-    }
-    return s->fault;
+    return (s->fault == EMOVE_FAULT_NONE) ? emove_run_move_to(s) : s->fault;
 }
 
 /* One step of table move_to_obj: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t emove_move_to_obj_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == EMOVE_FAULT_NONE) {
-        emove_settle(s);
-        emove_run_move_to_obj(s);
-    }
-    return s->fault;
+    return (s->fault == EMOVE_FAULT_NONE) ? emove_run_move_to_obj(s) : s->fault;
 }
 
 /* One step of table pause_emove: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t emove_pause_emove_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == EMOVE_FAULT_NONE) {
-        emove_settle(s);
-        emove_run_pause_emove(s);
-    }
-    return s->fault;
+    return (s->fault == EMOVE_FAULT_NONE) ? emove_run_pause_emove(s) : s->fault;
 }
 
 /* One step of table pickup: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t emove_pickup_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == EMOVE_FAULT_NONE) {
-        emove_settle(s);
-        emove_run_pickup(s);
-    }
-    return s->fault;
+    return (s->fault == EMOVE_FAULT_NONE) ? emove_run_pickup(s) : s->fault;
 }
 
 /* One step of table release_part: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t emove_release_part_step(emove_t *s)
 {
     emove_admit(s);
-    if (s->fault == EMOVE_FAULT_NONE) {
-        emove_settle(s);
-        emove_run_release_part(s);
-    }
-    return s->fault;
+    return (s->fault == EMOVE_FAULT_NONE) ? emove_run_release_part(s) : s->fault;
 }
 
 /* One cycle of level emove, every 40 ms: returns the fault, 0 for none. */
@@ -1914,38 +1931,27 @@ int32_t emove_emove_cycle(emove_t *s)
 {
     emove_admit(s);
     if (s->fault == EMOVE_FAULT_NONE) {
-        emove_settle(s);
-        if (s->fault == EMOVE_FAULT_NONE) {
-            emove_do_take_orders(s);
-        }
-        if (s->fault == EMOVE_FAULT_NONE) {
-            emove_do_look_below(s);
-        }
-        if (s->fault == EMOVE_FAULT_NONE) {
-            emove_do_measure(s);
-        }
-        if (s->fault == EMOVE_FAULT_NONE) {
-            const uint8_t chosen = s->task.input_command;
-            if (chosen == VOCABULARY_EMOVE_COMMAND_PAUSE) {
-                emove_run_pause_emove(s);
-            } else if (chosen == VOCABULARY_EMOVE_COMMAND_MOVE_TO) {
-                emove_run_move_to(s);
-            } else if (chosen == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ) {
-                emove_run_move_to_obj(s);
-            } else if (chosen == VOCABULARY_EMOVE_COMMAND_LOCATE) {
-                emove_run_locate(s);
-            } else if (chosen == VOCABULARY_EMOVE_COMMAND_PICKUP) {
-                emove_run_pickup(s);
-            } else if (chosen == VOCABULARY_EMOVE_COMMAND_RELEASE) {
-                emove_run_release_part(s);
-            } else {
-                s->fault = EMOVE_FAULT_NO_LINE; /* no table for it: proved impossible */
-            }
+        emove_do_take_orders(s);
+        emove_do_look_below(s);
+        emove_do_measure(s);
+        const uint8_t chosen = s->task.input_command;
+        if (chosen == VOCABULARY_EMOVE_COMMAND_PAUSE) {
+            (void)emove_run_pause_emove(s);
+        } else if (chosen == VOCABULARY_EMOVE_COMMAND_MOVE_TO) {
+            (void)emove_run_move_to(s);
+        } else if (chosen == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ) {
+            (void)emove_run_move_to_obj(s);
+        } else if (chosen == VOCABULARY_EMOVE_COMMAND_LOCATE) {
+            (void)emove_run_locate(s);
+        } else if (chosen == VOCABULARY_EMOVE_COMMAND_PICKUP) {
+            (void)emove_run_pickup(s);
+        } else if (chosen == VOCABULARY_EMOVE_COMMAND_RELEASE) {
+            (void)emove_run_release_part(s);
+        } else {
+            s->fault = EMOVE_FAULT_NO_LINE; /* no table for it: proved impossible */
         }
         if (s->fault == EMOVE_FAULT_NONE) {
             emove_do_asked(s);
-        }
-        if (s->fault == EMOVE_FAULT_NONE) {
             emove_do_give_orders(s);
         }
     }

@@ -246,9 +246,9 @@ enum {
     EMOVE_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
-/* Digests of what the tables mean, 9b385fe4bc08e20d, and of how the state is laid out, ddf7c673791a25cd:
+/* Digests of what the tables mean, 9b385fe4bc08e20d, and of how the state is laid out, 2077c843488f4c8d:
    comments, and names of files, change neither. The number is made of both. */
-#define EMOVE_DIGEST UINT32_C(0x38ef7723)
+#define EMOVE_DIGEST UINT32_C(0xe48f9953)
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.
@@ -318,13 +318,13 @@ typedef struct {
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     /* trace: position of the variable that was refused, or of the assumption; -1 for none */
     int32_t fault_at;
-    uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
+    uint32_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } emove_t;
 
-/* 456 bytes, or 436, 424, 410 where members are aligned to less than their size; with any other size this
+/* 456 bytes, or 432, 420, 406 where members are aligned to less than their size; with any other size this
    does not compile. */
-typedef char emove_layout_holds[((sizeof(emove_t) == 456u) || (sizeof(emove_t) == 436u) ||
-    (sizeof(emove_t) == 424u) || (sizeof(emove_t) == 410u)) ?
+typedef char emove_layout_holds[((sizeof(emove_t) == 456u) || (sizeof(emove_t) == 432u) ||
+    (sizeof(emove_t) == 420u) || (sizeof(emove_t) == 406u)) ?
         1 : -1];
 
 /* Every variable's initial value. */

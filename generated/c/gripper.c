@@ -163,7 +163,13 @@ static void gripper_do_failed(gripper_t *s)
     s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
-/* Admits every input; a refused one leaves everything else as it was. */
+/* Deferred variables take their next values, all at once. */
+static void gripper_settle(gripper_t *s)
+{
+    (void)s;
+}
+
+/* Admits every input, then settles; a refused one leaves everything else as it was. */
 static void gripper_admit(gripper_t *s)
 {
     s->line = -1;
@@ -210,18 +216,13 @@ static void gripper_admit(gripper_t *s)
                 s->hand.force_n = 1000.0;
             }
             s->hand.force_n = s->hand.force_n + 0.0;
+            gripper_settle(s);
         }
     }
 }
 
-/* Deferred variables take their next values, all at once. */
-static void gripper_settle(gripper_t *s)
-{
-    (void)s;
-}
-
-/* Matches table position and runs the line. */
-static void gripper_run_position(gripper_t *s)
+/* Matches table position and runs the line; returns the fault, 0 for none. */
+static int32_t gripper_run_position(gripper_t *s)
 {
     s->line = gripper_position_line(s);
     switch (s->line) {
@@ -275,10 +276,11 @@ static void gripper_run_position(gripper_t *s)
         s->fault = GRIPPER_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table grasp and runs the line. */
-static void gripper_run_grasp(gripper_t *s)
+/* Matches table grasp and runs the line; returns the fault, 0 for none. */
+static int32_t gripper_run_grasp(gripper_t *s)
 {
     s->line = gripper_grasp_line(s);
     switch (s->line) {
@@ -322,10 +324,11 @@ static void gripper_run_grasp(gripper_t *s)
         s->fault = GRIPPER_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table pause_gripper and runs the line. */
-static void gripper_run_pause_gripper(gripper_t *s)
+/* Matches table pause_gripper and runs the line; returns the fault, 0 for none. */
+static int32_t gripper_run_pause_gripper(gripper_t *s)
 {
     s->line = gripper_pause_gripper_line(s);
     switch (s->line) {
@@ -342,6 +345,7 @@ static void gripper_run_pause_gripper(gripper_t *s)
         s->fault = GRIPPER_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
 /* Every variable's initial value. */
@@ -430,26 +434,10 @@ int32_t gripper_position_line(const gripper_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint8_t t0[2];
-        uint8_t t1[3];
+        uint8_t t0[151];
+        uint8_t t1[24];
         uint8_t t2[2];
-        uint8_t t3[151];
-        uint8_t t4[2];
-        uint8_t t5[2];
     } t = {
-        { /* new_command */
-            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
-            0x1u /* true: lines 1 */
-        },
-        { /* cur_state */
-            0x21u, /* d_state: lines 1, 6 */
-            0x41u, /* f_state: lines 1, 7 */
-            0x1fu /* moving: lines 1, 2, 3, 4, 5 */
-        },
-        { /* at_opening */
-            0x7du, /* false: lines 1, 3, 4, 5, 6, 7 */
-            0x63u /* true: lines 1, 2, 6, 7 */
-        },
         { /* waited */
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
@@ -465,19 +453,42 @@ int32_t gripper_position_line(const gripper_t *s)
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x77u
         },
-        { /* closing and forced */
-            0x7bu, /* false: lines 1, 2, 4, 5, 6, 7 */
-            0x7fu /* true: every line */
+        { /* cur_state by new_command by at_opening by closing and forced */
+            0x20u, /* d_state, false, false, false: lines 6 */
+            0x20u, /* d_state, false, false, true: lines 6 */
+            0x20u, /* d_state, false, true, false: lines 6 */
+            0x20u, /* d_state, false, true, true: lines 6 */
+            0x1u, /* d_state, true, false, false: lines 1 */
+            0x1u, /* d_state, true, false, true: lines 1 */
+            0x1u, /* d_state, true, true, false: lines 1 */
+            0x1u, /* d_state, true, true, true: lines 1 */
+            0x40u, /* f_state, false, false, false: lines 7 */
+            0x40u, /* f_state, false, false, true: lines 7 */
+            0x40u, /* f_state, false, true, false: lines 7 */
+            0x40u, /* f_state, false, true, true: lines 7 */
+            0x1u, /* f_state, true, false, false: lines 1 */
+            0x1u, /* f_state, true, false, true: lines 1 */
+            0x1u, /* f_state, true, true, false: lines 1 */
+            0x1u, /* f_state, true, true, true: lines 1 */
+            0x18u, /* moving, false, false, false: lines 4, 5 */
+            0x1cu, /* moving, false, false, true: lines 3, 4, 5 */
+            0x2u, /* moving, false, true, false: lines 2 */
+            0x2u, /* moving, false, true, true: lines 2 */
+            0x1u, /* moving, true, false, false: lines 1 */
+            0x1u, /* moving, true, false, true: lines 1 */
+            0x1u, /* moving, true, true, false: lines 1 */
+            0x1u /* moving, true, true, true: lines 1 */
         },
         { /* not (closing and forced) */
             0x67u, /* false: lines 1, 2, 3, 6, 7 */
             0x7fu /* true: every line */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] &
-            (uint32_t)t.t2[(s->at_opening ? 1u : 0u)] & (uint32_t)t.t3[s->waited] &
-            (uint32_t)t.t4[((s->closing && s->forced) ? 1u : 0u)] &
-            (uint32_t)t.t5[((!(s->closing && s->forced)) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->at_opening ? 1u : 0u)) * 2u) +
+                ((s->closing && s->forced) ? 1u : 0u)] &
+            (uint32_t)t.t2[(!(s->closing && s->forced)) ? 1u : 0u];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = gripper_bit32(m | 0x80u);
     line = (m == 0x0u) ? (-1) : line;
@@ -499,24 +510,9 @@ int32_t gripper_grasp_line(const gripper_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint8_t t0[2];
-        uint8_t t1[3];
-        uint8_t t2[2];
-        uint8_t t3[151];
+        uint8_t t0[151];
+        uint8_t t1[12];
     } t = {
-        { /* new_command */
-            0x3eu, /* false: lines 2, 3, 4, 5, 6 */
-            0x1u /* true: lines 1 */
-        },
-        { /* cur_state */
-            0x11u, /* d_state: lines 1, 5 */
-            0x21u, /* f_state: lines 1, 6 */
-            0xfu /* moving: lines 1, 2, 3, 4 */
-        },
-        { /* forced */
-            0x3du, /* false: lines 1, 3, 4, 5, 6 */
-            0x33u /* true: lines 1, 2, 5, 6 */
-        },
         { /* waited */
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
@@ -532,9 +528,23 @@ int32_t gripper_grasp_line(const gripper_t *s)
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x3bu
         },
+        { /* cur_state by new_command by forced */
+            0x10u, /* d_state, false, false: lines 5 */
+            0x10u, /* d_state, false, true: lines 5 */
+            0x1u, /* d_state, true, false: lines 1 */
+            0x1u, /* d_state, true, true: lines 1 */
+            0x20u, /* f_state, false, false: lines 6 */
+            0x20u, /* f_state, false, true: lines 6 */
+            0x1u, /* f_state, true, false: lines 1 */
+            0x1u, /* f_state, true, true: lines 1 */
+            0xcu, /* moving, false, false: lines 3, 4 */
+            0x2u, /* moving, false, true: lines 2 */
+            0x1u, /* moving, true, false: lines 1 */
+            0x1u /* moving, true, true: lines 1 */
+        },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] &
-            (uint32_t)t.t2[(s->forced ? 1u : 0u)] & (uint32_t)t.t3[s->waited];
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) + (s->forced ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = gripper_bit32(m | 0x40u);
     line = (m == 0x0u) ? (-1) : line;
@@ -576,33 +586,21 @@ void gripper_pause_gripper_lines(const gripper_t *in, int32_t *out, uint32_t n)
 int32_t gripper_position_step(gripper_t *s)
 {
     gripper_admit(s);
-    if (s->fault == GRIPPER_FAULT_NONE) {
-        gripper_settle(s);
-        gripper_run_position(s);
-    }
-    return s->fault;
+    return (s->fault == GRIPPER_FAULT_NONE) ? gripper_run_position(s) : s->fault;
 }
 
 /* One step of table grasp: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t gripper_grasp_step(gripper_t *s)
 {
     gripper_admit(s);
-    if (s->fault == GRIPPER_FAULT_NONE) {
-        gripper_settle(s);
-        gripper_run_grasp(s);
-    }
-    return s->fault;
+    return (s->fault == GRIPPER_FAULT_NONE) ? gripper_run_grasp(s) : s->fault;
 }
 
 /* One step of table pause_gripper: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t gripper_pause_gripper_step(gripper_t *s)
 {
     gripper_admit(s);
-    if (s->fault == GRIPPER_FAULT_NONE) {
-        gripper_settle(s);
-        gripper_run_pause_gripper(s);
-    }
-    return s->fault;
+    return (s->fault == GRIPPER_FAULT_NONE) ? gripper_run_pause_gripper(s) : s->fault;
 }
 
 /* One cycle of level gripper, every 40 ms: returns the fault, 0 for none. */
@@ -610,29 +608,20 @@ int32_t gripper_gripper_cycle(gripper_t *s)
 {
     gripper_admit(s);
     if (s->fault == GRIPPER_FAULT_NONE) {
-        gripper_settle(s);
-        if (s->fault == GRIPPER_FAULT_NONE) {
-            gripper_do_take_orders(s);
-        }
-        if (s->fault == GRIPPER_FAULT_NONE) {
-            gripper_do_measure(s);
-        }
-        if (s->fault == GRIPPER_FAULT_NONE) {
-            const uint8_t chosen = s->primitive.input_command;
-            if (chosen == VOCABULARY_GRIPPER_COMMAND_PAUSE) {
-                gripper_run_pause_gripper(s);
-            } else if (chosen == VOCABULARY_GRIPPER_COMMAND_POSITION) {
-                gripper_run_position(s);
-            } else if (chosen == VOCABULARY_GRIPPER_COMMAND_GRASP) {
-                gripper_run_grasp(s);
-            } else {
-                s->fault = GRIPPER_FAULT_NO_LINE; /* no table for it: proved impossible */
-            }
+        gripper_do_take_orders(s);
+        gripper_do_measure(s);
+        const uint8_t chosen = s->primitive.input_command;
+        if (chosen == VOCABULARY_GRIPPER_COMMAND_PAUSE) {
+            (void)gripper_run_pause_gripper(s);
+        } else if (chosen == VOCABULARY_GRIPPER_COMMAND_POSITION) {
+            (void)gripper_run_position(s);
+        } else if (chosen == VOCABULARY_GRIPPER_COMMAND_GRASP) {
+            (void)gripper_run_grasp(s);
+        } else {
+            s->fault = GRIPPER_FAULT_NO_LINE; /* no table for it: proved impossible */
         }
         if (s->fault == GRIPPER_FAULT_NONE) {
             gripper_do_show_opening(s);
-        }
-        if (s->fault == GRIPPER_FAULT_NONE) {
             gripper_do_give_orders(s);
         }
     }

@@ -383,7 +383,17 @@ static void primitive_do_failed(primitive_t *s)
     s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
-/* Admits every input; a refused one leaves everything else as it was. */
+/* Deferred variables take their next values, all at once. */
+static void primitive_settle(primitive_t *s)
+{
+    const bool ready0 = (s->from_robot.inc_command_echo == s->to_robot.inc_command) &&
+            (s->from_gripper.inc_command_echo == s->to_gripper.inc_command);
+    if (ready0) {
+        s->cur_state = s->cur_state_next;
+    }
+}
+
+/* Admits every input, then settles; a refused one leaves everything else as it was. */
 static void primitive_admit(primitive_t *s)
 {
     s->line = -1;
@@ -523,17 +533,8 @@ static void primitive_admit(primitive_t *s)
             s->fingers.tolerance_mm = s->fingers.tolerance_mm + 0.0;
             s->fingers.force_n = s->fingers.force_n + 0.0;
             s->fingers.speed_mm_s = s->fingers.speed_mm_s + 0.0;
+            primitive_settle(s);
         }
-    }
-}
-
-/* Deferred variables take their next values, all at once. */
-static void primitive_settle(primitive_t *s)
-{
-    const bool ready0 = (s->from_robot.inc_command_echo == s->to_robot.inc_command) &&
-            (s->from_gripper.inc_command_echo == s->to_gripper.inc_command);
-    if (ready0) {
-        s->cur_state = s->cur_state_next;
     }
 }
 
@@ -579,12 +580,12 @@ static bool primitive_holds_immed_grasp_in_step(const primitive_t *s)
             (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
 }
 
-/* Matches table approach_position_fingers and runs the line. */
-static void primitive_run_approach_position_fingers(primitive_t *s)
+/* Matches table approach_position_fingers and runs the line; returns the fault, 0 for none. */
+static int32_t primitive_run_approach_position_fingers(primitive_t *s)
 {
     if (!primitive_holds_approach_position_fingers_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP);
+                (1u << (uint32_t)PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP);
     }
     s->line = primitive_approach_position_fingers_line(s);
     switch (s->line) {
@@ -636,22 +637,20 @@ static void primitive_run_approach_position_fingers(primitive_t *s)
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case (-1):
-        s->fault = PRIMITIVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table departure_position_fingers and runs the line. */
-static void primitive_run_departure_position_fingers(primitive_t *s)
+/* Matches table departure_position_fingers and runs the line; returns the fault, 0 for none. */
+static int32_t primitive_run_departure_position_fingers(primitive_t *s)
 {
     if (!primitive_holds_departure_position_fingers_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP);
+                (1u << (uint32_t)PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP);
     }
     s->line = primitive_departure_position_fingers_line(s);
     switch (s->line) {
@@ -703,22 +702,19 @@ static void primitive_run_departure_position_fingers(primitive_t *s)
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case (-1):
-        s->fault = PRIMITIVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table goto and runs the line. */
-static void primitive_run_goto_(primitive_t *s)
+/* Matches table goto and runs the line; returns the fault, 0 for none. */
+static int32_t primitive_run_goto_(primitive_t *s)
 {
     if (!primitive_holds_goto_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_GOTO_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)PRIMITIVE_ASSUMPTION_GOTO_IN_STEP);
     }
     s->line = primitive_goto__line(s);
     switch (s->line) {
@@ -796,22 +792,19 @@ static void primitive_run_goto_(primitive_t *s)
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case (-1):
-        s->fault = PRIMITIVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table gothru and runs the line. */
-static void primitive_run_gothru(primitive_t *s)
+/* Matches table gothru and runs the line; returns the fault, 0 for none. */
+static int32_t primitive_run_gothru(primitive_t *s)
 {
     if (!primitive_holds_gothru_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_GOTHRU_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)PRIMITIVE_ASSUMPTION_GOTHRU_IN_STEP);
     }
     s->line = primitive_gothru_line(s);
     switch (s->line) {
@@ -860,22 +853,20 @@ static void primitive_run_gothru(primitive_t *s)
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case (-1):
-        s->fault = PRIMITIVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table immed_grasp and runs the line. */
-static void primitive_run_immed_grasp(primitive_t *s)
+/* Matches table immed_grasp and runs the line; returns the fault, 0 for none. */
+static int32_t primitive_run_immed_grasp(primitive_t *s)
 {
     if (!primitive_holds_immed_grasp_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)PRIMITIVE_ASSUMPTION_IMMED_GRASP_IN_STEP);
+                (1u << (uint32_t)PRIMITIVE_ASSUMPTION_IMMED_GRASP_IN_STEP);
     }
     s->line = primitive_immed_grasp_line(s);
     switch (s->line) {
@@ -932,18 +923,16 @@ static void primitive_run_immed_grasp(primitive_t *s)
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
-    case (-1):
-        s->fault = PRIMITIVE_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table pause_primitive and runs the line. */
-static void primitive_run_pause_primitive(primitive_t *s)
+/* Matches table pause_primitive and runs the line; returns the fault, 0 for none. */
+static int32_t primitive_run_pause_primitive(primitive_t *s)
 {
     s->line = primitive_pause_primitive_line(s);
     switch (s->line) {
@@ -966,6 +955,7 @@ static void primitive_run_pause_primitive(primitive_t *s)
         s->fault = PRIMITIVE_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
 /* Every variable's initial value. */
@@ -1258,33 +1248,36 @@ int32_t primitive_approach_position_fingers_line(const primitive_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint8_t t0[2];
+        uint8_t t0[16];
         uint8_t t1[3];
-        uint8_t t2[2];
-        uint8_t t3[4];
     } t = {
-        { /* new_command */
-            0x7cu, /* false: lines 3, 4, 5, 6, 7 */
-            0x3u /* true: lines 1, 2 */
+        { /* cur_state by new_command by fingers.known */
+            0x20u, /* d_state, false, false: lines 6 */
+            0x20u, /* d_state, false, true: lines 6 */
+            0x2u, /* d_state, true, false: lines 2 */
+            0x1u, /* d_state, true, true: lines 1 */
+            0x40u, /* f_state, false, false: lines 7 */
+            0x40u, /* f_state, false, true: lines 7 */
+            0x2u, /* f_state, true, false: lines 2 */
+            0x1u, /* f_state, true, true: lines 1 */
+            0x0u, /* moving, false, false: no line */
+            0x0u, /* moving, false, true: no line */
+            0x2u, /* moving, true, false: lines 2 */
+            0x1u, /* moving, true, true: lines 1 */
+            0x1cu, /* fingering, false, false: lines 3, 4, 5 */
+            0x1cu, /* fingering, false, true: lines 3, 4, 5 */
+            0x2u, /* fingering, true, false: lines 2 */
+            0x1u /* fingering, true, true: lines 1 */
         },
         { /* gripper.status */
             0x6bu, /* done: lines 1, 2, 4, 6, 7 */
             0x67u, /* executing: lines 1, 2, 3, 6, 7 */
             0x73u /* failed: lines 1, 2, 5, 6, 7 */
         },
-        { /* fingers.known */
-            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
-            0x7du /* true: lines 1, 3, 4, 5, 6, 7 */
-        },
-        { /* cur_state */
-            0x23u, /* d_state: lines 1, 2, 6 */
-            0x43u, /* f_state: lines 1, 2, 7 */
-            0x3u, /* moving: lines 1, 2 */
-            0x1fu /* fingering: lines 1, 2, 3, 4, 5 */
-        },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] &
-            (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+        (s->fingers.known ? 1u : 0u)] &
+            (uint32_t)t.t1[s->gripper.status];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1306,33 +1299,36 @@ int32_t primitive_departure_position_fingers_line(const primitive_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint8_t t0[2];
+        uint8_t t0[16];
         uint8_t t1[3];
-        uint8_t t2[2];
-        uint8_t t3[4];
     } t = {
-        { /* new_command */
-            0x7cu, /* false: lines 3, 4, 5, 6, 7 */
-            0x3u /* true: lines 1, 2 */
+        { /* cur_state by new_command by fingers.known */
+            0x20u, /* d_state, false, false: lines 6 */
+            0x20u, /* d_state, false, true: lines 6 */
+            0x2u, /* d_state, true, false: lines 2 */
+            0x1u, /* d_state, true, true: lines 1 */
+            0x40u, /* f_state, false, false: lines 7 */
+            0x40u, /* f_state, false, true: lines 7 */
+            0x2u, /* f_state, true, false: lines 2 */
+            0x1u, /* f_state, true, true: lines 1 */
+            0x0u, /* moving, false, false: no line */
+            0x0u, /* moving, false, true: no line */
+            0x2u, /* moving, true, false: lines 2 */
+            0x1u, /* moving, true, true: lines 1 */
+            0x1cu, /* fingering, false, false: lines 3, 4, 5 */
+            0x1cu, /* fingering, false, true: lines 3, 4, 5 */
+            0x2u, /* fingering, true, false: lines 2 */
+            0x1u /* fingering, true, true: lines 1 */
         },
         { /* gripper.status */
             0x6bu, /* done: lines 1, 2, 4, 6, 7 */
             0x67u, /* executing: lines 1, 2, 3, 6, 7 */
             0x73u /* failed: lines 1, 2, 5, 6, 7 */
         },
-        { /* fingers.known */
-            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
-            0x7du /* true: lines 1, 3, 4, 5, 6, 7 */
-        },
-        { /* cur_state */
-            0x23u, /* d_state: lines 1, 2, 6 */
-            0x43u, /* f_state: lines 1, 2, 7 */
-            0x3u, /* moving: lines 1, 2 */
-            0x1fu /* fingering: lines 1, 2, 3, 4, 5 */
-        },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] &
-            (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+        (s->fingers.known ? 1u : 0u)] &
+            (uint32_t)t.t1[s->gripper.status];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1353,41 +1349,10 @@ int32_t primitive_goto__line(const primitive_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint16_t t0[2];
-        uint16_t t1[3];
-        uint16_t t2[2];
-        uint16_t t3[4];
-        uint16_t t4[2];
-        uint16_t t5[2];
-        uint16_t t6[251];
+        uint16_t t0[251];
+        uint16_t t1[16];
+        uint16_t t2[12];
     } t = {
-        { /* new_command */
-            0x7fcu, /* false: lines 3, 4, 5, 6, 6a, 6b, 7, 8, 9 */
-            0x3u /* true: lines 1, 2 */
-        },
-        { /* robot.status */
-            0x6e7u, /* done: lines 1, 2, 3, 6, 6a, 6b, 8, 9 */
-            0x61fu, /* executing: lines 1, 2, 3, 4, 5, 8, 9 */
-            0x703u /* failed: lines 1, 2, 7, 8, 9 */
-        },
-        { /* goal.known */
-            0x7feu, /* false: lines 2, 3, 4, 5, 6, 6a, 6b, 7, 8, 9 */
-            0x7fdu /* true: lines 1, 3, 4, 5, 6, 6a, 6b, 7, 8, 9 */
-        },
-        { /* cur_state */
-            0x203u, /* d_state: lines 1, 2, 8 */
-            0x403u, /* f_state: lines 1, 2, 9 */
-            0x1ffu, /* moving: lines 1, 2, 3, 4, 5, 6, 6a, 6b, 7 */
-            0x3u /* fingering: lines 1, 2 */
-        },
-        { /* there */
-            0x707u, /* false: lines 1, 2, 3, 7, 8, 9 */
-            0x7fbu /* true: lines 1, 2, 4, 5, 6, 6a, 6b, 7, 8, 9 */
-        },
-        { /* settled */
-            0x7dfu, /* false: lines 1, 2, 3, 4, 5, 6a, 6b, 7, 8, 9 */
-            0x73fu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9 */
-        },
         { /* waited */
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
@@ -1416,11 +1381,43 @@ int32_t primitive_goto__line(const primitive_t *s)
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
             0x7b7u
         },
+        { /* cur_state by new_command by goal.known */
+            0x200u, /* d_state, false, false: lines 8 */
+            0x200u, /* d_state, false, true: lines 8 */
+            0x2u, /* d_state, true, false: lines 2 */
+            0x1u, /* d_state, true, true: lines 1 */
+            0x400u, /* f_state, false, false: lines 9 */
+            0x400u, /* f_state, false, true: lines 9 */
+            0x2u, /* f_state, true, false: lines 2 */
+            0x1u, /* f_state, true, true: lines 1 */
+            0x1fcu, /* moving, false, false: lines 3, 4, 5, 6, 6a, 6b, 7 */
+            0x1fcu, /* moving, false, true: lines 3, 4, 5, 6, 6a, 6b, 7 */
+            0x2u, /* moving, true, false: lines 2 */
+            0x1u, /* moving, true, true: lines 1 */
+            0x0u, /* fingering, false, false: no line */
+            0x0u, /* fingering, false, true: no line */
+            0x2u, /* fingering, true, false: lines 2 */
+            0x1u /* fingering, true, true: lines 1 */
+        },
+        { /* robot.status by there by settled */
+            0x607u, /* done, false, false: lines 1, 2, 3, 8, 9 */
+            0x607u, /* done, false, true: lines 1, 2, 3, 8, 9 */
+            0x6c3u, /* done, true, false: lines 1, 2, 6a, 6b, 8, 9 */
+            0x623u, /* done, true, true: lines 1, 2, 6, 8, 9 */
+            0x607u, /* executing, false, false: lines 1, 2, 3, 8, 9 */
+            0x607u, /* executing, false, true: lines 1, 2, 3, 8, 9 */
+            0x61bu, /* executing, true, false: lines 1, 2, 4, 5, 8, 9 */
+            0x61bu, /* executing, true, true: lines 1, 2, 4, 5, 8, 9 */
+            0x703u, /* failed, false, false: lines 1, 2, 7, 8, 9 */
+            0x703u, /* failed, false, true: lines 1, 2, 7, 8, 9 */
+            0x703u, /* failed, true, false: lines 1, 2, 7, 8, 9 */
+            0x703u /* failed, true, true: lines 1, 2, 7, 8, 9 */
+        },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->robot.status] &
-            (uint32_t)t.t2[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] &
-            (uint32_t)t.t4[(s->there ? 1u : 0u)] & (uint32_t)t.t5[(s->settled ? 1u : 0u)] &
-            (uint32_t)t.t6[s->waited];
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->goal.known ? 1u : 0u)] &
+            (uint32_t)t.t2[(((s->robot.status * 2u) + (s->there ? 1u : 0u)) * 2u) + (s->settled ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x800u);
     line = several ? (-2) : line;
@@ -1441,39 +1438,39 @@ int32_t primitive_gothru_line(const primitive_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint8_t t0[2];
-        uint8_t t1[3];
-        uint8_t t2[2];
-        uint8_t t3[4];
-        uint8_t t4[2];
+        uint8_t t0[16];
+        uint8_t t1[6];
     } t = {
-        { /* new_command */
-            0x7cu, /* false: lines 3, 4, 5, 6, 7 */
-            0x3u /* true: lines 1, 2 */
+        { /* cur_state by new_command by goal.known */
+            0x30u, /* d_state, false, false: lines 5, 6 */
+            0x30u, /* d_state, false, true: lines 5, 6 */
+            0x2u, /* d_state, true, false: lines 2 */
+            0x1u, /* d_state, true, true: lines 1 */
+            0x40u, /* f_state, false, false: lines 7 */
+            0x40u, /* f_state, false, true: lines 7 */
+            0x2u, /* f_state, true, false: lines 2 */
+            0x1u, /* f_state, true, true: lines 1 */
+            0x2cu, /* moving, false, false: lines 3, 4, 6 */
+            0x2cu, /* moving, false, true: lines 3, 4, 6 */
+            0x2u, /* moving, true, false: lines 2 */
+            0x1u, /* moving, true, true: lines 1 */
+            0x0u, /* fingering, false, false: no line */
+            0x0u, /* fingering, false, true: no line */
+            0x2u, /* fingering, true, false: lines 2 */
+            0x1u /* fingering, true, true: lines 1 */
         },
-        { /* robot.status */
-            0x5fu, /* done: lines 1, 2, 3, 4, 5, 7 */
-            0x5fu, /* executing: lines 1, 2, 3, 4, 5, 7 */
-            0x63u /* failed: lines 1, 2, 6, 7 */
-        },
-        { /* goal.known */
-            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
-            0x7du /* true: lines 1, 3, 4, 5, 6, 7 */
-        },
-        { /* cur_state */
-            0x33u, /* d_state: lines 1, 2, 5, 6 */
-            0x43u, /* f_state: lines 1, 2, 7 */
-            0x2fu, /* moving: lines 1, 2, 3, 4, 6 */
-            0x3u /* fingering: lines 1, 2 */
-        },
-        { /* near */
-            0x77u, /* false: lines 1, 2, 3, 5, 6, 7 */
-            0x7bu /* true: lines 1, 2, 4, 5, 6, 7 */
+        { /* robot.status by near */
+            0x57u, /* done, false: lines 1, 2, 3, 5, 7 */
+            0x5bu, /* done, true: lines 1, 2, 4, 5, 7 */
+            0x57u, /* executing, false: lines 1, 2, 3, 5, 7 */
+            0x5bu, /* executing, true: lines 1, 2, 4, 5, 7 */
+            0x63u, /* failed, false: lines 1, 2, 6, 7 */
+            0x63u /* failed, true: lines 1, 2, 6, 7 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->robot.status] &
-            (uint32_t)t.t2[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] &
-            (uint32_t)t.t4[(s->near_ ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+        (s->goal.known ? 1u : 0u)] &
+            (uint32_t)t.t1[(s->robot.status * 2u) + (s->near_ ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x80u);
     line = several ? (-2) : line;
@@ -1494,39 +1491,39 @@ int32_t primitive_immed_grasp_line(const primitive_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint16_t t0[2];
-        uint16_t t1[3];
-        uint16_t t2[2];
-        uint16_t t3[4];
-        uint16_t t4[2];
+        uint8_t t0[16];
+        uint8_t t1[6];
     } t = {
-        { /* new_command */
-            0xfcu, /* false: lines 3, 4, 5, 6, 7, 8 */
-            0x3u /* true: lines 1, 2 */
+        { /* cur_state by new_command by fingers.known */
+            0x40u, /* d_state, false, false: lines 7 */
+            0x40u, /* d_state, false, true: lines 7 */
+            0x2u, /* d_state, true, false: lines 2 */
+            0x1u, /* d_state, true, true: lines 1 */
+            0x80u, /* f_state, false, false: lines 8 */
+            0x80u, /* f_state, false, true: lines 8 */
+            0x2u, /* f_state, true, false: lines 2 */
+            0x1u, /* f_state, true, true: lines 1 */
+            0x0u, /* moving, false, false: no line */
+            0x0u, /* moving, false, true: no line */
+            0x2u, /* moving, true, false: lines 2 */
+            0x1u, /* moving, true, true: lines 1 */
+            0x3cu, /* fingering, false, false: lines 3, 4, 5, 6 */
+            0x3cu, /* fingering, false, true: lines 3, 4, 5, 6 */
+            0x2u, /* fingering, true, false: lines 2 */
+            0x1u /* fingering, true, true: lines 1 */
         },
-        { /* gripper.status */
-            0xdbu, /* done: lines 1, 2, 4, 5, 7, 8 */
-            0xc7u, /* executing: lines 1, 2, 3, 7, 8 */
-            0xe3u /* failed: lines 1, 2, 6, 7, 8 */
-        },
-        { /* fingers.known */
-            0xfeu, /* false: lines 2, 3, 4, 5, 6, 7, 8 */
-            0xfdu /* true: lines 1, 3, 4, 5, 6, 7, 8 */
-        },
-        { /* cur_state */
-            0x43u, /* d_state: lines 1, 2, 7 */
-            0x83u, /* f_state: lines 1, 2, 8 */
-            0x3u, /* moving: lines 1, 2 */
-            0x3fu /* fingering: lines 1, 2, 3, 4, 5, 6 */
-        },
-        { /* fits */
-            0xf7u, /* false: lines 1, 2, 3, 5, 6, 7, 8 */
-            0xefu /* true: lines 1, 2, 3, 4, 6, 7, 8 */
+        { /* gripper.status by fits */
+            0xd3u, /* done, false: lines 1, 2, 5, 7, 8 */
+            0xcbu, /* done, true: lines 1, 2, 4, 7, 8 */
+            0xc7u, /* executing, false: lines 1, 2, 3, 7, 8 */
+            0xc7u, /* executing, true: lines 1, 2, 3, 7, 8 */
+            0xe3u, /* failed, false: lines 1, 2, 6, 7, 8 */
+            0xe3u /* failed, true: lines 1, 2, 6, 7, 8 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->gripper.status] &
-            (uint32_t)t.t2[(s->fingers.known ? 1u : 0u)] & (uint32_t)t.t3[s->cur_state] &
-            (uint32_t)t.t4[(s->fits ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+        (s->fingers.known ? 1u : 0u)] &
+            (uint32_t)t.t1[(s->gripper.status * 2u) + (s->fits ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x100u);
     line = several ? (-2) : line;
@@ -1554,7 +1551,7 @@ int32_t primitive_pause_primitive_line(const primitive_t *s)
             0x1u /* true: lines 1 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->idle ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = primitive_bit32(m | 0x4u);
     line = (m == 0x0u) ? (-1) : line;
@@ -1576,11 +1573,7 @@ void primitive_pause_primitive_lines(const primitive_t *in, int32_t *out, uint32
 int32_t primitive_approach_position_fingers_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == PRIMITIVE_FAULT_NONE) {
-        primitive_settle(s);
-        primitive_run_approach_position_fingers(s);
-    }
-    return s->fault;
+    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_approach_position_fingers(s) : s->fault;
 }
 
 /* One step of table departure_position_fingers: admits, settles, matches, acts; returns the fault, 0 for
@@ -1588,55 +1581,35 @@ int32_t primitive_approach_position_fingers_step(primitive_t *s)
 int32_t primitive_departure_position_fingers_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == PRIMITIVE_FAULT_NONE) {
-        primitive_settle(s);
-        primitive_run_departure_position_fingers(s);
-    }
-    return s->fault;
+    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_departure_position_fingers(s) : s->fault;
 }
 
 /* One step of table goto: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t primitive_goto__step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == PRIMITIVE_FAULT_NONE) {
-        primitive_settle(s);
-        primitive_run_goto_(s);
-    }
-    return s->fault;
+    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_goto_(s) : s->fault;
 }
 
 /* One step of table gothru: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t primitive_gothru_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == PRIMITIVE_FAULT_NONE) {
-        primitive_settle(s);
-        primitive_run_gothru(s);
-    }
-    return s->fault;
+    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_gothru(s) : s->fault;
 }
 
 /* One step of table immed_grasp: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t primitive_immed_grasp_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == PRIMITIVE_FAULT_NONE) {
-        primitive_settle(s);
-        primitive_run_immed_grasp(s);
-    }
-    return s->fault;
+    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_immed_grasp(s) : s->fault;
 }
 
 /* One step of table pause_primitive: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t primitive_pause_primitive_step(primitive_t *s)
 {
     primitive_admit(s);
-    if (s->fault == PRIMITIVE_FAULT_NONE) {
-        primitive_settle(s);
-        primitive_run_pause_primitive(s);
-    }
-    return s->fault;
+    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_pause_primitive(s) : s->fault;
 }
 
 /* One cycle of level primitive, every 40 ms: returns the fault, 0 for none. */
@@ -1644,38 +1617,27 @@ int32_t primitive_primitive_cycle(primitive_t *s)
 {
     primitive_admit(s);
     if (s->fault == PRIMITIVE_FAULT_NONE) {
-        primitive_settle(s);
-        if (s->fault == PRIMITIVE_FAULT_NONE) {
-            primitive_do_take_orders(s);
-        }
-        if (s->fault == PRIMITIVE_FAULT_NONE) {
-            primitive_do_start_waiting(s);
-        }
-        if (s->fault == PRIMITIVE_FAULT_NONE) {
-            primitive_do_measure(s);
-        }
-        if (s->fault == PRIMITIVE_FAULT_NONE) {
-            const uint8_t chosen = s->emove.input_command;
-            if (chosen == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) {
-                primitive_run_pause_primitive(s);
-            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_GOTO) {
-                primitive_run_goto_(s);
-            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU) {
-                primitive_run_gothru(s);
-            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS) {
-                primitive_run_approach_position_fingers(s);
-            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS) {
-                primitive_run_departure_position_fingers(s);
-            } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
-                primitive_run_immed_grasp(s);
-            } else {
-                s->fault = PRIMITIVE_FAULT_NO_LINE; /* no table for it: proved impossible */
-            }
+        primitive_do_take_orders(s);
+        primitive_do_start_waiting(s);
+        primitive_do_measure(s);
+        const uint8_t chosen = s->emove.input_command;
+        if (chosen == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) {
+            (void)primitive_run_pause_primitive(s);
+        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_GOTO) {
+            (void)primitive_run_goto_(s);
+        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU) {
+            (void)primitive_run_gothru(s);
+        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS) {
+            (void)primitive_run_approach_position_fingers(s);
+        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS) {
+            (void)primitive_run_departure_position_fingers(s);
+        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
+            (void)primitive_run_immed_grasp(s);
+        } else {
+            s->fault = PRIMITIVE_FAULT_NO_LINE; /* no table for it: proved impossible */
         }
         if (s->fault == PRIMITIVE_FAULT_NONE) {
             primitive_do_hold_part(s);
-        }
-        if (s->fault == PRIMITIVE_FAULT_NONE) {
             primitive_do_give_orders(s);
         }
     }

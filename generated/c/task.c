@@ -440,7 +440,16 @@ static void task_do_pause(task_t *s)
     s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
 }
 
-/* Admits every input; a refused one leaves everything else as it was. */
+/* Deferred variables take their next values, all at once. */
+static void task_settle(task_t *s)
+{
+    const bool ready0 = s->from_emove.inc_command_echo == s->to_emove.inc_command;
+    if (ready0) {
+        s->cur_state = s->cur_state_next;
+    }
+}
+
+/* Admits every input, then settles; a refused one leaves everything else as it was. */
 static void task_admit(task_t *s)
 {
     s->line = -1;
@@ -468,15 +477,8 @@ static void task_admit(task_t *s)
     if (at >= 0) {
         s->fault = TASK_FAULT_ADMIT;
         s->fault_at = at;
-    }
-}
-
-/* Deferred variables take their next values, all at once. */
-static void task_settle(task_t *s)
-{
-    const bool ready0 = s->from_emove.inc_command_echo == s->to_emove.inc_command;
-    if (ready0) {
-        s->cur_state = s->cur_state_next;
+    } else {
+        task_settle(s);
     }
 }
 
@@ -605,16 +607,14 @@ static bool task_holds_transfer_resting(const task_t *s)
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
-/* Matches table acquire and runs the line. */
-static void task_run_acquire(task_t *s)
+/* Matches table acquire and runs the line; returns the fault, 0 for none. */
+static int32_t task_run_acquire(task_t *s)
 {
     if (!task_holds_acquire_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_ACQUIRE_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_ACQUIRE_IN_STEP);
     }
     if (!task_holds_acquire_resting(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_ACQUIRE_RESTING);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_ACQUIRE_RESTING);
     }
     s->line = task_acquire_line(s);
     switch (s->line) {
@@ -733,26 +733,22 @@ static void task_run_acquire(task_t *s)
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case (-1):
-        s->fault = TASK_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table clear and runs the line. */
-static void task_run_clear(task_t *s)
+/* Matches table clear and runs the line; returns the fault, 0 for none. */
+static int32_t task_run_clear(task_t *s)
 {
     if (!task_holds_clear_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_CLEAR_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_CLEAR_IN_STEP);
     }
     if (!task_holds_clear_resting(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_CLEAR_RESTING);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_CLEAR_RESTING);
     }
     s->line = task_clear_line(s);
     switch (s->line) {
@@ -851,26 +847,22 @@ static void task_run_clear(task_t *s)
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case (-1):
-        s->fault = TASK_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table move and runs the line. */
-static void task_run_move(task_t *s)
+/* Matches table move and runs the line; returns the fault, 0 for none. */
+static int32_t task_run_move(task_t *s)
 {
     if (!task_holds_move_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_MOVE_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_MOVE_IN_STEP);
     }
     if (!task_holds_move_resting(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_MOVE_RESTING);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_MOVE_RESTING);
     }
     s->line = task_move_line(s);
     switch (s->line) {
@@ -1018,18 +1010,16 @@ static void task_run_move(task_t *s)
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case (-1):
-        s->fault = TASK_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table pause_task and runs the line. */
-static void task_run_pause_task(task_t *s)
+/* Matches table pause_task and runs the line; returns the fault, 0 for none. */
+static int32_t task_run_pause_task(task_t *s)
 {
     s->line = task_pause_task_line(s);
     switch (s->line) {
@@ -1052,18 +1042,19 @@ static void task_run_pause_task(task_t *s)
         s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table release_part and runs the line. */
-static void task_run_release_part(task_t *s)
+/* Matches table release_part and runs the line; returns the fault, 0 for none. */
+static int32_t task_run_release_part(task_t *s)
 {
     if (!task_holds_release_part_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_IN_STEP);
+                (1u << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_IN_STEP);
     }
     if (!task_holds_release_part_resting(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_RESTING);
+                (1u << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_RESTING);
     }
     s->line = task_release_part_line(s);
     switch (s->line) {
@@ -1145,26 +1136,22 @@ static void task_run_release_part(task_t *s)
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case (-1):
-        s->fault = TASK_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table transfer and runs the line. */
-static void task_run_transfer(task_t *s)
+/* Matches table transfer and runs the line; returns the fault, 0 for none. */
+static int32_t task_run_transfer(task_t *s)
 {
     if (!task_holds_transfer_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_TRANSFER_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_TRANSFER_IN_STEP);
     }
     if (!task_holds_transfer_resting(s)) {
-        s->assumptions_failed = s->assumptions_failed |
-                (UINT64_C(1) << (uint32_t)TASK_ASSUMPTION_TRANSFER_RESTING);
+        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_TRANSFER_RESTING);
     }
     s->line = task_transfer_line(s);
     switch (s->line) {
@@ -1331,14 +1318,12 @@ static void task_run_transfer(task_t *s)
         task_do_pause(s);
         task_do_failed(s);
         break;
-    case (-1):
-        s->fault = TASK_FAULT_NO_LINE;
-        break;
     default:
         s->line = -1;
         s->fault = TASK_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
 /* Every variable's initial value. */
@@ -1552,64 +1537,75 @@ int32_t task_acquire_line(const task_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint32_t t0[2];
-        uint32_t t1[6];
-        uint32_t t2[3];
-        uint32_t t3[2];
-        uint32_t t4[9];
-        uint32_t t5[2];
-        uint32_t t6[2];
-        uint32_t t7[2];
+        uint16_t t0[18];
+        uint16_t t1[24];
+        uint16_t t2[12];
     } t = {
-        { /* new_command */
-            0xffe0u, /* false: lines 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
-            0x1fu /* true: lines 0, 1, 2, 3, 4 */
+        { /* cur_state by new_command */
+            0x3e00u, /* d_state, false: lines 9, 10, 11, 12, 13 */
+            0x1fu, /* d_state, true: lines 0, 1, 2, 3, 4 */
+            0x4000u, /* f_state, false: lines 14 */
+            0x1fu, /* f_state, true: lines 0, 1, 2, 3, 4 */
+            0xbc40u, /* state_2, false: lines 6, 10, 11, 12, 13, 15 */
+            0x1fu, /* state_2, true: lines 0, 1, 2, 3, 4 */
+            0xbc80u, /* state_3, false: lines 7, 10, 11, 12, 13, 15 */
+            0x1fu, /* state_3, true: lines 0, 1, 2, 3, 4 */
+            0xbc20u, /* state_4, false: lines 5, 10, 11, 12, 13, 15 */
+            0x1fu, /* state_4, true: lines 0, 1, 2, 3, 4 */
+            0xbd00u, /* state_5, false: lines 8, 10, 11, 12, 13, 15 */
+            0x1fu, /* state_5, true: lines 0, 1, 2, 3, 4 */
+            0x3c00u, /* state_6, false: lines 10, 11, 12, 13 */
+            0x1fu, /* state_6, true: lines 0, 1, 2, 3, 4 */
+            0x3c00u, /* state_7, false: lines 10, 11, 12, 13 */
+            0x1fu, /* state_7, true: lines 0, 1, 2, 3, 4 */
+            0x3c00u, /* state_8, false: lines 10, 11, 12, 13 */
+            0x1fu /* state_8, true: lines 0, 1, 2, 3, 4 */
         },
-        { /* emove.command */
-            0xc21fu, /* pause: lines 0, 1, 2, 3, 4, 9, 14, 15 */
-            0xc441u, /* move_to: lines 0, 6, 10, 14, 15 */
-            0xc821u, /* move_to_obj: lines 0, 5, 11, 14, 15 */
-            0xd081u, /* locate: lines 0, 7, 12, 14, 15 */
-            0xe101u, /* pickup: lines 0, 8, 13, 14, 15 */
-            0xc001u /* release: lines 0, 14, 15 */
+        { /* emove.command by emove.resting by loc_of_obj */
+            0xc201u, /* pause, false, vis_reqd: lines 0, 9, 14, 15 */
+            0xc201u, /* pause, false, known: lines 0, 9, 14, 15 */
+            0xc21cu, /* pause, true, vis_reqd: lines 2, 3, 4, 9, 14, 15 */
+            0xc20eu, /* pause, true, known: lines 1, 2, 3, 9, 14, 15 */
+            0xc441u, /* move_to, false, vis_reqd: lines 0, 6, 10, 14, 15 */
+            0xc441u, /* move_to, false, known: lines 0, 6, 10, 14, 15 */
+            0xc440u, /* move_to, true, vis_reqd: lines 6, 10, 14, 15 */
+            0xc440u, /* move_to, true, known: lines 6, 10, 14, 15 */
+            0xc821u, /* move_to_obj, false, vis_reqd: lines 0, 5, 11, 14, 15 */
+            0xc821u, /* move_to_obj, false, known: lines 0, 5, 11, 14, 15 */
+            0xc820u, /* move_to_obj, true, vis_reqd: lines 5, 11, 14, 15 */
+            0xc820u, /* move_to_obj, true, known: lines 5, 11, 14, 15 */
+            0xd081u, /* locate, false, vis_reqd: lines 0, 7, 12, 14, 15 */
+            0xd081u, /* locate, false, known: lines 0, 7, 12, 14, 15 */
+            0xd080u, /* locate, true, vis_reqd: lines 7, 12, 14, 15 */
+            0xd080u, /* locate, true, known: lines 7, 12, 14, 15 */
+            0xe101u, /* pickup, false, vis_reqd: lines 0, 8, 13, 14, 15 */
+            0xe101u, /* pickup, false, known: lines 0, 8, 13, 14, 15 */
+            0xe100u, /* pickup, true, vis_reqd: lines 8, 13, 14, 15 */
+            0xe100u, /* pickup, true, known: lines 8, 13, 14, 15 */
+            0xc001u, /* release, false, vis_reqd: lines 0, 14, 15 */
+            0xc001u, /* release, false, known: lines 0, 14, 15 */
+            0xc000u, /* release, true, vis_reqd: lines 14, 15 */
+            0xc000u /* release, true, known: lines 14, 15 */
         },
-        { /* emove.status */
-            0x43ffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 14 */
-            0xc201u, /* executing: lines 0, 9, 14, 15 */
-            0x7e01u /* failed: lines 0, 9, 10, 11, 12, 13, 14 */
-        },
-        { /* emove.resting */
-            0xffe1u, /* false: lines 0, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
-            0xfffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
-        },
-        { /* cur_state */
-            0x3e1fu, /* d_state: lines 0, 1, 2, 3, 4, 9, 10, 11, 12, 13 */
-            0x401fu, /* f_state: lines 0, 1, 2, 3, 4, 14 */
-            0xbc5fu, /* state_2: lines 0, 1, 2, 3, 4, 6, 10, 11, 12, 13, 15 */
-            0xbc9fu, /* state_3: lines 0, 1, 2, 3, 4, 7, 10, 11, 12, 13, 15 */
-            0xbc3fu, /* state_4: lines 0, 1, 2, 3, 4, 5, 10, 11, 12, 13, 15 */
-            0xbd1fu, /* state_5: lines 0, 1, 2, 3, 4, 8, 10, 11, 12, 13, 15 */
-            0x3c1fu, /* state_6: lines 0, 1, 2, 3, 4, 10, 11, 12, 13 */
-            0x3c1fu, /* state_7: lines 0, 1, 2, 3, 4, 10, 11, 12, 13 */
-            0x3c1fu /* state_8: lines 0, 1, 2, 3, 4, 10, 11, 12, 13 */
-        },
-        { /* loc_of_obj */
-            0xfffdu, /* vis_reqd: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
-            0xffefu /* known: lines 0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
-        },
-        { /* source_spec */
-            0xffedu, /* false: lines 0, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
-            0xfff7u /* true: lines 0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
-        },
-        { /* obj_acquired */
-            0xfffbu, /* false: lines 0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
-            0xffe5u /* true: lines 0, 2, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 */
+        { /* emove.status by source_spec by obj_acquired */
+            0x43e9u, /* done, false, false: lines 0, 3, 5, 6, 7, 8, 9, 14 */
+            0x43e5u, /* done, false, true: lines 0, 2, 5, 6, 7, 8, 9, 14 */
+            0x43f3u, /* done, true, false: lines 0, 1, 4, 5, 6, 7, 8, 9, 14 */
+            0x43e5u, /* done, true, true: lines 0, 2, 5, 6, 7, 8, 9, 14 */
+            0xc201u, /* executing, false, false: lines 0, 9, 14, 15 */
+            0xc201u, /* executing, false, true: lines 0, 9, 14, 15 */
+            0xc201u, /* executing, true, false: lines 0, 9, 14, 15 */
+            0xc201u, /* executing, true, true: lines 0, 9, 14, 15 */
+            0x7e01u, /* failed, false, false: lines 0, 9, 10, 11, 12, 13, 14 */
+            0x7e01u, /* failed, false, true: lines 0, 9, 10, 11, 12, 13, 14 */
+            0x7e01u, /* failed, true, false: lines 0, 9, 10, 11, 12, 13, 14 */
+            0x7e01u /* failed, true, true: lines 0, 9, 10, 11, 12, 13, 14 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] &
-            (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] &
-            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] &
-            (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) + s->loc_of_obj] &
+            (uint32_t)t.t2[(((s->emove.status * 2u) + (s->source_spec ? 1u : 0u)) * 2u) +
+                (s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x10000u);
     line = several ? (-2) : line;
@@ -1630,64 +1626,76 @@ int32_t task_clear_line(const task_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint16_t t0[2];
-        uint16_t t1[6];
-        uint16_t t2[3];
-        uint16_t t3[2];
-        uint16_t t4[9];
-        uint16_t t5[2];
-        uint16_t t6[2];
-        uint16_t t7[2];
+        uint16_t t0[18];
+        uint16_t t1[24];
+        uint16_t t2[12];
     } t = {
-        { /* new_command */
-            0x1fe0u, /* false: lines 5, 6, 7, 8, 9, 10, 11, 12 */
-            0x1fu /* true: lines 0, 1, 2, 3, 4 */
+        { /* cur_state by new_command */
+            0x700u, /* d_state, false: lines 8, 9, 10 */
+            0x1fu, /* d_state, true: lines 0, 1, 2, 3, 4 */
+            0x800u, /* f_state, false: lines 11 */
+            0x1fu, /* f_state, true: lines 0, 1, 2, 3, 4 */
+            0x600u, /* state_2, false: lines 9, 10 */
+            0x1fu, /* state_2, true: lines 0, 1, 2, 3, 4 */
+            0x600u, /* state_3, false: lines 9, 10 */
+            0x1fu, /* state_3, true: lines 0, 1, 2, 3, 4 */
+            0x600u, /* state_4, false: lines 9, 10 */
+            0x1fu, /* state_4, true: lines 0, 1, 2, 3, 4 */
+            0x600u, /* state_5, false: lines 9, 10 */
+            0x1fu, /* state_5, true: lines 0, 1, 2, 3, 4 */
+            0x1620u, /* state_6, false: lines 5, 9, 10, 12 */
+            0x1fu, /* state_6, true: lines 0, 1, 2, 3, 4 */
+            0x1640u, /* state_7, false: lines 6, 9, 10, 12 */
+            0x1fu, /* state_7, true: lines 0, 1, 2, 3, 4 */
+            0x1680u, /* state_8, false: lines 7, 9, 10, 12 */
+            0x1fu /* state_8, true: lines 0, 1, 2, 3, 4 */
         },
-        { /* emove.command */
-            0x191fu, /* pause: lines 0, 1, 2, 3, 4, 8, 11, 12 */
-            0x1aa1u, /* move_to: lines 0, 5, 7, 9, 11, 12 */
-            0x1a21u, /* move_to_obj: lines 0, 5, 9, 11, 12 */
-            0x1801u, /* locate: lines 0, 11, 12 */
-            0x1801u, /* pickup: lines 0, 11, 12 */
-            0x1c41u /* release: lines 0, 6, 10, 11, 12 */
+        { /* emove.command by emove.resting by dest_spec */
+            0x1901u, /* pause, false, false: lines 0, 8, 11, 12 */
+            0x1901u, /* pause, false, true: lines 0, 8, 11, 12 */
+            0x1906u, /* pause, true, false: lines 1, 2, 8, 11, 12 */
+            0x191au, /* pause, true, true: lines 1, 3, 4, 8, 11, 12 */
+            0x1aa1u, /* move_to, false, false: lines 0, 5, 7, 9, 11, 12 */
+            0x1aa1u, /* move_to, false, true: lines 0, 5, 7, 9, 11, 12 */
+            0x1aa0u, /* move_to, true, false: lines 5, 7, 9, 11, 12 */
+            0x1aa0u, /* move_to, true, true: lines 5, 7, 9, 11, 12 */
+            0x1a21u, /* move_to_obj, false, false: lines 0, 5, 9, 11, 12 */
+            0x1a21u, /* move_to_obj, false, true: lines 0, 5, 9, 11, 12 */
+            0x1a20u, /* move_to_obj, true, false: lines 5, 9, 11, 12 */
+            0x1a20u, /* move_to_obj, true, true: lines 5, 9, 11, 12 */
+            0x1801u, /* locate, false, false: lines 0, 11, 12 */
+            0x1801u, /* locate, false, true: lines 0, 11, 12 */
+            0x1800u, /* locate, true, false: lines 11, 12 */
+            0x1800u, /* locate, true, true: lines 11, 12 */
+            0x1801u, /* pickup, false, false: lines 0, 11, 12 */
+            0x1801u, /* pickup, false, true: lines 0, 11, 12 */
+            0x1800u, /* pickup, true, false: lines 11, 12 */
+            0x1800u, /* pickup, true, true: lines 11, 12 */
+            0x1c41u, /* release, false, false: lines 0, 6, 10, 11, 12 */
+            0x1c41u, /* release, false, true: lines 0, 6, 10, 11, 12 */
+            0x1c40u, /* release, true, false: lines 6, 10, 11, 12 */
+            0x1c40u /* release, true, true: lines 6, 10, 11, 12 */
         },
-        { /* emove.status */
-            0x9ffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 11 */
-            0x1901u, /* executing: lines 0, 8, 11, 12 */
-            0xf01u /* failed: lines 0, 8, 9, 10, 11 */
-        },
-        { /* emove.resting */
-            0x1fe1u, /* false: lines 0, 5, 6, 7, 8, 9, 10, 11, 12 */
-            0x1ffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
-        },
-        { /* cur_state */
-            0x71fu, /* d_state: lines 0, 1, 2, 3, 4, 8, 9, 10 */
-            0x81fu, /* f_state: lines 0, 1, 2, 3, 4, 11 */
-            0x61fu, /* state_2: lines 0, 1, 2, 3, 4, 9, 10 */
-            0x61fu, /* state_3: lines 0, 1, 2, 3, 4, 9, 10 */
-            0x61fu, /* state_4: lines 0, 1, 2, 3, 4, 9, 10 */
-            0x61fu, /* state_5: lines 0, 1, 2, 3, 4, 9, 10 */
-            0x163fu, /* state_6: lines 0, 1, 2, 3, 4, 5, 9, 10, 12 */
-            0x165fu, /* state_7: lines 0, 1, 2, 3, 4, 6, 9, 10, 12 */
-            0x169fu /* state_8: lines 0, 1, 2, 3, 4, 7, 9, 10, 12 */
-        },
-        { /* dest_spec */
-            0x1fe7u, /* false: lines 0, 1, 2, 5, 6, 7, 8, 9, 10, 11, 12 */
-            0x1ffbu /* true: lines 0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
-        },
-        { /* names_known */
-            0x1fe3u, /* false: lines 0, 1, 5, 6, 7, 8, 9, 10, 11, 12 */
-            0x1ffdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
-        },
-        { /* obj_acquired */
-            0x1fefu, /* false: lines 0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12 */
-            0x1ff7u /* true: lines 0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12 */
+        { /* emove.status by names_known by obj_acquired */
+            0x9e3u, /* done, false, false: lines 0, 1, 5, 6, 7, 8, 11 */
+            0x9e3u, /* done, false, true: lines 0, 1, 5, 6, 7, 8, 11 */
+            0x9edu, /* done, true, false: lines 0, 2, 3, 5, 6, 7, 8, 11 */
+            0x9f5u, /* done, true, true: lines 0, 2, 4, 5, 6, 7, 8, 11 */
+            0x1901u, /* executing, false, false: lines 0, 8, 11, 12 */
+            0x1901u, /* executing, false, true: lines 0, 8, 11, 12 */
+            0x1901u, /* executing, true, false: lines 0, 8, 11, 12 */
+            0x1901u, /* executing, true, true: lines 0, 8, 11, 12 */
+            0xf01u, /* failed, false, false: lines 0, 8, 9, 10, 11 */
+            0xf01u, /* failed, false, true: lines 0, 8, 9, 10, 11 */
+            0xf01u, /* failed, true, false: lines 0, 8, 9, 10, 11 */
+            0xf01u /* failed, true, true: lines 0, 8, 9, 10, 11 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] &
-            (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] &
-            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->dest_spec ? 1u : 0u)] &
-            (uint32_t)t.t6[(s->names_known ? 1u : 0u)] & (uint32_t)t.t7[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) +
+                (s->dest_spec ? 1u : 0u)] &
+            (uint32_t)t.t2[(((s->emove.status * 2u) + (s->names_known ? 1u : 0u)) * 2u) +
+                (s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x2000u);
     line = several ? (-2) : line;
@@ -1708,89 +1716,110 @@ int32_t task_move_line(const task_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint32_t t0[8];
-        uint32_t t1[2];
-        uint32_t t2[6];
-        uint32_t t3[3];
-        uint32_t t4[2];
-        uint32_t t5[9];
-        uint32_t t6[2];
-        uint32_t t7[2];
-        uint32_t t8[2];
-        uint32_t t9[2];
-        uint32_t t10[2];
+        uint32_t t0[18];
+        uint32_t t1[16];
+        uint32_t t2[24];
+        uint32_t t3[24];
     } t = {
-        { /* workstation.obj */
-            0xffe7fu, /* null_obj: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7fu, /* tbox: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7fu, /* bbox: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7fu, /* flag: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7fu, /* hous: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            /* close_grip: lines 0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xfffbfu,
-            /* unknown_object: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7fu,
-            0xffe7fu /* open_grip: lines 0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+        { /* cur_state by new_command */
+            0x3c000u, /* d_state, false: lines 14, 15, 16, 17 */
+            0x1ffu, /* d_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+            0x40000u, /* f_state, false: lines 18 */
+            0x1ffu, /* f_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xb8200u, /* state_2, false: lines 9, 15, 16, 17, 19 */
+            0x1ffu, /* state_2, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xb8400u, /* state_3, false: lines 10, 15, 16, 17, 19 */
+            0x1ffu, /* state_3, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xb8800u, /* state_4, false: lines 11, 15, 16, 17, 19 */
+            0x1ffu, /* state_4, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xb9000u, /* state_5, false: lines 12, 15, 16, 17, 19 */
+            0x1ffu, /* state_5, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xba000u, /* state_6, false: lines 13, 15, 16, 17, 19 */
+            0x1ffu, /* state_6, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+            0x38000u, /* state_7, false: lines 15, 16, 17 */
+            0x1ffu, /* state_7, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+            0x38000u, /* state_8, false: lines 15, 16, 17 */
+            0x1ffu /* state_8, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
         },
-        { /* new_command */
-            0xffe00u, /* false: lines 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0x1ffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+        { /* workstation.obj by emove.resting */
+            0xffe01u, /* null_obj, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7eu, /* null_obj, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe01u, /* tbox, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7eu, /* tbox, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe01u, /* bbox, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7eu, /* bbox, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe01u, /* flag, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7eu, /* flag, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe01u, /* hous, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7eu, /* hous, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe01u, /* close_grip, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            /* close_grip, true: lines 1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xfffbeu,
+            0xffe01u, /* unknown_object, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            /* unknown_object, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7eu,
+            0xffe01u, /* open_grip, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+            0xffe7eu /* open_grip, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
         },
-        { /* emove.command */
-            0xc41ffu, /* pause: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 14, 18, 19 */
-            0xca201u, /* move_to: lines 0, 9, 13, 15, 18, 19 */
-            0xca801u, /* move_to_obj: lines 0, 11, 13, 15, 18, 19 */
-            0xd0401u, /* locate: lines 0, 10, 16, 18, 19 */
-            0xe1001u, /* pickup: lines 0, 12, 17, 18, 19 */
-            0xc0001u /* release: lines 0, 18, 19 */
+        { /* emove.command by loc_of_obj by source_spec */
+            0xc41c7u, /* pause, vis_reqd, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
+            0xc402fu, /* pause, vis_reqd, true: lines 0, 1, 2, 3, 5, 14, 18, 19 */
+            0xc41c7u, /* pause, known, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
+            0xc401fu, /* pause, known, true: lines 0, 1, 2, 3, 4, 14, 18, 19 */
+            0xca201u, /* move_to, vis_reqd, false: lines 0, 9, 13, 15, 18, 19 */
+            0xca201u, /* move_to, vis_reqd, true: lines 0, 9, 13, 15, 18, 19 */
+            0xca201u, /* move_to, known, false: lines 0, 9, 13, 15, 18, 19 */
+            0xca201u, /* move_to, known, true: lines 0, 9, 13, 15, 18, 19 */
+            0xca801u, /* move_to_obj, vis_reqd, false: lines 0, 11, 13, 15, 18, 19 */
+            0xca801u, /* move_to_obj, vis_reqd, true: lines 0, 11, 13, 15, 18, 19 */
+            0xca801u, /* move_to_obj, known, false: lines 0, 11, 13, 15, 18, 19 */
+            0xca801u, /* move_to_obj, known, true: lines 0, 11, 13, 15, 18, 19 */
+            0xd0401u, /* locate, vis_reqd, false: lines 0, 10, 16, 18, 19 */
+            0xd0401u, /* locate, vis_reqd, true: lines 0, 10, 16, 18, 19 */
+            0xd0401u, /* locate, known, false: lines 0, 10, 16, 18, 19 */
+            0xd0401u, /* locate, known, true: lines 0, 10, 16, 18, 19 */
+            0xe1001u, /* pickup, vis_reqd, false: lines 0, 12, 17, 18, 19 */
+            0xe1001u, /* pickup, vis_reqd, true: lines 0, 12, 17, 18, 19 */
+            0xe1001u, /* pickup, known, false: lines 0, 12, 17, 18, 19 */
+            0xe1001u, /* pickup, known, true: lines 0, 12, 17, 18, 19 */
+            0xc0001u, /* release, vis_reqd, false: lines 0, 18, 19 */
+            0xc0001u, /* release, vis_reqd, true: lines 0, 18, 19 */
+            0xc0001u, /* release, known, false: lines 0, 18, 19 */
+            0xc0001u /* release, known, true: lines 0, 18, 19 */
         },
-        { /* emove.status */
-            0x47fffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 18 */
-            0xc4001u, /* executing: lines 0, 14, 18, 19 */
-            0x7c001u /* failed: lines 0, 14, 15, 16, 17, 18 */
-        },
-        { /* emove.resting */
-            0xffe01u, /* false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffffeu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-        },
-        { /* cur_state */
-            0x3c1ffu, /* d_state: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 14, 15, 16, 17 */
-            0x401ffu, /* f_state: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 18 */
-            0xb83ffu, /* state_2: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 15, 16, 17, 19 */
-            0xb85ffu, /* state_3: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 15, 16, 17, 19 */
-            0xb89ffu, /* state_4: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 15, 16, 17, 19 */
-            0xb91ffu, /* state_5: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 15, 16, 17, 19 */
-            0xba1ffu, /* state_6: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 13, 15, 16, 17, 19 */
-            0x381ffu, /* state_7: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 15, 16, 17 */
-            0x381ffu /* state_8: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 15, 16, 17 */
-        },
-        { /* loc_of_obj */
-            0xfffefu, /* vis_reqd: lines 0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xfffdfu /* known: lines 0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-        },
-        { /* source_spec */
-            0xfffc7u, /* false: lines 0, 1, 2, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe3fu /* true: lines 0, 1, 2, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-        },
-        { /* dest_spec */
-            0xffe07u, /* false: lines 0, 1, 2, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffffbu /* true: lines 0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-        },
-        { /* names_known */
-            0xffe03u, /* false: lines 0, 1, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffffdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-        },
-        { /* obj_acquired */
-            0xffef7u, /* false: lines 0, 1, 2, 4, 5, 6, 7, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xfff4fu /* true: lines 0, 1, 2, 3, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+        { /* emove.status by dest_spec by names_known by obj_acquired */
+            0x47e03u, /* done, false, false, false: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
+            0x47e03u, /* done, false, false, true: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
+            0x47e05u, /* done, false, true, false: lines 0, 2, 9, 10, 11, 12, 13, 14, 18 */
+            0x47e05u, /* done, false, true, true: lines 0, 2, 9, 10, 11, 12, 13, 14, 18 */
+            0x47e03u, /* done, true, false, false: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
+            0x47e03u, /* done, true, false, true: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
+            0x47ef1u, /* done, true, true, false: lines 0, 4, 5, 6, 7, 9, 10, 11, 12, 13, 14, 18 */
+            0x47f49u, /* done, true, true, true: lines 0, 3, 6, 8, 9, 10, 11, 12, 13, 14, 18 */
+            0xc4001u, /* executing, false, false, false: lines 0, 14, 18, 19 */
+            0xc4001u, /* executing, false, false, true: lines 0, 14, 18, 19 */
+            0xc4001u, /* executing, false, true, false: lines 0, 14, 18, 19 */
+            0xc4001u, /* executing, false, true, true: lines 0, 14, 18, 19 */
+            0xc4001u, /* executing, true, false, false: lines 0, 14, 18, 19 */
+            0xc4001u, /* executing, true, false, true: lines 0, 14, 18, 19 */
+            0xc4001u, /* executing, true, true, false: lines 0, 14, 18, 19 */
+            0xc4001u, /* executing, true, true, true: lines 0, 14, 18, 19 */
+            0x7c001u, /* failed, false, false, false: lines 0, 14, 15, 16, 17, 18 */
+            0x7c001u, /* failed, false, false, true: lines 0, 14, 15, 16, 17, 18 */
+            0x7c001u, /* failed, false, true, false: lines 0, 14, 15, 16, 17, 18 */
+            0x7c001u, /* failed, false, true, true: lines 0, 14, 15, 16, 17, 18 */
+            0x7c001u, /* failed, true, false, false: lines 0, 14, 15, 16, 17, 18 */
+            0x7c001u, /* failed, true, false, true: lines 0, 14, 15, 16, 17, 18 */
+            0x7c001u, /* failed, true, true, false: lines 0, 14, 15, 16, 17, 18 */
+            0x7c001u /* failed, true, true, true: lines 0, 14, 15, 16, 17, 18 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[s->workstation.obj] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] &
-            (uint32_t)t.t2[s->emove.command] & (uint32_t)t.t3[s->emove.status] &
-            (uint32_t)t.t4[(s->emove.resting ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] &
-            (uint32_t)t.t6[s->loc_of_obj] & (uint32_t)t.t7[(s->source_spec ? 1u : 0u)] &
-            (uint32_t)t.t8[(s->dest_spec ? 1u : 0u)] & (uint32_t)t.t9[(s->names_known ? 1u : 0u)] &
-            (uint32_t)t.t10[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(s->workstation.obj * 2u) + (s->emove.resting ? 1u : 0u)] &
+            (uint32_t)t.t2[(((s->emove.command * 2u) + s->loc_of_obj) * 2u) + (s->source_spec ? 1u : 0u)] &
+            (uint32_t)t.t3[(((((s->emove.status * 2u) + (s->dest_spec ? 1u : 0u)) * 2u) +
+                (s->names_known ? 1u : 0u)) * 2u) +
+                (s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x100000u);
     line = several ? (-2) : line;
@@ -1818,7 +1847,7 @@ int32_t task_pause_task_line(const task_t *s)
             0x1u /* true: lines 1 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->emove.resting ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->emove.resting ? 1u : 0u];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x4u);
     line = (m == 0x0u) ? (-1) : line;
@@ -1840,59 +1869,69 @@ int32_t task_release_part_line(const task_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint16_t t0[2];
-        uint16_t t1[6];
-        uint16_t t2[3];
-        uint16_t t3[2];
-        uint16_t t4[9];
-        uint16_t t5[2];
-        uint16_t t6[2];
+        uint16_t t0[18];
+        uint16_t t1[24];
+        uint16_t t2[6];
     } t = {
-        { /* new_command */
-            0x7f0u, /* false: lines 4, 5, 6, 7, 8, 9, 10 */
-            0xfu /* true: lines 0, 1, 2, 3 */
+        { /* cur_state by new_command */
+            0x1c0u, /* d_state, false: lines 6, 7, 8 */
+            0xfu, /* d_state, true: lines 0, 1, 2, 3 */
+            0x200u, /* f_state, false: lines 9 */
+            0xfu, /* f_state, true: lines 0, 1, 2, 3 */
+            0x180u, /* state_2, false: lines 7, 8 */
+            0xfu, /* state_2, true: lines 0, 1, 2, 3 */
+            0x180u, /* state_3, false: lines 7, 8 */
+            0xfu, /* state_3, true: lines 0, 1, 2, 3 */
+            0x180u, /* state_4, false: lines 7, 8 */
+            0xfu, /* state_4, true: lines 0, 1, 2, 3 */
+            0x180u, /* state_5, false: lines 7, 8 */
+            0xfu, /* state_5, true: lines 0, 1, 2, 3 */
+            0x180u, /* state_6, false: lines 7, 8 */
+            0xfu, /* state_6, true: lines 0, 1, 2, 3 */
+            0x590u, /* state_7, false: lines 4, 7, 8, 10 */
+            0xfu, /* state_7, true: lines 0, 1, 2, 3 */
+            0x5a0u, /* state_8, false: lines 5, 7, 8, 10 */
+            0xfu /* state_8, true: lines 0, 1, 2, 3 */
         },
-        { /* emove.command */
-            0x64fu, /* pause: lines 0, 1, 2, 3, 6, 9, 10 */
-            0x721u, /* move_to: lines 0, 5, 8, 9, 10 */
-            0x601u, /* move_to_obj: lines 0, 9, 10 */
-            0x601u, /* locate: lines 0, 9, 10 */
-            0x601u, /* pickup: lines 0, 9, 10 */
-            0x691u /* release: lines 0, 4, 7, 9, 10 */
+        { /* emove.command by emove.resting by names_known */
+            0x641u, /* pause, false, false: lines 0, 6, 9, 10 */
+            0x641u, /* pause, false, true: lines 0, 6, 9, 10 */
+            0x642u, /* pause, true, false: lines 1, 6, 9, 10 */
+            0x64cu, /* pause, true, true: lines 2, 3, 6, 9, 10 */
+            0x721u, /* move_to, false, false: lines 0, 5, 8, 9, 10 */
+            0x721u, /* move_to, false, true: lines 0, 5, 8, 9, 10 */
+            0x720u, /* move_to, true, false: lines 5, 8, 9, 10 */
+            0x720u, /* move_to, true, true: lines 5, 8, 9, 10 */
+            0x601u, /* move_to_obj, false, false: lines 0, 9, 10 */
+            0x601u, /* move_to_obj, false, true: lines 0, 9, 10 */
+            0x600u, /* move_to_obj, true, false: lines 9, 10 */
+            0x600u, /* move_to_obj, true, true: lines 9, 10 */
+            0x601u, /* locate, false, false: lines 0, 9, 10 */
+            0x601u, /* locate, false, true: lines 0, 9, 10 */
+            0x600u, /* locate, true, false: lines 9, 10 */
+            0x600u, /* locate, true, true: lines 9, 10 */
+            0x601u, /* pickup, false, false: lines 0, 9, 10 */
+            0x601u, /* pickup, false, true: lines 0, 9, 10 */
+            0x600u, /* pickup, true, false: lines 9, 10 */
+            0x600u, /* pickup, true, true: lines 9, 10 */
+            0x691u, /* release, false, false: lines 0, 4, 7, 9, 10 */
+            0x691u, /* release, false, true: lines 0, 4, 7, 9, 10 */
+            0x690u, /* release, true, false: lines 4, 7, 9, 10 */
+            0x690u /* release, true, true: lines 4, 7, 9, 10 */
         },
-        { /* emove.status */
-            0x27fu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 9 */
-            0x641u, /* executing: lines 0, 6, 9, 10 */
-            0x3c1u /* failed: lines 0, 6, 7, 8, 9 */
-        },
-        { /* emove.resting */
-            0x7f1u, /* false: lines 0, 4, 5, 6, 7, 8, 9, 10 */
-            0x7feu /* true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 10 */
-        },
-        { /* cur_state */
-            0x1cfu, /* d_state: lines 0, 1, 2, 3, 6, 7, 8 */
-            0x20fu, /* f_state: lines 0, 1, 2, 3, 9 */
-            0x18fu, /* state_2: lines 0, 1, 2, 3, 7, 8 */
-            0x18fu, /* state_3: lines 0, 1, 2, 3, 7, 8 */
-            0x18fu, /* state_4: lines 0, 1, 2, 3, 7, 8 */
-            0x18fu, /* state_5: lines 0, 1, 2, 3, 7, 8 */
-            0x18fu, /* state_6: lines 0, 1, 2, 3, 7, 8 */
-            0x59fu, /* state_7: lines 0, 1, 2, 3, 4, 7, 8, 10 */
-            0x5afu /* state_8: lines 0, 1, 2, 3, 5, 7, 8, 10 */
-        },
-        { /* names_known */
-            0x7f3u, /* false: lines 0, 1, 4, 5, 6, 7, 8, 9, 10 */
-            0x7fdu /* true: lines 0, 2, 3, 4, 5, 6, 7, 8, 9, 10 */
-        },
-        { /* obj_acquired */
-            0x7f7u, /* false: lines 0, 1, 2, 4, 5, 6, 7, 8, 9, 10 */
-            0x7fbu /* true: lines 0, 1, 3, 4, 5, 6, 7, 8, 9, 10 */
+        { /* emove.status by obj_acquired */
+            0x277u, /* done, false: lines 0, 1, 2, 4, 5, 6, 9 */
+            0x27bu, /* done, true: lines 0, 1, 3, 4, 5, 6, 9 */
+            0x641u, /* executing, false: lines 0, 6, 9, 10 */
+            0x641u, /* executing, true: lines 0, 6, 9, 10 */
+            0x3c1u, /* failed, false: lines 0, 6, 7, 8, 9 */
+            0x3c1u /* failed, true: lines 0, 6, 7, 8, 9 */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] &
-            (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] &
-            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->names_known ? 1u : 0u)] &
-            (uint32_t)t.t6[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) +
+                (s->names_known ? 1u : 0u)] &
+            (uint32_t)t.t2[(s->emove.status * 2u) + (s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x800u);
     line = several ? (-2) : line;
@@ -1913,75 +1952,94 @@ int32_t task_transfer_line(const task_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint32_t t0[2];
-        uint32_t t1[6];
-        uint32_t t2[3];
+        uint32_t t0[18];
+        uint32_t t1[24];
+        uint32_t t2[24];
         uint32_t t3[2];
-        uint32_t t4[9];
-        uint32_t t5[2];
-        uint32_t t6[2];
-        uint32_t t7[2];
-        uint32_t t8[2];
-        uint32_t t9[2];
     } t = {
-        { /* new_command */
-            0x3fff00u, /* false: lines 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 */
-            0xffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+        { /* cur_state by new_command */
+            0xf8000u, /* d_state, false: lines 15, 16, 17, 18, 19 */
+            0xffu, /* d_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+            0x100000u, /* f_state, false: lines 20 */
+            0xffu, /* f_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+            0x2f0100u, /* state_2, false: lines 8, 16, 17, 18, 19, 21 */
+            0xffu, /* state_2, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+            0x2f0200u, /* state_3, false: lines 9, 16, 17, 18, 19, 21 */
+            0xffu, /* state_3, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+            0x2f0400u, /* state_4, false: lines 10, 16, 17, 18, 19, 21 */
+            0xffu, /* state_4, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+            0x2f0800u, /* state_5, false: lines 11, 16, 17, 18, 19, 21 */
+            0xffu, /* state_5, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+            0x2f1000u, /* state_6, false: lines 12, 16, 17, 18, 19, 21 */
+            0xffu, /* state_6, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+            0x2f2000u, /* state_7, false: lines 13, 16, 17, 18, 19, 21 */
+            0xffu, /* state_7, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+            0x2f4000u, /* state_8, false: lines 14, 16, 17, 18, 19, 21 */
+            0xffu /* state_8, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
         },
-        { /* emove.command */
-            0x3080ffu, /* pause: lines 0, 1, 2, 3, 4, 5, 6, 7, 15, 20, 21 */
-            0x315101u, /* move_to: lines 0, 8, 12, 14, 16, 20, 21 */
-            0x311401u, /* move_to_obj: lines 0, 10, 12, 16, 20, 21 */
-            0x320201u, /* locate: lines 0, 9, 17, 20, 21 */
-            0x340801u, /* pickup: lines 0, 11, 18, 20, 21 */
-            0x382001u /* release: lines 0, 13, 19, 20, 21 */
+        { /* emove.command by emove.resting by loc_of_obj */
+            0x308001u, /* pause, false, vis_reqd: lines 0, 15, 20, 21 */
+            0x308001u, /* pause, false, known: lines 0, 15, 20, 21 */
+            0x3080eeu, /* pause, true, vis_reqd: lines 1, 2, 3, 5, 6, 7, 15, 20, 21 */
+            0x3080deu, /* pause, true, known: lines 1, 2, 3, 4, 6, 7, 15, 20, 21 */
+            0x315101u, /* move_to, false, vis_reqd: lines 0, 8, 12, 14, 16, 20, 21 */
+            0x315101u, /* move_to, false, known: lines 0, 8, 12, 14, 16, 20, 21 */
+            0x315100u, /* move_to, true, vis_reqd: lines 8, 12, 14, 16, 20, 21 */
+            0x315100u, /* move_to, true, known: lines 8, 12, 14, 16, 20, 21 */
+            0x311401u, /* move_to_obj, false, vis_reqd: lines 0, 10, 12, 16, 20, 21 */
+            0x311401u, /* move_to_obj, false, known: lines 0, 10, 12, 16, 20, 21 */
+            0x311400u, /* move_to_obj, true, vis_reqd: lines 10, 12, 16, 20, 21 */
+            0x311400u, /* move_to_obj, true, known: lines 10, 12, 16, 20, 21 */
+            0x320201u, /* locate, false, vis_reqd: lines 0, 9, 17, 20, 21 */
+            0x320201u, /* locate, false, known: lines 0, 9, 17, 20, 21 */
+            0x320200u, /* locate, true, vis_reqd: lines 9, 17, 20, 21 */
+            0x320200u, /* locate, true, known: lines 9, 17, 20, 21 */
+            0x340801u, /* pickup, false, vis_reqd: lines 0, 11, 18, 20, 21 */
+            0x340801u, /* pickup, false, known: lines 0, 11, 18, 20, 21 */
+            0x340800u, /* pickup, true, vis_reqd: lines 11, 18, 20, 21 */
+            0x340800u, /* pickup, true, known: lines 11, 18, 20, 21 */
+            0x382001u, /* release, false, vis_reqd: lines 0, 13, 19, 20, 21 */
+            0x382001u, /* release, false, known: lines 0, 13, 19, 20, 21 */
+            0x382000u, /* release, true, vis_reqd: lines 13, 19, 20, 21 */
+            0x382000u /* release, true, known: lines 13, 19, 20, 21 */
         },
-        { /* emove.status */
-            0x10ffffu, /* done: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
-            0x308001u, /* executing: lines 0, 15, 20, 21 */
-            0x1f8001u /* failed: lines 0, 15, 16, 17, 18, 19, 20 */
-        },
-        { /* emove.resting */
-            0x3fff01u, /* false: lines 0, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 */
-            0x3ffffeu /* true */
-        },
-        { /* cur_state */
-            0xf80ffu, /* d_state: lines 0, 1, 2, 3, 4, 5, 6, 7, 15, 16, 17, 18, 19 */
-            0x1000ffu, /* f_state: lines 0, 1, 2, 3, 4, 5, 6, 7, 20 */
-            0x2f01ffu, /* state_2: lines 0, 1, 2, 3, 4, 5, 6, 7, 8, 16, 17, 18, 19, 21 */
-            0x2f02ffu, /* state_3: lines 0, 1, 2, 3, 4, 5, 6, 7, 9, 16, 17, 18, 19, 21 */
-            0x2f04ffu, /* state_4: lines 0, 1, 2, 3, 4, 5, 6, 7, 10, 16, 17, 18, 19, 21 */
-            0x2f08ffu, /* state_5: lines 0, 1, 2, 3, 4, 5, 6, 7, 11, 16, 17, 18, 19, 21 */
-            0x2f10ffu, /* state_6: lines 0, 1, 2, 3, 4, 5, 6, 7, 12, 16, 17, 18, 19, 21 */
-            0x2f20ffu, /* state_7: lines 0, 1, 2, 3, 4, 5, 6, 7, 13, 16, 17, 18, 19, 21 */
-            0x2f40ffu /* state_8: lines 0, 1, 2, 3, 4, 5, 6, 7, 14, 16, 17, 18, 19, 21 */
-        },
-        { /* loc_of_obj */
-            0x3fffefu, /* vis_reqd */
-            0x3fffdfu /* known */
-        },
-        { /* source_spec */
-            0x3fffc7u, /* false */
-            0x3fff3fu /* true */
-        },
-        { /* dest_spec */
-            0x3fff07u, /* false: lines 0, 1, 2, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 */
-            0x3ffffbu /* true */
-        },
-        { /* names_known */
-            0x3fff03u, /* false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 */
-            0x3ffffdu /* true */
+        { /* emove.status by source_spec by dest_spec by names_known */
+            0x10ff03u, /* done, false, false, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x10ff05u, /* done, false, false, true: lines 0, 2, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x10ff03u, /* done, false, true, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x10ffc1u, /* done, false, true, true: lines 0, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x10ff03u, /* done, true, false, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x10ff05u, /* done, true, false, true: lines 0, 2, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x10ff03u, /* done, true, true, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x10ff39u, /* done, true, true, true: lines 0, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x308001u, /* executing, false, false, false: lines 0, 15, 20, 21 */
+            0x308001u, /* executing, false, false, true: lines 0, 15, 20, 21 */
+            0x308001u, /* executing, false, true, false: lines 0, 15, 20, 21 */
+            0x308001u, /* executing, false, true, true: lines 0, 15, 20, 21 */
+            0x308001u, /* executing, true, false, false: lines 0, 15, 20, 21 */
+            0x308001u, /* executing, true, false, true: lines 0, 15, 20, 21 */
+            0x308001u, /* executing, true, true, false: lines 0, 15, 20, 21 */
+            0x308001u, /* executing, true, true, true: lines 0, 15, 20, 21 */
+            0x1f8001u, /* failed, false, false, false: lines 0, 15, 16, 17, 18, 19, 20 */
+            0x1f8001u, /* failed, false, false, true: lines 0, 15, 16, 17, 18, 19, 20 */
+            0x1f8001u, /* failed, false, true, false: lines 0, 15, 16, 17, 18, 19, 20 */
+            0x1f8001u, /* failed, false, true, true: lines 0, 15, 16, 17, 18, 19, 20 */
+            0x1f8001u, /* failed, true, false, false: lines 0, 15, 16, 17, 18, 19, 20 */
+            0x1f8001u, /* failed, true, false, true: lines 0, 15, 16, 17, 18, 19, 20 */
+            0x1f8001u, /* failed, true, true, false: lines 0, 15, 16, 17, 18, 19, 20 */
+            0x1f8001u /* failed, true, true, true: lines 0, 15, 16, 17, 18, 19, 20 */
         },
         { /* obj_acquired */
             0x3fffb7u, /* false */
             0x3fff4fu /* true */
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->emove.command] &
-            (uint32_t)t.t2[s->emove.status] & (uint32_t)t.t3[(s->emove.resting ? 1u : 0u)] &
-            (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[s->loc_of_obj] &
-            (uint32_t)t.t6[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t7[(s->dest_spec ? 1u : 0u)] &
-            (uint32_t)t.t8[(s->names_known ? 1u : 0u)] & (uint32_t)t.t9[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) + s->loc_of_obj] &
+            (uint32_t)t.t2[(((((s->emove.status * 2u) + (s->source_spec ? 1u : 0u)) * 2u) +
+                (s->dest_spec ? 1u : 0u)) * 2u) +
+                (s->names_known ? 1u : 0u)] &
+            (uint32_t)t.t3[s->obj_acquired ? 1u : 0u];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = task_bit32(m | 0x400000u);
     line = several ? (-2) : line;
@@ -2001,66 +2059,42 @@ void task_transfer_lines(const task_t *in, int32_t *out, uint32_t n)
 int32_t task_acquire_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == TASK_FAULT_NONE) {
-        task_settle(s);
-        task_run_acquire(s);
-    }
-    return s->fault;
+    return (s->fault == TASK_FAULT_NONE) ? task_run_acquire(s) : s->fault;
 }
 
 /* One step of table clear: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t task_clear_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == TASK_FAULT_NONE) {
-        task_settle(s);
-        task_run_clear(s);
-    }
-    return s->fault;
+    return (s->fault == TASK_FAULT_NONE) ? task_run_clear(s) : s->fault;
 }
 
 /* One step of table move: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t task_move_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == TASK_FAULT_NONE) {
-        task_settle(s);
-        task_run_move(s);
-    }
-    return s->fault;
+    return (s->fault == TASK_FAULT_NONE) ? task_run_move(s) : s->fault;
 }
 
 /* One step of table pause_task: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t task_pause_task_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == TASK_FAULT_NONE) {
-        task_settle(s);
-        task_run_pause_task(s);
-    }
-    return s->fault;
+    return (s->fault == TASK_FAULT_NONE) ? task_run_pause_task(s) : s->fault;
 }
 
 /* One step of table release_part: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t task_release_part_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == TASK_FAULT_NONE) {
-        task_settle(s);
-        task_run_release_part(s);
-    }
-    return s->fault;
+    return (s->fault == TASK_FAULT_NONE) ? task_run_release_part(s) : s->fault;
 }
 
 /* One step of table transfer: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t task_transfer_step(task_t *s)
 {
     task_admit(s);
-    if (s->fault == TASK_FAULT_NONE) {
-        task_settle(s);
-        task_run_transfer(s);
-    }
-    return s->fault;
+    return (s->fault == TASK_FAULT_NONE) ? task_run_transfer(s) : s->fault;
 }
 
 /* One cycle of level task, every 40 ms: returns the fault, 0 for none. */
@@ -2068,41 +2102,28 @@ int32_t task_task_cycle(task_t *s)
 {
     task_admit(s);
     if (s->fault == TASK_FAULT_NONE) {
-        task_settle(s);
-        if (s->fault == TASK_FAULT_NONE) {
-            task_do_take_orders(s);
-        }
-        if (s->fault == TASK_FAULT_NONE) {
-            task_do_forget_cause(s);
-        }
-        if (s->fault == TASK_FAULT_NONE) {
-            task_do_find_source(s);
-        }
-        if (s->fault == TASK_FAULT_NONE) {
-            task_do_test_variables(s);
-        }
-        if (s->fault == TASK_FAULT_NONE) {
-            const uint8_t chosen = s->workstation.input_command;
-            if (chosen == VOCABULARY_TASK_COMMAND_PAUSE) {
-                task_run_pause_task(s);
-            } else if (chosen == VOCABULARY_TASK_COMMAND_ACQUIRE) {
-                task_run_acquire(s);
-            } else if (chosen == VOCABULARY_TASK_COMMAND_MOVE) {
-                task_run_move(s);
-            } else if (chosen == VOCABULARY_TASK_COMMAND_RELEASE) {
-                task_run_release_part(s);
-            } else if (chosen == VOCABULARY_TASK_COMMAND_TRANSFER) {
-                task_run_transfer(s);
-            } else if (chosen == VOCABULARY_TASK_COMMAND_CLEAR) {
-                task_run_clear(s);
-            } else {
-                s->fault = TASK_FAULT_NO_LINE; /* no table for it: proved impossible */
-            }
+        task_do_take_orders(s);
+        task_do_forget_cause(s);
+        task_do_find_source(s);
+        task_do_test_variables(s);
+        const uint8_t chosen = s->workstation.input_command;
+        if (chosen == VOCABULARY_TASK_COMMAND_PAUSE) {
+            (void)task_run_pause_task(s);
+        } else if (chosen == VOCABULARY_TASK_COMMAND_ACQUIRE) {
+            (void)task_run_acquire(s);
+        } else if (chosen == VOCABULARY_TASK_COMMAND_MOVE) {
+            (void)task_run_move(s);
+        } else if (chosen == VOCABULARY_TASK_COMMAND_RELEASE) {
+            (void)task_run_release_part(s);
+        } else if (chosen == VOCABULARY_TASK_COMMAND_TRANSFER) {
+            (void)task_run_transfer(s);
+        } else if (chosen == VOCABULARY_TASK_COMMAND_CLEAR) {
+            (void)task_run_clear(s);
+        } else {
+            s->fault = TASK_FAULT_NO_LINE; /* no table for it: proved impossible */
         }
         if (s->fault == TASK_FAULT_NONE) {
             task_do_tell_gripped(s);
-        }
-        if (s->fault == TASK_FAULT_NONE) {
             task_do_give_orders(s);
         }
     }

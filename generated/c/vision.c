@@ -185,7 +185,13 @@ static void vision_do_failed(vision_t *s)
     s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
-/* Admits every input; a refused one leaves everything else as it was. */
+/* Deferred variables take their next values, all at once. */
+static void vision_settle(vision_t *s)
+{
+    (void)s;
+}
+
+/* Admits every input, then settles; a refused one leaves everything else as it was. */
 static void vision_admit(vision_t *s)
 {
     s->line = -1;
@@ -243,18 +249,13 @@ static void vision_admit(vision_t *s)
             s->camera.normal.x = s->camera.normal.x + 0.0;
             s->camera.normal.y = s->camera.normal.y + 0.0;
             s->camera.normal.z = s->camera.normal.z + 0.0;
+            vision_settle(s);
         }
     }
 }
 
-/* Deferred variables take their next values, all at once. */
-static void vision_settle(vision_t *s)
-{
-    (void)s;
-}
-
-/* Matches table flood_flash and runs the line. */
-static void vision_run_flood_flash(vision_t *s)
+/* Matches table flood_flash and runs the line; returns the fault, 0 for none. */
+static int32_t vision_run_flood_flash(vision_t *s)
 {
     s->line = vision_flood_flash_line(s);
     switch (s->line) {
@@ -305,10 +306,11 @@ static void vision_run_flood_flash(vision_t *s)
         s->fault = VISION_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table line_flash and runs the line. */
-static void vision_run_line_flash(vision_t *s)
+/* Matches table line_flash and runs the line; returns the fault, 0 for none. */
+static int32_t vision_run_line_flash(vision_t *s)
 {
     s->line = vision_line_flash_line(s);
     switch (s->line) {
@@ -367,10 +369,11 @@ static void vision_run_line_flash(vision_t *s)
         s->fault = VISION_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
-/* Matches table pause_vision and runs the line. */
-static void vision_run_pause_vision(vision_t *s)
+/* Matches table pause_vision and runs the line; returns the fault, 0 for none. */
+static int32_t vision_run_pause_vision(vision_t *s)
 {
     s->line = vision_pause_vision_line(s);
     switch (s->line) {
@@ -387,6 +390,7 @@ static void vision_run_pause_vision(vision_t *s)
         s->fault = VISION_FAULT_SEVERAL_LINES;
         break;
     }
+    return s->fault;
 }
 
 /* Every variable's initial value. */
@@ -494,29 +498,9 @@ int32_t vision_flood_flash_line(const vision_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint8_t t0[2];
-        uint8_t t1[2];
-        uint8_t t2[3];
-        uint8_t t3[2];
-        uint8_t t4[101];
+        uint8_t t0[101];
+        uint8_t t1[24];
     } t = {
-        { /* new_command */
-            0x7eu, /* false: lines 2, 3, 4, 5, 6, 7 */
-            0x1u /* true: lines 1 */
-        },
-        { /* camera.matched */
-            0x77u, /* false: lines 1, 2, 3, 5, 6, 7 */
-            0x6fu /* true: lines 1, 2, 3, 4, 6, 7 */
-        },
-        { /* cur_state */
-            0x21u, /* d_state: lines 1, 6 */
-            0x41u, /* f_state: lines 1, 7 */
-            0x1fu /* looking: lines 1, 2, 3, 4, 5 */
-        },
-        { /* arrived */
-            0x67u, /* false: lines 1, 2, 3, 6, 7 */
-            0x79u /* true: lines 1, 4, 5, 6, 7 */
-        },
         { /* waited */
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
@@ -528,10 +512,37 @@ int32_t vision_flood_flash_line(const vision_t *s)
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7du
         },
+        { /* cur_state by new_command by camera.matched by arrived */
+            0x20u, /* d_state, false, false, false: lines 6 */
+            0x20u, /* d_state, false, false, true: lines 6 */
+            0x20u, /* d_state, false, true, false: lines 6 */
+            0x20u, /* d_state, false, true, true: lines 6 */
+            0x1u, /* d_state, true, false, false: lines 1 */
+            0x1u, /* d_state, true, false, true: lines 1 */
+            0x1u, /* d_state, true, true, false: lines 1 */
+            0x1u, /* d_state, true, true, true: lines 1 */
+            0x40u, /* f_state, false, false, false: lines 7 */
+            0x40u, /* f_state, false, false, true: lines 7 */
+            0x40u, /* f_state, false, true, false: lines 7 */
+            0x40u, /* f_state, false, true, true: lines 7 */
+            0x1u, /* f_state, true, false, false: lines 1 */
+            0x1u, /* f_state, true, false, true: lines 1 */
+            0x1u, /* f_state, true, true, false: lines 1 */
+            0x1u, /* f_state, true, true, true: lines 1 */
+            0x6u, /* looking, false, false, false: lines 2, 3 */
+            0x10u, /* looking, false, false, true: lines 5 */
+            0x6u, /* looking, false, true, false: lines 2, 3 */
+            0x8u, /* looking, false, true, true: lines 4 */
+            0x1u, /* looking, true, false, false: lines 1 */
+            0x1u, /* looking, true, false, true: lines 1 */
+            0x1u, /* looking, true, true, false: lines 1 */
+            0x1u /* looking, true, true, true: lines 1 */
+        },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] &
-            (uint32_t)t.t1[(s->camera.matched ? 1u : 0u)] & (uint32_t)t.t2[s->cur_state] &
-            (uint32_t)t.t3[(s->arrived ? 1u : 0u)] & (uint32_t)t.t4[s->waited];
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->camera.matched ? 1u : 0u)) * 2u) +
+                (s->arrived ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = vision_bit32(m | 0x80u);
     line = (m == 0x0u) ? (-1) : line;
@@ -553,34 +564,10 @@ int32_t vision_line_flash_line(const vision_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint16_t t0[2];
-        uint16_t t1[3];
-        uint16_t t2[2];
-        uint16_t t3[2];
-        uint16_t t4[2];
-        uint16_t t5[101];
+        uint8_t t0[101];
+        uint8_t t1[24];
+        uint8_t t2[2];
     } t = {
-        { /* new_command */
-            0xfeu, /* false: lines 2, 3, 4, 5a, 5b, 6, 7 */
-            0x1u /* true: lines 1 */
-        },
-        { /* cur_state */
-            0x41u, /* d_state: lines 1, 6 */
-            0x81u, /* f_state: lines 1, 7 */
-            0x3fu /* looking: lines 1, 2, 3, 4, 5a, 5b */
-        },
-        { /* arrived */
-            0xc7u, /* false: lines 1, 2, 3, 6, 7 */
-            0xf9u /* true: lines 1, 4, 5a, 5b, 6, 7 */
-        },
-        { /* fits */
-            0xd7u, /* false: lines 1, 2, 3, 5a, 6, 7 */
-            0xefu /* true: lines 1, 2, 3, 4, 5b, 6, 7 */
-        },
-        { /* faces */
-            0xf7u, /* false: lines 1, 2, 3, 5a, 5b, 6, 7 */
-            0xdfu /* true: lines 1, 2, 3, 4, 5a, 6, 7 */
-        },
         { /* waited */
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
@@ -592,10 +579,42 @@ int32_t vision_line_flash_line(const vision_t *s)
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfdu
         },
+        { /* cur_state by new_command by arrived by fits */
+            0x40u, /* d_state, false, false, false: lines 6 */
+            0x40u, /* d_state, false, false, true: lines 6 */
+            0x40u, /* d_state, false, true, false: lines 6 */
+            0x40u, /* d_state, false, true, true: lines 6 */
+            0x1u, /* d_state, true, false, false: lines 1 */
+            0x1u, /* d_state, true, false, true: lines 1 */
+            0x1u, /* d_state, true, true, false: lines 1 */
+            0x1u, /* d_state, true, true, true: lines 1 */
+            0x80u, /* f_state, false, false, false: lines 7 */
+            0x80u, /* f_state, false, false, true: lines 7 */
+            0x80u, /* f_state, false, true, false: lines 7 */
+            0x80u, /* f_state, false, true, true: lines 7 */
+            0x1u, /* f_state, true, false, false: lines 1 */
+            0x1u, /* f_state, true, false, true: lines 1 */
+            0x1u, /* f_state, true, true, false: lines 1 */
+            0x1u, /* f_state, true, true, true: lines 1 */
+            0x6u, /* looking, false, false, false: lines 2, 3 */
+            0x6u, /* looking, false, false, true: lines 2, 3 */
+            0x10u, /* looking, false, true, false: lines 5a */
+            0x28u, /* looking, false, true, true: lines 4, 5b */
+            0x1u, /* looking, true, false, false: lines 1 */
+            0x1u, /* looking, true, false, true: lines 1 */
+            0x1u, /* looking, true, true, false: lines 1 */
+            0x1u /* looking, true, true, true: lines 1 */
+        },
+        { /* faces */
+            0xf7u, /* false: lines 1, 2, 3, 5a, 5b, 6, 7 */
+            0xdfu /* true: lines 1, 2, 3, 4, 5a, 6, 7 */
+        },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->cur_state] &
-            (uint32_t)t.t2[(s->arrived ? 1u : 0u)] & (uint32_t)t.t3[(s->fits ? 1u : 0u)] &
-            (uint32_t)t.t4[(s->faces ? 1u : 0u)] & (uint32_t)t.t5[s->waited];
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->arrived ? 1u : 0u)) * 2u) +
+                (s->fits ? 1u : 0u)] &
+            (uint32_t)t.t2[s->faces ? 1u : 0u];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = vision_bit32(m | 0x100u);
     line = (m == 0x0u) ? (-1) : line;
@@ -637,33 +656,21 @@ void vision_pause_vision_lines(const vision_t *in, int32_t *out, uint32_t n)
 int32_t vision_flood_flash_step(vision_t *s)
 {
     vision_admit(s);
-    if (s->fault == VISION_FAULT_NONE) {
-        vision_settle(s);
-        vision_run_flood_flash(s);
-    }
-    return s->fault;
+    return (s->fault == VISION_FAULT_NONE) ? vision_run_flood_flash(s) : s->fault;
 }
 
 /* One step of table line_flash: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t vision_line_flash_step(vision_t *s)
 {
     vision_admit(s);
-    if (s->fault == VISION_FAULT_NONE) {
-        vision_settle(s);
-        vision_run_line_flash(s);
-    }
-    return s->fault;
+    return (s->fault == VISION_FAULT_NONE) ? vision_run_line_flash(s) : s->fault;
 }
 
 /* One step of table pause_vision: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t vision_pause_vision_step(vision_t *s)
 {
     vision_admit(s);
-    if (s->fault == VISION_FAULT_NONE) {
-        vision_settle(s);
-        vision_run_pause_vision(s);
-    }
-    return s->fault;
+    return (s->fault == VISION_FAULT_NONE) ? vision_run_pause_vision(s) : s->fault;
 }
 
 /* One cycle of level vision, every 40 ms: returns the fault, 0 for none. */
@@ -671,24 +678,17 @@ int32_t vision_vision_cycle(vision_t *s)
 {
     vision_admit(s);
     if (s->fault == VISION_FAULT_NONE) {
-        vision_settle(s);
-        if (s->fault == VISION_FAULT_NONE) {
-            vision_do_take_orders(s);
-        }
-        if (s->fault == VISION_FAULT_NONE) {
-            vision_do_measure(s);
-        }
-        if (s->fault == VISION_FAULT_NONE) {
-            const uint8_t chosen = s->emove.input_command;
-            if (chosen == VOCABULARY_VISION_COMMAND_PAUSE) {
-                vision_run_pause_vision(s);
-            } else if (chosen == VOCABULARY_VISION_COMMAND_FLOOD_FLASH) {
-                vision_run_flood_flash(s);
-            } else if (chosen == VOCABULARY_VISION_COMMAND_LINE_FLASH) {
-                vision_run_line_flash(s);
-            } else {
-                s->fault = VISION_FAULT_NO_LINE; /* no table for it: proved impossible */
-            }
+        vision_do_take_orders(s);
+        vision_do_measure(s);
+        const uint8_t chosen = s->emove.input_command;
+        if (chosen == VOCABULARY_VISION_COMMAND_PAUSE) {
+            (void)vision_run_pause_vision(s);
+        } else if (chosen == VOCABULARY_VISION_COMMAND_FLOOD_FLASH) {
+            (void)vision_run_flood_flash(s);
+        } else if (chosen == VOCABULARY_VISION_COMMAND_LINE_FLASH) {
+            (void)vision_run_line_flash(s);
+        } else {
+            s->fault = VISION_FAULT_NO_LINE; /* no table for it: proved impossible */
         }
         if (s->fault == VISION_FAULT_NONE) {
             vision_do_give_orders(s);

@@ -128,7 +128,7 @@ class emove_state(IntEnum):
     releasing = 13
 
 
-DIGEST = 0x38ef7723
+DIGEST = 0xe48f9953
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 111
 """What `check` gives of a state that other tables made."""
@@ -462,41 +462,6 @@ def _lines_of(masks, lines, default):
 
 
 _LOCATE_0 = (
-    0xfff8,
-    0x7,
-)
-_LOCATE_1 = (
-    0xfc57,
-    0xff77,
-    0xfc57,
-    0xfcd7,
-    0xfc5f,
-    0xfc57,
-)
-_LOCATE_2 = (
-    0xb7ff,
-    0xf457,
-    0x2c07,
-)
-_LOCATE_3 = (
-    0xffaf,
-    0xffbf,
-    0xffef,
-)
-_LOCATE_4 = (
-    0x6fff,
-    0xefaf,
-    0x7faf,
-)
-_LOCATE_5 = (
-    0xfffb,
-    0xfffd,
-)
-_LOCATE_6 = (
-    0xfff9,
-    0xfffe,
-)
-_LOCATE_7 = (
     0x407,
     0x2007,
     0x7,
@@ -512,57 +477,51 @@ _LOCATE_7 = (
     0x7,
     0x7,
 )
+_LOCATE_1 = (
+    0xfc57,
+    0xff77,
+    0xfc57,
+    0xfcd7,
+    0xfc5f,
+    0xfc57,
+)
+_LOCATE_2 = (
+    0xfff8,
+    0x7,
+)
+_LOCATE_3 = (
+    0xfffb,
+    0xfffd,
+)
+_LOCATE_4 = (
+    0xb7ff,
+    0xf457,
+    0x2c07,
+)
+_LOCATE_5 = (
+    0xfff9,
+    0xfffe,
+)
+_LOCATE_6 = (
+    0xffaf,
+    0xffbf,
+    0xffef,
+)
+_LOCATE_7 = (
+    0x6fff,
+    0xefaf,
+    0x7faf,
+)
 _LOCATE_G0 = (
-    *_joined(_LOCATE_7, _LOCATE_1, _LOCATE_2, _LOCATE_0),
+    *_joined(_LOCATE_0, _LOCATE_1, _LOCATE_4, _LOCATE_2),
 )
 _LOCATE_G1 = (
-    *_joined(_LOCATE_3, _LOCATE_4, _LOCATE_5, _LOCATE_6),
+    *_joined(_LOCATE_6, _LOCATE_7, _LOCATE_3, _LOCATE_5),
 )
 _LOCATE_ONE = (
     _one_of(16, True),
 )
 _MOVE_TO_0 = (
-    0x1fe0,
-    0x1f,
-)
-_MOVE_TO_1 = (
-    0x1a1f,
-    0x1f9f,
-    0x1e7f,
-    0x1a1f,
-    0x1a1f,
-    0x1a1f,
-)
-_MOVE_TO_2 = (
-    0xbff,
-    0x1a1f,
-    0xe1f,
-)
-_MOVE_TO_3 = (
-    0x1fe3,
-    0x1ffd,
-)
-_MOVE_TO_4 = (
-    0x1fe1,
-    0x1ffe,
-)
-_MOVE_TO_5 = (
-    0x61f,
-    0x81f,
-    0x147f,
-    0x159f,
-    0x41f,
-    0x41f,
-    0x41f,
-    0x41f,
-    0x41f,
-    0x41f,
-    0x41f,
-    0x41f,
-    0x41f,
-    0x41f,
-)
-_MOVE_TO_6 = (
     0x1fe7,
     0x1feb,
     0x1ff3,
@@ -627,6 +586,47 @@ _MOVE_TO_6 = (
     0x1ff3,
     0x1ff3,
 )
+_MOVE_TO_1 = (
+    0x61f,
+    0x81f,
+    0x147f,
+    0x159f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+)
+_MOVE_TO_2 = (
+    0x1a1f,
+    0x1f9f,
+    0x1e7f,
+    0x1a1f,
+    0x1a1f,
+    0x1a1f,
+)
+_MOVE_TO_3 = (
+    0x1fe0,
+    0x1f,
+)
+_MOVE_TO_4 = (
+    0x1fe3,
+    0x1ffd,
+)
+_MOVE_TO_5 = (
+    0xbff,
+    0x1a1f,
+    0xe1f,
+)
+_MOVE_TO_6 = (
+    0x1fe1,
+    0x1ffe,
+)
 _MOVE_TO_7 = (
     0x1eff,
     0x1f7f,
@@ -640,10 +640,10 @@ _MOVE_TO_9 = (
     0x1fff,
 )
 _MOVE_TO_G0 = (
-    *_joined(_MOVE_TO_6, _MOVE_TO_1),
+    *_joined(_MOVE_TO_0, _MOVE_TO_2),
 )
 _MOVE_TO_G1 = (
-    *_joined(_MOVE_TO_5, _MOVE_TO_2, _MOVE_TO_0, _MOVE_TO_3, _MOVE_TO_4),
+    *_joined(_MOVE_TO_1, _MOVE_TO_5, _MOVE_TO_3, _MOVE_TO_4, _MOVE_TO_6),
 )
 _MOVE_TO_G2 = (
     *_joined(_MOVE_TO_7, _MOVE_TO_8, _MOVE_TO_9),
@@ -652,47 +652,6 @@ _MOVE_TO_ONE = (
     _one_of(13, True),
 )
 _MOVE_TO_OBJ_0 = (
-    0x1ff0,
-    0xf,
-)
-_MOVE_TO_OBJ_1 = (
-    0x1a0f,
-    0x1f0f,
-    0x1ecf,
-    0x1e3f,
-    0x1a0f,
-    0x1a0f,
-)
-_MOVE_TO_OBJ_2 = (
-    0xbff,
-    0x1a0f,
-    0xe0f,
-)
-_MOVE_TO_OBJ_3 = (
-    0x1ff3,
-    0x1ffd,
-)
-_MOVE_TO_OBJ_4 = (
-    0x1ff1,
-    0x1ffe,
-)
-_MOVE_TO_OBJ_5 = (
-    0x60f,
-    0x80f,
-    0x14cf,
-    0x150f,
-    0x143f,
-    0x40f,
-    0x40f,
-    0x40f,
-    0x40f,
-    0x40f,
-    0x40f,
-    0x40f,
-    0x40f,
-    0x40f,
-)
-_MOVE_TO_OBJ_6 = (
     0x1fd7,
     0x1fdb,
     0x1feb,
@@ -757,6 +716,47 @@ _MOVE_TO_OBJ_6 = (
     0x1feb,
     0x1feb,
 )
+_MOVE_TO_OBJ_1 = (
+    0x60f,
+    0x80f,
+    0x14cf,
+    0x150f,
+    0x143f,
+    0x40f,
+    0x40f,
+    0x40f,
+    0x40f,
+    0x40f,
+    0x40f,
+    0x40f,
+    0x40f,
+    0x40f,
+)
+_MOVE_TO_OBJ_2 = (
+    0x1a0f,
+    0x1f0f,
+    0x1ecf,
+    0x1e3f,
+    0x1a0f,
+    0x1a0f,
+)
+_MOVE_TO_OBJ_3 = (
+    0x1ff0,
+    0xf,
+)
+_MOVE_TO_OBJ_4 = (
+    0x1ff3,
+    0x1ffd,
+)
+_MOVE_TO_OBJ_5 = (
+    0xbff,
+    0x1a0f,
+    0xe0f,
+)
+_MOVE_TO_OBJ_6 = (
+    0x1ff1,
+    0x1ffe,
+)
 _MOVE_TO_OBJ_7 = (
     0x1fbf,
     0x1fff,
@@ -766,10 +766,10 @@ _MOVE_TO_OBJ_8 = (
     0x1fff,
 )
 _MOVE_TO_OBJ_G0 = (
-    *_joined(_MOVE_TO_OBJ_6, _MOVE_TO_OBJ_1),
+    *_joined(_MOVE_TO_OBJ_0, _MOVE_TO_OBJ_2),
 )
 _MOVE_TO_OBJ_G1 = (
-    *_joined(_MOVE_TO_OBJ_5, _MOVE_TO_OBJ_2, _MOVE_TO_OBJ_0, _MOVE_TO_OBJ_3, _MOVE_TO_OBJ_4),
+    *_joined(_MOVE_TO_OBJ_1, _MOVE_TO_OBJ_5, _MOVE_TO_OBJ_3, _MOVE_TO_OBJ_4, _MOVE_TO_OBJ_6),
 )
 _MOVE_TO_OBJ_G2 = (
     *_joined(_MOVE_TO_OBJ_7, _MOVE_TO_OBJ_8),
@@ -785,27 +785,6 @@ _PAUSE_EMOVE_LINE = (
     *_lines_of(_joined(_PAUSE_EMOVE_0), 2, False),
 )
 _PICKUP_0 = (
-    0x7c,
-    0x3,
-)
-_PICKUP_1 = (
-    0x6b,
-    0x6b,
-    0x6b,
-    0x6b,
-    0x6b,
-    0x7f,
-)
-_PICKUP_2 = (
-    0x2f,
-    0x6b,
-    0x3b,
-)
-_PICKUP_3 = (
-    0x7d,
-    0x7e,
-)
-_PICKUP_4 = (
     0xb,
     0x23,
     0x3,
@@ -821,31 +800,31 @@ _PICKUP_4 = (
     0x57,
     0x3,
 )
+_PICKUP_1 = (
+    0x6b,
+    0x6b,
+    0x6b,
+    0x6b,
+    0x6b,
+    0x7f,
+)
+_PICKUP_2 = (
+    0x7c,
+    0x3,
+)
+_PICKUP_3 = (
+    0x7d,
+    0x7e,
+)
+_PICKUP_4 = (
+    0x2f,
+    0x6b,
+    0x3b,
+)
 _PICKUP_LINE = (
-    *_lines_of(_joined(_PICKUP_4, _PICKUP_1, _PICKUP_2, _PICKUP_0, _PICKUP_3), 7, True),
+    *_lines_of(_joined(_PICKUP_0, _PICKUP_1, _PICKUP_4, _PICKUP_2, _PICKUP_3), 7, True),
 )
 _RELEASE_PART_0 = (
-    0xf8,
-    0x7,
-)
-_RELEASE_PART_1 = (
-    0xd7,
-    0xd7,
-    0xd7,
-    0xd7,
-    0xff,
-    0xd7,
-)
-_RELEASE_PART_2 = (
-    0x5f,
-    0xd7,
-    0x77,
-)
-_RELEASE_PART_3 = (
-    0xf9,
-    0xfe,
-)
-_RELEASE_PART_4 = (
     0x17,
     0x47,
     0x7,
@@ -861,12 +840,33 @@ _RELEASE_PART_4 = (
     0x7,
     0xaf,
 )
+_RELEASE_PART_1 = (
+    0xd7,
+    0xd7,
+    0xd7,
+    0xd7,
+    0xff,
+    0xd7,
+)
+_RELEASE_PART_2 = (
+    0xf8,
+    0x7,
+)
+_RELEASE_PART_3 = (
+    0xf9,
+    0xfe,
+)
+_RELEASE_PART_4 = (
+    0x5f,
+    0xd7,
+    0x77,
+)
 _RELEASE_PART_5 = (
     0xfb,
     0xfd,
 )
 _RELEASE_PART_LINE = (
-    *_lines_of(_joined(_RELEASE_PART_4, _RELEASE_PART_1, _RELEASE_PART_2, _RELEASE_PART_0, _RELEASE_PART_3, _RELEASE_PART_5), 8, True),
+    *_lines_of(_joined(_RELEASE_PART_0, _RELEASE_PART_1, _RELEASE_PART_4, _RELEASE_PART_2, _RELEASE_PART_3, _RELEASE_PART_5), 8, True),
 )
 
 

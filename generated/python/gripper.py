@@ -117,7 +117,7 @@ class gripper_state(IntEnum):
     moving = 2
 
 
-DIGEST = 0x96a9c44c
+DIGEST = 0xa1ee4292
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 25
 """What `check` gives of a state that other tables made."""
@@ -272,19 +272,6 @@ def _lines_of(masks, lines, default):
 
 
 _POSITION_0 = (
-    0x7e,
-    0x1,
-)
-_POSITION_1 = (
-    0x21,
-    0x41,
-    0x1f,
-)
-_POSITION_2 = (
-    0x7d,
-    0x63,
-)
-_POSITION_3 = (
     0x6f,
     0x6f,
     0x6f,
@@ -437,6 +424,19 @@ _POSITION_3 = (
     0x6f,
     0x77,
 )
+_POSITION_1 = (
+    0x21,
+    0x41,
+    0x1f,
+)
+_POSITION_2 = (
+    0x7e,
+    0x1,
+)
+_POSITION_3 = (
+    0x7d,
+    0x63,
+)
 _POSITION_4 = (
     0x7b,
     0x7f,
@@ -446,22 +446,9 @@ _POSITION_5 = (
     0x7f,
 )
 _POSITION_LINE = (
-    *_lines_of(_joined(_POSITION_3, _POSITION_1, _POSITION_0, _POSITION_2, _POSITION_4, _POSITION_5), 7, False),
+    *_lines_of(_joined(_POSITION_0, _POSITION_1, _POSITION_2, _POSITION_3, _POSITION_4, _POSITION_5), 7, False),
 )
 _GRASP_0 = (
-    0x3e,
-    0x1,
-)
-_GRASP_1 = (
-    0x11,
-    0x21,
-    0xf,
-)
-_GRASP_2 = (
-    0x3d,
-    0x33,
-)
-_GRASP_3 = (
     0x37,
     0x37,
     0x37,
@@ -614,8 +601,21 @@ _GRASP_3 = (
     0x37,
     0x3b,
 )
+_GRASP_1 = (
+    0x11,
+    0x21,
+    0xf,
+)
+_GRASP_2 = (
+    0x3e,
+    0x1,
+)
+_GRASP_3 = (
+    0x3d,
+    0x33,
+)
 _GRASP_LINE = (
-    *_lines_of(_joined(_GRASP_3, _GRASP_1, _GRASP_0, _GRASP_2), 6, False),
+    *_lines_of(_joined(_GRASP_0, _GRASP_1, _GRASP_2, _GRASP_3), 6, False),
 )
 _PAUSE_GRIPPER_ONE = (
     _one_of(1, False),

@@ -125,7 +125,7 @@ class display(IntEnum):
     fingers = 1
 
 
-DIGEST = 0x6aaffae0
+DIGEST = 0xdf111493
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 119
 """What `check` gives of a state that other tables made."""
@@ -475,77 +475,50 @@ def _lines_of(masks, lines, default):
 
 
 _APPROACH_POSITION_FINGERS_0 = (
-    0x7c,
+    0x23,
+    0x43,
     0x3,
+    0x1f,
 )
 _APPROACH_POSITION_FINGERS_1 = (
-    0x6b,
-    0x67,
-    0x73,
+    0x7c,
+    0x3,
 )
 _APPROACH_POSITION_FINGERS_2 = (
     0x7e,
     0x7d,
 )
 _APPROACH_POSITION_FINGERS_3 = (
+    0x6b,
+    0x67,
+    0x73,
+)
+_APPROACH_POSITION_FINGERS_LINE = (
+    *_lines_of(_joined(_APPROACH_POSITION_FINGERS_0, _APPROACH_POSITION_FINGERS_3, _APPROACH_POSITION_FINGERS_1, _APPROACH_POSITION_FINGERS_2), 7, True),
+)
+_DEPARTURE_POSITION_FINGERS_0 = (
     0x23,
     0x43,
     0x3,
     0x1f,
 )
-_APPROACH_POSITION_FINGERS_LINE = (
-    *_lines_of(_joined(_APPROACH_POSITION_FINGERS_3, _APPROACH_POSITION_FINGERS_1, _APPROACH_POSITION_FINGERS_0, _APPROACH_POSITION_FINGERS_2), 7, True),
-)
-_DEPARTURE_POSITION_FINGERS_0 = (
+_DEPARTURE_POSITION_FINGERS_1 = (
     0x7c,
     0x3,
-)
-_DEPARTURE_POSITION_FINGERS_1 = (
-    0x6b,
-    0x67,
-    0x73,
 )
 _DEPARTURE_POSITION_FINGERS_2 = (
     0x7e,
     0x7d,
 )
 _DEPARTURE_POSITION_FINGERS_3 = (
-    0x23,
-    0x43,
-    0x3,
-    0x1f,
+    0x6b,
+    0x67,
+    0x73,
 )
 _DEPARTURE_POSITION_FINGERS_LINE = (
-    *_lines_of(_joined(_DEPARTURE_POSITION_FINGERS_3, _DEPARTURE_POSITION_FINGERS_1, _DEPARTURE_POSITION_FINGERS_0, _DEPARTURE_POSITION_FINGERS_2), 7, True),
+    *_lines_of(_joined(_DEPARTURE_POSITION_FINGERS_0, _DEPARTURE_POSITION_FINGERS_3, _DEPARTURE_POSITION_FINGERS_1, _DEPARTURE_POSITION_FINGERS_2), 7, True),
 )
 _GOTO__0 = (
-    0x7fc,
-    0x3,
-)
-_GOTO__1 = (
-    0x6e7,
-    0x61f,
-    0x703,
-)
-_GOTO__2 = (
-    0x7fe,
-    0x7fd,
-)
-_GOTO__3 = (
-    0x203,
-    0x403,
-    0x1ff,
-    0x3,
-)
-_GOTO__4 = (
-    0x707,
-    0x7fb,
-)
-_GOTO__5 = (
-    0x7df,
-    0x73f,
-)
-_GOTO__6 = (
     0x76f,
     0x76f,
     0x76f,
@@ -798,66 +771,93 @@ _GOTO__6 = (
     0x76f,
     0x7b7,
 )
+_GOTO__1 = (
+    0x203,
+    0x403,
+    0x1ff,
+    0x3,
+)
+_GOTO__2 = (
+    0x7fc,
+    0x3,
+)
+_GOTO__3 = (
+    0x7fe,
+    0x7fd,
+)
+_GOTO__4 = (
+    0x6e7,
+    0x61f,
+    0x703,
+)
+_GOTO__5 = (
+    0x707,
+    0x7fb,
+)
+_GOTO__6 = (
+    0x7df,
+    0x73f,
+)
 _GOTO__G0 = (
-    *_joined(_GOTO__6, _GOTO__0),
+    *_joined(_GOTO__0, _GOTO__2),
 )
 _GOTO__G1 = (
-    *_joined(_GOTO__3, _GOTO__1, _GOTO__2, _GOTO__4, _GOTO__5),
+    *_joined(_GOTO__1, _GOTO__4, _GOTO__3, _GOTO__5, _GOTO__6),
 )
 _GOTO__ONE = (
     _one_of(11, True),
 )
 _GOTHRU_0 = (
-    0x7c,
+    0x33,
+    0x43,
+    0x2f,
     0x3,
 )
 _GOTHRU_1 = (
-    0x5f,
-    0x5f,
-    0x63,
+    0x7c,
+    0x3,
 )
 _GOTHRU_2 = (
     0x7e,
     0x7d,
 )
 _GOTHRU_3 = (
-    0x33,
-    0x43,
-    0x2f,
-    0x3,
+    0x5f,
+    0x5f,
+    0x63,
 )
 _GOTHRU_4 = (
     0x77,
     0x7b,
 )
 _GOTHRU_LINE = (
-    *_lines_of(_joined(_GOTHRU_3, _GOTHRU_1, _GOTHRU_0, _GOTHRU_2, _GOTHRU_4), 7, True),
+    *_lines_of(_joined(_GOTHRU_0, _GOTHRU_3, _GOTHRU_1, _GOTHRU_2, _GOTHRU_4), 7, True),
 )
 _IMMED_GRASP_0 = (
-    0xfc,
+    0x43,
+    0x83,
     0x3,
+    0x3f,
 )
 _IMMED_GRASP_1 = (
-    0xdb,
-    0xc7,
-    0xe3,
+    0xfc,
+    0x3,
 )
 _IMMED_GRASP_2 = (
     0xfe,
     0xfd,
 )
 _IMMED_GRASP_3 = (
-    0x43,
-    0x83,
-    0x3,
-    0x3f,
+    0xdb,
+    0xc7,
+    0xe3,
 )
 _IMMED_GRASP_4 = (
     0xf7,
     0xef,
 )
 _IMMED_GRASP_LINE = (
-    *_lines_of(_joined(_IMMED_GRASP_3, _IMMED_GRASP_1, _IMMED_GRASP_0, _IMMED_GRASP_2, _IMMED_GRASP_4), 8, True),
+    *_lines_of(_joined(_IMMED_GRASP_0, _IMMED_GRASP_3, _IMMED_GRASP_1, _IMMED_GRASP_2, _IMMED_GRASP_4), 8, True),
 )
 _PAUSE_PRIMITIVE_0 = (
     0x2,

@@ -130,7 +130,7 @@ class locating(IntEnum):
     known = 1
 
 
-DIGEST = 0xef34c29e
+DIGEST = 0x7c2a9834
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 80
 """What `check` gives of a state that other tables made."""
@@ -407,27 +407,6 @@ def _lines_of(masks, lines, default):
 
 
 _ACQUIRE_0 = (
-    0xffe0,
-    0x1f,
-)
-_ACQUIRE_1 = (
-    0xc21f,
-    0xc441,
-    0xc821,
-    0xd081,
-    0xe101,
-    0xc001,
-)
-_ACQUIRE_2 = (
-    0x43ff,
-    0xc201,
-    0x7e01,
-)
-_ACQUIRE_3 = (
-    0xffe1,
-    0xfffe,
-)
-_ACQUIRE_4 = (
     0x3e1f,
     0x401f,
     0xbc5f,
@@ -438,9 +417,30 @@ _ACQUIRE_4 = (
     0x3c1f,
     0x3c1f,
 )
-_ACQUIRE_5 = (
+_ACQUIRE_1 = (
+    0xffe0,
+    0x1f,
+)
+_ACQUIRE_2 = (
+    0xc21f,
+    0xc441,
+    0xc821,
+    0xd081,
+    0xe101,
+    0xc001,
+)
+_ACQUIRE_3 = (
+    0xffe1,
+    0xfffe,
+)
+_ACQUIRE_4 = (
     0xfffd,
     0xffef,
+)
+_ACQUIRE_5 = (
+    0x43ff,
+    0xc201,
+    0x7e01,
 )
 _ACQUIRE_6 = (
     0xffed,
@@ -451,30 +451,9 @@ _ACQUIRE_7 = (
     0xffe5,
 )
 _ACQUIRE_LINE = (
-    *_lines_of(_joined(_ACQUIRE_4, _ACQUIRE_1, _ACQUIRE_2, _ACQUIRE_0, _ACQUIRE_3, _ACQUIRE_5, _ACQUIRE_6, _ACQUIRE_7), 16, True),
+    *_lines_of(_joined(_ACQUIRE_0, _ACQUIRE_2, _ACQUIRE_5, _ACQUIRE_1, _ACQUIRE_3, _ACQUIRE_4, _ACQUIRE_6, _ACQUIRE_7), 16, True),
 )
 _CLEAR_0 = (
-    0x1fe0,
-    0x1f,
-)
-_CLEAR_1 = (
-    0x191f,
-    0x1aa1,
-    0x1a21,
-    0x1801,
-    0x1801,
-    0x1c41,
-)
-_CLEAR_2 = (
-    0x9ff,
-    0x1901,
-    0xf01,
-)
-_CLEAR_3 = (
-    0x1fe1,
-    0x1ffe,
-)
-_CLEAR_4 = (
     0x71f,
     0x81f,
     0x61f,
@@ -485,9 +464,30 @@ _CLEAR_4 = (
     0x165f,
     0x169f,
 )
-_CLEAR_5 = (
+_CLEAR_1 = (
+    0x1fe0,
+    0x1f,
+)
+_CLEAR_2 = (
+    0x191f,
+    0x1aa1,
+    0x1a21,
+    0x1801,
+    0x1801,
+    0x1c41,
+)
+_CLEAR_3 = (
+    0x1fe1,
+    0x1ffe,
+)
+_CLEAR_4 = (
     0x1fe7,
     0x1ffb,
+)
+_CLEAR_5 = (
+    0x9ff,
+    0x1901,
+    0xf01,
 )
 _CLEAR_6 = (
     0x1fe3,
@@ -498,40 +498,9 @@ _CLEAR_7 = (
     0x1ff7,
 )
 _CLEAR_LINE = (
-    *_lines_of(_joined(_CLEAR_4, _CLEAR_1, _CLEAR_2, _CLEAR_0, _CLEAR_3, _CLEAR_5, _CLEAR_6, _CLEAR_7), 13, True),
+    *_lines_of(_joined(_CLEAR_0, _CLEAR_2, _CLEAR_5, _CLEAR_1, _CLEAR_3, _CLEAR_4, _CLEAR_6, _CLEAR_7), 13, True),
 )
 _MOVE_0 = (
-    0xffe7f,
-    0xffe7f,
-    0xffe7f,
-    0xffe7f,
-    0xffe7f,
-    0xfffbf,
-    0xffe7f,
-    0xffe7f,
-)
-_MOVE_1 = (
-    0xffe00,
-    0x1ff,
-)
-_MOVE_2 = (
-    0xc41ff,
-    0xca201,
-    0xca801,
-    0xd0401,
-    0xe1001,
-    0xc0001,
-)
-_MOVE_3 = (
-    0x47fff,
-    0xc4001,
-    0x7c001,
-)
-_MOVE_4 = (
-    0xffe01,
-    0xffffe,
-)
-_MOVE_5 = (
     0x3c1ff,
     0x401ff,
     0xb83ff,
@@ -542,13 +511,44 @@ _MOVE_5 = (
     0x381ff,
     0x381ff,
 )
-_MOVE_6 = (
+_MOVE_1 = (
+    0xffe00,
+    0x1ff,
+)
+_MOVE_2 = (
+    0xffe7f,
+    0xffe7f,
+    0xffe7f,
+    0xffe7f,
+    0xffe7f,
+    0xfffbf,
+    0xffe7f,
+    0xffe7f,
+)
+_MOVE_3 = (
+    0xffe01,
+    0xffffe,
+)
+_MOVE_4 = (
+    0xc41ff,
+    0xca201,
+    0xca801,
+    0xd0401,
+    0xe1001,
+    0xc0001,
+)
+_MOVE_5 = (
     0xfffef,
     0xfffdf,
 )
-_MOVE_7 = (
+_MOVE_6 = (
     0xfffc7,
     0xffe3f,
+)
+_MOVE_7 = (
+    0x47fff,
+    0xc4001,
+    0x7c001,
 )
 _MOVE_8 = (
     0xffe07,
@@ -563,10 +563,10 @@ _MOVE_10 = (
     0xfff4f,
 )
 _MOVE_G0 = (
-    *_joined(_MOVE_5, _MOVE_0, _MOVE_2),
+    *_joined(_MOVE_0, _MOVE_2, _MOVE_4),
 )
 _MOVE_G1 = (
-    *_joined(_MOVE_3, _MOVE_1, _MOVE_4, _MOVE_6, _MOVE_7, _MOVE_8, _MOVE_9, _MOVE_10),
+    *_joined(_MOVE_7, _MOVE_1, _MOVE_3, _MOVE_5, _MOVE_6, _MOVE_8, _MOVE_9, _MOVE_10),
 )
 _MOVE_ONE = (
     _one_of(20, True),
@@ -579,27 +579,6 @@ _PAUSE_TASK_LINE = (
     *_lines_of(_joined(_PAUSE_TASK_0), 2, False),
 )
 _RELEASE_PART_0 = (
-    0x7f0,
-    0xf,
-)
-_RELEASE_PART_1 = (
-    0x64f,
-    0x721,
-    0x601,
-    0x601,
-    0x601,
-    0x691,
-)
-_RELEASE_PART_2 = (
-    0x27f,
-    0x641,
-    0x3c1,
-)
-_RELEASE_PART_3 = (
-    0x7f1,
-    0x7fe,
-)
-_RELEASE_PART_4 = (
     0x1cf,
     0x20f,
     0x18f,
@@ -610,39 +589,39 @@ _RELEASE_PART_4 = (
     0x59f,
     0x5af,
 )
-_RELEASE_PART_5 = (
+_RELEASE_PART_1 = (
+    0x7f0,
+    0xf,
+)
+_RELEASE_PART_2 = (
+    0x64f,
+    0x721,
+    0x601,
+    0x601,
+    0x601,
+    0x691,
+)
+_RELEASE_PART_3 = (
+    0x7f1,
+    0x7fe,
+)
+_RELEASE_PART_4 = (
     0x7f3,
     0x7fd,
+)
+_RELEASE_PART_5 = (
+    0x27f,
+    0x641,
+    0x3c1,
 )
 _RELEASE_PART_6 = (
     0x7f7,
     0x7fb,
 )
 _RELEASE_PART_LINE = (
-    *_lines_of(_joined(_RELEASE_PART_4, _RELEASE_PART_1, _RELEASE_PART_2, _RELEASE_PART_0, _RELEASE_PART_3, _RELEASE_PART_5, _RELEASE_PART_6), 11, True),
+    *_lines_of(_joined(_RELEASE_PART_0, _RELEASE_PART_2, _RELEASE_PART_5, _RELEASE_PART_1, _RELEASE_PART_3, _RELEASE_PART_4, _RELEASE_PART_6), 11, True),
 )
 _TRANSFER_0 = (
-    0x3fff00,
-    0xff,
-)
-_TRANSFER_1 = (
-    0x3080ff,
-    0x315101,
-    0x311401,
-    0x320201,
-    0x340801,
-    0x382001,
-)
-_TRANSFER_2 = (
-    0x10ffff,
-    0x308001,
-    0x1f8001,
-)
-_TRANSFER_3 = (
-    0x3fff01,
-    0x3ffffe,
-)
-_TRANSFER_4 = (
     0xf80ff,
     0x1000ff,
     0x2f01ff,
@@ -653,9 +632,30 @@ _TRANSFER_4 = (
     0x2f20ff,
     0x2f40ff,
 )
-_TRANSFER_5 = (
+_TRANSFER_1 = (
+    0x3fff00,
+    0xff,
+)
+_TRANSFER_2 = (
+    0x3080ff,
+    0x315101,
+    0x311401,
+    0x320201,
+    0x340801,
+    0x382001,
+)
+_TRANSFER_3 = (
+    0x3fff01,
+    0x3ffffe,
+)
+_TRANSFER_4 = (
     0x3fffef,
     0x3fffdf,
+)
+_TRANSFER_5 = (
+    0x10ffff,
+    0x308001,
+    0x1f8001,
 )
 _TRANSFER_6 = (
     0x3fffc7,
@@ -674,10 +674,10 @@ _TRANSFER_9 = (
     0x3fff4f,
 )
 _TRANSFER_G0 = (
-    *_joined(_TRANSFER_4, _TRANSFER_1, _TRANSFER_2, _TRANSFER_0),
+    *_joined(_TRANSFER_0, _TRANSFER_2, _TRANSFER_5, _TRANSFER_1),
 )
 _TRANSFER_G1 = (
-    *_joined(_TRANSFER_3, _TRANSFER_5, _TRANSFER_6, _TRANSFER_7, _TRANSFER_8, _TRANSFER_9),
+    *_joined(_TRANSFER_3, _TRANSFER_4, _TRANSFER_6, _TRANSFER_7, _TRANSFER_8, _TRANSFER_9),
 )
 _TRANSFER_ONE = (
     _one_of(22, True),

@@ -125,7 +125,7 @@ class flash(IntEnum):
     line = 2
 
 
-DIGEST = 0x09cf2cfa
+DIGEST = 0xcb40c93f
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 38
 """What `check` gives of a state that other tables made."""
@@ -306,23 +306,6 @@ def _lines_of(masks, lines, default):
 
 
 _FLOOD_FLASH_0 = (
-    0x7e,
-    0x1,
-)
-_FLOOD_FLASH_1 = (
-    0x77,
-    0x6f,
-)
-_FLOOD_FLASH_2 = (
-    0x21,
-    0x41,
-    0x1f,
-)
-_FLOOD_FLASH_3 = (
-    0x67,
-    0x79,
-)
-_FLOOD_FLASH_4 = (
     0x7b,
     0x7b,
     0x7b,
@@ -425,31 +408,27 @@ _FLOOD_FLASH_4 = (
     0x7b,
     0x7d,
 )
-_FLOOD_FLASH_LINE = (
-    *_lines_of(_joined(_FLOOD_FLASH_4, _FLOOD_FLASH_2, _FLOOD_FLASH_0, _FLOOD_FLASH_1, _FLOOD_FLASH_3), 7, False),
+_FLOOD_FLASH_1 = (
+    0x21,
+    0x41,
+    0x1f,
 )
-_LINE_FLASH_0 = (
-    0xfe,
+_FLOOD_FLASH_2 = (
+    0x7e,
     0x1,
 )
-_LINE_FLASH_1 = (
-    0x41,
-    0x81,
-    0x3f,
+_FLOOD_FLASH_3 = (
+    0x77,
+    0x6f,
 )
-_LINE_FLASH_2 = (
-    0xc7,
-    0xf9,
+_FLOOD_FLASH_4 = (
+    0x67,
+    0x79,
 )
-_LINE_FLASH_3 = (
-    0xd7,
-    0xef,
+_FLOOD_FLASH_LINE = (
+    *_lines_of(_joined(_FLOOD_FLASH_0, _FLOOD_FLASH_1, _FLOOD_FLASH_2, _FLOOD_FLASH_3, _FLOOD_FLASH_4), 7, False),
 )
-_LINE_FLASH_4 = (
-    0xf7,
-    0xdf,
-)
-_LINE_FLASH_5 = (
+_LINE_FLASH_0 = (
     0xfb,
     0xfb,
     0xfb,
@@ -552,8 +531,29 @@ _LINE_FLASH_5 = (
     0xfb,
     0xfd,
 )
+_LINE_FLASH_1 = (
+    0x41,
+    0x81,
+    0x3f,
+)
+_LINE_FLASH_2 = (
+    0xfe,
+    0x1,
+)
+_LINE_FLASH_3 = (
+    0xc7,
+    0xf9,
+)
+_LINE_FLASH_4 = (
+    0xd7,
+    0xef,
+)
+_LINE_FLASH_5 = (
+    0xf7,
+    0xdf,
+)
 _LINE_FLASH_LINE = (
-    *_lines_of(_joined(_LINE_FLASH_5, _LINE_FLASH_1, _LINE_FLASH_0, _LINE_FLASH_2, _LINE_FLASH_3, _LINE_FLASH_4), 8, False),
+    *_lines_of(_joined(_LINE_FLASH_0, _LINE_FLASH_1, _LINE_FLASH_2, _LINE_FLASH_3, _LINE_FLASH_4, _LINE_FLASH_5), 8, False),
 )
 _PAUSE_VISION_ONE = (
     _one_of(1, False),

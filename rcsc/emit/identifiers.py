@@ -45,6 +45,8 @@ FAULTS = ("none", *(fault.name.lower() for fault in Fault if fault is not Fault.
 LONGEST = 100
 MOST_SAID = 400
 FAILED_BITS = 64
+FEW_FAILED_BITS = 32
+"""Assumptions up to which C keeps those that failed in a smaller word."""
 
 
 def short(name: str) -> str:
@@ -189,6 +191,11 @@ class Names:
     layout: str
     c: NameScope
     module: NameScope
+
+
+def failed_type(monitored: int) -> str:
+    """Give the type of those members: one machine word of a small processor where that is enough."""
+    return "uint32_t" if monitored <= FEW_FAILED_BITS else "uint64_t"
 
 
 def failed_words(monitored: int) -> tuple[str, ...]:

@@ -42,7 +42,9 @@ MOST_CODED = 4096
 FEW_CUTS = 2
 """Cuts up to which comparing is cheaper than looking up."""
 MOST_GROUPED = 512
-"""Combinations of classes up to which leaves share a table of masks."""
+"""Combinations of classes up to which leaves share a table of masks of several words."""
+FEW_GROUPED = 24
+"""The same where a mask is one word: as many rows as a person reads, and no more bytes than one table for each leaf."""
 
 
 def lower(proved: ProvedProgram, root: str = "", *, defensive: bool = False) -> Plan:
@@ -137,7 +139,8 @@ def _matcher(program: Program, table: Table) -> Matcher:
     everyone = (1 << len(table.lines)) - 1
     probes = [_leaf_probe(variables[name], stated, everyone) for name, stated in _declared(table, by_leaf)]
     probes += [_test_probe(truth, lines, everyone) for truth, lines in relational.values()]
-    groups = grouped(probes, MOST_GROUPED) if len(table.lines) > WORD else tuple((probe,) for probe in probes)
+    wide = len(table.lines) > WORD
+    groups = grouped(probes, MOST_GROUPED if wide else FEW_GROUPED, shifted=not wide)
     return Matcher(len(table.lines), table.default is not None, groups)
 
 

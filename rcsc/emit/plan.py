@@ -109,11 +109,19 @@ def joined(group: Group) -> tuple[int, ...]:
     return masks
 
 
-def grouped(probes: Iterable[Probe], most: int) -> tuple[Group, ...]:
-    """Probes joined while their classes together are at most `most`: fewer masks to load, larger tables."""
+def grouped(probes: Iterable[Probe], most: int, *, shifted: bool = False) -> tuple[Group, ...]:
+    """Probes joined while their classes together are at most `most`: fewer masks to load, larger tables.
+
+    Args:
+        probes: One for each leaf or test.
+        most: Combinations of classes in a group; a probe with more stands alone.
+        shifted: Whether the classes of all but the first of a group must be a power of two, so that an index is shifted, never
+            multiplied.
+    """
     bins: list[list[Probe]] = []
     for probe in sorted(probes, key=lambda probe: -len(probe.masks)):
-        for group in bins:
+        joins = not shifted or len(probe.masks).bit_count() == 1
+        for group in bins if joins else ():
             if prod(len(other.masks) for other in group) * len(probe.masks) <= most:
                 group.append(probe)
                 break

@@ -215,7 +215,7 @@ def _members(system: Linked) -> Iterator[tuple[str, list[tuple[str, str]]]]:
             (f"{level.member}.{level.program.path(at)}", FORMATS[leaf.c_type])
             for at, leaf in enumerate(sign.leaves)
         ]
-        trace = zip(sign.trace, sign.trace_format, strict=True)
+        trace = zip(sign.trace, sign.trace_format_in_c, strict=True)
         yield level.name, leaves + [(f"{level.member}.{name}", form) for name, form in trace]
     for buffer in system.buffers:
         end = buffer.end

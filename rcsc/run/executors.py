@@ -192,7 +192,7 @@ class CExecutor:
         self._check = getattr(library.handle, sign.check)
         self._check.restype = ctypes.c_int32
         getattr(library.handle, sign.init)(self._address)
-        formats = [*(FORMATS[leaf.c_type] for leaf in sign.leaves), *sign.trace_format]
+        formats = [*(FORMATS[leaf.c_type] for leaf in sign.leaves), *sign.trace_format_in_c]
         self._places, self._formats = places, formats
         order = sorted(range(count), key=places.__getitem__)
         self._whole = _padded([(places[at], formats[at]) for at in order], places[-1])

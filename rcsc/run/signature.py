@@ -28,6 +28,8 @@ TRACE = ("line", "fault", "fault_at")
 """What a cycle leaves beside the leaves; the words of failed assumptions come after it."""
 FAILED = ("assumptions_failed",)
 """The words of failed assumptions, 64 in each, where the symbol file names no others."""
+FEW_MONITORED = 32
+"""Assumptions up to which C keeps those that failed in a word of 32 bits."""
 FAULTS = (
     "none",
     "input refused",
@@ -195,8 +197,13 @@ class Signature:
 
     @property
     def trace_format(self) -> str:
-        """The trace's members as `struct` calls them."""
+        """The trace's members as `struct` calls them, in a log."""
         return "i" * len(TRACE) + "Q" * len(self.failed)
+
+    @property
+    def trace_format_in_c(self) -> str:
+        """The same in C's struct, where few assumptions take a smaller word."""
+        return "i" * len(TRACE) + ("I" if len(self.monitored) <= FEW_MONITORED else "Q") * len(self.failed)
 
     def failures(self, values: Values) -> tuple[str, ...]:
         """The monitored assumptions that failed in the cycle that left these values."""

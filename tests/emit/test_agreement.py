@@ -297,8 +297,8 @@ C_FAULTS = {
     ),
     "deferral": ("s->phase = s->phase_next;", ";", "step"),
     "monitor": (
-        "(UINT64_C(1) << (uint32_t)CASE__ASSUMPTION_",
-        "(UINT64_C(2) << (uint32_t)CASE__ASSUMPTION_",
+        "(1u << (uint32_t)CASE__ASSUMPTION_",
+        "(2u << (uint32_t)CASE__ASSUMPTION_",
         "step",
     ),
     "initial value": (

@@ -139,7 +139,7 @@ class CSystem:
         sign = self.signs[level]
         leaves = [(f"{level}.{leaf.place}", FORMATS[leaf.c_type]) for leaf in sign.leaves]
         return leaves + [
-            (f"{level}.{name}", form) for name, form in zip(sign.trace, sign.trace_format, strict=True)
+            (f"{level}.{name}", form) for name, form in zip(sign.trace, sign.trace_format_in_c, strict=True)
         ]
 
     def _buffer_members(self, source: str, target: str) -> list[tuple[str, str]]:

@@ -41,18 +41,18 @@ def admit_function(c: CProgram, reals: bool) -> Function:
     inputs = [v for v in c.program.variables if v.kind is model.Kind.INPUT]
     tests = [(Name(c.names.leaves[v.name]), refusal(c, v, c.text.place(v.name))) for v in inputs]
     asked = [(leaf, test) for leaf, test in tests if test is not None]
-    taken = tuple(s for v in inputs for s in admitted(c, v, c.text.place(v.name)))
+    taken = (*(s for v in inputs for s in admitted(c, v, c.text.place(v.name))), run_on_state(c, "settle"))
     told = Set(FAULT, fault_name(c, Fault.ADMIT)), Set(FAULT_AT, AT)
     body: Body = taken
     if asked:
-        branch = Branch(((infix(">=", AT, Constant(0)), told),), taken or None)
+        branch = Branch(((infix(">=", AT, Constant(0)), told),), taken)
         body = (Let("int32_t", "at", NONE), *first_of(asked), branch)
     if reals:
         inexact = Prefix("!", Invoke(f"{c.p}_exact"))
-        body = (Branch(((inexact, (Set(FAULT, fault_name(c, Fault.ARITHMETIC)),)),), body or None),)
+        body = (Branch(((inexact, (Set(FAULT, fault_name(c, Fault.ARITHMETIC)),)),), body),)
     return on_state(
         c,
-        "Admits every input; a refused one leaves everything else as it was.",
+        "Admits every input, then settles; a refused one leaves everything else as it was.",
         "admit",
         *trace(c, fault_name(c, Fault.OK), NONE),
         *body,

@@ -30,7 +30,7 @@ from rcsc.emit.c.matching import match_functions
 from rcsc.emit.c.procedures import callees_first, failing, procedure_function
 from rcsc.emit.c.symbols import symbols
 from rcsc.emit.code_tree import Invoke, read
-from rcsc.emit.identifiers import comment, guard, names_of, types_header
+from rcsc.emit.identifiers import comment, failed_type, guard, names_of, types_header
 from rcsc.emit.plan import Plan
 from rcsc.emit.rendering import render
 
@@ -40,9 +40,10 @@ def _view(c: CProgram) -> dict[str, object]:
     procedures = [procedure_function(c, procedure) for procedure in callees_first(c.program)]
     tables = [function for table in c.plan.tables for function in match_functions(c, table)]
     levels = [cycle_function(c, level) for level in c.program.levels]
-    inner = [settle_function(c), *safe_functions(c), *assumption_functions(c), *action_functions(c)]
+    settle = settle_function(c)
+    inner = [*safe_functions(c), *assumption_functions(c), *action_functions(c)]
     publics = (init_function(c), check_function(c), *tables, *step_functions(c), *levels)
-    code = tuple(read((*procedures, *inner, *publics, *c.classifiers)))
+    code = tuple(read((*procedures, settle, *inner, *publics, *c.classifiers)))
     kinds = {c_type(variable.type) for variable in c.program.variables}
     reals = "double" in kinds.union(getattr(node, "type", "") for node in code)
     admission = admit_function(c, reals)
@@ -62,12 +63,13 @@ def _view(c: CProgram) -> dict[str, object]:
         "layout": layout_condition(c),
         "fields": list(fields(c)),
         "failed": c.names.failed,
+        "failed_type": failed_type(len(c.plan.monitored)),
         "faults": c.names.faults,
         "reals": reals,
         "bits": bits,
         "externs": list(externs(c)),
         "helpers": [*(helper(c.p, name) for name in sorted(used - bits)), *c.classifiers],
-        "privates": [*procedures, admission, *inner, *begin_functions(c)],
+        "privates": [*procedures, settle, admission, *inner, *begin_functions(c)],
         "publics": publics,
     }
 

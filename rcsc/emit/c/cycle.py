@@ -1,12 +1,11 @@
 """What a cycle does: settles, checks assumptions, runs the line that matches, and what goes before and after."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from rcsc.emit.c.admission import trace
 from rcsc.emit.c.cprogram import (
     NONE,
-    ONE,
     CProgram,
     assigned,
     discarded,
@@ -20,6 +19,7 @@ from rcsc.emit.code_tree import (
     Body,
     Branch,
     Cast,
+    Choice,
     Constant,
     Do,
     Frame,
@@ -38,7 +38,7 @@ from rcsc.emit.code_tree import (
     infix,
     when,
 )
-from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment
+from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment, failed_type
 from rcsc.emit.plan import PlanTable, answering
 from rcsc.emit.translate import FAULT, FAULT_AT, LINE, STATE
 from rcsc.lang import model
@@ -75,8 +75,9 @@ def action_functions(c: CProgram) -> Iterator[Function]:
         told = [stmt for place in table.monitored for stmt in _told(c, place, stops=place in table.stops)]
         matched = _matched(c, table, name)
         run = (when(c.text.faultless, *matched),) if table.stops else matched
-        doc = f"Matches table {table.table.name} and runs the line.{comment(answering(table.table.requirements))}"
-        yield on_state(c, doc, f"run_{name}", *told, *run)
+        answers = comment(answering(table.table.requirements))
+        doc = f"Matches table {table.table.name} and runs the line; returns the fault, 0 for none.{answers}"
+        yield on_state(c, doc, f"run_{name}", *told, *run, Leave(FAULT), gives="int32_t")
 
 
 def assumption_functions(c: CProgram) -> Iterator[Function]:
@@ -96,7 +97,8 @@ def _told(c: CProgram, place: int, *, stops: bool) -> Body:
     word, bit = divmod(place, FAILED_BITS)
     failed = Place((c.names.failed[word],))
     shift = Constant(bit, "uint32_t") if word else Cast("uint32_t", Name(c.names.assumptions[place]))
-    mark = Set(failed, infix("|", failed, infix("<<", ONE, shift)))
+    one = Constant(1, failed_type(len(c.plan.monitored)))
+    mark = Set(failed, infix("|", failed, infix("<<", one, shift)))
     name = Name(c.names.assumptions[place])
     end = Set(FAULT, fault_name(c, Fault.ASSUMPTION)), Set(FAULT_AT, name)
     ended = (when(c.text.faultless, *end),) if stops else ()
@@ -113,11 +115,12 @@ def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
         head = (f"case {line_name}: /* {comment(line.told)} */",)
         cases.append(Frame(head, (*_kept(c, table, number), *body, Line("break;"))))
     none, several = (Set(FAULT, fault_name(c, fault)) for fault in (Fault.NO_LINE, Fault.SEVERAL_LINES))
+    unmatched = Frame(("case ", Round(NONE), ":"), (none, Line("break;")))
     return (
         Set(LINE, Invoke(f"{c.p}_{name}_line", (STATE,))),
         Frame(("switch (", LINE, ") {")),
         *cases,
-        Frame(("case ", Round(NONE), ":"), (none, Line("break;"))),
+        *(() if table.matcher.default else (unmatched,)),
         Frame(("default:",), (Set(LINE, NONE), several, Line("break;"))),
         Line("}"),
     )
@@ -129,13 +132,19 @@ def _kept(c: CProgram, table: PlanTable, line: int) -> Body:
     return () if leaf is None else (assigned(c, c.program.variable(leaf), line),)
 
 
+def _begin(c: CProgram) -> Do:
+    return run_on_state(c, "begin" if c.plan.defensive else "admit")
+
+
 def _cycle(c: CProgram, doc: str, name: str, *body: Stmt) -> Function:
-    """The frame of every step and cycle."""
-    begin = run_on_state(c, "begin" if c.plan.defensive else "admit")
-    shown = any(variable.safe is not None for variable in c.program.variables)
-    safe = (when(c.text.faulted, run_on_state(c, "safe")),) if shown else ()
-    run = when(c.text.faultless, run_on_state(c, "settle"), *body)
-    return on_state(c, doc, name, begin, run, *safe, Leave(FAULT), gives="int32_t")
+    """The frame of every cycle, and of a step where outputs have safe values."""
+    safe = (when(c.text.faulted, run_on_state(c, "safe")),) if _shows_safe(c) else ()
+    run = when(c.text.faultless, *body)
+    return on_state(c, doc, name, _begin(c), run, *safe, Leave(FAULT), gives="int32_t")
+
+
+def _shows_safe(c: CProgram) -> bool:
+    return any(variable.safe is not None for variable in c.program.variables)
 
 
 def step_functions(c: CProgram) -> Iterator[Function]:
@@ -143,18 +152,41 @@ def step_functions(c: CProgram) -> Iterator[Function]:
     for table in c.plan.tables:
         name = c.names.tables[table.table.name]
         doc = f"One step of table {table.table.name}: admits, settles, matches, acts; returns the fault, 0 for none."
-        yield _cycle(c, doc, f"{name}_step", run_on_state(c, f"run_{name}"))
+        if _shows_safe(c):
+            yield _cycle(c, doc, f"{name}_step", _table_run(c, table.table.name))
+        else:  # nothing is left to do after the line: compilers jump there, and do not come back
+            last = Choice(c.text.faultless, Invoke(f"{c.p}_run_{name}", (STATE,)), FAULT)
+            yield on_state(c, doc, f"{name}_step", _begin(c), Leave(last), gives="int32_t")
 
 
 def cycle_function(c: CProgram, level: model.Level) -> Function:
     """Give the cycle of a level."""
-    before = (when(c.text.faultless, Do(c.text.call(name))) for name in level.preprocess)
-    stages = (when(c.text.faultless, *_chosen(c, stage, partial(_stage, c))) for stage in level.stages)
-    after = (when(c.text.faultless, Do(c.text.call(name))) for name in level.postprocess)
+    before = (_called(c, name) for name in level.preprocess)
+    stages = (
+        (True, tuple(_chosen(c, stage, partial(_stage, c), f"chosen_{at}")))
+        for at, stage in enumerate(level.stages, 1)
+    )
+    after = (_called(c, name) for name in level.postprocess)
     doc = f"One cycle of level {level.name}, every {level.period_ms} ms: returns the fault, 0 for none.{_order(c, level)}"
     name = f"{c.names.levels[level.name]}_cycle"
-    last = when(c.text.faultless, *_chosen(c, level.tables, lambda table: (_table_run(c, table),)))
-    return _cycle(c, doc, name, *before, *stages, last, *after)
+    last = True, tuple(_chosen(c, level.tables, lambda table: (_table_run(c, table),), "chosen"))
+    return _cycle(c, doc, name, *_while_faultless(c, (*before, *stages, last, *after)))
+
+
+def _called(c: CProgram, procedure: str) -> tuple[bool, Body]:
+    """Call a procedure; and whether a fault may stand after it."""
+    return procedure in c.text.failing, (Do(c.text.call(procedure)),)
+
+
+def _while_faultless(c: CProgram, parts: Sequence[tuple[bool, Body]]) -> Iterator[Stmt]:
+    """Statements in order; after each that may end in a fault it is asked whether one stands."""
+    together: list[Stmt] = []
+    asked = False
+    for number, (fails, body) in enumerate(parts, 1):
+        together += body
+        if fails or number == len(parts):
+            yield from (when(c.text.faultless, *together),) if asked else together
+            together, asked = [], True
 
 
 def _order(c: CProgram, level: model.Level) -> str:
@@ -170,7 +202,8 @@ def _order(c: CProgram, level: model.Level) -> str:
 
 
 def _table_run(c: CProgram, table: str) -> Do:
-    return run_on_state(c, f"run_{c.names.tables[table]}")
+    """Run a table in a cycle, which reads the fault from the state."""
+    return Do(Cast("void", Invoke(f"{c.p}_run_{c.names.tables[table]}", (STATE,))))
 
 
 def _stage(c: CProgram, table: str) -> Body:
@@ -183,14 +216,14 @@ def _stage(c: CProgram, table: str) -> Body:
     return _table_run(c, table), Set(LINE, NONE), named
 
 
-def _chosen(c: CProgram, choice: model.TableChoice, run: Callable[[str], Body]) -> Iterator[Stmt]:
-    """Runs the table of a choice."""
+def _chosen(c: CProgram, choice: model.TableChoice, run: Callable[[str], Body], name: str) -> Iterator[Stmt]:
+    """Runs the table of a choice, whose value is kept by that name."""
     if isinstance(choice, model.OneTable):
         yield from run(choice.table)
         return
     kind, given = choice.selector.type, c.text.whole(choice.selector)
-    chosen = Name("chosen")
-    yield Let(f"const {c_type(kind) if isinstance(given, Place) else local_type(kind)}", "chosen", given)
+    chosen = Name(name)
+    yield Let(f"const {c_type(kind) if isinstance(given, Place) else local_type(kind)}", name, given)
     arms = ((infix("==", chosen, c.text.constant(kind, value)), run(name)) for value, name in choice.tables)
     yield Branch(
         tuple(arms),

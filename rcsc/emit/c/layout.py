@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from rcsc.emit.c.ctext import c_type
-from rcsc.emit.identifiers import DIGEST, TRACE, Names
+from rcsc.emit.identifiers import DIGEST, TRACE, Names, failed_type
 from rcsc.lang.digest import Digests
+from rcsc.lang.meaning import checked
 from rcsc.lang.model import Array, Program, Record, Type, pending
 
 CAPS = (8, 4, 2, 1)
@@ -68,7 +69,7 @@ def members(program: Program, names: Names) -> Iterator[tuple[str, Type | str]]:
         if later in variables:
             yield "".join(names.paths[later]), variables[later]
     yield from ((word, "int32_t") for word in TRACE)
-    yield from ((word, "uint64_t") for word in names.failed)
+    yield from ((word, failed_type(len(checked(program)))) for word in names.failed)
 
 
 def _scalars(program: Program, names: Names) -> Iterator[tuple[str, str]]:

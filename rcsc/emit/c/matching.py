@@ -74,8 +74,8 @@ def _index(c: CProgram, group: Group, name: str) -> Code:
     index: Code | None = None
     for number, probe in enumerate(group):
         leaf_class = _class(c, probe.index, f"{name}_{number}")
-        moved = index and Round(infix("*", Round(index), Constant(probe.index.count, "uint32_t")))
-        index = Round(infix("+", moved, leaf_class)) if moved else leaf_class
+        moved = index and infix("*", index, Constant(probe.index.count, "uint32_t"))
+        index = infix("+", moved, leaf_class) if moved else leaf_class
     assert index is not None
     return index
 
@@ -83,13 +83,13 @@ def _index(c: CProgram, group: Group, name: str) -> Code:
 def _class(c: CProgram, index: Index, name: str) -> Code:
     match index:
         case Direct(leaf=leaf, type=Bool()):
-            return Round(_bit(c.text.place(leaf)))
+            return _bit(c.text.place(leaf))
         case Direct(leaf=leaf, low=0):
             return c.text.place(leaf)
         case Direct(leaf=leaf, type=kind, low=low):
             return _above(c, kind, c.text.place(leaf), low)
         case Truth(condition=condition):
-            return Round(_bit(c.text.expr(condition)))
+            return _bit(c.text.expr(condition))
         case Coded(leaf=leaf, type=kind, low=low):
             above = _above(c, kind, c.text.place(leaf), low)
             return _classify(c, name, "The class of the value.", above, "uint32_t", _codes(index))
@@ -99,7 +99,7 @@ def _class(c: CProgram, index: Index, name: str) -> Code:
                 return Constant(0, "uint32_t")
             if len(cuts) <= 6:
                 tests = (_bit(infix(">=", place, c.text.constant(kind, cut))) for cut in cuts)
-                return Round(Infix("+", tuple(tests)))
+                return Infix("+", tuple(tests))
             return _classify(
                 c, name, "How many cuts are at most the value.", place, held, tuple(_search(index, held))
             )
@@ -180,7 +180,7 @@ def _word(value: int, bits: int) -> Name:
 
 
 def _width(lines: int) -> int:
-    return next(bits for bits in (8, 16, 32, 64) if lines < bits or bits == 64)
+    return next(bits for bits in (8, 16, 32, 64) if lines <= bits)
 
 
 def _masks(matcher: Matcher, lines: Sequence[str]) -> Iterator[Stmt]:

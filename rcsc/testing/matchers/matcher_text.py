@@ -5,8 +5,8 @@ text that is not of the shape described here is refused: the per-variable check 
 
 The shape: tables `t.t0`, `t.t1`, ..; one look-up in each, `t.tK[INDEX]`; the look-ups joined with `&` (in words of
 64 lines where there are more); then a tail that reads nothing but the joined mask. An INDEX is one component,
-or several in mixed radix, `(((A) * nu) + B)`. A component reads one leaf and compares it with constants only,
-or is the truth of a condition.
+or several in mixed radix, `(A * nu) + B`. A component reads one leaf and compares it with constants only,
+or is the truth of a condition; it stands in parentheses where C needs them.
 """
 
 import re
@@ -27,17 +27,19 @@ EVERY_KEY = 4096
 """Keys of a leaf up to which `matcher` finds the class of each."""
 UNARY = (
     re.compile(rf"^{PLACE}$"),
-    re.compile(rf"^\({PLACE} \? 1u : 0u\)$"),
+    re.compile(rf"^{PLACE} \? 1u : 0u$"),
     re.compile(rf"^{CONVERTED}?\({ABOVE}\)$"),
+    re.compile(rf"^\({PLACE} >= {CONSTANT}\) \? 1u : 0u$"),
     re.compile(
-        rf"^\(\(\({PLACE} >= {CONSTANT}\) \? 1u : 0u\)"
-        rf"(?: \+ \(\({AGAIN} >= {CONSTANT}\) \? 1u : 0u\))*\)$"
+        rf"^\(\({PLACE} >= {CONSTANT}\) \? 1u : 0u\)"
+        rf"(?: \+ \(\({AGAIN} >= {CONSTANT}\) \? 1u : 0u\))+$"
     ),
     re.compile(
         rf"^(?P<search>[A-Za-z_]\w*_class_\w+)\((?:{CONVERTED}\()?(?:\(u?int(?:32|64)_t\))?{PLACE}(?: [-+] {CONSTANT})?\)?\)$"
     ),
 )
-TRUTH = re.compile(r"^\((?P<condition>.*) \? 1u : 0u\)$", re.DOTALL)
+TRUTH = re.compile(r"^(?P<condition>.*) \? 1u : 0u$", re.DOTALL)
+RADIX = re.compile(r"(?P<rest>.*) \* (?P<count>\d+)u", re.DOTALL)
 LOAD = re.compile(r"\bt\.t(\d+)\[")
 WHOLE = re.compile(r"\b(0[xX][0-9a-fA-F]+|\d+)[uUlL]*\b")
 NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?)u?(?![\w.])(?! : 0u)(?<! : 0u)")
@@ -140,13 +142,19 @@ def closing(text: str, start: int, pair: str) -> int:
 
 def parted(index: str) -> list[tuple[str, int]]:
     """The components of an index with their counts; 0 for the first."""
-    if index.startswith("((("):
-        end = closing(index, 2, "()")
-        rest = re.match(r"\) \* (\d+)u\) \+ ", index[end:])
-        if rest and index.endswith(")"):
-            last = index[end + rest.end() : -1]
-            return [*parted(index[3:end]), (last, int(rest[1]))]
+    index = bare(index)
+    if index.startswith("("):
+        end = closing(index, 0, "()")
+        scaled = RADIX.fullmatch(index, 1, end)
+        if scaled and index.startswith(") + ", end):
+            return [*parted(scaled["rest"]), (bare(index[end + len(") + ") :]), int(scaled["count"]))]
     return [(index, 0)]
+
+
+def bare(text: str) -> str:
+    """An expression without parentheses around all of it."""
+    around = text.startswith("(") and closing(text, 0, "()") == len(text) - 1
+    return bare(text[1:-1]) if around else text
 
 
 def component(source: str, text: str, count: int) -> Component:
