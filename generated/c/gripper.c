@@ -128,7 +128,7 @@ static void gripper_do_take_orders(gripper_t *s)
         s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
         s->to_primitive.failure = VOCABULARY_REASON_NONE;
     } else {
-        if (s->answered && true) {
+        if (s->answered) {
             s->new_command = false;
         }
     }

@@ -150,7 +150,7 @@ static void vision_do_take_orders(vision_t *s)
         s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
         s->to_emove.failure = VOCABULARY_REASON_NONE;
     } else {
-        if (s->answered && true) {
+        if (s->answered) {
             s->new_command = false;
         }
     }

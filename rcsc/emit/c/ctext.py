@@ -194,6 +194,14 @@ def _joined(op: str, code: Code) -> tuple[Code, ...]:
     return code.operands if isinstance(code, Infix) and code.op == op else (code,)
 
 
+def _chain(op: str, args: Iterable[Code]) -> Code:
+    """A chain of one operator, without constants that it does not depend on: they can never decide."""
+    neutral = constant(Bool(), op == "&&")
+    parts = [part for arg in args for part in _joined(op, arg)]
+    left = tuple(part for part in parts if part != neutral)
+    return infix(op, *left) if left else neutral
+
+
 def _plain(code: Code) -> bool:
     """Whether it may be cast as it stands: a variable, or a constant that is one token."""
     match code:
@@ -391,11 +399,11 @@ class CText(Text):
             case Op.NEG:
                 return Prefix("-", args[0])
             case Op.IMPLIES:
-                return Infix("||", (negated(args[0]), *_joined("||", args[1])))
+                return _chain("||", (negated(args[0]), args[1]))
             case Op.ABS | Op.MIN | Op.MAX:
                 return self._helper(f"{op.value}_{_CALLED[shared]}", args, shared)
             case Op.AND | Op.OR:
-                return Infix(_INFIX[op], tuple(part for arg in args for part in _joined(_INFIX[op], arg)))
+                return _chain(_INFIX[op], args)
             case (
                 Op.EQ | Op.NE | Op.LT | Op.LE | Op.GT | Op.GE
                 | Op.ADD | Op.SUB | Op.MUL | Op.DIV | Op.MOD
