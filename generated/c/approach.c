@@ -150,27 +150,27 @@ static int32_t approach_run_approach(approach_t *s)
     case APPROACH_LINE_APPROACH_BLOCKED: /* examples/approach.rcs line blocked: force_n > limit_n */
         approach_do_smooth(s);
         approach_do_stop(s);
-        s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_FAILED;
+        s->status_report = EXM_WRDS_1984_LVL_STS_FAILED;
         break;
     /* examples/approach.rcs line arrived: force_n <= limit_n; distance_mm - tolerance_mm <= 0 */
     case APPROACH_LINE_APPROACH_ARRIVED:
         approach_do_smooth(s);
         approach_do_settle(s);
-        s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_DONE;
+        s->status_report = EXM_WRDS_1984_LVL_STS_DONE;
         break;
     /* examples/approach.rcs line brake: force_n <= limit_n; distance_mm - tolerance_mm > 0; distance_mm <=
        tolerance_mm + braking_mm */
     case APPROACH_LINE_APPROACH_BRAKE:
         approach_do_smooth(s);
         approach_do_slow_down(s);
-        s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_EXECUTING;
+        s->status_report = EXM_WRDS_1984_LVL_STS_EXECUTING;
         break;
     /* examples/approach.rcs line cruise: force_n <= limit_n; distance_mm - tolerance_mm > 0; distance_mm >
        tolerance_mm + braking_mm */
     case APPROACH_LINE_APPROACH_CRUISE:
         approach_do_smooth(s);
         approach_do_full_speed(s);
-        s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_EXECUTING;
+        s->status_report = EXM_WRDS_1984_LVL_STS_EXECUTING;
         break;
     case (-1):
         s->fault = APPROACH_FAULT_NO_LINE;
@@ -199,7 +199,7 @@ void approach_init(approach_t *s)
     s->smooth_n = 0.0;
     s->settled = 0u;
     s->speed_mm_s = 0u;
-    s->status_report = EXAMPLES_WORDS_1984_LEVEL_STATUS_DONE;
+    s->status_report = EXM_WRDS_1984_LVL_STS_DONE;
 }
 
 /* Whether the state may be gone on from: APPROACH_CHECK_OK; APPROACH_CHECK_FOREIGN where other tables made
@@ -216,7 +216,7 @@ int32_t approach_check(const approach_t *s)
         at = APPROACH_LEAF_SETTLED;
     } else if (s->speed_mm_s > 1000u) {
         at = APPROACH_LEAF_SPEED_MM_S;
-    } else if (s->status_report > EXAMPLES_WORDS_1984_LEVEL_STATUS_FAILED) {
+    } else if (s->status_report > EXM_WRDS_1984_LVL_STS_FAILED) {
         at = APPROACH_LEAF_STATUS_REPORT;
     } else {
         /* none of these */

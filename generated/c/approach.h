@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "examples_words_1984_types.h"
+#include "exmpls_words_1984_types.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -79,7 +79,7 @@ typedef struct {
     double smooth_n; /* 5: state; 0.0 .. 500.0 N; Smoothed force. */
     uint8_t settled; /* 6: state; 0 .. 25; Cycles spent near the goal. */
     uint16_t speed_mm_s; /* 7: output; 0 .. 1000 mm*s^-1; Commanded speed. */
-    examples_words_1984_level_status_t status_report; /* 8: output */
+    exmpls_words_1984_level_status_t status_report; /* 8: output */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     /* trace: position of the variable that was refused, or of the assumption; -1 for none */

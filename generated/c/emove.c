@@ -95,15 +95,15 @@ static void emove_do_measure(emove_t *s)
     if (s->new_command) {
         s->path_length = (uint8_t)((uint32_t)s->path.depart_count + (uint32_t)s->path.approach_count);
     }
-    if ((!s->answered) || (s->last_primitive.input_command == VOCABULARY_PRIMITIVE_COMMAND_GOTO) ||
-            (s->last_primitive.input_command == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU)) {
+    if ((!s->answered) || (s->last_primitive.input_command == VCBLRY_PRIMITIVE_COMMAND_GOTO) ||
+            (s->last_primitive.input_command == VCBLRY_PRIMITIVE_COMMAND_GOTHRU)) {
         s->lost = (((s->task.gripped_obj_ptr == VOCABULARY_OBJECT_TBOX) ||
             (s->task.gripped_obj_ptr == VOCABULARY_OBJECT_BBOX) ||
             (s->task.gripped_obj_ptr == VOCABULARY_OBJECT_FLAG) ||
             (s->task.gripped_obj_ptr == VOCABULARY_OBJECT_HOUS)) &&
                 (!s->from_primitive.holds));
     }
-    if (s->task.input_command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ) {
+    if (s->task.input_command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ) {
         s->lift_mm = s->object_data.lift_mm + 0.0;
     } else {
         s->lift_mm = s->held_data.lift_mm + 0.0;
@@ -157,13 +157,13 @@ static void emove_do_pause(emove_t *s)
 /* Procedure goto. */
 static void emove_do_goto_(emove_t *s)
 {
-    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_GOTO;
+    s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_GOTO;
 }
 
 /* Procedure gothru. */
 static void emove_do_gothru(emove_t *s)
 {
-    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_GOTHRU;
+    s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_GOTHRU;
 }
 
 /* Procedure approach_position_fingers. */
@@ -566,7 +566,7 @@ static bool emove_holds_locate_in_step(const emove_t *s)
             (((s->cur_state == EMOVE_COMMON_EMOVE_STATE_CENTERING) ||
                 (s->cur_state == EMOVE_COMMON_EMOVE_STATE_HOVERING) ||
                 (s->cur_state == EMOVE_COMMON_EMOVE_STATE_LOWERING)) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTO) &&
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTO) &&
                 (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LINING) &&
                 (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) &&
@@ -584,9 +584,9 @@ static bool emove_holds_move_to_in_step(const emove_t *s)
                 (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
             (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_THROUGH) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU)) ||
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTHRU)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LAST) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTO));
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTO));
 }
 
 /* Assumption move_to_obj_in_step: A state goes with the orders that it waits for (section 9). */
@@ -597,9 +597,9 @@ static bool emove_holds_move_to_obj_in_step(const emove_t *s)
                 (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
             (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_THROUGH) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU)) ||
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTHRU)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LAST) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_GOTO)) ||
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTO)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_OPENING) &&
                 (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS));
 }
@@ -1268,15 +1268,15 @@ int32_t emove_check(const emove_t *s)
     } else if (s->to_primitive.pose_ptr > 9999u) {
         at = EMOVE_LEAF_TO_PRIMITIVE_POSE_PTR;
     } else if (!((s->to_primitive.displaced.x >= (-500.0)) && (s->to_primitive.displaced.x <= 500.0))) {
-        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_X;
+        at = EMOVE_LEAF_TO_PRMTV_DISPLACED_X;
     } else if (!((s->to_primitive.displaced.y >= (-500.0)) && (s->to_primitive.displaced.y <= 500.0))) {
-        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_Y;
+        at = EMOVE_LEAF_TO_PRMTV_DISPLACED_Y;
     } else if (!((s->to_primitive.displaced.z >= (-500.0)) && (s->to_primitive.displaced.z <= 500.0))) {
-        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_Z;
+        at = EMOVE_LEAF_TO_PRMTV_DISPLACED_Z;
     } else if (!((s->to_primitive.displaced.c >= (-1.0)) && (s->to_primitive.displaced.c <= 1.0))) {
-        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_C;
+        at = EMOVE_LEAF_TO_PRMTV_DISPLACED_C;
     } else if (!((s->to_primitive.displaced.s >= (-1.0)) && (s->to_primitive.displaced.s <= 1.0))) {
-        at = EMOVE_LEAF_TO_PRIMITIVE_DISPLACED_S;
+        at = EMOVE_LEAF_TO_PRMTV_DISPLACED_S;
     } else if (s->primitive.command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = EMOVE_LEAF_PRIMITIVE_COMMAND;
     } else if (s->primitive.status > VOCABULARY_LEVEL_STATUS_FAILED) {
@@ -1294,15 +1294,15 @@ int32_t emove_check(const emove_t *s)
     } else if (s->last_primitive.pose_ptr > 9999u) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_POSE_PTR;
     } else if (!((s->last_primitive.displaced.x >= (-500.0)) && (s->last_primitive.displaced.x <= 500.0))) {
-        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_X;
+        at = EMOVE_LEAF_LAST_PRMTV_DSPLCD_X;
     } else if (!((s->last_primitive.displaced.y >= (-500.0)) && (s->last_primitive.displaced.y <= 500.0))) {
-        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_Y;
+        at = EMOVE_LEAF_LAST_PRMTV_DSPLCD_Y;
     } else if (!((s->last_primitive.displaced.z >= (-500.0)) && (s->last_primitive.displaced.z <= 500.0))) {
-        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_Z;
+        at = EMOVE_LEAF_LAST_PRMTV_DSPLCD_Z;
     } else if (!((s->last_primitive.displaced.c >= (-1.0)) && (s->last_primitive.displaced.c <= 1.0))) {
-        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_C;
+        at = EMOVE_LEAF_LAST_PRMTV_DSPLCD_C;
     } else if (!((s->last_primitive.displaced.s >= (-1.0)) && (s->last_primitive.displaced.s <= 1.0))) {
-        at = EMOVE_LEAF_LAST_PRIMITIVE_DISPLACED_S;
+        at = EMOVE_LEAF_LAST_PRMTV_DSPLCD_S;
     } else if (s->to_vision.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
         at = EMOVE_LEAF_TO_VISION_INPUT_COMMAND;
     } else if (s->to_vision.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
@@ -1310,11 +1310,11 @@ int32_t emove_check(const emove_t *s)
     } else if (!((s->to_vision.expected_range_mm >= 0.0) && (s->to_vision.expected_range_mm <= 2000.0))) {
         at = EMOVE_LEAF_TO_VISION_EXPECTED_RANGE_MM;
     } else if (!((s->to_vision.expected_normal.x >= (-1.0)) && (s->to_vision.expected_normal.x <= 1.0))) {
-        at = EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_X;
+        at = EMOVE_LEAF_TO_VSN_EXPCTD_NRML_X;
     } else if (!((s->to_vision.expected_normal.y >= (-1.0)) && (s->to_vision.expected_normal.y <= 1.0))) {
-        at = EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_Y;
+        at = EMOVE_LEAF_TO_VSN_EXPCTD_NRML_Y;
     } else if (!((s->to_vision.expected_normal.z >= (-1.0)) && (s->to_vision.expected_normal.z <= 1.0))) {
-        at = EMOVE_LEAF_TO_VISION_EXPECTED_NORMAL_Z;
+        at = EMOVE_LEAF_TO_VSN_EXPCTD_NRML_Z;
     } else if (s->vision.command > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
         at = EMOVE_LEAF_VISION_COMMAND;
     } else if (s->vision.status > VOCABULARY_LEVEL_STATUS_FAILED) {
@@ -1937,9 +1937,9 @@ int32_t emove_emove_cycle(emove_t *s)
         const uint8_t chosen = s->task.input_command;
         if (chosen == VOCABULARY_EMOVE_COMMAND_PAUSE) {
             (void)emove_run_pause_emove(s);
-        } else if (chosen == VOCABULARY_EMOVE_COMMAND_MOVE_TO) {
+        } else if (chosen == VCBLRY_EMOVE_CMND_MOVE_TO) {
             (void)emove_run_move_to(s);
-        } else if (chosen == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ) {
+        } else if (chosen == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ) {
             (void)emove_run_move_to_obj(s);
         } else if (chosen == VOCABULARY_EMOVE_COMMAND_LOCATE) {
             (void)emove_run_locate(s);

@@ -413,15 +413,15 @@ static void primitive_admit(primitive_t *s)
         } else if (s->emove.pose_ptr > 9999u) {
             at = PRIMITIVE_LEAF_EMOVE_POSE_PTR;
         } else if (!((s->emove.displaced.x >= (-500.0)) && (s->emove.displaced.x <= 500.0))) {
-            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_X;
+            at = PRMTV_LEAF_EMOVE_DISPLACED_X;
         } else if (!((s->emove.displaced.y >= (-500.0)) && (s->emove.displaced.y <= 500.0))) {
-            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_Y;
+            at = PRMTV_LEAF_EMOVE_DISPLACED_Y;
         } else if (!((s->emove.displaced.z >= (-500.0)) && (s->emove.displaced.z <= 500.0))) {
-            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_Z;
+            at = PRMTV_LEAF_EMOVE_DISPLACED_Z;
         } else if (!((s->emove.displaced.c >= (-1.0)) && (s->emove.displaced.c <= 1.0))) {
-            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_C;
+            at = PRMTV_LEAF_EMOVE_DISPLACED_C;
         } else if (!((s->emove.displaced.s >= (-1.0)) && (s->emove.displaced.s <= 1.0))) {
-            at = PRIMITIVE_LEAF_EMOVE_DISPLACED_S;
+            at = PRMTV_LEAF_EMOVE_DISPLACED_S;
         } else if (s->from_robot.ref_command_echo > VOCABULARY_ROBOT_COMMAND_FOLLOW) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_REF_COMMAND_ECHO;
         } else if (s->from_robot.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
@@ -429,23 +429,23 @@ static void primitive_admit(primitive_t *s)
         } else if (s->from_robot.failure > VOCABULARY_REASON_NO_PICTURE) {
             at = PRIMITIVE_LEAF_FROM_ROBOT_FAILURE;
         } else if (!((s->from_robot.plate[0] >= (-4000.0)) && (s->from_robot.plate[0] <= 4000.0))) {
-            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_0;
+            at = PRMTV_LEAF_FROM_ROBOT_PLATE_0;
         } else if (!((s->from_robot.plate[1] >= (-4000.0)) && (s->from_robot.plate[1] <= 4000.0))) {
-            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_1;
+            at = PRMTV_LEAF_FROM_ROBOT_PLATE_1;
         } else if (!((s->from_robot.plate[2] >= (-4000.0)) && (s->from_robot.plate[2] <= 4000.0))) {
-            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_2;
+            at = PRMTV_LEAF_FROM_ROBOT_PLATE_2;
         } else if (!((s->from_robot.plate[3] >= (-4000.0)) && (s->from_robot.plate[3] <= 4000.0))) {
-            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_3;
+            at = PRMTV_LEAF_FROM_ROBOT_PLATE_3;
         } else if (!((s->from_robot.plate[4] >= (-4000.0)) && (s->from_robot.plate[4] <= 4000.0))) {
-            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_4;
+            at = PRMTV_LEAF_FROM_ROBOT_PLATE_4;
         } else if (!((s->from_robot.plate[5] >= (-4000.0)) && (s->from_robot.plate[5] <= 4000.0))) {
-            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_5;
+            at = PRMTV_LEAF_FROM_ROBOT_PLATE_5;
         } else if (!((s->from_robot.plate[6] >= (-4000.0)) && (s->from_robot.plate[6] <= 4000.0))) {
-            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_6;
+            at = PRMTV_LEAF_FROM_ROBOT_PLATE_6;
         } else if (!((s->from_robot.plate[7] >= (-4000.0)) && (s->from_robot.plate[7] <= 4000.0))) {
-            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_7;
+            at = PRMTV_LEAF_FROM_ROBOT_PLATE_7;
         } else if (!((s->from_robot.plate[8] >= (-4000.0)) && (s->from_robot.plate[8] <= 4000.0))) {
-            at = PRIMITIVE_LEAF_FROM_ROBOT_PLATE_8;
+            at = PRMTV_LEAF_FROM_ROBOT_PLATE_8;
         } else if (s->from_gripper.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP) {
             at = PRIMITIVE_LEAF_FROM_GRIPPER_REF_COMMAND_ECHO;
         } else if (s->from_gripper.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
@@ -542,98 +542,96 @@ static void primitive_admit(primitive_t *s)
    9). */
 static bool primitive_holds_approach_position_fingers_in_step(const primitive_t *s)
 {
-    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
+    return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
+            (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) ||
+            (s->cur_state == PRMTV_CMN_PRMTV_STATE_FINGERING);
 }
 
 /* Assumption departure_position_fingers_in_step: A state goes with the orders that it waits for (section
    9). */
 static bool primitive_holds_departure_position_fingers_in_step(const primitive_t *s)
 {
-    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
+    return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
+            (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) ||
+            (s->cur_state == PRMTV_CMN_PRMTV_STATE_FINGERING);
 }
 
 /* Assumption goto_in_step: A state goes with the orders that it waits for (section 9). */
 static bool primitive_holds_goto_in_step(const primitive_t *s)
 {
-    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_MOVING);
+    return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
+            (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) || (s->cur_state == PRMTV_CMN_PRMTV_STATE_MOVING);
 }
 
 /* Assumption gothru_in_step: A state goes with the orders that it waits for (section 9). */
 static bool primitive_holds_gothru_in_step(const primitive_t *s)
 {
-    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_MOVING);
+    return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
+            (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) || (s->cur_state == PRMTV_CMN_PRMTV_STATE_MOVING);
 }
 
 /* Assumption immed_grasp_in_step: A state goes with the orders that it waits for (section 9). */
 static bool primitive_holds_immed_grasp_in_step(const primitive_t *s)
 {
-    return s->new_command || (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE) ||
-            (s->cur_state == PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
+    return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
+            (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) ||
+            (s->cur_state == PRMTV_CMN_PRMTV_STATE_FINGERING);
 }
 
 /* Matches table approach_position_fingers and runs the line; returns the fault, 0 for none. */
-static int32_t primitive_run_approach_position_fingers(primitive_t *s)
+static int32_t primitive_run_aprc_pstn_fngrs(primitive_t *s)
 {
     if (!primitive_holds_approach_position_fingers_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
                 (1u << (uint32_t)PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP);
     }
-    s->line = primitive_approach_position_fingers_line(s);
+    s->line = primitive_aprc_pstn_fngrs_line(s);
     switch (s->line) {
     /* primitive/approach_position_fingers.rcs line 1: new_command true; fingers.known true */
-    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_1:
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
+    case PRMTV_LINE_APRCH_PSTN_FINGERS_1:
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_FINGERING);
         primitive_do_position(s, s->fingers.approach_mm + 0.0);
         primitive_do_executing(s);
         break;
     /* primitive/approach_position_fingers.rcs line 2: new_command true; fingers.known false */
-    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_2:
+    case PRMTV_LINE_APRCH_PSTN_FINGERS_2:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     /* primitive/approach_position_fingers.rcs line 3: new_command false; cur_state fingering;
        gripper.status executing */
-    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_3:
+    case PRMTV_LINE_APRCH_PSTN_FINGERS_3:
         primitive_do_executing(s);
         break;
     /* primitive/approach_position_fingers.rcs line 4: new_command false; cur_state fingering;
        gripper.status done */
-    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_4:
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
+    case PRMTV_LINE_APRCH_PSTN_FINGERS_4:
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_D_STATE);
         primitive_do_done(s);
         break;
     /* primitive/approach_position_fingers.rcs line 5: new_command false; cur_state fingering;
        gripper.status failed */
-    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_5:
+    case PRMTV_LINE_APRCH_PSTN_FINGERS_5:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     /* primitive/approach_position_fingers.rcs line 6: new_command false; cur_state d_state */
-    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_6:
+    case PRMTV_LINE_APRCH_PSTN_FINGERS_6:
         primitive_do_done(s);
         break;
     /* primitive/approach_position_fingers.rcs line 7: new_command false; cur_state f_state */
-    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_7:
+    case PRMTV_LINE_APRCH_PSTN_FINGERS_7:
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     /* primitive/approach_position_fingers.rcs line 8: no other line matches */
-    case PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_8:
+    case PRMTV_LINE_APRCH_PSTN_FINGERS_8:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -646,59 +644,59 @@ static int32_t primitive_run_approach_position_fingers(primitive_t *s)
 }
 
 /* Matches table departure_position_fingers and runs the line; returns the fault, 0 for none. */
-static int32_t primitive_run_departure_position_fingers(primitive_t *s)
+static int32_t primitive_run_dprt_pstn_fngrs(primitive_t *s)
 {
     if (!primitive_holds_departure_position_fingers_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
                 (1u << (uint32_t)PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP);
     }
-    s->line = primitive_departure_position_fingers_line(s);
+    s->line = primitive_dprt_pstn_fngrs_line(s);
     switch (s->line) {
     /* primitive/departure_position_fingers.rcs line 1: new_command true; fingers.known true */
-    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_1:
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
+    case PRMTV_LINE_DPRTR_PSTN_FINGERS_1:
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_FINGERING);
         primitive_do_position(s, s->fingers.departure_mm + 0.0);
         primitive_do_executing(s);
         break;
     /* primitive/departure_position_fingers.rcs line 2: new_command true; fingers.known false */
-    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_2:
+    case PRMTV_LINE_DPRTR_PSTN_FINGERS_2:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     /* primitive/departure_position_fingers.rcs line 3: new_command false; cur_state fingering;
        gripper.status executing */
-    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_3:
+    case PRMTV_LINE_DPRTR_PSTN_FINGERS_3:
         primitive_do_executing(s);
         break;
     /* primitive/departure_position_fingers.rcs line 4: new_command false; cur_state fingering;
        gripper.status done */
-    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_4:
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
+    case PRMTV_LINE_DPRTR_PSTN_FINGERS_4:
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_D_STATE);
         primitive_do_done(s);
         break;
     /* primitive/departure_position_fingers.rcs line 5: new_command false; cur_state fingering;
        gripper.status failed */
-    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_5:
+    case PRMTV_LINE_DPRTR_PSTN_FINGERS_5:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     /* primitive/departure_position_fingers.rcs line 6: new_command false; cur_state d_state */
-    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_6:
+    case PRMTV_LINE_DPRTR_PSTN_FINGERS_6:
         primitive_do_done(s);
         break;
     /* primitive/departure_position_fingers.rcs line 7: new_command false; cur_state f_state */
-    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_7:
+    case PRMTV_LINE_DPRTR_PSTN_FINGERS_7:
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     /* primitive/departure_position_fingers.rcs line 8: no other line matches */
-    case PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_8:
+    case PRMTV_LINE_DPRTR_PSTN_FINGERS_8:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -720,13 +718,13 @@ static int32_t primitive_run_goto_(primitive_t *s)
     switch (s->line) {
     case PRIMITIVE_LINE_GOTO_1: /* primitive/goto.rcs line 1: new_command true; goal.known true */
         primitive_do_start(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_MOVING);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_MOVING);
         primitive_do_follow(s);
         primitive_do_executing(s);
         break;
     case PRIMITIVE_LINE_GOTO_2: /* primitive/goto.rcs line 2: new_command true; goal.known false */
         primitive_do_no_pose(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -746,7 +744,7 @@ static int32_t primitive_run_goto_(primitive_t *s)
        waited most_waited */
     case PRIMITIVE_LINE_GOTO_5:
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -754,7 +752,7 @@ static int32_t primitive_run_goto_(primitive_t *s)
        settled true */
     case PRIMITIVE_LINE_GOTO_6:
         primitive_do_stop(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_D_STATE);
         primitive_do_done(s);
         break;
     /* primitive/goto.rcs line 6a: new_command false; cur_state moving; robot.status done; there true;
@@ -768,14 +766,14 @@ static int32_t primitive_run_goto_(primitive_t *s)
        settled false; waited most_waited */
     case PRIMITIVE_LINE_GOTO_6B:
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     /* primitive/goto.rcs line 7: new_command false; cur_state moving; robot.status failed */
     case PRIMITIVE_LINE_GOTO_7:
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -788,7 +786,7 @@ static int32_t primitive_run_goto_(primitive_t *s)
         break;
     case PRIMITIVE_LINE_GOTO_10: /* primitive/goto.rcs line 10: no other line matches */
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -810,13 +808,13 @@ static int32_t primitive_run_gothru(primitive_t *s)
     switch (s->line) {
     case PRIMITIVE_LINE_GOTHRU_1: /* primitive/gothru.rcs line 1: new_command true; goal.known true */
         primitive_do_start(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_MOVING);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_MOVING);
         primitive_do_follow(s);
         primitive_do_executing(s);
         break;
     case PRIMITIVE_LINE_GOTHRU_2: /* primitive/gothru.rcs line 2: new_command true; goal.known false */
         primitive_do_no_pose(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -828,7 +826,7 @@ static int32_t primitive_run_gothru(primitive_t *s)
     /* primitive/gothru.rcs line 4: new_command false; cur_state moving; robot.status /= failed; near true */
     case PRIMITIVE_LINE_GOTHRU_4:
         primitive_do_advance_thru(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_D_STATE);
         primitive_do_done(s);
         break;
     /* primitive/gothru.rcs line 5: new_command false; cur_state d_state; robot.status /= failed */
@@ -839,7 +837,7 @@ static int32_t primitive_run_gothru(primitive_t *s)
     /* primitive/gothru.rcs line 6: new_command false; cur_state in {moving, d_state}; robot.status failed */
     case PRIMITIVE_LINE_GOTHRU_6:
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -849,7 +847,7 @@ static int32_t primitive_run_gothru(primitive_t *s)
         break;
     case PRIMITIVE_LINE_GOTHRU_8: /* primitive/gothru.rcs line 8: no other line matches */
         primitive_do_robot_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -872,14 +870,14 @@ static int32_t primitive_run_immed_grasp(primitive_t *s)
     switch (s->line) {
     /* primitive/immed_grasp.rcs line 1: new_command true; fingers.known true */
     case PRIMITIVE_LINE_IMMED_GRASP_1:
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_FINGERING);
         primitive_do_grasp(s);
         primitive_do_executing(s);
         break;
     /* primitive/immed_grasp.rcs line 2: new_command true; fingers.known false */
     case PRIMITIVE_LINE_IMMED_GRASP_2:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -890,21 +888,21 @@ static int32_t primitive_run_immed_grasp(primitive_t *s)
     /* primitive/immed_grasp.rcs line 4: new_command false; cur_state fingering; gripper.status done; fits
        true */
     case PRIMITIVE_LINE_IMMED_GRASP_4:
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_D_STATE);
         primitive_do_done(s);
         break;
     /* primitive/immed_grasp.rcs line 5: new_command false; cur_state fingering; gripper.status done; fits
        false */
     case PRIMITIVE_LINE_IMMED_GRASP_5:
         primitive_do_misfit_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
     /* primitive/immed_grasp.rcs line 6: new_command false; cur_state fingering; gripper.status failed */
     case PRIMITIVE_LINE_IMMED_GRASP_6:
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -919,7 +917,7 @@ static int32_t primitive_run_immed_grasp(primitive_t *s)
         break;
     case PRIMITIVE_LINE_IMMED_GRASP_9: /* primitive/immed_grasp.rcs line 9: no other line matches */
         primitive_do_grip_failure(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_F_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_F_STATE);
         primitive_do_pause(s);
         primitive_do_failed(s);
         break;
@@ -936,14 +934,14 @@ static int32_t primitive_run_pause_primitive(primitive_t *s)
 {
     s->line = primitive_pause_primitive_line(s);
     switch (s->line) {
-    case PRIMITIVE_LINE_PAUSE_PRIMITIVE_1: /* primitive/pause.rcs line 1: idle true */
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
+    case PRMTV_LINE_PAUSE_PRIMITIVE_1: /* primitive/pause.rcs line 1: idle true */
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_D_STATE);
         primitive_do_pause(s);
         primitive_do_done(s);
         break;
-    case PRIMITIVE_LINE_PAUSE_PRIMITIVE_2: /* primitive/pause.rcs line 2: idle false */
+    case PRMTV_LINE_PAUSE_PRIMITIVE_2: /* primitive/pause.rcs line 2: idle false */
         primitive_do_settle(s);
-        primitive_do_nextstate(s, PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE);
+        primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_D_STATE);
         primitive_do_pause(s);
         primitive_do_executing(s);
         break;
@@ -1054,8 +1052,8 @@ void primitive_init(primitive_t *s)
     s->fingers.force_n = 0.0;
     s->fingers.speed_mm_s = 0.0;
     s->idle = true;
-    s->cur_state = PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE;
-    s->cur_state_next = PRIMITIVE_COMMON_PRIMITIVE_STATE_D_STATE;
+    s->cur_state = PRMTV_CMN_PRMTV_STATE_D_STATE;
+    s->cur_state_next = PRMTV_CMN_PRMTV_STATE_D_STATE;
     s->from[0] = (-4000.0);
     s->from[1] = (-4000.0);
     s->from[2] = (-4000.0);
@@ -1169,9 +1167,9 @@ int32_t primitive_check(const primitive_t *s)
         at = PRIMITIVE_LEAF_FINGERS_KNOWN;
     } else if ((*(const uint8_t *)&s->idle) > 1u) {
         at = PRIMITIVE_LEAF_IDLE;
-    } else if (s->cur_state > PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING) {
+    } else if (s->cur_state > PRMTV_CMN_PRMTV_STATE_FINGERING) {
         at = PRIMITIVE_LEAF_CUR_STATE;
-    } else if (s->cur_state_next > PRIMITIVE_COMMON_PRIMITIVE_STATE_FINGERING) {
+    } else if (s->cur_state_next > PRMTV_CMN_PRMTV_STATE_FINGERING) {
         at = PRIMITIVE_LEAF_CUR_STATE_NEXT;
     } else if (!((s->from[0] >= (-4000.0)) && (s->from[0] <= 4000.0))) {
         at = PRIMITIVE_LEAF_FROM_0;
@@ -1244,7 +1242,7 @@ int32_t primitive_check(const primitive_t *s)
 
 /* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2
    several. */
-int32_t primitive_approach_position_fingers_line(const primitive_t *s)
+int32_t primitive_aprc_pstn_fngrs_line(const primitive_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
@@ -1285,17 +1283,17 @@ int32_t primitive_approach_position_fingers_line(const primitive_t *s)
 }
 
 /* The same for n inputs at once, table approach_position_fingers. */
-void primitive_approach_position_fingers_lines(const primitive_t *in, int32_t *out, uint32_t n)
+void primitive_aprc_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
     for (i = 0u; i < n; i = i + 1u) {
-        out[i] = primitive_approach_position_fingers_line(&in[i]);
+        out[i] = primitive_aprc_pstn_fngrs_line(&in[i]);
     }
 }
 
 /* The line of table departure_position_fingers that matches admitted inputs: its position; -1 none, -2
    several. */
-int32_t primitive_departure_position_fingers_line(const primitive_t *s)
+int32_t primitive_dprt_pstn_fngrs_line(const primitive_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
@@ -1336,11 +1334,11 @@ int32_t primitive_departure_position_fingers_line(const primitive_t *s)
 }
 
 /* The same for n inputs at once, table departure_position_fingers. */
-void primitive_departure_position_fingers_lines(const primitive_t *in, int32_t *out, uint32_t n)
+void primitive_dprt_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
     for (i = 0u; i < n; i = i + 1u) {
-        out[i] = primitive_departure_position_fingers_line(&in[i]);
+        out[i] = primitive_dprt_pstn_fngrs_line(&in[i]);
     }
 }
 
@@ -1570,18 +1568,18 @@ void primitive_pause_primitive_lines(const primitive_t *in, int32_t *out, uint32
 
 /* One step of table approach_position_fingers: admits, settles, matches, acts; returns the fault, 0 for
    none. */
-int32_t primitive_approach_position_fingers_step(primitive_t *s)
+int32_t primitive_aprc_pstn_fngrs_step(primitive_t *s)
 {
     primitive_admit(s);
-    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_approach_position_fingers(s) : s->fault;
+    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_aprc_pstn_fngrs(s) : s->fault;
 }
 
 /* One step of table departure_position_fingers: admits, settles, matches, acts; returns the fault, 0 for
    none. */
-int32_t primitive_departure_position_fingers_step(primitive_t *s)
+int32_t primitive_dprt_pstn_fngrs_step(primitive_t *s)
 {
     primitive_admit(s);
-    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_departure_position_fingers(s) : s->fault;
+    return (s->fault == PRIMITIVE_FAULT_NONE) ? primitive_run_dprt_pstn_fngrs(s) : s->fault;
 }
 
 /* One step of table goto: admits, settles, matches, acts; returns the fault, 0 for none. */
@@ -1623,14 +1621,14 @@ int32_t primitive_primitive_cycle(primitive_t *s)
         const uint8_t chosen = s->emove.input_command;
         if (chosen == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) {
             (void)primitive_run_pause_primitive(s);
-        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_GOTO) {
+        } else if (chosen == VCBLRY_PRIMITIVE_COMMAND_GOTO) {
             (void)primitive_run_goto_(s);
-        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_GOTHRU) {
+        } else if (chosen == VCBLRY_PRIMITIVE_COMMAND_GOTHRU) {
             (void)primitive_run_gothru(s);
         } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS) {
-            (void)primitive_run_approach_position_fingers(s);
+            (void)primitive_run_aprc_pstn_fngrs(s);
         } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS) {
-            (void)primitive_run_departure_position_fingers(s);
+            (void)primitive_run_dprt_pstn_fngrs(s);
         } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
             (void)primitive_run_immed_grasp(s);
         } else {

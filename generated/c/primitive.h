@@ -14,26 +14,26 @@ extern "C" {
 
 /* `line`, where table approach_position_fingers ran; -1 for none. */
 enum {
-    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_1 = 0,
-    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_2 = 1,
-    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_3 = 2,
-    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_4 = 3,
-    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_5 = 4,
-    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_6 = 5,
-    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_7 = 6,
-    PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_8 = 7
+    PRMTV_LINE_APRCH_PSTN_FINGERS_1 = 0,
+    PRMTV_LINE_APRCH_PSTN_FINGERS_2 = 1,
+    PRMTV_LINE_APRCH_PSTN_FINGERS_3 = 2,
+    PRMTV_LINE_APRCH_PSTN_FINGERS_4 = 3,
+    PRMTV_LINE_APRCH_PSTN_FINGERS_5 = 4,
+    PRMTV_LINE_APRCH_PSTN_FINGERS_6 = 5,
+    PRMTV_LINE_APRCH_PSTN_FINGERS_7 = 6,
+    PRMTV_LINE_APRCH_PSTN_FINGERS_8 = 7
 };
 
 /* `line`, where table departure_position_fingers ran; -1 for none. */
 enum {
-    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_1 = 0,
-    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_2 = 1,
-    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_3 = 2,
-    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_4 = 3,
-    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_5 = 4,
-    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_6 = 5,
-    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_7 = 6,
-    PRIMITIVE_LINE_DEPARTURE_POSITION_FINGERS_8 = 7
+    PRMTV_LINE_DPRTR_PSTN_FINGERS_1 = 0,
+    PRMTV_LINE_DPRTR_PSTN_FINGERS_2 = 1,
+    PRMTV_LINE_DPRTR_PSTN_FINGERS_3 = 2,
+    PRMTV_LINE_DPRTR_PSTN_FINGERS_4 = 3,
+    PRMTV_LINE_DPRTR_PSTN_FINGERS_5 = 4,
+    PRMTV_LINE_DPRTR_PSTN_FINGERS_6 = 5,
+    PRMTV_LINE_DPRTR_PSTN_FINGERS_7 = 6,
+    PRMTV_LINE_DPRTR_PSTN_FINGERS_8 = 7
 };
 
 /* `line`, where table goto ran; -1 for none. */
@@ -79,8 +79,8 @@ enum {
 
 /* `line`, where table pause_primitive ran; -1 for none. */
 enum {
-    PRIMITIVE_LINE_PAUSE_PRIMITIVE_1 = 0,
-    PRIMITIVE_LINE_PAUSE_PRIMITIVE_2 = 1
+    PRMTV_LINE_PAUSE_PRIMITIVE_1 = 0,
+    PRMTV_LINE_PAUSE_PRIMITIVE_2 = 1
 };
 
 /* Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed. */
@@ -101,11 +101,11 @@ enum {
     PRIMITIVE_LEAF_EMOVE_OBJ_PTR = 2,
     PRIMITIVE_LEAF_EMOVE_GRASP = 3,
     PRIMITIVE_LEAF_EMOVE_POSE_PTR = 4,
-    PRIMITIVE_LEAF_EMOVE_DISPLACED_X = 5,
-    PRIMITIVE_LEAF_EMOVE_DISPLACED_Y = 6,
-    PRIMITIVE_LEAF_EMOVE_DISPLACED_Z = 7,
-    PRIMITIVE_LEAF_EMOVE_DISPLACED_C = 8,
-    PRIMITIVE_LEAF_EMOVE_DISPLACED_S = 9,
+    PRMTV_LEAF_EMOVE_DISPLACED_X = 5,
+    PRMTV_LEAF_EMOVE_DISPLACED_Y = 6,
+    PRMTV_LEAF_EMOVE_DISPLACED_Z = 7,
+    PRMTV_LEAF_EMOVE_DISPLACED_C = 8,
+    PRMTV_LEAF_EMOVE_DISPLACED_S = 9,
     PRIMITIVE_LEAF_TO_EMOVE_INC_COMMAND_ECHO = 10,
     PRIMITIVE_LEAF_TO_EMOVE_REF_COMMAND_ECHO = 11,
     PRIMITIVE_LEAF_TO_EMOVE_STATUS_REPORT = 12,
@@ -119,15 +119,15 @@ enum {
     PRIMITIVE_LEAF_FROM_ROBOT_REF_COMMAND_ECHO = 20,
     PRIMITIVE_LEAF_FROM_ROBOT_STATUS_REPORT = 21,
     PRIMITIVE_LEAF_FROM_ROBOT_FAILURE = 22,
-    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_0 = 23,
-    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_1 = 24,
-    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_2 = 25,
-    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_3 = 26,
-    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_4 = 27,
-    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_5 = 28,
-    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_6 = 29,
-    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_7 = 30,
-    PRIMITIVE_LEAF_FROM_ROBOT_PLATE_8 = 31,
+    PRMTV_LEAF_FROM_ROBOT_PLATE_0 = 23,
+    PRMTV_LEAF_FROM_ROBOT_PLATE_1 = 24,
+    PRMTV_LEAF_FROM_ROBOT_PLATE_2 = 25,
+    PRMTV_LEAF_FROM_ROBOT_PLATE_3 = 26,
+    PRMTV_LEAF_FROM_ROBOT_PLATE_4 = 27,
+    PRMTV_LEAF_FROM_ROBOT_PLATE_5 = 28,
+    PRMTV_LEAF_FROM_ROBOT_PLATE_6 = 29,
+    PRMTV_LEAF_FROM_ROBOT_PLATE_7 = 30,
+    PRMTV_LEAF_FROM_ROBOT_PLATE_8 = 31,
     PRIMITIVE_LEAF_TO_ROBOT_INC_COMMAND = 32,
     PRIMITIVE_LEAF_TO_ROBOT_INPUT_COMMAND = 33,
     PRIMITIVE_LEAF_TO_ROBOT_PLATE_0 = 34,
@@ -319,17 +319,17 @@ int32_t primitive_check(const primitive_t *s);
 
 /* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2
    several. */
-int32_t primitive_approach_position_fingers_line(const primitive_t *s);
+int32_t primitive_aprc_pstn_fngrs_line(const primitive_t *s);
 
 /* The same for n inputs at once, table approach_position_fingers. */
-void primitive_approach_position_fingers_lines(const primitive_t *in, int32_t *out, uint32_t n);
+void primitive_aprc_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32_t n);
 
 /* The line of table departure_position_fingers that matches admitted inputs: its position; -1 none, -2
    several. */
-int32_t primitive_departure_position_fingers_line(const primitive_t *s);
+int32_t primitive_dprt_pstn_fngrs_line(const primitive_t *s);
 
 /* The same for n inputs at once, table departure_position_fingers. */
-void primitive_departure_position_fingers_lines(const primitive_t *in, int32_t *out, uint32_t n);
+void primitive_dprt_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32_t n);
 
 /* The line of table goto that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_goto__line(const primitive_t *s);
@@ -357,11 +357,11 @@ void primitive_pause_primitive_lines(const primitive_t *in, int32_t *out, uint32
 
 /* One step of table approach_position_fingers: admits, settles, matches, acts; returns the fault, 0 for
    none. */
-int32_t primitive_approach_position_fingers_step(primitive_t *s);
+int32_t primitive_aprc_pstn_fngrs_step(primitive_t *s);
 
 /* One step of table departure_position_fingers: admits, settles, matches, acts; returns the fault, 0 for
    none. */
-int32_t primitive_departure_position_fingers_step(primitive_t *s);
+int32_t primitive_dprt_pstn_fngrs_step(primitive_t *s);
 
 /* One step of table goto: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t primitive_goto__step(primitive_t *s);

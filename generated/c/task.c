@@ -128,7 +128,7 @@ static void task_do_locate(task_t *s)
 /* Procedure move_to. */
 static void task_do_move_to(task_t *s)
 {
-    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_MOVE_TO;
+    s->to_emove.input_command = VCBLRY_EMOVE_CMND_MOVE_TO;
 }
 
 /* Procedure move_to_obj. */
@@ -136,7 +136,7 @@ static void task_do_move_to_obj(task_t *s)
 {
     s->to_emove.obj_ptr = s->workstation.obj;
     s->to_emove.grasp = s->workstation.grasp;
-    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ;
+    s->to_emove.input_command = VCBLRY_EMOVE_CMND_MOVE_TO_OBJ;
 }
 
 /* Nothing is in the gripper. */
@@ -340,7 +340,7 @@ static void task_do_set_end(task_t *s)
     if (s->workstation.end_at_locpt != 0u) {
         s->to_emove.locpt_ptr = s->workstation.end_at_locpt;
     } else {
-        if (s->last_emove.input_command != VOCABULARY_EMOVE_COMMAND_MOVE_TO) {
+        if (s->last_emove.input_command != VCBLRY_EMOVE_CMND_MOVE_TO) {
             s->to_emove.locpt_ptr = s->here.safe;
         }
     }
@@ -490,11 +490,11 @@ static bool task_holds_acquire_in_step(const task_t *s)
                 (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_2) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_3) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_LOCATE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_4) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_5) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP));
 }
@@ -516,7 +516,7 @@ static bool task_holds_clear_in_step(const task_t *s)
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_STATE_6) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_STATE_8)) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_7) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE));
 }
@@ -537,16 +537,16 @@ static bool task_holds_move_in_step(const task_t *s)
                 (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_2) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_3) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_LOCATE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_4) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_5) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_6) &&
-                ((s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO) ||
-                    (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ)));
+                ((s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO) ||
+                    (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ)));
 }
 
 /* Assumption move_resting: What rests says so. */
@@ -567,7 +567,7 @@ static bool task_holds_release_part_in_step(const task_t *s)
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_7) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_8) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO));
+                (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO));
 }
 
 /* Assumption release_part_resting: What rests says so. */
@@ -588,11 +588,11 @@ static bool task_holds_transfer_in_step(const task_t *s)
             (((s->cur_state == TASK_COMMON_TASK_STATE_STATE_2) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_STATE_6) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_STATE_8)) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_3) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_LOCATE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_4) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_5) &&
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_7) &&
@@ -1427,9 +1427,9 @@ int32_t task_check(const task_t *s)
     } else if (s->to_workstation.ref_command_echo > VOCABULARY_TASK_COMMAND_CLEAR) {
         at = TASK_LEAF_TO_WORKSTATION_REF_COMMAND_ECHO;
     } else if (s->to_workstation.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
-        at = TASK_LEAF_TO_WORKSTATION_STATUS_REPORT;
+        at = TASK_LEAF_TO_WRKS_STS_REPORT;
     } else if (s->to_workstation.status_parameter > VOCABULARY_OBJECT_OPEN_GRIP) {
-        at = TASK_LEAF_TO_WORKSTATION_STATUS_PARAMETER;
+        at = TASK_LEAF_TO_WRKS_STS_PARAMETER;
     } else if (s->to_workstation.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = TASK_LEAF_TO_WORKSTATION_FAILURE;
     } else if (s->to_workstation.cause > VOCABULARY_REASON_NO_PICTURE) {

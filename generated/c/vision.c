@@ -209,11 +209,11 @@ static void vision_admit(vision_t *s)
         } else if (!((s->emove.expected_range_mm >= 0.0) && (s->emove.expected_range_mm <= 2000.0))) {
             at = VISION_LEAF_EMOVE_EXPECTED_RANGE_MM;
         } else if (!((s->emove.expected_normal.x >= (-1.0)) && (s->emove.expected_normal.x <= 1.0))) {
-            at = VISION_LEAF_EMOVE_EXPECTED_NORMAL_X;
+            at = VSN_LEAF_EMOVE_EXPCTD_NORMAL_X;
         } else if (!((s->emove.expected_normal.y >= (-1.0)) && (s->emove.expected_normal.y <= 1.0))) {
-            at = VISION_LEAF_EMOVE_EXPECTED_NORMAL_Y;
+            at = VSN_LEAF_EMOVE_EXPCTD_NORMAL_Y;
         } else if (!((s->emove.expected_normal.z >= (-1.0)) && (s->emove.expected_normal.z <= 1.0))) {
-            at = VISION_LEAF_EMOVE_EXPECTED_NORMAL_Z;
+            at = VSN_LEAF_EMOVE_EXPCTD_NORMAL_Z;
         } else if (!((s->camera.x_mm >= (-500.0)) && (s->camera.x_mm <= 500.0))) {
             at = VISION_LEAF_CAMERA_X_MM;
         } else if (!((s->camera.y_mm >= (-500.0)) && (s->camera.y_mm <= 500.0))) {

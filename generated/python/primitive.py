@@ -474,49 +474,49 @@ def _lines_of(masks, lines, default):
     return tuple(_line_of(m, lines, default) for m in masks)
 
 
-_APPROACH_POSITION_FINGERS_0 = (
+_APRC_PSTN_FNGRS_0 = (
     0x23,
     0x43,
     0x3,
     0x1f,
 )
-_APPROACH_POSITION_FINGERS_1 = (
+_APRC_PSTN_FNGRS_1 = (
     0x7c,
     0x3,
 )
-_APPROACH_POSITION_FINGERS_2 = (
+_APRC_PSTN_FNGRS_2 = (
     0x7e,
     0x7d,
 )
-_APPROACH_POSITION_FINGERS_3 = (
+_APRC_PSTN_FNGRS_3 = (
     0x6b,
     0x67,
     0x73,
 )
-_APPROACH_POSITION_FINGERS_LINE = (
-    *_lines_of(_joined(_APPROACH_POSITION_FINGERS_0, _APPROACH_POSITION_FINGERS_3, _APPROACH_POSITION_FINGERS_1, _APPROACH_POSITION_FINGERS_2), 7, True),
+_APRC_PSTN_FNGRS_LINE = (
+    *_lines_of(_joined(_APRC_PSTN_FNGRS_0, _APRC_PSTN_FNGRS_3, _APRC_PSTN_FNGRS_1, _APRC_PSTN_FNGRS_2), 7, True),
 )
-_DEPARTURE_POSITION_FINGERS_0 = (
+_DPRT_PSTN_FNGRS_0 = (
     0x23,
     0x43,
     0x3,
     0x1f,
 )
-_DEPARTURE_POSITION_FINGERS_1 = (
+_DPRT_PSTN_FNGRS_1 = (
     0x7c,
     0x3,
 )
-_DEPARTURE_POSITION_FINGERS_2 = (
+_DPRT_PSTN_FNGRS_2 = (
     0x7e,
     0x7d,
 )
-_DEPARTURE_POSITION_FINGERS_3 = (
+_DPRT_PSTN_FNGRS_3 = (
     0x6b,
     0x67,
     0x73,
 )
-_DEPARTURE_POSITION_FINGERS_LINE = (
-    *_lines_of(_joined(_DEPARTURE_POSITION_FINGERS_0, _DEPARTURE_POSITION_FINGERS_3, _DEPARTURE_POSITION_FINGERS_1, _DEPARTURE_POSITION_FINGERS_2), 7, True),
+_DPRT_PSTN_FNGRS_LINE = (
+    *_lines_of(_joined(_DPRT_PSTN_FNGRS_0, _DPRT_PSTN_FNGRS_3, _DPRT_PSTN_FNGRS_1, _DPRT_PSTN_FNGRS_2), 7, True),
 )
 _GOTO__0 = (
     0x76f,
@@ -1489,36 +1489,36 @@ def _settle(s):
         s.cur_state = s.cur_state_next
 
 
-def approach_position_fingers_line(s):
+def aprc_pstn_fngrs_line(s):
     """The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2 several."""
-    return _APPROACH_POSITION_FINGERS_LINE[s.cur_state * 12 + s.gripper_status * 4 + s.new_command * 2 + s.fingers_known]
+    return _APRC_PSTN_FNGRS_LINE[s.cur_state * 12 + s.gripper_status * 4 + s.new_command * 2 + s.fingers_known]
 
 
-def approach_position_fingers_lines(states):
+def aprc_pstn_fngrs_lines(states):
     """The same for many inputs, table approach_position_fingers."""
-    return [approach_position_fingers_line(s) for s in states]
+    return [aprc_pstn_fngrs_line(s) for s in states]
 
 
-def _run_approach_position_fingers(s):
+def _run_aprc_pstn_fngrs(s):
     """Matches table approach_position_fingers and runs the line."""
     if not (not (not s.new_command) or (s.cur_state in (0, 1, 3,))):  # approach_position_fingers_in_step
         s.assumptions_failed |= 1 << 0
-    line = approach_position_fingers_line(s)
+    line = aprc_pstn_fngrs_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
         return
     s.line = line
-    _APPROACH_POSITION_FINGERS_ACTIONS[line](s)
+    _APRC_PSTN_FNGRS_ACTIONS[line](s)
 
 
-def _approach_position_fingers_0(s):
+def _aprc_pstn_fngrs_0(s):
     """primitive/approach_position_fingers.rcs line 1"""
     _do_nextstate(s, 3)
     _do_position(s, s.fingers_approach_mm + 0.0)
     _do_executing(s)
 
 
-def _approach_position_fingers_1(s):
+def _aprc_pstn_fngrs_1(s):
     """primitive/approach_position_fingers.rcs line 2"""
     _do_grip_failure(s)
     _do_nextstate(s, 1)
@@ -1526,18 +1526,18 @@ def _approach_position_fingers_1(s):
     _do_failed(s)
 
 
-def _approach_position_fingers_2(s):
+def _aprc_pstn_fngrs_2(s):
     """primitive/approach_position_fingers.rcs line 3"""
     _do_executing(s)
 
 
-def _approach_position_fingers_3(s):
+def _aprc_pstn_fngrs_3(s):
     """primitive/approach_position_fingers.rcs line 4"""
     _do_nextstate(s, 0)
     _do_done(s)
 
 
-def _approach_position_fingers_4(s):
+def _aprc_pstn_fngrs_4(s):
     """primitive/approach_position_fingers.rcs line 5"""
     _do_grip_failure(s)
     _do_nextstate(s, 1)
@@ -1545,18 +1545,18 @@ def _approach_position_fingers_4(s):
     _do_failed(s)
 
 
-def _approach_position_fingers_5(s):
+def _aprc_pstn_fngrs_5(s):
     """primitive/approach_position_fingers.rcs line 6"""
     _do_done(s)
 
 
-def _approach_position_fingers_6(s):
+def _aprc_pstn_fngrs_6(s):
     """primitive/approach_position_fingers.rcs line 7"""
     _do_pause(s)
     _do_failed(s)
 
 
-def _approach_position_fingers_7(s):
+def _aprc_pstn_fngrs_7(s):
     """primitive/approach_position_fingers.rcs line 8"""
     _do_grip_failure(s)
     _do_nextstate(s, 1)
@@ -1564,48 +1564,48 @@ def _approach_position_fingers_7(s):
     _do_failed(s)
 
 
-def approach_position_fingers_step(s):
+def aprc_pstn_fngrs_step(s):
     """One step of table approach_position_fingers: admits, settles, matches, acts; the fault, 0 for none."""
     s.fault = _admit(s)
     if s.fault == 0:
         try:
             _settle(s)
-            _run_approach_position_fingers(s)
+            _run_aprc_pstn_fngrs(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
     return s.fault
 
 
-def departure_position_fingers_line(s):
+def dprt_pstn_fngrs_line(s):
     """The line of table departure_position_fingers that matches admitted inputs: its position; -1 none, -2 several."""
-    return _DEPARTURE_POSITION_FINGERS_LINE[s.cur_state * 12 + s.gripper_status * 4 + s.new_command * 2 + s.fingers_known]
+    return _DPRT_PSTN_FNGRS_LINE[s.cur_state * 12 + s.gripper_status * 4 + s.new_command * 2 + s.fingers_known]
 
 
-def departure_position_fingers_lines(states):
+def dprt_pstn_fngrs_lines(states):
     """The same for many inputs, table departure_position_fingers."""
-    return [departure_position_fingers_line(s) for s in states]
+    return [dprt_pstn_fngrs_line(s) for s in states]
 
 
-def _run_departure_position_fingers(s):
+def _run_dprt_pstn_fngrs(s):
     """Matches table departure_position_fingers and runs the line."""
     if not (not (not s.new_command) or (s.cur_state in (0, 1, 3,))):  # departure_position_fingers_in_step
         s.assumptions_failed |= 1 << 1
-    line = departure_position_fingers_line(s)
+    line = dprt_pstn_fngrs_line(s)
     if line < 0:
         s.fault = 2 if line == -1 else 3
         return
     s.line = line
-    _DEPARTURE_POSITION_FINGERS_ACTIONS[line](s)
+    _DPRT_PSTN_FNGRS_ACTIONS[line](s)
 
 
-def _departure_position_fingers_0(s):
+def _dprt_pstn_fngrs_0(s):
     """primitive/departure_position_fingers.rcs line 1"""
     _do_nextstate(s, 3)
     _do_position(s, s.fingers_departure_mm + 0.0)
     _do_executing(s)
 
 
-def _departure_position_fingers_1(s):
+def _dprt_pstn_fngrs_1(s):
     """primitive/departure_position_fingers.rcs line 2"""
     _do_grip_failure(s)
     _do_nextstate(s, 1)
@@ -1613,18 +1613,18 @@ def _departure_position_fingers_1(s):
     _do_failed(s)
 
 
-def _departure_position_fingers_2(s):
+def _dprt_pstn_fngrs_2(s):
     """primitive/departure_position_fingers.rcs line 3"""
     _do_executing(s)
 
 
-def _departure_position_fingers_3(s):
+def _dprt_pstn_fngrs_3(s):
     """primitive/departure_position_fingers.rcs line 4"""
     _do_nextstate(s, 0)
     _do_done(s)
 
 
-def _departure_position_fingers_4(s):
+def _dprt_pstn_fngrs_4(s):
     """primitive/departure_position_fingers.rcs line 5"""
     _do_grip_failure(s)
     _do_nextstate(s, 1)
@@ -1632,18 +1632,18 @@ def _departure_position_fingers_4(s):
     _do_failed(s)
 
 
-def _departure_position_fingers_5(s):
+def _dprt_pstn_fngrs_5(s):
     """primitive/departure_position_fingers.rcs line 6"""
     _do_done(s)
 
 
-def _departure_position_fingers_6(s):
+def _dprt_pstn_fngrs_6(s):
     """primitive/departure_position_fingers.rcs line 7"""
     _do_pause(s)
     _do_failed(s)
 
 
-def _departure_position_fingers_7(s):
+def _dprt_pstn_fngrs_7(s):
     """primitive/departure_position_fingers.rcs line 8"""
     _do_grip_failure(s)
     _do_nextstate(s, 1)
@@ -1651,13 +1651,13 @@ def _departure_position_fingers_7(s):
     _do_failed(s)
 
 
-def departure_position_fingers_step(s):
+def dprt_pstn_fngrs_step(s):
     """One step of table departure_position_fingers: admits, settles, matches, acts; the fault, 0 for none."""
     s.fault = _admit(s)
     if s.fault == 0:
         try:
             _settle(s)
-            _run_departure_position_fingers(s)
+            _run_dprt_pstn_fngrs(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
     return s.fault
@@ -2028,7 +2028,7 @@ def primitive_cycle(s):
             _do_take_orders(s)
             _do_start_waiting(s)
             _do_measure(s)
-            {0: _run_pause_primitive, 1: _run_goto_, 2: _run_gothru, 3: _run_approach_position_fingers, 4: _run_departure_position_fingers, 5: _run_immed_grasp}[s.emove_input_command](s)
+            {0: _run_pause_primitive, 1: _run_goto_, 2: _run_gothru, 3: _run_aprc_pstn_fngrs, 4: _run_dprt_pstn_fngrs, 5: _run_immed_grasp}[s.emove_input_command](s)
             if s.fault == 0:
                 _do_hold_part(s)
                 _do_give_orders(s)
@@ -2037,17 +2037,17 @@ def primitive_cycle(s):
     return s.fault
 
 
-_APPROACH_POSITION_FINGERS_ACTIONS = (
-    _approach_position_fingers_0,
-    _approach_position_fingers_1,
-    _approach_position_fingers_2,
-    _approach_position_fingers_3,
-    _approach_position_fingers_4,
-    _approach_position_fingers_5,
-    _approach_position_fingers_6,
-    _approach_position_fingers_7,
+_APRC_PSTN_FNGRS_ACTIONS = (
+    _aprc_pstn_fngrs_0,
+    _aprc_pstn_fngrs_1,
+    _aprc_pstn_fngrs_2,
+    _aprc_pstn_fngrs_3,
+    _aprc_pstn_fngrs_4,
+    _aprc_pstn_fngrs_5,
+    _aprc_pstn_fngrs_6,
+    _aprc_pstn_fngrs_7,
 )
-APPROACH_POSITION_FINGERS_LINES = (
+APRC_PSTN_FNGRS_LINES = (
     "1",
     "2",
     "3",
@@ -2058,17 +2058,17 @@ APPROACH_POSITION_FINGERS_LINES = (
     "8",
 )
 
-_DEPARTURE_POSITION_FINGERS_ACTIONS = (
-    _departure_position_fingers_0,
-    _departure_position_fingers_1,
-    _departure_position_fingers_2,
-    _departure_position_fingers_3,
-    _departure_position_fingers_4,
-    _departure_position_fingers_5,
-    _departure_position_fingers_6,
-    _departure_position_fingers_7,
+_DPRT_PSTN_FNGRS_ACTIONS = (
+    _dprt_pstn_fngrs_0,
+    _dprt_pstn_fngrs_1,
+    _dprt_pstn_fngrs_2,
+    _dprt_pstn_fngrs_3,
+    _dprt_pstn_fngrs_4,
+    _dprt_pstn_fngrs_5,
+    _dprt_pstn_fngrs_6,
+    _dprt_pstn_fngrs_7,
 )
-DEPARTURE_POSITION_FINGERS_LINES = (
+DPRT_PSTN_FNGRS_LINES = (
     "1",
     "2",
     "3",

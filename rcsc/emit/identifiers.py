@@ -5,15 +5,16 @@ name in front, and texts that go into comments are cleaned here.
 
 Each namespace is a `NameScope`: it begins with what is reserved in it (`rcsc.lang.reserved`) and takes every name given in it, whatever it
 names. A name that is free stays as it was written; the others get what makes them different. A table, level or procedure has one
-*stem* in both languages: it is chosen so that all names made of it are free in both.
+*stem* in both languages: it is chosen so that all names made of it are free in both. In C two names differ within 31 characters.
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from itertools import groupby
 from types import MappingProxyType
 
+from rcsc.emit.scope import NameScope, abbreviated, c_scope, short
 from rcsc.lang import reserved
 from rcsc.lang.interpret import Fault
 from rcsc.lang.meaning import checked
@@ -42,20 +43,10 @@ OWN = ("t", "init", "check", "begin", "admit", "settle", "safe")
 """Ends of the C names that every program may have."""
 FAULTS = ("none", *(fault.name.lower() for fault in Fault if fault is not Fault.OK))
 """How C calls each fault, in order."""
-LONGEST = 100
 MOST_SAID = 400
 FAILED_BITS = 64
 FEW_FAILED_BITS = 32
 """Assumptions up to which C keeps those that failed in a smaller word."""
-
-
-def short(name: str) -> str:
-    """`name`; a long one is cut, with a digest of the whole."""
-    if len(name) <= LONGEST:
-        return name
-    import hashlib
-
-    return f"{name[:LONGEST]}_{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
 def c_word(name: str) -> str:
@@ -89,52 +80,6 @@ def comment(text: str) -> str:
     for mark in ("*/", "/*", "//", "${", "-suppress", "coding:", "coding=", "NOLINT"):
         clean = clean.replace(mark, f"{mark[:-1]} {mark[-1]}")
     return clean.replace('"', "'")
-
-
-@dataclass(slots=True)
-class NameScope:
-    """A namespace: the names in it, reserved ones first."""
-
-    names: set[str] = field(default_factory=set)
-
-    def fresh(self, name: str) -> str:
-        """`name`, or the first of `name_2`, `name_3` that is free; it is then taken."""
-        free = next(variant for variant in _variants(name) if variant not in self.names)
-        self.names.add(free)
-        return free
-
-    def all(self, wanted: Iterable[tuple[str, str]], claims: "Claims | None" = None) -> dict[str, str]:
-        """A spelling for each name, in order.
-
-        Args:
-            wanted: Each name, and the word that is wanted for it. Those that are the name itself are given first.
-            claims: Names that a spelling makes in other scopes, which must be free and are then taken, too.
-        """
-        pairs = list(wanted)
-        given: dict[str, str] = {}
-        for name, word in sorted(pairs, key=lambda pair: pair[0] != pair[1]):
-            given[name] = self._claimed(word, claims)
-        return {name: given[name] for name, _ in pairs}
-
-    def _claimed(self, word: str, claims: "Claims | None") -> str:
-        for variant in _variants(word):
-            claimed = [(self, variant), *(claims(variant) if claims else ())]
-            if all(name not in scope.names for scope, name in claimed):
-                for scope, name in claimed:
-                    scope.names.add(name)
-                return variant
-        raise AssertionError(word)
-
-
-Claims = Callable[[str], Iterable[tuple[NameScope, str]]]
-
-
-def _variants(name: str) -> Iterator[str]:
-    yield name
-    number = 2
-    while True:
-        yield f"{name}_{number}"
-        number += 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +165,7 @@ def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}))
     types = _types(program, units, c)
     constants = _constants(program, units, c)
     stems = _Stems(p, c, module)
-    members = {r.name: NameScope().all((f.name, c_word(f.name)) for f in r.fields) for r in program.records}
+    members = {r.name: c_scope().all((f.name, c_word(f.name)) for f in r.fields) for r in program.records}
     roots, paths = _paths(program, members, failed)
     tables = stems.of(
         (t.name for t in program.tables), ("{p}_{x}_line", "{p}_{x}_lines", "{p}_{x}_step", "{p}_run_{x}"),
@@ -247,8 +192,13 @@ def plain_word(name: str) -> str:
     return short(word if word[0].isalpha() else f"p{word}")
 
 
+LONGEST_PREFIX = 18
+"""Characters of a program's word, or a file's, up to which it stands before other names as it is."""
+
+
 def file_word(word: str) -> str:
     """A word that C names and files may bear: one that no library or tool keeps."""
+    word = abbreviated(word, LONGEST_PREFIX)
     kept = word.lower() in _FILES | C_WORDS
     composed = any(f"{word}_{end}" in reserved.C_COMPOSED for end in OWN)
     return f"{word}_" if kept or composed else word
@@ -300,7 +250,8 @@ def _named(record: Record) -> Iterator[str]:
 
 def _types(program: Program, units: Mapping[str, str], scope: NameScope) -> dict[str, str]:
     """`UNIT_NAME_t` for each type."""
-    return {kind.name: scope.fresh(f"{units[kind.file]}_{_stem(kind.name)}_t") for kind in program.types}
+    wanted = [f"{units[kind.file]}_{_stem(kind.name)}_t" for kind in program.types]
+    return dict(zip((kind.name for kind in program.types), scope.distinct(wanted), strict=True))
 
 
 def capitals(p: str) -> str:
@@ -321,7 +272,7 @@ def types_guard(unit: str) -> str:
 def _file_scope(program: Program, p: str) -> NameScope:
     externs = {procedure.extern.c for procedure in program.procedures if procedure.extern is not None}
     own = {f"{p}_{end}" for end in (*OWN, "exact", "bit32", "bit64")} | {guard(p)}
-    return NameScope(set(reserved.C_COMPOSED | C_WORDS) | externs | own)
+    return c_scope(set(reserved.C_COMPOSED | C_WORDS) | externs | own)
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,8 +328,8 @@ def constant_word(p: str, *parts: str) -> str:
 
 def _constants(program: Program, units: Mapping[str, str], scope: NameScope) -> dict[str, tuple[str, ...]]:
     return {
-        enum.name: tuple(
-            scope.fresh(constant_word(units[enum.file], enum.name, member)) for member in enum.members
+        enum.name: scope.distinct(
+            [constant_word(units[enum.file], enum.name, member) for member in enum.members]
         )
         for enum in program.enums
     }
@@ -400,26 +351,30 @@ def _positions(
     Lines of each table, assumptions that are checked, faults, variables, invariants, tables that others follow.
     """
     lines = {
-        str(table.name): tuple(
-            scope.fresh(constant_word(p, "line", table.name, name))
-            for name in (
-                *(line.name for line in table.lines),
-                *((table.default.name,) if table.default else ()),
-            )
+        str(table.name): scope.distinct(
+            [
+                constant_word(p, "line", table.name, name)
+                for name in (
+                    *(line.name for line in table.lines),
+                    *((table.default.name,) if table.default else ()),
+                )
+            ]
         )
         for table in program.tables
     }
     named = [program.assumptions[at].name for at in checked(program)]
-    holding = tuple(scope.fresh(f"{p}_holds_{_stem(str(name))}") for name in named)
-    assumptions = tuple(scope.fresh(constant_word(p, "assumption", name)) for name in named)
-    faults = tuple(scope.fresh(constant_word(p, "fault", word)) for word in FAULTS)
-    leaves = {
-        str(v.name): scope.fresh(constant_word(p, "leaf", _flat(str(v.name)))) for v in program.variables
-    }
-    invariants = tuple(
-        scope.fresh(constant_word(p, "invariant", invariant.name)) for invariant in program.invariants
-    )
-    places = {str(table): scope.fresh(constant_word(p, "table", table)) for table in program.line_leaves}
+    holding = scope.distinct([f"{p}_holds_{_stem(str(name))}" for name in named])
+
+    def constants(kind: str, names: Iterable[str]) -> tuple[str, ...]:
+        return scope.distinct([constant_word(p, kind, name) for name in names])
+
+    assumptions = constants("assumption", named)
+    faults = constants("fault", FAULTS)
+    variables = [str(v.name) for v in program.variables]
+    leaves = dict(zip(variables, constants("leaf", map(_flat, variables)), strict=True))
+    invariants = constants("invariant", (invariant.name for invariant in program.invariants))
+    staged = [str(table) for table in program.line_leaves]
+    places = dict(zip(staged, constants("table", staged), strict=True))
     return lines, assumptions, holding, faults, leaves, invariants, places
 
 
@@ -445,7 +400,7 @@ def _paths(
     program: Program, members: dict[str, dict[str, str]], failed: tuple[str, ...]
 ) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
     """What the struct calls each declared variable, and the place of each leaf; the pending leaf of `x` is `x_next`."""
-    taken = NameScope({DIGEST, *TRACE, *failed})
+    taken = c_scope({DIGEST, *TRACE, *failed})
     roots = taken.all((d.name, _unlike(c_word(d.name), taken)) for d in program.declared)
     variables = {str(v.name) for v in program.variables}
     paths: dict[str, tuple[str, ...]] = {}

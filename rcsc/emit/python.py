@@ -48,7 +48,18 @@ from rcsc.emit.plan import (
     table_position,
 )
 from rcsc.emit.rendering import render
-from rcsc.emit.translate import FAULT, FAULT_AT, FAULTED, FAULTLESS, LINE, STATE, PyText, constant, local
+from rcsc.emit.translate import (
+    FAULT,
+    FAULT_AT,
+    FAULTED,
+    FAULTLESS,
+    LINE,
+    STATE,
+    PyText,
+    constant,
+    local,
+    local_word,
+)
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Bool, Procedure, Real, Variable, key_bounds, pending
@@ -119,7 +130,7 @@ class _Maker:
     # --- procedures ---
 
     def _procedure(self, procedure: Procedure) -> Function:
-        params = ", ".join(["s", *(f"v_{p.name}" for p in procedure.params)])
+        params = ", ".join(["s", *(local_word(p.name) for p in procedure.params)])
         body = self._extern(procedure) if procedure.extern is not None else self.text.block(procedure.body)
         head = f"_do_{self.names.procedures[procedure.name]}({params})"
         return Function(comment(stated(procedure)), head, tuple(body))

@@ -27,6 +27,7 @@ from rcsc.emit.code_tree import (
     infix,
 )
 from rcsc.emit.identifiers import Names
+from rcsc.emit.scope import SIGNIFICANT, hashed
 from rcsc.lang import model
 from rcsc.lang.model import Expr, Int, Op, Real, Scalar, Statement, Value
 from rcsc.lang.operator_table import Operator
@@ -42,7 +43,12 @@ def constant(kind: Scalar, value: Value) -> Constant:
 
 def local(name: str) -> Name:
     """A parameter, local or loop variable of a procedure."""
-    return Name(f"v_{name}")
+    return Name(local_word(name))
+
+
+def local_word(name: str) -> str:
+    """How a parameter, local or loop variable is called in both languages; names of one procedure differ within 31 characters."""
+    return f"v_{name}" if len(name) <= SIGNIFICANT - 2 else f"v_{hashed(name, SIGNIFICANT - 2)}"
 
 
 @dataclass

@@ -13,7 +13,6 @@ from rcsc.emit.c.layout import digest
 from rcsc.emit.c.symbols import symbols
 from rcsc.emit.identifiers import (
     Names,
-    NameScope,
     c_word,
     constant_word,
     file_word,
@@ -22,6 +21,7 @@ from rcsc.emit.identifiers import (
     plain_word,
 )
 from rcsc.emit.plan import Plan
+from rcsc.emit.scope import NameScope, c_scope
 from rcsc.host.files.read import CheckedFields, json_of
 from rcsc.lang.model import Array, Record, Type
 from rcsc.run.description import Description, LevelSpec, Wire
@@ -209,11 +209,9 @@ def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linke
     word = system_word(system.name, (program.names.program for program in programs.values()))
     wiring = _Wiring(programs, word)
     buffers = tuple(wiring.buffer(wire) for wire in system.wires)
-    members = NameScope({IN, OUT, BETWEEN, TICK}).all(
-        (spec.name, c_word(spec.name)) for spec in system.levels
-    )
+    members = c_scope({IN, OUT, BETWEEN, TICK}).all((spec.name, c_word(spec.name)) for spec in system.levels)
     wiring.scope.names |= {f"{word}_{does}_{member}" for does in DOES for member in members.values()}
-    constants = NameScope({constant_word(word, "level", "none"), constant_word(word, "tick", "ms")})
+    constants = c_scope({constant_word(word, "level", "none"), constant_word(word, "tick", "ms")})
     levels = tuple(
         _level(
             spec,
@@ -270,7 +268,7 @@ class _Wiring:
     scope: NameScope = field(init=False)
 
     def __post_init__(self) -> None:
-        self.scope = NameScope({f"{self.word}_{end}" for end in OWN})
+        self.scope = c_scope({f"{self.word}_{end}" for end in OWN})
 
     def buffer(self, wire: Wire) -> Buffer:
         """A buffer with its ends and its place."""
@@ -296,7 +294,7 @@ class _Wiring:
         return Question(self.functions[form], keys, into)
 
     def _member(self, struct: str, text: str) -> str:
-        return self.members.setdefault(struct, NameScope()).fresh(parameter_word(text))
+        return self.members.setdefault(struct, c_scope()).fresh(parameter_word(text))
 
     def _wired(self, text: str) -> End | None:
         """The end that a buffer names; None where it is no level's."""

@@ -7,9 +7,10 @@ from rcsc.emit.c.cprogram import CProgram
 from rcsc.emit.c.ctext import c_type, declared, wide_type
 from rcsc.emit.c.layout import record_size, sizes
 from rcsc.emit.c.symbols import unit_text
-from rcsc.emit.identifiers import DIGEST, NameScope, comment, parameter_word, types_guard, types_header
+from rcsc.emit.identifiers import DIGEST, comment, parameter_word, types_guard, types_header
 from rcsc.emit.plan import table_position
 from rcsc.emit.rendering import render
+from rcsc.emit.scope import c_scope
 from rcsc.lang import model
 from rcsc.lang.model import Enum, Int, Procedure, Real, Variable, pending, spell
 
@@ -195,7 +196,7 @@ def externs(c: CProgram) -> Iterator[str]:
 def _parameters(c: CProgram, extern: Procedure) -> Iterator[tuple[str, str]]:
     """Types, up to the name, and names."""
     kinds = {v.name: v.type for v in c.program.variables}
-    word = NameScope().fresh
+    word = c_scope().fresh
     yield from ((f"{c_type(kinds[name])} ", word(parameter_word(name))) for name in extern.reads)
     yield from ((f"{wide_type(param.type)} ", word(parameter_word(param.name))) for param in extern.params)
     yield from ((f"{c_type(kinds[name])} *", word(f"{parameter_word(name)}_out")) for name in extern.writes)

@@ -8,7 +8,7 @@ from rcsc.emit.c.ctext import c_type, local_type, locals_of, wide_type
 from rcsc.emit.code_tree import Branch, Code, Do, Function, Invoke, Let, Name, Prefix, Set, Stmt, read, when
 from rcsc.emit.identifiers import comment
 from rcsc.emit.plan import stated
-from rcsc.emit.translate import FAULT, FAULT_AT, STATE, local
+from rcsc.emit.translate import FAULT, FAULT_AT, STATE, local, local_word
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
 from rcsc.lang.leaves import everything
@@ -17,7 +17,7 @@ from rcsc.lang.model import Enum, Procedure, Program
 
 def procedure_function(c: CProgram, procedure: Procedure) -> Function:
     """Give the function of a procedure."""
-    params = [f"{c.p}_t *s", *(f"{_held(c, p.type)} v_{p.name}" for p in procedure.params)]
+    params = [f"{c.p}_t *s", *(f"{_held(c, p.type)} {local_word(p.name)}" for p in procedure.params)]
     head = f"void {c.p}_do_{c.names.procedures[procedure.name]}({', '.join(params)})"
     body = _extern_body(c, procedure) if procedure.extern else _body(c, procedure)
     return Function(comment(stated(procedure)), head, tuple(body))
@@ -26,7 +26,7 @@ def procedure_function(c: CProgram, procedure: Procedure) -> Function:
 def _body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:
     kinds = dict(locals_of(procedure))
     yield from (
-        Let(_held(c, kind), f"v_{name}", c.text.constant(kind, 0, local_type(kind)))
+        Let(_held(c, kind), local_word(name), c.text.constant(kind, 0, local_type(kind)))
         for name, kind in kinds.items()
     )
     body = c.text.block(procedure.body)
