@@ -1,8 +1,10 @@
 """Text to tree and back: round trips, errors with a place, nothing that makes the parser raise."""
 
+import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -22,6 +24,7 @@ from rcsc.lang.syntax.parse import MOST_ERRORS, made_tables, parse
 from rcsc.lang.syntax.rows import PIECES
 from rcsc.lang.syntax.spell import spell_expr
 from rcsc.solvers.options import Options
+from tests.bench import families
 from tests.support.programs.arbitrary import expressions, files, tables
 from tests.support.programs.stages import reported, shipped
 from tests.support.programs.texts import parted_and_broken
@@ -492,3 +495,71 @@ def test_lark_is_asked_only_where_it_must_be(text: str, before: str, printed: st
     program = LARK_COUNTED.format(text=text, before=before)
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == printed
+
+
+def spans(node: object) -> object:
+    """Every span of a tree, in its order."""
+    if isinstance(node, Span):
+        return node
+    if isinstance(node, tuple):
+        return tuple(map(spans, node))
+    slots = getattr(type(node), "__dataclass_fields__", ())
+    return tuple(spans(getattr(node, name)) for name in slots)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(expressions(), min_size=2, max_size=5, unique_by=spell_expr), st.booleans())
+def test_conditions_joined_by_and_are_what_the_whole_cell_says(parts: list[tree.Expr], again: bool) -> None:
+    cell = " and ".join(spell_expr(part) for part in parts)
+    first = "| 0 | " + " and ".join(spell_expr(part) for part in reversed(parts)) + " ||\n" if again else ""
+    text = f"table t {{\n| line | when ||\n|---|---||\n{first}| 1 | {cell} ||\n}}\n"
+    parsed = parse(Source("a.rcs", text))
+    whole = parse(Source("b.rcs", f"assume a : {cell}\n"))
+    if not isinstance(parsed, tree.File) or not isinstance(whole, tree.File):
+        assert type(parsed) is type(whole)
+        return
+    [table], [assumed] = parsed.declarations, whole.declarations
+    assert isinstance(table, tree.TableDecl)
+    assert isinstance(assumed, tree.AssumeDecl)
+    [condition] = table.rows[-1].conditions
+    assert isinstance(condition, tree.Comparison)
+    assert condition.value == assumed.condition
+    if not again:
+        shift = text.rindex(cell) - len("assume a : ")
+        moved = [(span.start - shift, span.end - shift) for span in flat(spans(condition.value)) if span.file]
+        if moved:  # else the cell is parsed whole, and its places count from its start
+            assert moved == [(span.start, span.end) for span in flat(spans(assumed.condition)) if span.file]
+
+
+def flat(places: object) -> Iterator[Span]:
+    if isinstance(places, Span):
+        yield places
+    elif isinstance(places, tuple):
+        for place in places:
+            yield from flat(place)
+
+
+def test_each_condition_is_parsed_once_though_many_lines_join_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    plain = Tables.parse
+
+    def counted(tables: Tables, text: str, start: str) -> ParseNode | None:
+        asked.append(text)
+        return plain(tables, text, start)
+
+    monkeypatch.setattr(Tables, "parse", counted)
+    text = families.linear(64, 6, 3)
+    assert isinstance(parse(Source("counted.rcs", text)), tree.File)
+    cells = [row.split("|")[2].strip() for row in text.splitlines() if re.match(r"\| \d", row)]
+    pieces = [piece for cell in cells for piece in cell.split(" and ")]
+    assert len(pieces) > 3 * len(set(pieces))
+    assert sorted(piece for piece in asked if piece in set(pieces)) == sorted(set(pieces))
+    assert not [cell for cell in asked if cell in set(cells) - set(pieces)]
+
+
+def test_a_division_is_told_in_each_line_that_has_it() -> None:
+    rows = ["y and 10 / x > 1", "y and 10 / x <= 1", "not y and 10 / x > 1", "not y and 10 / x <= 1"]
+    lines = "".join(f"| {at} | {row} ||\n" for at, row in enumerate(rows))
+    text = f"input x : int -5 .. 5\ninput y : bool\ntable t {{\n| line | when ||\n|---|---||\n{lines}}}\n"
+    told = {text.count("\n", 0, finding.primary.span.start) for finding in reported(text)}
+    assert told == {5, 6, 7, 8}

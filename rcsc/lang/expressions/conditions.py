@@ -65,6 +65,8 @@ class Tests:
     Attributes:
         subjects: What each column's heading means; None under `when`, and after an error.
         texts: What each heading says.
+        pieces: What each condition means that `and` joins to others in a cell, by its identity: one stands in many cells.
+        reads: The leaves that each of these meanings reads, by its identity.
     """
 
     scope: Scope
@@ -72,12 +74,14 @@ class Tests:
     subjects: tuple[Typed | None, ...]
     texts: tuple[str, ...]
     known: dict[tuple[int, int], Test | None] = field(default_factory=dict)
-    meant: dict[tuple[int, tree.Condition], Test | None] = field(default_factory=dict)
+    meant: dict[tuple[int, tree.Condition | str], Test | None] = field(default_factory=dict)
+    pieces: dict[int, Expr | None] = field(default_factory=dict)
+    reads: dict[int, frozenset[VariableName]] = field(default_factory=dict)
     __test__ = False
 
     def test(self, column: int, written: tree.Condition, cell: Cell) -> Test | None:
         """The test of a cell; None where it is always true, or after an error."""
-        meaning = (column, written)
+        meaning = (column, cell.text if self.headings[column].subject is None else written)
         if meaning not in self.meant:
             self.scope.cell = cell
             self.meant[meaning] = self._test(column, written, cell)
@@ -90,7 +94,7 @@ class Tests:
         if condition is None:
             return None
         value = fold(condition)
-        names = tuple(sorted(set(read_by(condition)), key=self.scope.order))
+        names = tuple(sorted(self._reads(condition), key=self.scope.order))
         box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
         text = " ".join(cell.text.split())
         if value is False or box == ():
@@ -114,7 +118,7 @@ class Tests:
         scope, body = self.scope, Body()
         if self.headings[column].subject is None:
             assert isinstance(written, tree.Comparison)
-            return boolean(scope, body, written.value)
+            return self._joined(written.value)
         subject = self.subjects[column]
         if subject is None:
             return None
@@ -138,6 +142,29 @@ class Tests:
         if condition is not None and not isinstance(written, tree.Comparison) and written.negated:
             condition = other_than(condition)
         return None if condition is None else condition.expr
+
+    def _joined(self, written: tree.Expr) -> Expr | None:
+        """What a condition under `when` means; pieces that the parser shares between cells are resolved once."""
+        if not written.span.file:
+            return boolean(self.scope, Body(), written)
+        if isinstance(written, tree.Binary) and written.op == "and":
+            left, right = self._joined(written.left), self._joined(written.right)
+            return (
+                None if left is None or right is None else Apply(Op.AND, (left, right), Bool(), written.span)
+            )
+        if id(written) not in self.pieces:
+            condition = self.pieces[id(written)] = boolean(self.scope, Body(), written)
+            if condition is not None:
+                self.reads[id(condition)] = frozenset(read_by(condition))
+        return self.pieces[id(written)]
+
+    def _reads(self, condition: Expr) -> frozenset[VariableName]:
+        if id(condition) in self.reads:
+            return self.reads[id(condition)]
+        if isinstance(condition, Apply) and condition.op is Op.AND:
+            left, right = condition.args
+            return self._reads(left) | self._reads(right)
+        return frozenset(read_by(condition))
 
     def _fits(self, column: int, subject: Typed, other: Typed, span: Span) -> bool:
         """Whether a cell's value is of the kind of its column; reports it where not."""

@@ -42,6 +42,7 @@ from rcsc.lang.syntax.rows import (
     TO_WHOM,
     Cell,
     Cells,
+    conjuncts,
     cut,
     joined,
     parts,
@@ -49,6 +50,8 @@ from rcsc.lang.syntax.rows import (
 )
 
 MOST_ERRORS = 20
+MOST_CONJUNCTS = 100
+"""In one cell, up to which each is parsed by itself: all of them nest less deep than a condition may."""
 
 
 _TABLES = "rcs.tables.json"
@@ -226,6 +229,10 @@ def _over(pieces: Sequence[_Line]) -> _Line:
     return _Line(
         first.start, first.end, cells, tuple(comment for line in pieces for comment in line.comments)
     )
+
+
+_NO_COMMENTS = Comments(Source("", ""))
+"""Of a cell, which has none."""
 
 
 @dataclass(slots=True)
@@ -418,10 +425,40 @@ class _Rows:
         if not cell.text or _says_default(cell):  # which is reported
             return None
         if heading.subject is None:
-            whole = self._parse("when", cell)
+            whole = self._conjunction(cell) or self._parse("when", cell)
             return None if whole is None else tree.Comparison("=", whole, Span("", 0, len(cell.text)))
         helps = ONE_GROUP.format(cell.text) if BITS.fullmatch(cell.text) else ""
         return cast("tree.Condition | None", self._parse("cell", cell, helps))
+
+    def _conjunction(self, cell: Cell) -> tree.Expr | None:
+        """What a cell says that joins conditions by `and`; each distinct one is parsed once, and stands where it stood first.
+
+        None where the cell is no such list, goes on in another row, or is wrong: then it is parsed whole.
+        """
+        if ("ands", cell.text) in self.memory:
+            return cast("tree.Expr", self.memory["ands", cell.text])
+        places = conjuncts(cell.text) if not cell.further else []
+        if not 0 < len(places) <= MOST_CONJUNCTS:
+            return None
+        whole: tree.Expr | None = None
+        for start, end in places:
+            part = self._conjunct(cell, start, end)
+            if part is None:
+                return None
+            span = cell.at(places[0][0], end)
+            whole = part if whole is None else tree.Binary("and", whole, part, span)
+        self.memory["ands", cell.text] = whole
+        return whole
+
+    def _conjunct(self, cell: Cell, start: int, end: int) -> tree.Expr | None:
+        text = cell.text[start:end]
+        if ("and", text) not in self.memory:
+            node = _tables().parse(text, "when")
+            if node is None or _deep_in(node):
+                return None
+            build = Build(self.source.name, _NO_COMMENTS, None, cell.start + start)
+            self.memory["and", text] = build.cell(node)
+        return cast("tree.Expr", self.memory["and", text])
 
     def _action(self, cell: Cell, heading: tree.Heading) -> tuple[tree.Statement, ...] | tree.Comparison:
         if not cell.text:
@@ -445,7 +482,7 @@ class _Rows:
             if _deep_in(node):
                 self.diagnostics.append(screen.too_deep(self.source, cell.span.start, cell.span.end))
                 return None
-            parsed = Build("", Comments(Source("", "")), None).cell(node)
+            parsed = Build("", _NO_COMMENTS, None).cell(node)
         except lark.UnexpectedInput as error:
             wrong = _syntax_error(error, "", 0, len(cell.text), cell.text)
             wrong = replace(wrong, primary=Label(tree.absolute(wrong.primary.span, cell)))

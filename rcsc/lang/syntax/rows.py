@@ -139,6 +139,44 @@ def stub_of(cell: Cell) -> Stub:
     return Stub(cell.part(*stub.span("name")), tuple(lines["above"]), tuple(lines["same"]))
 
 
+_JOINTS = re.compile(r"[\[({]|[\])}]|(?<![\w.@])(?:and|or|xor|implies|when)(?!\w)", re.ASCII)
+
+
+_OWES = re.compile(r"/(?!=)|<<|>>|\[|(?<!\w)mod(?!\w)", re.ASCII)
+"""What may be undefined for some values: a finding about it points at its own line."""
+
+
+def conjuncts(text: str) -> list[tuple[int, int]]:
+    """Where each of the conditions stands that `and` joins in a text; none where it is no such list, or may be undefined.
+
+    >>> text = "a = 1 and (b or c)"
+    >>> [text[start:end] for start, end in conjuncts(text)]
+    ['a = 1', '(b or c)']
+    >>> conjuncts("a and b or c"), conjuncts("a")
+    ([], [])
+    """
+    if _OWES.search(text):
+        return []
+    depth, cuts = 0, [(0, 0)]
+    for joint in _JOINTS.finditer(text):
+        word = joint[0]
+        if word in "[({":
+            depth += 1
+        elif word in "])}":
+            depth -= 1
+        elif depth == 0 and word != "and":
+            return []
+        elif depth == 0:
+            cuts.append(joint.span())
+    if len(cuts) == 1:
+        return []
+    ends = [start for start, _ in cuts[1:]] + [len(text)]
+    return [
+        (at + len(text[at:end]) - len(text[at:end].lstrip()), at + len(text[at:end].rstrip()))
+        for (_, at), end in zip(cuts, ends, strict=True)
+    ]
+
+
 @dataclass(frozen=True, slots=True)
 class Cells:
     """A row: conditions before the `||` (the line's name first), actions after it."""
