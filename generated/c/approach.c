@@ -136,7 +136,6 @@ static void approach_admit(approach_t *s)
                 s->distance_mm = 2000u;
             }
             s->force_n = s->force_n + 0.0;
-            s->limit_n = s->limit_n + 0.0;
             approach_settle(s);
         }
     }
@@ -277,7 +276,7 @@ int32_t approach_approach_line(const approach_t *s)
 void approach_approach_lines(const approach_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = approach_approach_line(&in[i]);
     }
 }

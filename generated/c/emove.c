@@ -1471,7 +1471,7 @@ int32_t emove_locate_line(const emove_t *s)
 void emove_locate_lines(const emove_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = emove_locate_line(&in[i]);
     }
 }
@@ -1586,7 +1586,7 @@ int32_t emove_move_to_line(const emove_t *s)
 void emove_move_to_lines(const emove_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = emove_move_to_line(&in[i]);
     }
 }
@@ -1695,7 +1695,7 @@ int32_t emove_move_to_obj_line(const emove_t *s)
 void emove_move_to_obj_lines(const emove_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = emove_move_to_obj_line(&in[i]);
     }
 }
@@ -1724,7 +1724,7 @@ int32_t emove_pause_emove_line(const emove_t *s)
 void emove_pause_emove_lines(const emove_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = emove_pause_emove_line(&in[i]);
     }
 }
@@ -1800,7 +1800,7 @@ int32_t emove_pickup_line(const emove_t *s)
 void emove_pickup_lines(const emove_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = emove_pickup_line(&in[i]);
     }
 }
@@ -1879,7 +1879,7 @@ int32_t emove_release_part_line(const emove_t *s)
 void emove_release_part_lines(const emove_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = emove_release_part_line(&in[i]);
     }
 }

@@ -500,7 +500,7 @@ int32_t gripper_position_line(const gripper_t *s)
 void gripper_position_lines(const gripper_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = gripper_position_line(&in[i]);
     }
 }
@@ -556,7 +556,7 @@ int32_t gripper_grasp_line(const gripper_t *s)
 void gripper_grasp_lines(const gripper_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = gripper_grasp_line(&in[i]);
     }
 }
@@ -577,7 +577,7 @@ int32_t gripper_pause_gripper_line(const gripper_t *s)
 void gripper_pause_gripper_lines(const gripper_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = gripper_pause_gripper_line(&in[i]);
     }
 }

@@ -86,7 +86,7 @@ static void primitive_do_measure(primitive_t *s)
     s->there = (s->travelled_mm >= s->length_mm);
     if (s->last_robot.input_command == VOCABULARY_ROBOT_COMMAND_FOLLOW) {
         s->settled = true;
-        for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) {
+        for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) { /* 9 times */
             s->settled = (s->settled && (primitive_abs_f64(s->from_robot.plate[v_i] - s->to[v_i]) <= 1.5));
         }
     }
@@ -206,11 +206,11 @@ static void primitive_do_measure_length(primitive_t *s)
                 ((s->to[1] - s->from[1]) * (s->to[1] - s->from[1]))) +
             ((s->to[2] - s->from[2]) * (s->to[2] - s->from[2])))) +
             0.0;
-    for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) {
+    for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) { /* 9 times */
         v_most = primitive_max_f64(v_most, primitive_abs_f64(s->to[v_i] - s->from[v_i])) + 0.0;
     }
     v_root = (v_most * 1.4) + 0.0;
-    for (uint32_t v_i_2 = 1u; v_i_2 <= 4u; v_i_2 = v_i_2 + 1u) {
+    for (uint32_t v_i_2 = 1u; v_i_2 <= 4u; v_i_2 = v_i_2 + 1u) { /* 4 times */
         v_root = primitive_max_f64(1.0, primitive_min_f64(30000.0, 0.5 * (v_root + (v_square / v_root)))) +
                 0.0;
     }
@@ -231,12 +231,12 @@ static void primitive_do_start(primitive_t *s)
     v_east = 0.0;
     v_north = 0.0;
     if (s->last_robot.input_command != VOCABULARY_ROBOT_COMMAND_FOLLOW) {
-        for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) {
+        for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) { /* 9 times */
             s->to_robot.plate[v_i] = s->from_robot.plate[v_i] + 0.0;
         }
         s->speed_mm_s = 0.0 + 0.0;
     }
-    for (uint32_t v_i_2 = 0u; v_i_2 <= 8u; v_i_2 = v_i_2 + 1u) {
+    for (uint32_t v_i_2 = 0u; v_i_2 <= 8u; v_i_2 = v_i_2 + 1u) { /* 9 times */
         s->from[v_i_2] = s->to_robot.plate[v_i_2] + 0.0;
     }
     v_east = ((s->goal.plate[6] - s->goal.plate[0]) / 100.0) + 0.0;
@@ -246,7 +246,7 @@ static void primitive_do_start(primitive_t *s)
     primitive_do_within(s, 1u,
             ((s->goal.plate[1] + (s->emove.displaced.x * v_north)) + (s->emove.displaced.y * v_east)) + 0.0);
     primitive_do_within(s, 2u, (s->goal.plate[2] + s->emove.displaced.z) + 0.0);
-    for (uint32_t v_k = 1u; v_k <= 2u; v_k = v_k + 1u) {
+    for (uint32_t v_k = 1u; v_k <= 2u; v_k = v_k + 1u) { /* 2 times */
         v_u = (s->goal.plate[3u * v_k] - s->goal.plate[0]) + 0.0;
         v_v = (s->goal.plate[(3u * v_k) + 1u] - s->goal.plate[1]) + 0.0;
         primitive_do_within(s, 3u * v_k,
@@ -268,7 +268,7 @@ static void primitive_do_advance_at(primitive_t *s, double v_v)
     s->speed_mm_s = v_v + 0.0;
     s->travelled_mm = primitive_min_f64(s->length_mm, s->travelled_mm + (v_v * 0.04)) + 0.0;
     v_share = primitive_max_f64(0.0, primitive_min_f64(1.0, s->travelled_mm / s->length_mm)) + 0.0;
-    for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) {
+    for (uint32_t v_i = 0u; v_i <= 8u; v_i = v_i + 1u) { /* 9 times */
         s->to_robot.plate[v_i] = primitive_max_f64((-4000.0),
             primitive_min_f64(4000.0, s->from[v_i] + ((s->to[v_i] - s->from[v_i]) * v_share))) +
                 0.0;
@@ -504,28 +504,13 @@ static void primitive_admit(primitive_t *s)
             s->emove.displaced.z = s->emove.displaced.z + 0.0;
             s->emove.displaced.c = s->emove.displaced.c + 0.0;
             s->emove.displaced.s = s->emove.displaced.s + 0.0;
-            s->from_robot.plate[0] = s->from_robot.plate[0] + 0.0;
-            s->from_robot.plate[1] = s->from_robot.plate[1] + 0.0;
-            s->from_robot.plate[2] = s->from_robot.plate[2] + 0.0;
-            s->from_robot.plate[3] = s->from_robot.plate[3] + 0.0;
-            s->from_robot.plate[4] = s->from_robot.plate[4] + 0.0;
-            s->from_robot.plate[5] = s->from_robot.plate[5] + 0.0;
-            s->from_robot.plate[6] = s->from_robot.plate[6] + 0.0;
-            s->from_robot.plate[7] = s->from_robot.plate[7] + 0.0;
-            s->from_robot.plate[8] = s->from_robot.plate[8] + 0.0;
+            for (uint32_t k = 0u; k <= 8u; k = k + 1u) { /* 9 times */
+                s->from_robot.plate[k] = s->from_robot.plate[k] + 0.0;
+            }
             s->from_gripper.opening_mm = s->from_gripper.opening_mm + 0.0;
-            s->goal.plate[0] = s->goal.plate[0] + 0.0;
-            s->goal.plate[1] = s->goal.plate[1] + 0.0;
-            s->goal.plate[2] = s->goal.plate[2] + 0.0;
-            s->goal.plate[3] = s->goal.plate[3] + 0.0;
-            s->goal.plate[4] = s->goal.plate[4] + 0.0;
-            s->goal.plate[5] = s->goal.plate[5] + 0.0;
-            s->goal.plate[6] = s->goal.plate[6] + 0.0;
-            s->goal.plate[7] = s->goal.plate[7] + 0.0;
-            s->goal.plate[8] = s->goal.plate[8] + 0.0;
-            s->goal.speed_mm_s = s->goal.speed_mm_s + 0.0;
-            s->goal.accel_mm_s2 = s->goal.accel_mm_s2 + 0.0;
-            s->goal.decel_mm_s2 = s->goal.decel_mm_s2 + 0.0;
+            for (uint32_t k = 0u; k <= 8u; k = k + 1u) { /* 9 times */
+                s->goal.plate[k] = s->goal.plate[k] + 0.0;
+            }
             s->goal.breakpoint_mm = s->goal.breakpoint_mm + 0.0;
             s->fingers.approach_mm = s->fingers.approach_mm + 0.0;
             s->fingers.departure_mm = s->fingers.departure_mm + 0.0;
@@ -1286,7 +1271,7 @@ int32_t primitive_aprc_pstn_fngrs_line(const primitive_t *s)
 void primitive_aprc_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = primitive_aprc_pstn_fngrs_line(&in[i]);
     }
 }
@@ -1337,7 +1322,7 @@ int32_t primitive_dprt_pstn_fngrs_line(const primitive_t *s)
 void primitive_dprt_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = primitive_dprt_pstn_fngrs_line(&in[i]);
     }
 }
@@ -1426,7 +1411,7 @@ int32_t primitive_goto__line(const primitive_t *s)
 void primitive_goto__lines(const primitive_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = primitive_goto__line(&in[i]);
     }
 }
@@ -1479,7 +1464,7 @@ int32_t primitive_gothru_line(const primitive_t *s)
 void primitive_gothru_lines(const primitive_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = primitive_gothru_line(&in[i]);
     }
 }
@@ -1532,7 +1517,7 @@ int32_t primitive_immed_grasp_line(const primitive_t *s)
 void primitive_immed_grasp_lines(const primitive_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = primitive_immed_grasp_line(&in[i]);
     }
 }
@@ -1561,7 +1546,7 @@ int32_t primitive_pause_primitive_line(const primitive_t *s)
 void primitive_pause_primitive_lines(const primitive_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = primitive_pause_primitive_line(&in[i]);
     }
 }

@@ -1616,7 +1616,7 @@ int32_t task_acquire_line(const task_t *s)
 void task_acquire_lines(const task_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = task_acquire_line(&in[i]);
     }
 }
@@ -1706,7 +1706,7 @@ int32_t task_clear_line(const task_t *s)
 void task_clear_lines(const task_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = task_clear_line(&in[i]);
     }
 }
@@ -1830,7 +1830,7 @@ int32_t task_move_line(const task_t *s)
 void task_move_lines(const task_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = task_move_line(&in[i]);
     }
 }
@@ -1859,7 +1859,7 @@ int32_t task_pause_task_line(const task_t *s)
 void task_pause_task_lines(const task_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = task_pause_task_line(&in[i]);
     }
 }
@@ -1942,7 +1942,7 @@ int32_t task_release_part_line(const task_t *s)
 void task_release_part_lines(const task_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = task_release_part_line(&in[i]);
     }
 }
@@ -2050,7 +2050,7 @@ int32_t task_transfer_line(const task_t *s)
 void task_transfer_lines(const task_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = task_transfer_line(&in[i]);
     }
 }

@@ -554,7 +554,7 @@ int32_t vision_flood_flash_line(const vision_t *s)
 void vision_flood_flash_lines(const vision_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = vision_flood_flash_line(&in[i]);
     }
 }
@@ -626,7 +626,7 @@ int32_t vision_line_flash_line(const vision_t *s)
 void vision_line_flash_lines(const vision_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = vision_line_flash_line(&in[i]);
     }
 }
@@ -647,7 +647,7 @@ int32_t vision_pause_vision_line(const vision_t *s)
 void vision_pause_vision_lines(const vision_t *in, int32_t *out, uint32_t n)
 {
     uint32_t i;
-    for (i = 0u; i < n; i = i + 1u) {
+    for (i = 0u; i < n; i = i + 1u) { /* n times */
         out[i] = vision_pause_vision_line(&in[i]);
     }
 }

@@ -214,10 +214,15 @@ def type_bounds(name: str) -> tuple[int, int]:
     return (0, 2**bits - 1) if name.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
-def repeated(begin: Set, goes: Code, step: Set, *body: Stmt, declared: str = "") -> Frame:
-    """C's `for`; it declares its variable, where a type is given."""
+def times(count: int) -> str:
+    """How often, in words."""
+    return "once" if count == 1 else f"{count} times"
+
+
+def repeated(begin: Set, goes: Code, step: Set, *body: Stmt, bound: str, declared: str = "") -> Frame:
+    """C's `for`, with a comment that says how often it runs; it declares its variable, where a type is given."""
     first, then = (infix("=", assignment.place, assignment.value) for assignment in (begin, step))
-    return Frame((f"for ({declared}", first, "; ", goes, "; ", then, ") {"), body, "}")
+    return Frame((f"for ({declared}", first, "; ", goes, "; ", then, f") {{ /* {bound} */"), body, "}")
 
 
 def when(condition: Code, *body: Stmt) -> Branch:
@@ -390,12 +395,13 @@ class C(Language):
                 count, high = Name(name), Constant(stmt.high, kind)
                 begin = Set(count, Constant(stmt.low, kind))
                 step = Set(count, infix("+", count, Constant(1, kind)))
+        bound = f"at most {times(stmt.high - stmt.low + 1)}" if guard else times(stmt.high - stmt.low + 1)
         if stmt.high < type_bounds(kind)[1]:
             goes = infix("&&", infix("<=", count, high), *guard)
-            return (repeated(begin, goes, step, *stmt.body, declared=f"{kind} "),)
+            return (repeated(begin, goes, step, *stmt.body, bound=bound, declared=f"{kind} "),)
         more = Name(f"more_{name.removeprefix('v_')}")
         inner = (*stmt.body, Set(more, infix("<", count, high)), when(more, step))
-        again = Frame(("while (", infix("&&", more, *guard), ") {"), inner, "}")
+        again = Frame(("while (", infix("&&", more, *guard), f") {{ /* {bound} */"), inner, "}")
         first = Let(kind, name, begin.value)
         return (Frame(("{",), (Let("bool", more.text, Constant(1, "bool")), first, again), "}"),)
 

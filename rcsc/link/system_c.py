@@ -23,6 +23,7 @@ from rcsc.emit.code_tree import (
     Stmt,
     infix,
     repeated,
+    times,
     type_bounds,
     when,
 )
@@ -419,4 +420,4 @@ def _counted(count: str, end: int, *body: Stmt) -> Stmt:
     """A loop from 0 up to the end, which is left out."""
     name, zero, step = Name(count), Constant(0, "uint32_t"), Constant(1, "uint32_t")
     goes = infix("<", name, Constant(end, "uint32_t"))
-    return repeated(Set(name, zero), goes, Set(name, infix("+", name, step)), *body)
+    return repeated(Set(name, zero), goes, Set(name, infix("+", name, step)), *body, bound=times(end))

@@ -88,6 +88,25 @@ def test_a_mask_says_of_which_class_it_is_and_which_lines_it_leaves(mixed: dict[
 
 
 @pytest.mark.parametrize("name", SHIPPED)
+def test_each_loop_says_how_often_it_runs(name: str) -> None:
+    text = (GENERATED / name).read_text(encoding="utf-8")
+    told = r"/\* (?:at most )?(?:n times|[1-9]\d* times|once) \*/"
+    loops = re.findall(r"^ +(?:for|while) \(", text, re.MULTILINE)
+    within = re.findall(rf"(?:for|while) \([^{{]*\{{ {told}\n", text)
+    before = re.findall(rf"{told}\n +(?:for|while) \([^{{]*\{{\n", text)
+    assert len(within) + len(before) == len(loops)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_bound_is_how_often_the_loop_runs(program: str) -> None:
+    text = (GENERATED / f"{program}.c").read_text(encoding="utf-8")
+    counted = r"for \((?:uint32_t )?(\w+) = (\d+)u; \1 (<=?) (\d+)u; \1 = \1 \+ 1u\) \{ /\* (\w+)"
+    for _, low, sign, high, told in re.findall(counted, text):
+        runs = int(high) - int(low) + (sign == "<=")
+        assert told == ("once" if runs == 1 else str(runs))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
 def test_lines_are_short(name: str) -> None:
     text = (GENERATED / name).read_text(encoding="utf-8")
     assert max(map(len, text.splitlines())) <= WIDTH

@@ -1,6 +1,7 @@
 """Admission of inputs and of results, and the check of a state that comes from outside."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 from rcsc.emit.c.cprogram import AT, NONE, CProgram, fault_name, first_of, on_state, run_on_state
 from rcsc.emit.c.ctext import c_type
@@ -14,6 +15,7 @@ from rcsc.emit.code_tree import (
     Invoke,
     Leave,
     Let,
+    Loop,
     Name,
     Place,
     Prefix,
@@ -41,7 +43,7 @@ def admit_function(c: CProgram, reals: bool) -> Function:
     inputs = [v for v in c.program.variables if v.kind is model.Kind.INPUT]
     tests = [(Name(c.names.leaves[v.name]), refusal(c, v, c.text.place(v.name))) for v in inputs]
     asked = [(leaf, test) for leaf, test in tests if test is not None]
-    taken = (*(s for v in inputs for s in admitted(c, v, c.text.place(v.name))), run_on_state(c, "settle"))
+    taken = (*_all_admitted(c, inputs), run_on_state(c, "settle"))
     told = Set(FAULT, fault_name(c, Fault.ADMIT)), Set(FAULT_AT, AT)
     body: Body = taken
     if asked:
@@ -81,9 +83,28 @@ def admitted(c: CProgram, variable: Variable, place: Code) -> Iterator[Stmt]:
             low, high = (c.text.constant(kind, end) for end in (kind.low, kind.high))
             yield when(infix("<", place, low), Set(place, low))
             yield when(infix(">", place, high), Set(place, high))
-        yield Set(place, infix("+", place, constant(kind, 0)))
+        if kind.low <= 0 <= kind.high:
+            yield Set(place, infix("+", place, constant(kind, 0)))
     elif clamped and not isinstance(kind, Bool):
         yield from (when(test, Set(place, end)) for test, end in _outside(c, kind, place))
+
+
+def _all_admitted(c: CProgram, inputs: Sequence[Variable]) -> Iterator[Stmt]:
+    """What admission makes of the inputs; of the reals of an array in a loop, for which a compiler keeps no copies on the stack."""
+    for (array, kind, _), group in groupby(inputs, lambda v: (_array_of(c, v), v.type, v.admit)):
+        leaves = tuple(group)
+        if array and isinstance(kind, Real) and len(leaves) > 1 and leaves[0].admit is not model.Admit.CLAMP:
+            body = tuple(admitted(c, leaves[0], Place((*array, Name("k")))))
+            if body:
+                yield Loop("k", 0, len(leaves) - 1, body, type="uint32_t")
+        else:
+            yield from (stmt for leaf in leaves for stmt in admitted(c, leaf, c.text.place(leaf.name)))
+
+
+def _array_of(c: CProgram, variable: Variable) -> tuple[str, ...]:
+    """The place of the array whose element a leaf is; empty where it is none."""
+    *array, last = c.names.paths[variable.name]
+    return tuple(array) if last.startswith("[") else ()
 
 
 def _beyond(c: CProgram, kind: Real, place: Code) -> Code:

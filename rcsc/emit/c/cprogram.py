@@ -112,7 +112,8 @@ def first_of(asked: Sequence[tuple[Code, Code]]) -> Iterator[Stmt]:
         yield when(infix("<", AT, Constant(0)), chain) if begin else chain
 
 
-def counted_loop(count: Name, end: Code, *body: Stmt) -> Frame:
-    """A loop from 0 up to the end, exclusive."""
+def counted_loop(count: Name, end: Code, *body: Stmt, bound: str) -> Frame:
+    """A loop from 0 up to the end, exclusive, with what is said of how often it runs."""
     zero, one = Constant(0, "uint32_t"), Constant(1, "uint32_t")
-    return repeated(Set(count, zero), infix("<", count, end), Set(count, infix("+", count, one)), *body)
+    step = Set(count, infix("+", count, one))
+    return repeated(Set(count, zero), infix("<", count, end), step, *body, bound=bound)

@@ -29,6 +29,7 @@ from rcsc.emit.code_tree import (
     Set,
     Stmt,
     infix,
+    times,
 )
 from rcsc.emit.identifiers import comment
 from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, PlanTable, Truth, joined
@@ -54,7 +55,7 @@ def match_functions(c: CProgram, table: PlanTable) -> Iterator[Function]:
     yield Function(doc, f"int32_t {c.p}_{name}_line(const {c.p}_t *s)", (*unread, *body))
     i, n = Name("i"), Name("n")
     line = Invoke(f"{c.p}_{name}_line", (Prefix("&", Element(Name("in"), i)),))
-    each = counted_loop(i, n, Set(Element(Name("out"), i), line))
+    each = counted_loop(i, n, Set(Element(Name("out"), i), line), bound="n times")
     head = f"void {c.p}_{name}_lines(const {c.p}_t *in, int32_t *out, uint32_t n)"
     doc = f"The same for n inputs at once, table {table.table.name}."
     yield Function(doc, head, (Let("uint32_t", "i"), each))
@@ -163,7 +164,7 @@ def _many_words(c: CProgram, matcher: Matcher, masks: list[Element]) -> Iterator
         Set(seen, infix("|", seen, some)),
         Set(FOUND, Choice(nonzero, at, FOUND)),
     )
-    yield counted_loop(w, Constant(matcher.words, "uint32_t"), *body)
+    yield counted_loop(w, Constant(matcher.words, "uint32_t"), *body, bound=times(matcher.words))
     yield Set(Name("none"), Constant(matcher.lines) if matcher.default else Round(NONE))
     yield Set(FOUND, Choice(infix("==", seen, zero), Name("none"), FOUND))
     yield Set(FOUND, Choice(infix("!=", several, zero), Round(SEVERAL), FOUND))
