@@ -8,7 +8,7 @@ form and one bound. Two doubles compare as their keys do, which is linear as wel
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
@@ -111,6 +111,7 @@ class Universe:
         self.single: list[int] = []
         self._column: dict[str, int] = {}
         self._form: dict[Form, int] = {}
+        self._known: dict[tuple[int, bool], tuple[Expr, Formula]] = {}
 
     def column(self, term: Expr) -> int:
         """The number of `term`, entered when new."""
@@ -156,12 +157,18 @@ class Universe:
                 return TRUE if bool(value) == wanted else FALSE
             case Apply(op=Op.NOT, args=(part,)):
                 return self.of(part, not wanted)
+            case Apply(op=Op.AND) if wanted:
+                return every(map(self.of, _conjuncts(condition)))
             case Apply(op=op) if is_logic(op) and _written_out(condition) > MOST_WRITTEN_OUT:
                 return self._truth(condition, wanted)
             case Apply(op=op, args=(left, right)) if is_logic(op):
                 return self._truths(op, left, right)(wanted)
             case Apply(op=op, args=(left, right)) if is_comparison(op):
-                return self._comparison(condition, left, right, op if wanted else OPPOSITE[op], wanted)
+                known = self._known.get((id(condition), wanted))  # lines share conditions
+                if known is None:
+                    formula = self._comparison(condition, left, right, op if wanted else OPPOSITE[op], wanted)
+                    known = self._known[id(condition), wanted] = condition, formula
+                return known[1]
             case Among(subject=subject, values=values):
                 keys = [key_of(subject.type, value) for value in values]
                 return self._among(condition, subject, keys, wanted)
@@ -300,6 +307,17 @@ def _written_out(condition: Expr) -> int:
             return 2 * (_written_out(left) + _written_out(right))
         case _:
             return 1
+
+
+def _conjuncts(condition: Expr) -> Iterator[Expr]:
+    """The conditions that `and` joins, left to right."""
+    waiting = [condition]
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, Apply) and part.op is Op.AND:
+            waiting += reversed(part.args)
+        else:
+            yield part
 
 
 def _is_plain(expr: Expr) -> bool:
