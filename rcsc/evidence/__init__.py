@@ -12,6 +12,6 @@ True
 Trusted: the tools that a kind names, in the versions that its files state. No verdict of `rcsc check` rests on
 anything here. What it costs: seconds to minutes a program, by kind.
 
-Modules: `kind` (what a kind takes and gives), one for each kind, `kinds` (their names), `collect` (all that was asked
-for, on one screen).
+Modules: `kind` (what a kind takes and gives), `kinds` (their names), `collect` (all that was asked for, on one screen).
+Kinds: `runtime` (Frama-C's EVA).
 """

@@ -1,0 +1,346 @@
+"""Frama-C's EVA shows that no operation of the generated C can go wrong while it runs, for any state and any inputs.
+
+In: the emitted C of a program. Out: for each access, index, division, shift, conversion and sum that C leaves
+undefined, or that loses something, where it stands and what EVA says of it.
+
+Every function that the header declares is called on a state of which nothing is known: `check` and `init` on any
+bytes; a cycle, or a step of a table, where `check` accepts it, with any inputs; a matcher with admitted inputs.
+With `--defensive` a cycle is called on any bytes, without `check`. The RTE plugin writes down what must hold; EVA
+proves it by abstract interpretation, which errs on one side only. The options are the same for every program: states
+are kept apart in the functions that are one chain of comparisons or that call one (`-eva-slevel-function`).
+
+A second run takes the reals that come from outside as any finite ones and shows that no operation gives an infinity
+or a NaN. EVA 25 does not follow that a comparison with NaN is false: that admission refuses one is shown by tests and by
+`model-check`, not here. In the first run a NaN is a value like others. The second run takes `volatile` out of the
+self-test of the machine's arithmetic, which EVA would take for a sensor: its reals are constants.
+"""
+
+import csv
+import io
+import re
+import shutil
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+from rcsc.emit import emitted
+from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
+from rcsc.host.children import scratch
+from rcsc.host.tools import run_command, write_c
+from rcsc.lang.model import I64_MAX, Bool, Enum, Int, Program, Real, Scalar, key_bounds
+from rcsc.lang.model import Kind as Role
+from rcsc.testing.executors.externs import externs
+from rcsc.testing.executors.symbols import Symbols, symbols_of
+
+PACKAGE = "frama-c-base"
+STATES = 1000
+"""How many states EVA keeps apart in a chain of comparisons: more than a program has variables."""
+TIMEOUT_S = 1800.0
+MEMORY_MB = 6000
+GREATEST = "0x1.fffffffffffffp+1023"
+OPTIONS = (
+    "-machdep", "gcc_x86_64", "-rte", "-warn-signed-downcast", "-warn-unsigned-downcast", "-warn-special-float",
+)  # fmt: skip
+WORDS: Mapping[str, str] = {
+    "mem_access": "accesses to memory",
+    "index_bound": "indices",
+    "division_by_zero": "divisions and remainders",
+    "shift": "shifts",
+    "signed_overflow": "signed results within their type",
+    "signed_downcast": "conversions to a signed type",
+    "unsigned_downcast": "conversions to an unsigned type",
+    "float_to_int": "conversions of a real to a whole number",
+    "is_nan_or_infinite": "reals that are numbers",
+    "bool_value": "booleans that are 0 or 1",
+    "initialization": "reads of what was written",
+    "precondition of __builtin_ctz": "arguments of __builtin_ctz that are not zero",
+}
+"""What the classes of EVA's alarms are called."""
+OWED = frozenset(
+    {"division_by_zero", "signed_overflow", "signed_downcast", "unsigned_downcast", "float_to_int"}
+)
+"""What `rcsc check` proves of every expression of a table: divisors that are not 0, results that fit.
+
+EVA keeps a range for each variable, and no relation between two: where a line's conditions or an `if` make the
+difference, the place is listed with the proof that it rests on, and counted apart.
+"""
+PROVED = frozenset({"Valid", "Considered valid"})
+DEAD = "Dead"
+VERDICTS = ("shown", "by the table's proof", "not shown", "never reached")
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """What must hold at one place of the C, and what EVA says of it.
+
+    Attributes:
+        kind: The class of the alarm, as Frama-C names it.
+        status: `Valid`, `Dead` (the place is never reached) or what was not shown.
+        text: In ACSL.
+    """
+
+    file: str
+    line: int
+    function: str
+    kind: str
+    status: str
+    text: str
+
+    @property
+    def verdict(self) -> str:
+        """What became of it: a column of the certificate."""
+        if self.status in PROVED:
+            return "shown"
+        if self.status == DEAD:
+            return "never reached"
+        return "by the table's proof" if self.kind in OWED and self.status == "Unknown" else "not shown"
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """One run of EVA: its name, its command, the C by file, what was shown, or why there is no answer."""
+
+    name: str
+    command: tuple[str, ...]
+    sources: Mapping[str, str]
+    properties: tuple[Property, ...]
+    failure: str = ""
+
+
+@cache
+def version() -> str | None:
+    """Frama-C's version; None where it is not installed."""
+    program = shutil.which("frama-c")
+    return None if program is None else run_command([program, "-version"], Path(), 60.0).out.strip()
+
+
+def collect(subject: Subject) -> Evidence:
+    """Analyse the C of a program, and the C that trusts no state."""
+    if version() is None:
+        return Evidence((), missing=f"Frama-C is not installed (Debian's package {PACKAGE})")
+    guarded = emitted(replace(subject.plan, defensive=True), ("c",))
+    runs = [
+        _analysis(subject, files, name, defensive=defensive, finite=finite)
+        for files, defensive, title in ((subject.files, False, ""), (guarded, True, "defensive, "))
+        for finite, name in _runs(subject.program, title)
+    ]
+    return Evidence(tuple(_figures(runs)), _kept(subject, runs), tuple(_shortfalls(runs)))
+
+
+def _runs(program: Program, title: str) -> Iterator[tuple[bool, str]]:
+    """What EVA is asked of one text: any bytes; and, of a program with reals, finite ones."""
+    yield False, f"{title}any bytes"
+    if any(isinstance(variable.type, Real) for variable in program.variables):
+        yield True, f"{title}finite reals"
+
+
+def _analysis(
+    subject: Subject, files: Mapping[str, str], name: str, *, defensive: bool, finite: bool
+) -> Analysis:
+    symbols = symbols_of(subject.program, files)
+    sources = {Path(path).name: text for path, text in files.items()}
+    text = harness(subject.program, symbols, defensive=defensive, finite=finite)
+    shown = tuple(_command(symbols, Path(), finite=finite, defensive=defensive))
+    subject.progress(f"{symbols.source}: EVA, {name}")
+    with scratch("eva") as place:
+        write_c(files, place)
+        (place / "harness.c").write_text(text, "utf-8")
+        command = _command(symbols, place, finite=finite, defensive=defensive)
+        ran = run_command(command, place, TIMEOUT_S, MEMORY_MB)
+        table = place / "properties.csv"
+        if ran.status is None:
+            return Analysis(name, shown, sources, (), f"no answer in {TIMEOUT_S:.0f} s")
+        if ran.status != 0 or not table.is_file():
+            return Analysis(name, shown, sources, (), (ran.out + ran.err).strip()[-400:])
+        return Analysis(name, shown, sources, tuple(_properties(table.read_text("utf-8"))))
+
+
+def _command(symbols: Symbols, place: Path, *, finite: bool, defensive: bool) -> list[str]:
+    """The command; files by whole paths, since Frama-C asks the shell's `PWD` where it is."""
+    p = symbols.program
+    apart = ["main", f"{p}_check", f"{p}_admit", *([f"{p}_begin"] if defensive else [])]
+    apart += [*symbols.steps.values(), *symbols.cycles.values()]
+    return [
+        "frama-c", *OPTIONS, *(("non-finite", "-cpp-extra-args=-Dvolatile=") if finite else ("none",)), str(place / "harness.c"),
+        str(place / symbols.source),
+        "-then", "-eva", "-eva-slevel-function", ",".join(f"{name}:{STATES}" for name in apart),
+        "-eva-split-return", "full", "-then", "-report-csv", str(place / "properties.csv"),
+    ]  # fmt: skip
+
+
+def harness(program: Program, symbols: Symbols, *, defensive: bool, finite: bool) -> str:
+    """The C that calls every function of the header on states of which nothing is known."""
+    lines = ['#include "__fc_builtin.h"', f'#include "{symbols.header}"', f"static {symbols.struct} s;"]
+    lines += _stand_ins(program, symbols)
+    lines += ["static void any(void) {", "    Frama_C_make_unknown((char *)&s, sizeof s);"]
+    if finite:
+        reals = [v for v in program.variables if isinstance(v.type, Real)]
+        lines += [
+            f"    s.{symbols.path(v.name)} = {_any(symbols.c_type(v.name), v.type, whole=True)};"
+            for v in reals
+        ]
+    inputs = [v for v in program.variables if v.kind is Role.INPUT]
+    lines += ["}", "static void admitted(void) {", "    any();"]
+    lines += [f"    s.{symbols.path(v.name)} = {_any(symbols.c_type(v.name), v.type)};" for v in inputs]
+    lines += ["}", "int main(void) {", "    switch (Frama_C_interval(0, 9999)) {"]
+    for number, body in enumerate(_calls(symbols, defensive=defensive)):
+        lines += [f"    case {number}: {body} break;"]
+    return "\n".join([*lines, "    default: break;", "    }", "    return 0;", "}", ""])
+
+
+def _calls(symbols: Symbols, *, defensive: bool) -> Iterator[str]:
+    """A call of every function, with what it asks of its caller."""
+    check = f"{symbols.program}_check(&s)"
+    yield f"any(); {symbols.init}(&s);"
+    yield f"any(); (void){check};"
+    for function in (*symbols.steps.values(), *symbols.cycles.values()):
+        call = f"(void){function}(&s);"
+        yield f"any(); {call}" if defensive else f"any(); if ({check} < 0) {{ {call} }}"
+    for name, function in symbols.lines.items():
+        many = f"int32_t at[1]; {symbols.batches[name]}(&s, at, 1u);"
+        yield f"admitted(); if ({check} < 0) {{ (void){function}(&s); {many} }}"
+
+
+def _stand_ins(program: Program, symbols: Symbols) -> Iterator[str]:
+    """Functions of the user's, that give anything of its type."""
+    for procedure in externs(program):
+        given = [symbols.c_type(name) for name in procedure.reads]
+        given += [symbols.value_type(p.type) for p in procedure.params]
+        params = [f"{c_type} a{at}" for at, c_type in enumerate(given)]
+        params += [f"{symbols.c_type(name)} *r{at}" for at, name in enumerate(procedure.writes)]
+        function = procedure.extern.c if procedure.extern else ""
+        written = " ".join(
+            f"*r{at} = {_any(symbols.c_type(name), program.variable(name).type, whole=True)};"
+            for at, name in enumerate(procedure.writes)
+        )
+        yield f"void {function}({', '.join(params) or 'void'}) {{ {written} }}"
+
+
+def _any(c_type: str, kind: Scalar, *, whole: bool = False) -> str:
+    """Any value of a kind, or of its whole C type, as an expression of EVA's."""
+    if isinstance(kind, Real):
+        low, high = (f"-{GREATEST}", GREATEST) if whole else (float(kind.low).hex(), float(kind.high).hex())
+        return f"({c_type})Frama_C_double_interval({low}, {high})"
+    least, most = _bounds(c_type, kind, whole=whole)
+    if most > I64_MAX:
+        return f"({c_type})Frama_C_unsigned_long_long_interval({least}ULL, {most}ULL)"
+    lowest = f"{least}LL" if least > -I64_MAX else f"(-{I64_MAX}LL - 1LL)"
+    return f"({c_type})Frama_C_long_long_interval({lowest}, {most}LL)"
+
+
+def _bounds(c_type: str, kind: Bool | Enum | Int, *, whole: bool) -> tuple[int, int]:
+    """The bounds of a kind, or of its C type."""
+    if isinstance(kind, Bool):
+        return 0, 1
+    if not whole:
+        return key_bounds(kind)
+    bits = int(re.sub(r"\D", "", c_type.removesuffix("_t")))
+    return (0, (1 << bits) - 1) if c_type.startswith("u") else (-(1 << bits - 1), (1 << bits - 1) - 1)
+
+
+def _properties(text: str) -> Iterator[Property]:
+    """What Frama-C's report says of the emitted C; not of the harness, and not what its library assumes of itself."""
+    for row in csv.DictReader(io.StringIO(text), delimiter="\t", quoting=csv.QUOTE_NONE):
+        kind = row["property kind"]
+        if row["file"] != "harness.c" and kind in WORDS:
+            yield Property(
+                row["file"], int(row["line"]), row["function"], kind, row["status"], row["property"]
+            )
+
+
+def _figures(runs: list[Analysis]) -> Iterator[str]:
+    for run in runs:
+        count = Counter(place.verdict for place in run.properties)
+        reached = sum(count.values()) - count["never reached"]
+        rest = "".join(f", {count[verdict]} {verdict}" for verdict in VERDICTS[1:] if count[verdict])
+        failure = f"; {run.failure}" if run.failure else ""
+        yield f"Frama-C {version()}, {run.name}: {count['shown']} of {reached} places shown safe{rest}{failure}"
+
+
+def _kept(subject: Subject, runs: list[Analysis]) -> dict[str, str]:
+    symbols = symbols_of(subject.program, subject.files)
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(("run", "file", "line", "function", "class", "status", "property"))
+    for run in runs:
+        writer.writerows(
+            (run.name, p.file, p.line, p.function, p.kind, p.status, p.text) for p in run.properties
+        )
+    return {
+        "certificate.md": _certificate(symbols, runs),
+        "properties.csv": out.getvalue(),
+        "harness.c": harness(subject.program, symbols, defensive=False, finite=False),
+    }
+
+
+def _certificate(symbols: Symbols, runs: list[Analysis]) -> str:
+    lines = [f"# {symbols.source}: no operation goes wrong while it runs", ""]
+    lines += [f"Frama-C {version()}, plugins RTE and EVA.", ""]
+    lines += [
+        "Every function of the header, on a state of which nothing is known: a cycle or a step where `check` accepts"
+    ]
+    lines += [
+        "it, with any inputs; a matcher with admitted inputs; with `--defensive` a cycle on any bytes. Every place of"
+    ]
+    lines += ["each is in `properties.csv`; `harness.c` is what EVA was given beside the C.", ""]
+    for run in runs:
+        lines += [f"## {run.name}", "", f"    {' '.join(run.command)}", ""]
+        lines += [*_rows(run), ""]
+        if resting := [*_resting(run, run.sources)]:
+            lines += [
+                "By the table's proof: EVA knows each variable's range, not how two go together. `rcsc check` proved that"
+            ]
+            lines += [
+                "no divisor is 0 and that every result fits, which the C rests on here:",
+                "",
+                *resting,
+                "",
+            ]
+    return "\n".join(lines)
+
+
+def _rows(run: Analysis) -> Iterator[str]:
+    yield f"| What | {' | '.join(VERDICTS)} |"
+    yield f"| --- |{' ---: |' * len(VERDICTS)}"
+    for kind, words in WORDS.items():
+        count = Counter(place.verdict for place in run.properties if place.kind == kind)
+        if count:
+            yield f"| {words} (`{kind}`) | {' | '.join(str(count[verdict]) for verdict in VERDICTS)} |"
+
+
+def _resting(run: Analysis, text: Mapping[str, str]) -> Iterator[str]:
+    """The places that rest on the table's proof, each with what must hold there."""
+    for place in run.properties:
+        if place.verdict == "by the table's proof":
+            yield f"- {_where(place, text)}: `{place.text}`"
+
+
+def _where(place: Property, text: Mapping[str, str]) -> str:
+    return f"{place.file}:{place.line} ({place.function}{line_of(text.get(place.file, ''), place.line)})"
+
+
+def _shortfalls(runs: list[Analysis]) -> Iterator[Shortfall]:
+    for run in runs:
+        if run.failure:
+            yield Shortfall(run.name, run.failure)
+        for place in run.properties:
+            if place.verdict == "not shown":
+                yield Shortfall(_where(place, run.sources), f"{run.name}: {WORDS[place.kind]}: {place.text}")
+
+
+HEAD = re.compile(r"/\* (?P<line>\S+\.rcs line [^:*]+)")
+
+
+def line_of(text: str, number: int) -> str:
+    """The table line that a line of C belongs to, as the comment above it says; empty where there is none."""
+    for line in reversed(text.split("\n")[:number]):
+        if line == "}":
+            return ""
+        if head := HEAD.search(line):
+            return f", {head['line']}"
+    return ""
+
+
+KIND = Kind("Frama-C's EVA: every index, division, conversion and access of the C is safe", collect)
