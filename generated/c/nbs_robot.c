@@ -37,17 +37,17 @@ static int32_t nbs_robot_restart_task(nbs_robot_t *s)
     nbs_robot_take_task(s);
     now = s->task;
     now.inc_command_seen = now.workstation.inc_command;
-    now.to_workstation.status_report = (uint8_t)INT64_C(2);
-    now.to_workstation.failure = (uint8_t)INT64_C(15);
-    now.to_emove.input_command = (uint8_t)INT64_C(0);
+    now.to_workstation.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    now.to_workstation.failure = VOCABULARY_REASON_RESTART;
+    now.to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
     number = (uint64_t)now.from_emove.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.task_to_emove.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_emove.inc_command = (uint16_t)number;
-    now.cur_state = (uint8_t)INT64_C(1);
-    now.cur_state_next = (uint8_t)INT64_C(1);
+    now.cur_state = TASK_COMMON_TASK_STATE_F_STATE;
+    now.cur_state_next = TASK_COMMON_TASK_STATE_F_STATE;
     at = task_check(&now);
     if (at < 0) {
         s->task = now;
@@ -112,24 +112,24 @@ static int32_t nbs_robot_restart_emove(nbs_robot_t *s)
     nbs_robot_take_emove(s);
     now = s->emove;
     now.inc_command_seen = now.task.inc_command;
-    now.to_task.status_report = (uint8_t)INT64_C(2);
-    now.to_task.failure = (uint8_t)INT64_C(15);
-    now.to_primitive.input_command = (uint8_t)INT64_C(0);
+    now.to_task.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    now.to_task.failure = VOCABULARY_REASON_RESTART;
+    now.to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
     number = (uint64_t)now.from_primitive.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.emove_to_primitive.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_primitive.inc_command = (uint16_t)number;
-    now.to_vision.input_command = (uint8_t)INT64_C(0);
+    now.to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
     number = (uint64_t)now.from_vision.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.emove_to_vision.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_vision.inc_command = (uint16_t)number;
-    now.cur_state = (uint8_t)INT64_C(1);
-    now.cur_state_next = (uint8_t)INT64_C(1);
+    now.cur_state = EMOVE_COMMON_EMOVE_STATE_F_STATE;
+    now.cur_state_next = EMOVE_COMMON_EMOVE_STATE_F_STATE;
     at = emove_check(&now);
     if (at < 0) {
         s->emove = now;
@@ -180,9 +180,9 @@ static int32_t nbs_robot_restart_vision(nbs_robot_t *s)
     nbs_robot_take_vision(s);
     now = s->vision;
     now.inc_command_seen = now.emove.inc_command;
-    now.to_emove.status_report = (uint8_t)INT64_C(2);
-    now.to_emove.failure = (uint8_t)INT64_C(15);
-    now.cur_state = (uint8_t)INT64_C(1);
+    now.to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    now.to_emove.failure = VOCABULARY_REASON_RESTART;
+    now.cur_state = VISION_VISION_STATE_F_STATE;
     number = (uint64_t)now.camera.number;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->out.camera.order.number;
@@ -246,24 +246,24 @@ static int32_t nbs_robot_restart_primitive(nbs_robot_t *s)
     nbs_robot_take_primitive(s);
     now = s->primitive;
     now.inc_command_seen = now.emove.inc_command;
-    now.to_emove.status_report = (uint8_t)INT64_C(2);
-    now.to_emove.failure = (uint8_t)INT64_C(15);
-    now.to_robot.input_command = (uint8_t)INT64_C(0);
+    now.to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    now.to_emove.failure = VOCABULARY_REASON_RESTART;
+    now.to_robot.input_command = VOCABULARY_ROBOT_COMMAND_HOLD;
     number = (uint64_t)now.from_robot.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->out.robot.order.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_robot.inc_command = (uint16_t)number;
-    now.to_gripper.input_command = (uint8_t)INT64_C(0);
+    now.to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
     number = (uint64_t)now.from_gripper.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.primitive_to_gripper.inc_command;
     }
     number = (number + UINT64_C(1)) % UINT64_C(65536);
     now.to_gripper.inc_command = (uint16_t)number;
-    now.cur_state = (uint8_t)INT64_C(1);
-    now.cur_state_next = (uint8_t)INT64_C(1);
+    now.cur_state = PRMTV_CMN_PRMTV_STATE_F_STATE;
+    now.cur_state_next = PRMTV_CMN_PRMTV_STATE_F_STATE;
     at = primitive_check(&now);
     if (at < 0) {
         s->primitive = now;
@@ -313,9 +313,9 @@ static int32_t nbs_robot_restart_gripper(nbs_robot_t *s)
     nbs_robot_take_gripper(s);
     now = s->gripper;
     now.inc_command_seen = now.primitive.inc_command;
-    now.to_primitive.status_report = (uint8_t)INT64_C(2);
-    now.to_primitive.failure = (uint8_t)INT64_C(15);
-    now.cur_state = (uint8_t)INT64_C(1);
+    now.to_primitive.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    now.to_primitive.failure = VOCABULARY_REASON_RESTART;
+    now.cur_state = GRIPPER_GRIPPER_STATE_F_STATE;
     at = gripper_check(&now);
     if (at < 0) {
         s->gripper = now;

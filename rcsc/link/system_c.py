@@ -30,7 +30,7 @@ from rcsc.emit.code_tree import (
 from rcsc.emit.identifiers import TRACE, comment, constant_word, guard
 from rcsc.emit.rendering import render
 from rcsc.emit.translate import constant
-from rcsc.lang.model import Admit, Array, Bool, Real, Record, Scalar, Type, Value
+from rcsc.lang.model import Admit, Array, Bool, Enum, Real, Record, Scalar, Type, Value
 from rcsc.link.wiring import BETWEEN, IN, OUT, OWN, TICK, Buffer, End, LevelProgram, Linked, LinkedLevel
 from rcsc.run.adopt import NUMBERS, Copied, Fixed, Numbered, Start, adoption
 
@@ -237,7 +237,7 @@ class _Maker:
         place = Name(f"now.{program.path(start.at)}")
         match start:
             case Fixed(value=value):
-                yield Set(place, _constant(program.plan.program.variables[start.at].type, value))
+                yield Set(place, _constant(program, program.plan.program.variables[start.at].type, value))
             case Copied(source=source):
                 given = Name(f"now.{program.path(source)}")
                 same = program.sign.leaves[source].c_type == leaf.c_type
@@ -361,9 +361,10 @@ def _chosen(each: Iterable[tuple[LinkedLevel, Code]]) -> Iterator[Stmt]:
     yield Leave(AT)
 
 
-def _constant(kind: Scalar, value: Value) -> Code:
-    code = constant(kind, value)
-    return code if isinstance(kind, Bool | Real) else Cast(c_type(kind), code)
+def _constant(program: LevelProgram, kind: Scalar, value: Value) -> Code:
+    if isinstance(kind, Enum):
+        return Name(program.names.constants[kind.name][int(value)])
+    return constant(kind, value) if isinstance(kind, Bool | Real) else Constant(value, c_type(kind))
 
 
 def _greatest(level: LinkedLevel, start: Numbered) -> int:
