@@ -64,20 +64,21 @@ static inline uint32_t approach_u32_of_i32(int32_t a)
     return (uint32_t)a;
 }
 
-/* Procedure smooth. */
+/* examples/approach.rcs procedure smooth */
 static void approach_do_smooth(approach_t *s)
 {
     s->smooth_n = ((0.75 * s->smooth_n) + (0.25 * s->force_n)) + 0.0;
 }
 
-/* Procedure full_speed. */
+/* examples/approach.rcs procedure full_speed */
 static void approach_do_full_speed(approach_t *s)
 {
     s->speed_mm_s = 1000u;
     s->settled = 0u;
 }
 
-/* Slows down with the share of the braking distance that is left. */
+/* examples/approach.rcs procedure slow_down: Slows down with the share of the braking distance that is
+   left. */
 static void approach_do_slow_down(approach_t *s)
 {
     uint32_t v_left_mm = 0u;
@@ -86,14 +87,14 @@ static void approach_do_slow_down(approach_t *s)
     s->settled = 0u;
 }
 
-/* Procedure settle. */
+/* examples/approach.rcs procedure settle */
 static void approach_do_settle(approach_t *s)
 {
     s->speed_mm_s = 0u;
     s->settled = (uint8_t)approach_min_u32((uint32_t)s->settled + 1u, 25u);
 }
 
-/* Procedure stop. */
+/* examples/approach.rcs procedure stop */
 static void approach_do_stop(approach_t *s)
 {
     s->speed_mm_s = 0u;
@@ -226,13 +227,14 @@ int32_t approach_check(const approach_t *s)
 /* The line of table approach that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t approach_approach_line(const approach_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of examples/approach.rcs: from the lowest bit, lines blocked, arrived, brake, cruise; each set
+       where its line does not exclude that class. */
     static const struct {
         uint8_t t0[16];
         uint8_t t1[4];
     } t = {
-        /* force_n > limit_n by force_n <= limit_n by distance_mm - tolerance_mm <= 0 by distance_mm -
-           tolerance_mm > 0 */
+        /* examples/approach.rcs: force_n > limit_n, force_n <= limit_n, distance_mm - tolerance_mm <= 0,
+           distance_mm - tolerance_mm > 0 */
         {
             0x0u, /* false, false, false, false: no line */
             0x0u, /* false, false, false, true: no line */
@@ -240,21 +242,23 @@ int32_t approach_approach_line(const approach_t *s)
             0x0u, /* false, false, true, true: no line */
             0x0u, /* false, true, false, false: no line */
             0xcu, /* false, true, false, true: lines brake, cruise */
-            0x2u, /* false, true, true, false: lines arrived */
-            0xeu, /* false, true, true, true: lines arrived, brake, cruise */
-            0x1u, /* true, false, false, false: lines blocked */
-            0x1u, /* true, false, false, true: lines blocked */
-            0x1u, /* true, false, true, false: lines blocked */
-            0x1u, /* true, false, true, true: lines blocked */
-            0x1u, /* true, true, false, false: lines blocked */
-            0xdu, /* true, true, false, true: lines blocked, brake, cruise */
+            0x2u, /* false, true, true, false: line arrived */
+            0xeu, /* false, true, true, true: all lines but blocked */
+            0x1u, /* true, false, false, false: line blocked */
+            0x1u, /* true, false, false, true: line blocked */
+            0x1u, /* true, false, true, false: line blocked */
+            0x1u, /* true, false, true, true: line blocked */
+            0x1u, /* true, true, false, false: line blocked */
+            0xdu, /* true, true, false, true: all lines but arrived */
             0x3u, /* true, true, true, false: lines blocked, arrived */
             0xfu /* true, true, true, true: every line */
         },
-        { /* distance_mm <= tolerance_mm + braking_mm by distance_mm > tolerance_mm + braking_mm */
+        /* examples/approach.rcs: distance_mm <= tolerance_mm + braking_mm, distance_mm > tolerance_mm +
+           braking_mm */
+        {
             0x3u, /* false, false: lines blocked, arrived */
-            0xbu, /* false, true: lines blocked, arrived, cruise */
-            0x7u, /* true, false: lines blocked, arrived, brake */
+            0xbu, /* false, true: all lines but brake */
+            0x7u, /* true, false: all lines but cruise */
             0xfu /* true, true: every line */
         },
     };

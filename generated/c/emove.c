@@ -82,14 +82,15 @@ static inline uint16_t emove_u16_of_i32(int32_t a)
     return (uint16_t)a;
 }
 
-/* Procedure look_below. */
+/* emove/common.rcs procedure look_below */
 static void emove_do_look_below(emove_t *s)
 {
     s->idle = (s->primitive.resting && s->vision.resting && (s->here == s->here_asked) &&
             (s->here_sector == s->here_sector_asked));
 }
 
-/* How long the path would be that begins now; whether the part is still there. */
+/* emove/common.rcs procedure measure: How long the path would be that begins now; whether the part is
+   still there. */
 static void emove_do_measure(emove_t *s)
 {
     if (s->new_command) {
@@ -110,63 +111,63 @@ static void emove_do_measure(emove_t *s)
     }
 }
 
-/* Behind the table: the next cycle's question. */
+/* emove/common.rcs procedure asked: Behind the table: the next cycle's question. */
 static void emove_do_asked(emove_t *s)
 {
     s->here_asked = s->here;
     s->here_sector_asked = s->here_sector;
 }
 
-/* Procedure nextstate. */
+/* emove/common.rcs procedure nextstate */
 static void emove_do_nextstate(emove_t *s, emove_common_emove_state_t v_value)
 {
     s->cur_state_next = v_value;
 }
 
-/* Procedure no_place. */
+/* emove/common.rcs procedure no_place */
 static void emove_do_no_place(emove_t *s)
 {
     s->to_task.failure = VOCABULARY_REASON_NO_PLACE;
 }
 
-/* What PRIMITIVE says went wrong. */
+/* emove/common.rcs procedure primitive_failure: What PRIMITIVE says went wrong. */
 static void emove_do_primitive_failure(emove_t *s)
 {
     s->to_task.failure = s->primitive.failure;
 }
 
-/* The fingers are not where the part would keep them. */
+/* emove/common.rcs procedure part_lost: The fingers are not where the part would keep them. */
 static void emove_do_part_lost(emove_t *s)
 {
     s->to_task.failure = VOCABULARY_REASON_NOTHING_GRIPPED;
 }
 
-/* What vision says went wrong. */
+/* emove/common.rcs procedure vision_failure: What vision says went wrong. */
 static void emove_do_vision_failure(emove_t *s)
 {
     s->to_task.failure = s->vision.failure;
 }
 
-/* Procedure pause. */
+/* emove/common.rcs procedure pause */
 static void emove_do_pause(emove_t *s)
 {
     s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
-/* Procedure goto. */
+/* emove/common.rcs procedure goto */
 static void emove_do_goto_(emove_t *s)
 {
     s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_GOTO;
 }
 
-/* Procedure gothru. */
+/* emove/common.rcs procedure gothru */
 static void emove_do_gothru(emove_t *s)
 {
     s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_GOTHRU;
 }
 
-/* Procedure approach_position_fingers. */
+/* emove/common.rcs procedure approach_position_fingers */
 static void emove_do_approach_position_fingers(emove_t *s)
 {
     s->to_primitive.obj_ptr = s->task.obj_ptr;
@@ -175,7 +176,7 @@ static void emove_do_approach_position_fingers(emove_t *s)
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
-/* Procedure departure_position_fingers. */
+/* emove/common.rcs procedure departure_position_fingers */
 static void emove_do_departure_position_fingers(emove_t *s)
 {
     s->to_primitive.obj_ptr = s->task.obj_ptr;
@@ -183,7 +184,7 @@ static void emove_do_departure_position_fingers(emove_t *s)
     s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS;
 }
 
-/* So that vision sees the whole scene (section 4.1). */
+/* emove/common.rcs procedure open_fully: So that vision sees the whole scene (section 4.1). */
 static void emove_do_open_fully(emove_t *s)
 {
     s->to_primitive.obj_ptr = VOCABULARY_OBJECT_OPEN_GRIP;
@@ -192,7 +193,7 @@ static void emove_do_open_fully(emove_t *s)
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
-/* Procedure immed_grasp. */
+/* emove/common.rcs procedure immed_grasp */
 static void emove_do_immed_grasp(emove_t *s)
 {
     s->to_primitive.obj_ptr = s->task.obj_ptr;
@@ -200,7 +201,7 @@ static void emove_do_immed_grasp(emove_t *s)
     s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP;
 }
 
-/* Procedure flood_flash. */
+/* emove/common.rcs procedure flood_flash */
 static void emove_do_flood_flash(emove_t *s)
 {
     emove_do_pause(s);
@@ -209,7 +210,7 @@ static void emove_do_flood_flash(emove_t *s)
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_FLOOD_FLASH;
 }
 
-/* Procedure line_flash. */
+/* emove/common.rcs procedure line_flash */
 static void emove_do_line_flash(emove_t *s)
 {
     emove_do_pause(s);
@@ -219,7 +220,7 @@ static void emove_do_line_flash(emove_t *s)
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_LINE_FLASH;
 }
 
-/* The path is kept, and the robot is nowhere until it arrives. */
+/* emove/common.rcs procedure depart: The path is kept, and the robot is nowhere until it arrives. */
 static void emove_do_depart(emove_t *s)
 {
     s->depart_first = s->path.depart_first;
@@ -228,7 +229,7 @@ static void emove_do_depart(emove_t *s)
     s->here_next = 0u;
 }
 
-/* Procedure no_displacement. */
+/* emove/common.rcs procedure no_displacement */
 static void emove_do_no_displacement(emove_t *s)
 {
     s->to_primitive.displaced.x = 0.0 + 0.0;
@@ -238,7 +239,8 @@ static void emove_do_no_displacement(emove_t *s)
     s->to_primitive.displaced.s = 0.0 + 0.0;
 }
 
-/* Point `at` of the path: first the departure, displaced as the part was, then the approach. */
+/* emove/common.rcs procedure aim: Point `at` of the path: first the departure, displaced as the part was,
+   then the approach. */
 static void emove_do_aim(emove_t *s, uint32_t v_at)
 {
     emove_do_no_displacement(s);
@@ -254,7 +256,7 @@ static void emove_do_aim(emove_t *s, uint32_t v_at)
     }
 }
 
-/* The first point of the path. */
+/* emove/common.rcs procedure aim_first: The first point of the path. */
 static void emove_do_aim_first(emove_t *s)
 {
     emove_do_depart(s);
@@ -262,21 +264,21 @@ static void emove_do_aim_first(emove_t *s)
     s->path_at_next = 0u;
 }
 
-/* The next one; `path_at` counts on when PRIMITIVE has echoed the order, so that a line that matches again
-   asks for the same. */
+/* emove/common.rcs procedure aim_next: The next one; `path_at` counts on when PRIMITIVE has echoed the
+   order, so that a line that matches again asks for the same. */
 static void emove_do_aim_next(emove_t *s)
 {
     emove_do_aim(s, (uint32_t)s->path_at + 1u);
     s->path_at_next = (uint8_t)emove_min_u32((uint32_t)s->path_at + 1u, 62u);
 }
 
-/* The last one. */
+/* emove/common.rcs procedure aim_last: The last one. */
 static void emove_do_aim_last(emove_t *s)
 {
     emove_do_aim(s, emove_min_u32((uint32_t)s->path_at + 1u, 62u));
 }
 
-/* The robot is at the location of the task. */
+/* emove/common.rcs procedure arrived: The robot is at the location of the task. */
 static void emove_do_arrived(emove_t *s)
 {
     s->here_next = s->task.locpt_ptr;
@@ -285,7 +287,8 @@ static void emove_do_arrived(emove_t *s)
     s->displaced_here.y = 0.0 + 0.0;
 }
 
-/* The camera above the part: the two lines of the second picture are to fall on it. */
+/* emove/common.rcs procedure aim_view: The camera above the part: the two lines of the second picture are
+   to fall on it. */
 static void emove_do_aim_view(emove_t *s)
 {
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
@@ -296,7 +299,7 @@ static void emove_do_aim_view(emove_t *s)
     s->here_next = 0u;
 }
 
-/* Above the part, turned with it. */
+/* emove/common.rcs procedure aim_above: Above the part, turned with it. */
 static void emove_do_aim_above(emove_t *s)
 {
     s->to_primitive.pose_ptr = s->target.hover_point;
@@ -308,8 +311,8 @@ static void emove_do_aim_above(emove_t *s)
     s->here_next = 0u;
 }
 
-/* Around the part; the pads go as much lower as its top is farther away than one that they would take
-   without. */
+/* emove/common.rcs procedure aim_at_part: Around the part; the pads go as much lower as its top is farther
+   away than one that they would take without. */
 static void emove_do_aim_at_part(emove_t *s)
 {
     s->to_primitive.pose_ptr = s->target.grasp_point;
@@ -318,7 +321,7 @@ static void emove_do_aim_at_part(emove_t *s)
             0.0;
 }
 
-/* Procedure located. */
+/* emove/common.rcs procedure located */
 static void emove_do_located(emove_t *s)
 {
     s->here_next = s->task.locpt_ptr;
@@ -327,7 +330,7 @@ static void emove_do_located(emove_t *s)
     s->displaced_here.y = s->to_primitive.displaced.y + 0.0;
 }
 
-/* Procedure take_orders. */
+/* emove/common.rcs procedure take_orders */
 static void emove_do_take_orders(emove_t *s)
 {
     s->echoed = ((s->from_primitive.inc_command_echo == s->to_primitive.inc_command) &&
@@ -358,7 +361,7 @@ static void emove_do_take_orders(emove_t *s)
             (s->vision.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
-/* Procedure give_orders. */
+/* emove/common.rcs procedure give_orders */
 static void emove_do_give_orders(emove_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -394,7 +397,7 @@ static void emove_do_give_orders(emove_t *s)
     s->last_vision.obj_ptr = s->to_vision.obj_ptr;
 }
 
-/* A new command finds a level below at work: let it rest first. */
+/* emove/common.rcs procedure settle: A new command finds a level below at work: let it rest first. */
 static void emove_do_settle(emove_t *s)
 {
     s->settling = true;
@@ -402,19 +405,19 @@ static void emove_do_settle(emove_t *s)
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
-/* Procedure done. */
+/* emove/common.rcs procedure done */
 static void emove_do_done(emove_t *s)
 {
     s->to_task.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
-/* Procedure executing. */
+/* emove/common.rcs procedure executing */
 static void emove_do_executing(emove_t *s)
 {
     s->to_task.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
-/* Procedure failed. */
+/* emove/common.rcs procedure failed */
 static void emove_do_failed(emove_t *s)
 {
     s->to_task.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
@@ -549,7 +552,7 @@ static void emove_admit(emove_t *s)
     }
 }
 
-/* Assumption locate_in_step: A state goes with the orders that it waits for (section 9). */
+/* emove/locate.rcs assumption locate_in_step: A state goes with the orders that it waits for (section 9). */
 static bool emove_holds_locate_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -576,7 +579,8 @@ static bool emove_holds_locate_in_step(const emove_t *s)
                 (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE));
 }
 
-/* Assumption move_to_in_step: A state goes with the orders that it waits for (section 9). */
+/* emove/move_to.rcs assumption move_to_in_step: A state goes with the orders that it waits for (section
+   9). */
 static bool emove_holds_move_to_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -589,7 +593,8 @@ static bool emove_holds_move_to_in_step(const emove_t *s)
                 (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTO));
 }
 
-/* Assumption move_to_obj_in_step: A state goes with the orders that it waits for (section 9). */
+/* emove/move_to_obj.rcs assumption move_to_obj_in_step: A state goes with the orders that it waits for
+   (section 9). */
 static bool emove_holds_move_to_obj_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -604,7 +609,7 @@ static bool emove_holds_move_to_obj_in_step(const emove_t *s)
                 (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS));
 }
 
-/* Assumption pickup_in_step: A state goes with the orders that it waits for (section 9). */
+/* emove/pickup.rcs assumption pickup_in_step: A state goes with the orders that it waits for (section 9). */
 static bool emove_holds_pickup_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -615,7 +620,8 @@ static bool emove_holds_pickup_in_step(const emove_t *s)
                 (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP));
 }
 
-/* Assumption release_part_in_step: A state goes with the orders that it waits for (section 9). */
+/* emove/release.rcs assumption release_part_in_step: A state goes with the orders that it waits for
+   (section 9). */
 static bool emove_holds_release_part_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -1387,7 +1393,8 @@ int32_t emove_check(const emove_t *s)
 /* The line of table locate that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_locate_line(const emove_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of emove/locate.rcs: from the lowest bit, lines 0, 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12,
+       13, 14; each set where its line does not exclude that class. */
     static const struct {
         uint16_t t0[14];
         uint16_t t1[24];
@@ -1395,7 +1402,7 @@ int32_t emove_locate_line(const emove_t *s)
         uint16_t t3[3];
         uint16_t t4[3];
     } t = {
-        { /* cur_state */
+        { /* emove/locate.rcs: cur_state */
             0x407u, /* d_state: lines 0, 1, 2, 9 */
             0x2007u, /* f_state: lines 0, 1, 2, 12 */
             0x7u, /* through: lines 0, 1, 2 */
@@ -1411,25 +1418,25 @@ int32_t emove_locate_line(const emove_t *s)
             0x7u, /* grasping: lines 0, 1, 2 */
             0x7u /* releasing: lines 0, 1, 2 */
         },
-        { /* primitive.command by new_command by target.known */
+        { /* emove/locate.rcs: primitive.command, new_command, target.known */
             0xfc50u, /* pause, false, false: lines 4, 5, 9, 10, 11, 12, 13, 14 */
             0xfc50u, /* pause, false, true: lines 4, 5, 9, 10, 11, 12, 13, 14 */
             0x3u, /* pause, true, false: lines 0, 1 */
             0x5u, /* pause, true, true: lines 0, 2 */
-            0xff70u, /* goto, false, false: lines 4, 4a, 5, 7, 8, 9, 10, 11, 12, 13, 14 */
-            0xff70u, /* goto, false, true: lines 4, 4a, 5, 7, 8, 9, 10, 11, 12, 13, 14 */
+            0xff70u, /* goto, false, false: all lines but 0, 1, 2, 3, 6 */
+            0xff70u, /* goto, false, true: all lines but 0, 1, 2, 3, 6 */
             0x3u, /* goto, true, false: lines 0, 1 */
             0x5u, /* goto, true, true: lines 0, 2 */
             0xfc50u, /* gothru, false, false: lines 4, 5, 9, 10, 11, 12, 13, 14 */
             0xfc50u, /* gothru, false, true: lines 4, 5, 9, 10, 11, 12, 13, 14 */
             0x3u, /* gothru, true, false: lines 0, 1 */
             0x5u, /* gothru, true, true: lines 0, 2 */
-            0xfcd0u, /* approach_position_fingers, false, false: lines 4, 5, 6, 9, 10, 11, 12, 13, 14 */
-            0xfcd0u, /* approach_position_fingers, false, true: lines 4, 5, 6, 9, 10, 11, 12, 13, 14 */
+            0xfcd0u, /* approach_position_fingers, false, false: all lines but 0, 1, 2, 3, 4a, 7, 8 */
+            0xfcd0u, /* approach_position_fingers, false, true: all lines but 0, 1, 2, 3, 4a, 7, 8 */
             0x3u, /* approach_position_fingers, true, false: lines 0, 1 */
             0x5u, /* approach_position_fingers, true, true: lines 0, 2 */
-            0xfc58u, /* departure_position_fingers, false, false: lines 3, 4, 5, 9, 10, 11, 12, 13, 14 */
-            0xfc58u, /* departure_position_fingers, false, true: lines 3, 4, 5, 9, 10, 11, 12, 13, 14 */
+            0xfc58u, /* departure_position_fingers, false, false: all lines but 0, 1, 2, 4a, 6, 7, 8 */
+            0xfc58u, /* departure_position_fingers, false, true: all lines but 0, 1, 2, 4a, 6, 7, 8 */
             0x3u, /* departure_position_fingers, true, false: lines 0, 1 */
             0x5u, /* departure_position_fingers, true, true: lines 0, 2 */
             0xfc50u, /* immed_grasp, false, false: lines 4, 5, 9, 10, 11, 12, 13, 14 */
@@ -1437,23 +1444,23 @@ int32_t emove_locate_line(const emove_t *s)
             0x3u, /* immed_grasp, true, false: lines 0, 1 */
             0x5u /* immed_grasp, true, true: lines 0, 2 */
         },
-        { /* primitive.status by idle */
-            0xb7f9u, /* done, false: lines 0, 3, 4, 4a, 5, 6, 7, 8, 9, 11, 12, 14 */
-            0xb7feu, /* done, true: lines 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 11, 12, 14 */
+        { /* emove/locate.rcs: primitive.status, idle */
+            0xb7f9u, /* done, false: all lines but 1, 2, 10, 13 */
+            0xb7feu, /* done, true: all lines but 0, 10, 13 */
             0xf451u, /* executing, false: lines 0, 4, 5, 9, 11, 12, 13, 14 */
-            0xf456u, /* executing, true: lines 1, 2, 4, 5, 9, 11, 12, 13, 14 */
+            0xf456u, /* executing, true: all lines but 0, 3, 4a, 6, 7, 8, 10 */
             0x2c01u, /* failed, false: lines 0, 9, 10, 12 */
             0x2c06u /* failed, true: lines 1, 2, 9, 10, 12 */
         },
-        { /* vision.command */
-            0xffafu, /* pause: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-            0xffbfu, /* flood_flash: lines 0, 1, 2, 3, 4, 4a, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
-            0xffefu /* line_flash: lines 0, 1, 2, 3, 4a, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14 */
+        { /* emove/locate.rcs: vision.command */
+            0xffafu, /* pause: all lines but 4, 5 */
+            0xffbfu, /* flood_flash: all lines but 5 */
+            0xffefu /* line_flash: all lines but 4 */
         },
-        { /* vision.status */
-            0x6fffu, /* done: lines 0, 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 12, 13 */
-            0xefafu, /* executing: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 12, 13, 14 */
-            0x7fafu /* failed: lines 0, 1, 2, 3, 4a, 6, 7, 8, 9, 10, 11, 12, 13 */
+        { /* emove/locate.rcs: vision.status */
+            0x6fffu, /* done: all lines but 11, 14 */
+            0xefafu, /* executing: all lines but 4, 5, 11 */
+            0x7fafu /* failed: all lines but 4, 5, 14 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->cur_state] &
@@ -1479,7 +1486,8 @@ void emove_locate_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table move_to that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_move_to_line(const emove_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of emove/move_to.rcs: from the lowest bit, lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11;
+       each set where its line does not exclude that class. */
     static const struct {
         uint16_t t0[63];
         uint16_t t1[14];
@@ -1487,20 +1495,23 @@ int32_t emove_move_to_line(const emove_t *s)
         uint16_t t3[24];
         uint16_t t4[2];
     } t = {
-        { /* path_length */
-            0x1fe7u, 0x1febu, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+        { /* emove/move_to.rcs: path_length */
+            0x1fe7u, /* 0: all lines but 3, 4 */
+            0x1febu, /* 1: all lines but 2, 4 */
+            /* 2 .. 62: all lines but 2, 3 */
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u
         },
-        { /* cur_state */
-            0x61fu, /* d_state: lines 0, 1, 2, 3, 4, 8, 9 */
+        { /* emove/move_to.rcs: cur_state */
+            0x61fu, /* d_state: all lines but 5, 6, 7, 7a, 10, 11 */
             0x81fu, /* f_state: lines 0, 1, 2, 3, 4, 10 */
-            0x147fu, /* through: lines 0, 1, 2, 3, 4, 5, 6, 9, 11 */
-            0x159fu, /* last: lines 0, 1, 2, 3, 4, 7, 7a, 9, 11 */
+            0x147fu, /* through: all lines but 7, 7a, 8, 10 */
+            0x159fu, /* last: all lines but 5, 6, 8, 10 */
             0x41fu, /* opening: lines 0, 1, 2, 3, 4, 9 */
             0x41fu, /* looking: lines 0, 1, 2, 3, 4, 9 */
             0x41fu, /* flooding: lines 0, 1, 2, 3, 4, 9 */
@@ -1512,7 +1523,7 @@ int32_t emove_move_to_line(const emove_t *s)
             0x41fu, /* grasping: lines 0, 1, 2, 3, 4, 9 */
             0x41fu /* releasing: lines 0, 1, 2, 3, 4, 9 */
         },
-        { /* primitive.command by new_command by target.known */
+        { /* emove/move_to.rcs: primitive.command, new_command, target.known */
             0x1a00u, /* pause, false, false: lines 8, 10, 11 */
             0x1a00u, /* pause, false, true: lines 8, 10, 11 */
             0x3u, /* pause, true, false: lines 0, 1 */
@@ -1538,35 +1549,35 @@ int32_t emove_move_to_line(const emove_t *s)
             0x3u, /* immed_grasp, true, false: lines 0, 1 */
             0x1du /* immed_grasp, true, true: lines 0, 2, 3, 4 */
         },
-        { /* primitive.status by idle by lost by path_length - path_at > 2 */
+        { /* emove/move_to.rcs: primitive.status, idle, lost, path_length - path_at > 2 */
             0xac1u, /* done, false, false, false: lines 0, 6, 7, 8, 10 */
             0xae1u, /* done, false, false, true: lines 0, 5, 6, 7, 8, 10 */
             0xb41u, /* done, false, true, false: lines 0, 6, 7a, 8, 10 */
             0xb61u, /* done, false, true, true: lines 0, 5, 6, 7a, 8, 10 */
-            0xadeu, /* done, true, false, false: lines 1, 2, 3, 4, 6, 7, 8, 10 */
-            0xafeu, /* done, true, false, true: lines 1, 2, 3, 4, 5, 6, 7, 8, 10 */
-            0xb5eu, /* done, true, true, false: lines 1, 2, 3, 4, 6, 7a, 8, 10 */
-            0xb7eu, /* done, true, true, true: lines 1, 2, 3, 4, 5, 6, 7a, 8, 10 */
+            0xadeu, /* done, true, false, false: all lines but 0, 5, 7a, 9, 11 */
+            0xafeu, /* done, true, false, true: all lines but 0, 7a, 9, 11 */
+            0xb5eu, /* done, true, true, false: all lines but 0, 5, 7, 9, 11 */
+            0xb7eu, /* done, true, true, true: all lines but 0, 7, 9, 11 */
             0x1a01u, /* executing, false, false, false: lines 0, 8, 10, 11 */
             0x1a01u, /* executing, false, false, true: lines 0, 8, 10, 11 */
             0x1a01u, /* executing, false, true, false: lines 0, 8, 10, 11 */
             0x1a01u, /* executing, false, true, true: lines 0, 8, 10, 11 */
-            0x1a1eu, /* executing, true, false, false: lines 1, 2, 3, 4, 8, 10, 11 */
-            0x1a1eu, /* executing, true, false, true: lines 1, 2, 3, 4, 8, 10, 11 */
-            0x1a1eu, /* executing, true, true, false: lines 1, 2, 3, 4, 8, 10, 11 */
-            0x1a1eu, /* executing, true, true, true: lines 1, 2, 3, 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, false, false: all lines but 0, 5, 6, 7, 7a, 9 */
+            0x1a1eu, /* executing, true, false, true: all lines but 0, 5, 6, 7, 7a, 9 */
+            0x1a1eu, /* executing, true, true, false: all lines but 0, 5, 6, 7, 7a, 9 */
+            0x1a1eu, /* executing, true, true, true: all lines but 0, 5, 6, 7, 7a, 9 */
             0xe01u, /* failed, false, false, false: lines 0, 8, 9, 10 */
             0xe01u, /* failed, false, false, true: lines 0, 8, 9, 10 */
             0xe01u, /* failed, false, true, false: lines 0, 8, 9, 10 */
             0xe01u, /* failed, false, true, true: lines 0, 8, 9, 10 */
-            0xe1eu, /* failed, true, false, false: lines 1, 2, 3, 4, 8, 9, 10 */
-            0xe1eu, /* failed, true, false, true: lines 1, 2, 3, 4, 8, 9, 10 */
-            0xe1eu, /* failed, true, true, false: lines 1, 2, 3, 4, 8, 9, 10 */
-            0xe1eu /* failed, true, true, true: lines 1, 2, 3, 4, 8, 9, 10 */
+            0xe1eu, /* failed, true, false, false: all lines but 0, 5, 6, 7, 7a, 11 */
+            0xe1eu, /* failed, true, false, true: all lines but 0, 5, 6, 7, 7a, 11 */
+            0xe1eu, /* failed, true, true, false: all lines but 0, 5, 6, 7, 7a, 11 */
+            0xe1eu /* failed, true, true, true: all lines but 0, 5, 6, 7, 7a, 11 */
         },
-        { /* path_length - path_at <= 2 */
-            0x1fbfu, /* false: lines 0, 1, 2, 3, 4, 5, 7, 7a, 8, 9, 10, 11 */
-            0x1fffu /* true: lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11 */
+        { /* emove/move_to.rcs: path_length - path_at <= 2 */
+            0x1fbfu, /* false: all lines but 6 */
+            0x1fffu /* true: every line */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->path_length] & (uint32_t)t.t1[s->cur_state] &
@@ -1594,28 +1605,31 @@ void emove_move_to_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table move_to_obj that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_move_to_obj_line(const emove_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of emove/move_to_obj.rcs: bit k is set where line k does not exclude that class. */
     static const struct {
         uint16_t t0[63];
         uint16_t t1[14];
         uint16_t t2[24];
         uint16_t t3[24];
     } t = {
-        { /* path_length */
-            0x1fd7u, 0x1fdbu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+        { /* emove/move_to_obj.rcs: path_length */
+            0x1fd7u, /* 0: all lines but 3, 5 */
+            0x1fdbu, /* 1: all lines but 2, 5 */
+            /* 2 .. 62: all lines but 2, 4 */
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu
         },
-        { /* cur_state */
+        { /* emove/move_to_obj.rcs: cur_state */
             0x60fu, /* d_state: lines 0, 1, 2, 3, 9, 10 */
             0x80fu, /* f_state: lines 0, 1, 2, 3, 11 */
-            0x14cfu, /* through: lines 0, 1, 2, 3, 6, 7, 10, 12 */
-            0x150fu, /* last: lines 0, 1, 2, 3, 8, 10, 12 */
-            0x143fu, /* opening: lines 0, 1, 2, 3, 4, 5, 10, 12 */
+            0x14cfu, /* through: all lines but 4, 5, 8, 9, 11 */
+            0x150fu, /* last: all lines but 4, 5, 6, 7, 9, 11 */
+            0x143fu, /* opening: all lines but 6, 7, 8, 9, 11 */
             0x40fu, /* looking: lines 0, 1, 2, 3, 10 */
             0x40fu, /* flooding: lines 0, 1, 2, 3, 10 */
             0x40fu, /* centering: lines 0, 1, 2, 3, 10 */
@@ -1626,7 +1640,7 @@ int32_t emove_move_to_obj_line(const emove_t *s)
             0x40fu, /* grasping: lines 0, 1, 2, 3, 10 */
             0x40fu /* releasing: lines 0, 1, 2, 3, 10 */
         },
-        { /* primitive.command by new_command by target.known */
+        { /* emove/move_to_obj.rcs: primitive.command, new_command, target.known */
             0x1a00u, /* pause, false, false: lines 9, 11, 12 */
             0x1a00u, /* pause, false, true: lines 9, 11, 12 */
             0x3u, /* pause, true, false: lines 0, 1 */
@@ -1652,15 +1666,17 @@ int32_t emove_move_to_obj_line(const emove_t *s)
             0x3u, /* immed_grasp, true, false: lines 0, 1 */
             0xdu /* immed_grasp, true, true: lines 0, 2, 3 */
         },
-        { /* primitive.status by idle by path_length - path_at > 2 by path_length - path_at <= 2 */
+        /* emove/move_to_obj.rcs: primitive.status, idle, path_length - path_at > 2, path_length - path_at
+           <= 2 */
+        {
             0xb31u, /* done, false, false, false: lines 0, 4, 5, 8, 9, 11 */
-            0xbb1u, /* done, false, false, true: lines 0, 4, 5, 7, 8, 9, 11 */
-            0xb71u, /* done, false, true, false: lines 0, 4, 5, 6, 8, 9, 11 */
-            0xbf1u, /* done, false, true, true: lines 0, 4, 5, 6, 7, 8, 9, 11 */
-            0xb3eu, /* done, true, false, false: lines 1, 2, 3, 4, 5, 8, 9, 11 */
-            0xbbeu, /* done, true, false, true: lines 1, 2, 3, 4, 5, 7, 8, 9, 11 */
-            0xb7eu, /* done, true, true, false: lines 1, 2, 3, 4, 5, 6, 8, 9, 11 */
-            0xbfeu, /* done, true, true, true: lines 1, 2, 3, 4, 5, 6, 7, 8, 9, 11 */
+            0xbb1u, /* done, false, false, true: all lines but 1, 2, 3, 6, 10, 12 */
+            0xb71u, /* done, false, true, false: all lines but 1, 2, 3, 7, 10, 12 */
+            0xbf1u, /* done, false, true, true: all lines but 1, 2, 3, 10, 12 */
+            0xb3eu, /* done, true, false, false: all lines but 0, 6, 7, 10, 12 */
+            0xbbeu, /* done, true, false, true: all lines but 0, 6, 10, 12 */
+            0xb7eu, /* done, true, true, false: all lines but 0, 7, 10, 12 */
+            0xbfeu, /* done, true, true, true: all lines but 0, 10, 12 */
             0x1a01u, /* executing, false, false, false: lines 0, 9, 11, 12 */
             0x1a01u, /* executing, false, false, true: lines 0, 9, 11, 12 */
             0x1a01u, /* executing, false, true, false: lines 0, 9, 11, 12 */
@@ -1703,13 +1719,14 @@ void emove_move_to_obj_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table pause_emove that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_pause_emove_line(const emove_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of emove/pause.rcs: from the lowest bit, lines 1, 2; each set where its line does not exclude
+       that class. */
     static const struct {
         uint8_t t0[2];
     } t = {
-        { /* idle */
-            0x2u, /* false: lines 2 */
-            0x1u /* true: lines 1 */
+        { /* emove/pause.rcs: idle */
+            0x2u, /* false: line 2 */
+            0x1u /* true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];
@@ -1732,13 +1749,13 @@ void emove_pause_emove_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table pickup that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_pickup_line(const emove_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of emove/pickup.rcs: bit k is set where line k does not exclude that class. */
     static const struct {
         uint8_t t0[14];
         uint8_t t1[24];
         uint8_t t2[3];
     } t = {
-        { /* cur_state */
+        { /* emove/pickup.rcs: cur_state */
             0xbu, /* d_state: lines 0, 1, 3 */
             0x23u, /* f_state: lines 0, 1, 5 */
             0x3u, /* through: lines 0, 1 */
@@ -1751,39 +1768,39 @@ int32_t emove_pickup_line(const emove_t *s)
             0x3u, /* closing: lines 0, 1 */
             0x3u, /* hovering: lines 0, 1 */
             0x3u, /* lowering: lines 0, 1 */
-            0x57u, /* grasping: lines 0, 1, 2, 4, 6 */
+            0x57u, /* grasping: all lines but 3, 5 */
             0x3u /* releasing: lines 0, 1 */
         },
-        { /* primitive.command by new_command by idle */
+        { /* emove/pickup.rcs: primitive.command, new_command, idle */
             0x68u, /* pause, false, false: lines 3, 5, 6 */
             0x68u, /* pause, false, true: lines 3, 5, 6 */
-            0x1u, /* pause, true, false: lines 0 */
-            0x2u, /* pause, true, true: lines 1 */
+            0x1u, /* pause, true, false: line 0 */
+            0x2u, /* pause, true, true: line 1 */
             0x68u, /* goto, false, false: lines 3, 5, 6 */
             0x68u, /* goto, false, true: lines 3, 5, 6 */
-            0x1u, /* goto, true, false: lines 0 */
-            0x2u, /* goto, true, true: lines 1 */
+            0x1u, /* goto, true, false: line 0 */
+            0x2u, /* goto, true, true: line 1 */
             0x68u, /* gothru, false, false: lines 3, 5, 6 */
             0x68u, /* gothru, false, true: lines 3, 5, 6 */
-            0x1u, /* gothru, true, false: lines 0 */
-            0x2u, /* gothru, true, true: lines 1 */
+            0x1u, /* gothru, true, false: line 0 */
+            0x2u, /* gothru, true, true: line 1 */
             0x68u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
             0x68u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
-            0x1u, /* approach_position_fingers, true, false: lines 0 */
-            0x2u, /* approach_position_fingers, true, true: lines 1 */
+            0x1u, /* approach_position_fingers, true, false: line 0 */
+            0x2u, /* approach_position_fingers, true, true: line 1 */
             0x68u, /* departure_position_fingers, false, false: lines 3, 5, 6 */
             0x68u, /* departure_position_fingers, false, true: lines 3, 5, 6 */
-            0x1u, /* departure_position_fingers, true, false: lines 0 */
-            0x2u, /* departure_position_fingers, true, true: lines 1 */
-            0x7cu, /* immed_grasp, false, false: lines 2, 3, 4, 5, 6 */
-            0x7cu, /* immed_grasp, false, true: lines 2, 3, 4, 5, 6 */
-            0x1u, /* immed_grasp, true, false: lines 0 */
-            0x2u /* immed_grasp, true, true: lines 1 */
+            0x1u, /* departure_position_fingers, true, false: line 0 */
+            0x2u, /* departure_position_fingers, true, true: line 1 */
+            0x7cu, /* immed_grasp, false, false: all lines but 0, 1 */
+            0x7cu, /* immed_grasp, false, true: all lines but 0, 1 */
+            0x1u, /* immed_grasp, true, false: line 0 */
+            0x2u /* immed_grasp, true, true: line 1 */
         },
-        { /* primitive.status */
-            0x2fu, /* done: lines 0, 1, 2, 3, 5 */
-            0x6bu, /* executing: lines 0, 1, 3, 5, 6 */
-            0x3bu /* failed: lines 0, 1, 3, 4, 5 */
+        { /* emove/pickup.rcs: primitive.status */
+            0x2fu, /* done: all lines but 4, 6 */
+            0x6bu, /* executing: all lines but 2, 4 */
+            0x3bu /* failed: all lines but 2, 6 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->cur_state] &
@@ -1808,13 +1825,14 @@ void emove_pickup_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table release_part that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_release_part_line(const emove_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of emove/release.rcs: from the lowest bit, lines 0, 1, 1a, 2, 3, 4, 5, 6; each set where its
+       line does not exclude that class. */
     static const struct {
         uint8_t t0[14];
         uint8_t t1[24];
         uint8_t t2[6];
     } t = {
-        { /* cur_state */
+        { /* emove/release.rcs: cur_state */
             0x17u, /* d_state: lines 0, 1, 1a, 3 */
             0x47u, /* f_state: lines 0, 1, 1a, 5 */
             0x7u, /* through: lines 0, 1, 1a */
@@ -1828,41 +1846,41 @@ int32_t emove_release_part_line(const emove_t *s)
             0x7u, /* hovering: lines 0, 1, 1a */
             0x7u, /* lowering: lines 0, 1, 1a */
             0x7u, /* grasping: lines 0, 1, 1a */
-            0xafu /* releasing: lines 0, 1, 1a, 2, 4, 6 */
+            0xafu /* releasing: all lines but 3, 5 */
         },
-        { /* primitive.command by new_command by idle */
+        { /* emove/release.rcs: primitive.command, new_command, idle */
             0xd0u, /* pause, false, false: lines 3, 5, 6 */
             0xd0u, /* pause, false, true: lines 3, 5, 6 */
-            0x1u, /* pause, true, false: lines 0 */
+            0x1u, /* pause, true, false: line 0 */
             0x6u, /* pause, true, true: lines 1, 1a */
             0xd0u, /* goto, false, false: lines 3, 5, 6 */
             0xd0u, /* goto, false, true: lines 3, 5, 6 */
-            0x1u, /* goto, true, false: lines 0 */
+            0x1u, /* goto, true, false: line 0 */
             0x6u, /* goto, true, true: lines 1, 1a */
             0xd0u, /* gothru, false, false: lines 3, 5, 6 */
             0xd0u, /* gothru, false, true: lines 3, 5, 6 */
-            0x1u, /* gothru, true, false: lines 0 */
+            0x1u, /* gothru, true, false: line 0 */
             0x6u, /* gothru, true, true: lines 1, 1a */
             0xd0u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
             0xd0u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
-            0x1u, /* approach_position_fingers, true, false: lines 0 */
+            0x1u, /* approach_position_fingers, true, false: line 0 */
             0x6u, /* approach_position_fingers, true, true: lines 1, 1a */
-            0xf8u, /* departure_position_fingers, false, false: lines 2, 3, 4, 5, 6 */
-            0xf8u, /* departure_position_fingers, false, true: lines 2, 3, 4, 5, 6 */
-            0x1u, /* departure_position_fingers, true, false: lines 0 */
+            0xf8u, /* departure_position_fingers, false, false: all lines but 0, 1, 1a */
+            0xf8u, /* departure_position_fingers, false, true: all lines but 0, 1, 1a */
+            0x1u, /* departure_position_fingers, true, false: line 0 */
             0x6u, /* departure_position_fingers, true, true: lines 1, 1a */
             0xd0u, /* immed_grasp, false, false: lines 3, 5, 6 */
             0xd0u, /* immed_grasp, false, true: lines 3, 5, 6 */
-            0x1u, /* immed_grasp, true, false: lines 0 */
+            0x1u, /* immed_grasp, true, false: line 0 */
             0x6u /* immed_grasp, true, true: lines 1, 1a */
         },
-        { /* primitive.status by lost */
-            0x5bu, /* done, false: lines 0, 1, 2, 3, 5 */
-            0x5du, /* done, true: lines 0, 1a, 2, 3, 5 */
-            0xd3u, /* executing, false: lines 0, 1, 3, 5, 6 */
-            0xd5u, /* executing, true: lines 0, 1a, 3, 5, 6 */
-            0x73u, /* failed, false: lines 0, 1, 3, 4, 5 */
-            0x75u /* failed, true: lines 0, 1a, 3, 4, 5 */
+        { /* emove/release.rcs: primitive.status, lost */
+            0x5bu, /* done, false: all lines but 1a, 4, 6 */
+            0x5du, /* done, true: all lines but 1, 4, 6 */
+            0xd3u, /* executing, false: all lines but 1a, 2, 4 */
+            0xd5u, /* executing, true: all lines but 1, 2, 4 */
+            0x73u, /* failed, false: all lines but 1a, 2, 6 */
+            0x75u /* failed, true: all lines but 1, 2, 6 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->cur_state] &

@@ -65,8 +65,8 @@ static inline bool gripper_number_f64(double a)
     return positive || (a <= 0.0);
 }
 
-/* Within half a millimetre; the force met but for a twentieth: fingers come to rest a little before they
-   push all of it. */
+/* gripper/gripper.rcs procedure measure: Within half a millimetre; the force met but for a twentieth:
+   fingers come to rest a little before they push all of it. */
 static void gripper_do_measure(gripper_t *s)
 {
     if (s->new_command) {
@@ -77,19 +77,20 @@ static void gripper_do_measure(gripper_t *s)
     s->closing = (s->primitive.opening_mm < s->hand.opening_mm);
 }
 
-/* Procedure show_opening. */
+/* gripper/gripper.rcs procedure show_opening */
 static void gripper_do_show_opening(gripper_t *s)
 {
     s->to_primitive.opening_mm = s->hand.opening_mm + 0.0;
 }
 
-/* Lets go of nothing: the fingers stay as they are, with the force that they have. */
+/* gripper/gripper.rcs procedure hold: Lets go of nothing: the fingers stay as they are, with the force
+   that they have. */
 static void gripper_do_hold(gripper_t *s)
 {
     s->to_hand.drive = false;
 }
 
-/* Procedure drive. */
+/* gripper/gripper.rcs procedure drive */
 static void gripper_do_drive(gripper_t *s)
 {
     s->to_hand.drive = true;
@@ -98,19 +99,19 @@ static void gripper_do_drive(gripper_t *s)
     s->to_hand.speed_mm_s = s->primitive.speed_mm_s + 0.0;
 }
 
-/* Procedure state. */
+/* gripper/gripper.rcs procedure state */
 static void gripper_do_state(gripper_t *s, gripper_gripper_state_t v_value)
 {
     s->cur_state = v_value;
 }
 
-/* Procedure grip_failure. */
+/* gripper/gripper.rcs procedure grip_failure */
 static void gripper_do_grip_failure(gripper_t *s)
 {
     s->to_primitive.failure = VOCABULARY_REASON_GRIP;
 }
 
-/* Procedure wait. */
+/* gripper/gripper.rcs procedure wait */
 static void gripper_do_wait(gripper_t *s)
 {
     if (s->waited < 150u) {
@@ -118,7 +119,7 @@ static void gripper_do_wait(gripper_t *s)
     }
 }
 
-/* Procedure take_orders. */
+/* gripper/gripper.rcs procedure take_orders */
 static void gripper_do_take_orders(gripper_t *s)
 {
     if (s->primitive.inc_command != s->inc_command_seen) {
@@ -135,7 +136,7 @@ static void gripper_do_take_orders(gripper_t *s)
     s->settling = false;
 }
 
-/* Procedure give_orders. */
+/* gripper/gripper.rcs procedure give_orders */
 static void gripper_do_give_orders(gripper_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -145,19 +146,19 @@ static void gripper_do_give_orders(gripper_t *s)
     s->to_primitive.ref_command_echo = s->primitive.input_command;
 }
 
-/* Procedure done. */
+/* gripper/gripper.rcs procedure done */
 static void gripper_do_done(gripper_t *s)
 {
     s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
-/* Procedure executing. */
+/* gripper/gripper.rcs procedure executing */
 static void gripper_do_executing(gripper_t *s)
 {
     s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
-/* Procedure failed. */
+/* gripper/gripper.rcs procedure failed */
 static void gripper_do_failed(gripper_t *s)
 {
     s->to_primitive.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
@@ -432,13 +433,15 @@ int32_t gripper_check(const gripper_t *s)
 /* The line of table position that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t gripper_position_line(const gripper_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of gripper/gripper.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each set where its
+       line does not exclude that class. */
     static const struct {
         uint8_t t0[151];
         uint8_t t1[24];
         uint8_t t2[2];
     } t = {
-        { /* waited */
+        { /* gripper/gripper.rcs: waited */
+            /* 0 .. 149: all lines but 5 */
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
@@ -451,36 +454,37 @@ int32_t gripper_position_line(const gripper_t *s)
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x77u
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x77u /* 150: all lines but 4 */
         },
-        { /* cur_state by new_command by at_opening by closing and forced */
-            0x20u, /* d_state, false, false, false: lines 6 */
-            0x20u, /* d_state, false, false, true: lines 6 */
-            0x20u, /* d_state, false, true, false: lines 6 */
-            0x20u, /* d_state, false, true, true: lines 6 */
-            0x1u, /* d_state, true, false, false: lines 1 */
-            0x1u, /* d_state, true, false, true: lines 1 */
-            0x1u, /* d_state, true, true, false: lines 1 */
-            0x1u, /* d_state, true, true, true: lines 1 */
-            0x40u, /* f_state, false, false, false: lines 7 */
-            0x40u, /* f_state, false, false, true: lines 7 */
-            0x40u, /* f_state, false, true, false: lines 7 */
-            0x40u, /* f_state, false, true, true: lines 7 */
-            0x1u, /* f_state, true, false, false: lines 1 */
-            0x1u, /* f_state, true, false, true: lines 1 */
-            0x1u, /* f_state, true, true, false: lines 1 */
-            0x1u, /* f_state, true, true, true: lines 1 */
+        { /* gripper/gripper.rcs: cur_state, new_command, at_opening, closing and forced */
+            0x20u, /* d_state, false, false, false: line 6 */
+            0x20u, /* d_state, false, false, true: line 6 */
+            0x20u, /* d_state, false, true, false: line 6 */
+            0x20u, /* d_state, false, true, true: line 6 */
+            0x1u, /* d_state, true, false, false: line 1 */
+            0x1u, /* d_state, true, false, true: line 1 */
+            0x1u, /* d_state, true, true, false: line 1 */
+            0x1u, /* d_state, true, true, true: line 1 */
+            0x40u, /* f_state, false, false, false: line 7 */
+            0x40u, /* f_state, false, false, true: line 7 */
+            0x40u, /* f_state, false, true, false: line 7 */
+            0x40u, /* f_state, false, true, true: line 7 */
+            0x1u, /* f_state, true, false, false: line 1 */
+            0x1u, /* f_state, true, false, true: line 1 */
+            0x1u, /* f_state, true, true, false: line 1 */
+            0x1u, /* f_state, true, true, true: line 1 */
             0x18u, /* moving, false, false, false: lines 4, 5 */
             0x1cu, /* moving, false, false, true: lines 3, 4, 5 */
-            0x2u, /* moving, false, true, false: lines 2 */
-            0x2u, /* moving, false, true, true: lines 2 */
-            0x1u, /* moving, true, false, false: lines 1 */
-            0x1u, /* moving, true, false, true: lines 1 */
-            0x1u, /* moving, true, true, false: lines 1 */
-            0x1u /* moving, true, true, true: lines 1 */
+            0x2u, /* moving, false, true, false: line 2 */
+            0x2u, /* moving, false, true, true: line 2 */
+            0x1u, /* moving, true, false, false: line 1 */
+            0x1u, /* moving, true, false, true: line 1 */
+            0x1u, /* moving, true, true, false: line 1 */
+            0x1u /* moving, true, true, true: line 1 */
         },
-        { /* not (closing and forced) */
-            0x67u, /* false: lines 1, 2, 3, 6, 7 */
+        { /* gripper/gripper.rcs: not (closing and forced) */
+            0x67u, /* false: all lines but 4, 5 */
             0x7fu /* true: every line */
         },
     };
@@ -508,12 +512,14 @@ void gripper_position_lines(const gripper_t *in, int32_t *out, uint32_t n)
 /* The line of table grasp that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t gripper_grasp_line(const gripper_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of gripper/gripper.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6; each set where its line
+       does not exclude that class. */
     static const struct {
         uint8_t t0[151];
         uint8_t t1[12];
     } t = {
-        { /* waited */
+        { /* gripper/gripper.rcs: waited */
+            /* 0 .. 149: all lines but 4 */
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
@@ -526,21 +532,22 @@ int32_t gripper_grasp_line(const gripper_t *s)
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x3bu
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x3bu /* 150: all lines but 3 */
         },
-        { /* cur_state by new_command by forced */
-            0x10u, /* d_state, false, false: lines 5 */
-            0x10u, /* d_state, false, true: lines 5 */
-            0x1u, /* d_state, true, false: lines 1 */
-            0x1u, /* d_state, true, true: lines 1 */
-            0x20u, /* f_state, false, false: lines 6 */
-            0x20u, /* f_state, false, true: lines 6 */
-            0x1u, /* f_state, true, false: lines 1 */
-            0x1u, /* f_state, true, true: lines 1 */
+        { /* gripper/gripper.rcs: cur_state, new_command, forced */
+            0x10u, /* d_state, false, false: line 5 */
+            0x10u, /* d_state, false, true: line 5 */
+            0x1u, /* d_state, true, false: line 1 */
+            0x1u, /* d_state, true, true: line 1 */
+            0x20u, /* f_state, false, false: line 6 */
+            0x20u, /* f_state, false, true: line 6 */
+            0x1u, /* f_state, true, false: line 1 */
+            0x1u, /* f_state, true, true: line 1 */
             0xcu, /* moving, false, false: lines 3, 4 */
-            0x2u, /* moving, false, true: lines 2 */
-            0x1u, /* moving, true, false: lines 1 */
-            0x1u /* moving, true, true: lines 1 */
+            0x2u, /* moving, false, true: line 2 */
+            0x1u, /* moving, true, false: line 1 */
+            0x1u /* moving, true, true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->waited] &

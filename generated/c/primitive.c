@@ -70,7 +70,7 @@ static inline double primitive_min_f64(double a, double b)
     return (b < a) ? b : a;
 }
 
-/* Procedure start_waiting. */
+/* primitive/common.rcs procedure start_waiting */
 static void primitive_do_start_waiting(primitive_t *s)
 {
     if (s->new_command && (!s->answered)) {
@@ -79,7 +79,7 @@ static void primitive_do_start_waiting(primitive_t *s)
     s->idle = (s->robot.resting && s->gripper.resting && s->echoed);
 }
 
-/* Procedure measure. */
+/* primitive/common.rcs procedure measure */
 static void primitive_do_measure(primitive_t *s)
 {
     s->near_ = ((s->length_mm - s->travelled_mm) <= s->goal.breakpoint_mm);
@@ -97,37 +97,37 @@ static void primitive_do_measure(primitive_t *s)
     }
 }
 
-/* Procedure hold_part. */
+/* primitive/common.rcs procedure hold_part */
 static void primitive_do_hold_part(primitive_t *s)
 {
     s->to_emove.holds = (s->fits && (!s->closed));
 }
 
-/* Procedure nextstate. */
+/* primitive/common.rcs procedure nextstate */
 static void primitive_do_nextstate(primitive_t *s, primitive_common_primitive_state_t v_value)
 {
     s->cur_state_next = v_value;
 }
 
-/* Procedure no_pose. */
+/* primitive/common.rcs procedure no_pose */
 static void primitive_do_no_pose(primitive_t *s)
 {
     s->to_emove.failure = VOCABULARY_REASON_NO_POSE;
 }
 
-/* Procedure robot_failure. */
+/* primitive/common.rcs procedure robot_failure */
 static void primitive_do_robot_failure(primitive_t *s)
 {
     s->to_emove.failure = VOCABULARY_REASON_ROBOT;
 }
 
-/* Procedure grip_failure. */
+/* primitive/common.rcs procedure grip_failure */
 static void primitive_do_grip_failure(primitive_t *s)
 {
     s->to_emove.failure = VOCABULARY_REASON_GRIP;
 }
 
-/* The spacing is not that of the part. */
+/* primitive/common.rcs procedure misfit_failure: The spacing is not that of the part. */
 static void primitive_do_misfit_failure(primitive_t *s)
 {
     if (s->closed) {
@@ -137,7 +137,7 @@ static void primitive_do_misfit_failure(primitive_t *s)
     }
 }
 
-/* Procedure wait. */
+/* primitive/common.rcs procedure wait */
 static void primitive_do_wait(primitive_t *s)
 {
     if (s->waited < 250u) {
@@ -145,7 +145,7 @@ static void primitive_do_wait(primitive_t *s)
     }
 }
 
-/* Procedure pause. */
+/* primitive/common.rcs procedure pause */
 static void primitive_do_pause(primitive_t *s)
 {
     s->to_robot.input_command = VOCABULARY_ROBOT_COMMAND_HOLD;
@@ -153,7 +153,7 @@ static void primitive_do_pause(primitive_t *s)
     s->speed_mm_s = 0.0 + 0.0;
 }
 
-/* Procedure follow. */
+/* primitive/common.rcs procedure follow */
 static void primitive_do_follow(primitive_t *s)
 {
     s->display = PRIMITIVE_COMMON_DISPLAY_PATH;
@@ -161,7 +161,7 @@ static void primitive_do_follow(primitive_t *s)
     s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
 }
 
-/* To an opening; fails if the force is met first. */
+/* primitive/common.rcs procedure position: To an opening; fails if the force is met first. */
 static void primitive_do_position(primitive_t *s, double v_opening_mm)
 {
     primitive_do_pause(s);
@@ -172,7 +172,7 @@ static void primitive_do_position(primitive_t *s, double v_opening_mm)
     s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_POSITION;
 }
 
-/* Until the force is met (section 6.5: 100 lb, from the database). */
+/* primitive/common.rcs procedure grasp: Until the force is met (section 6.5: 100 lb, from the database). */
 static void primitive_do_grasp(primitive_t *s)
 {
     primitive_do_pause(s);
@@ -183,15 +183,15 @@ static void primitive_do_grasp(primitive_t *s)
     s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_GRASP;
 }
 
-/* Procedure within. */
+/* primitive/common.rcs procedure within */
 static void primitive_do_within(primitive_t *s, uint32_t v_at, double v_value)
 {
     s->to[v_at] = primitive_max_f64((-4000.0), primitive_min_f64(4000.0, v_value)) + 0.0;
 }
 
-/* The length of the centre's path by four steps of Newton's square root, from at most the third root of
-   three above it; never less than the farthest that a coordinate goes, so that a turn on the spot takes
-   its time too. */
+/* primitive/common.rcs procedure measure_length: The length of the centre's path by four steps of Newton's
+   square root, from at most the third root of three above it; never less than the farthest that a
+   coordinate goes, so that a turn on the spot takes its time too. */
 static void primitive_do_measure_length(primitive_t *s)
 {
     double v_square = 0.0;
@@ -217,9 +217,9 @@ static void primitive_do_measure_length(primitive_t *s)
     s->length_mm = primitive_max_f64(v_root, v_most) + 0.0;
 }
 
-/* From where the robot is, or was last told to be, to the point displaced: the centre by `x` along the
-   plate's x axis, by `y` to the left of it, and by `z` upward; the two other points of the plate turned
-   about the vertical through it. */
+/* primitive/common.rcs procedure start: From where the robot is, or was last told to be, to the point
+   displaced: the centre by `x` along the plate's x axis, by `y` to the left of it, and by `z` upward; the
+   two other points of the plate turned about the vertical through it. */
 static void primitive_do_start(primitive_t *s)
 {
     double v_u = 0.0;
@@ -260,7 +260,7 @@ static void primitive_do_start(primitive_t *s)
     primitive_do_measure_length(s);
 }
 
-/* One cycle along the line at `v`. */
+/* primitive/common.rcs procedure advance_at: One cycle along the line at `v`. */
 static void primitive_do_advance_at(primitive_t *s, double v_v)
 {
     double v_share = 0.0;
@@ -275,7 +275,7 @@ static void primitive_do_advance_at(primitive_t *s, double v_v)
     }
 }
 
-/* Faster, up to the point's speed. */
+/* primitive/common.rcs procedure advance_thru: Faster, up to the point's speed. */
 static void primitive_do_advance_thru(primitive_t *s)
 {
     primitive_do_advance_at(s,
@@ -284,7 +284,7 @@ static void primitive_do_advance_thru(primitive_t *s)
             0.0);
 }
 
-/* The same, but slower where what is left is needed to stop. */
+/* primitive/common.rcs procedure advance: The same, but slower where what is left is needed to stop. */
 static void primitive_do_advance(primitive_t *s)
 {
     if ((s->speed_mm_s * s->speed_mm_s) >=
@@ -296,13 +296,13 @@ static void primitive_do_advance(primitive_t *s)
     }
 }
 
-/* At the end of the line. */
+/* primitive/common.rcs procedure stop: At the end of the line. */
 static void primitive_do_stop(primitive_t *s)
 {
     s->speed_mm_s = 0.0 + 0.0;
 }
 
-/* Procedure take_orders. */
+/* primitive/common.rcs procedure take_orders */
 static void primitive_do_take_orders(primitive_t *s)
 {
     s->echoed = ((s->from_robot.inc_command_echo == s->to_robot.inc_command) &&
@@ -333,7 +333,7 @@ static void primitive_do_take_orders(primitive_t *s)
             (s->gripper.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
-/* Procedure give_orders. */
+/* primitive/common.rcs procedure give_orders */
 static void primitive_do_give_orders(primitive_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -357,7 +357,7 @@ static void primitive_do_give_orders(primitive_t *s)
     s->last_gripper.speed_mm_s = s->to_gripper.speed_mm_s + 0.0;
 }
 
-/* A new command finds a level below at work: let it rest first. */
+/* primitive/common.rcs procedure settle: A new command finds a level below at work: let it rest first. */
 static void primitive_do_settle(primitive_t *s)
 {
     s->settling = true;
@@ -365,19 +365,19 @@ static void primitive_do_settle(primitive_t *s)
     s->to_gripper.input_command = VOCABULARY_GRIPPER_COMMAND_PAUSE;
 }
 
-/* Procedure done. */
+/* primitive/common.rcs procedure done */
 static void primitive_do_done(primitive_t *s)
 {
     s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
-/* Procedure executing. */
+/* primitive/common.rcs procedure executing */
 static void primitive_do_executing(primitive_t *s)
 {
     s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
-/* Procedure failed. */
+/* primitive/common.rcs procedure failed */
 static void primitive_do_failed(primitive_t *s)
 {
     s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
@@ -523,8 +523,8 @@ static void primitive_admit(primitive_t *s)
     }
 }
 
-/* Assumption approach_position_fingers_in_step: A state goes with the orders that it waits for (section
-   9). */
+/* primitive/approach_position_fingers.rcs assumption approach_position_fingers_in_step: A state goes with
+   the orders that it waits for (section 9). */
 static bool primitive_holds_approach_position_fingers_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
@@ -532,8 +532,8 @@ static bool primitive_holds_approach_position_fingers_in_step(const primitive_t 
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_FINGERING);
 }
 
-/* Assumption departure_position_fingers_in_step: A state goes with the orders that it waits for (section
-   9). */
+/* primitive/departure_position_fingers.rcs assumption departure_position_fingers_in_step: A state goes
+   with the orders that it waits for (section 9). */
 static bool primitive_holds_departure_position_fingers_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
@@ -541,21 +541,23 @@ static bool primitive_holds_departure_position_fingers_in_step(const primitive_t
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_FINGERING);
 }
 
-/* Assumption goto_in_step: A state goes with the orders that it waits for (section 9). */
+/* primitive/goto.rcs assumption goto_in_step: A state goes with the orders that it waits for (section 9). */
 static bool primitive_holds_goto_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) || (s->cur_state == PRMTV_CMN_PRMTV_STATE_MOVING);
 }
 
-/* Assumption gothru_in_step: A state goes with the orders that it waits for (section 9). */
+/* primitive/gothru.rcs assumption gothru_in_step: A state goes with the orders that it waits for (section
+   9). */
 static bool primitive_holds_gothru_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) || (s->cur_state == PRMTV_CMN_PRMTV_STATE_MOVING);
 }
 
-/* Assumption immed_grasp_in_step: A state goes with the orders that it waits for (section 9). */
+/* primitive/immed_grasp.rcs assumption immed_grasp_in_step: A state goes with the orders that it waits for
+   (section 9). */
 static bool primitive_holds_immed_grasp_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
@@ -1229,33 +1231,34 @@ int32_t primitive_check(const primitive_t *s)
    several. */
 int32_t primitive_aprc_pstn_fngrs_line(const primitive_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of primitive/approach_position_fingers.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7;
+       each set where its line does not exclude that class. */
     static const struct {
         uint8_t t0[16];
         uint8_t t1[3];
     } t = {
-        { /* cur_state by new_command by fingers.known */
-            0x20u, /* d_state, false, false: lines 6 */
-            0x20u, /* d_state, false, true: lines 6 */
-            0x2u, /* d_state, true, false: lines 2 */
-            0x1u, /* d_state, true, true: lines 1 */
-            0x40u, /* f_state, false, false: lines 7 */
-            0x40u, /* f_state, false, true: lines 7 */
-            0x2u, /* f_state, true, false: lines 2 */
-            0x1u, /* f_state, true, true: lines 1 */
+        { /* primitive/approach_position_fingers.rcs: cur_state, new_command, fingers.known */
+            0x20u, /* d_state, false, false: line 6 */
+            0x20u, /* d_state, false, true: line 6 */
+            0x2u, /* d_state, true, false: line 2 */
+            0x1u, /* d_state, true, true: line 1 */
+            0x40u, /* f_state, false, false: line 7 */
+            0x40u, /* f_state, false, true: line 7 */
+            0x2u, /* f_state, true, false: line 2 */
+            0x1u, /* f_state, true, true: line 1 */
             0x0u, /* moving, false, false: no line */
             0x0u, /* moving, false, true: no line */
-            0x2u, /* moving, true, false: lines 2 */
-            0x1u, /* moving, true, true: lines 1 */
+            0x2u, /* moving, true, false: line 2 */
+            0x1u, /* moving, true, true: line 1 */
             0x1cu, /* fingering, false, false: lines 3, 4, 5 */
             0x1cu, /* fingering, false, true: lines 3, 4, 5 */
-            0x2u, /* fingering, true, false: lines 2 */
-            0x1u /* fingering, true, true: lines 1 */
+            0x2u, /* fingering, true, false: line 2 */
+            0x1u /* fingering, true, true: line 1 */
         },
-        { /* gripper.status */
-            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
-            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
-            0x73u /* failed: lines 1, 2, 5, 6, 7 */
+        { /* primitive/approach_position_fingers.rcs: gripper.status */
+            0x6bu, /* done: all lines but 3, 5 */
+            0x67u, /* executing: all lines but 4, 5 */
+            0x73u /* failed: all lines but 3, 4 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
@@ -1280,33 +1283,34 @@ void primitive_aprc_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32
    several. */
 int32_t primitive_dprt_pstn_fngrs_line(const primitive_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of primitive/departure_position_fingers.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7;
+       each set where its line does not exclude that class. */
     static const struct {
         uint8_t t0[16];
         uint8_t t1[3];
     } t = {
-        { /* cur_state by new_command by fingers.known */
-            0x20u, /* d_state, false, false: lines 6 */
-            0x20u, /* d_state, false, true: lines 6 */
-            0x2u, /* d_state, true, false: lines 2 */
-            0x1u, /* d_state, true, true: lines 1 */
-            0x40u, /* f_state, false, false: lines 7 */
-            0x40u, /* f_state, false, true: lines 7 */
-            0x2u, /* f_state, true, false: lines 2 */
-            0x1u, /* f_state, true, true: lines 1 */
+        { /* primitive/departure_position_fingers.rcs: cur_state, new_command, fingers.known */
+            0x20u, /* d_state, false, false: line 6 */
+            0x20u, /* d_state, false, true: line 6 */
+            0x2u, /* d_state, true, false: line 2 */
+            0x1u, /* d_state, true, true: line 1 */
+            0x40u, /* f_state, false, false: line 7 */
+            0x40u, /* f_state, false, true: line 7 */
+            0x2u, /* f_state, true, false: line 2 */
+            0x1u, /* f_state, true, true: line 1 */
             0x0u, /* moving, false, false: no line */
             0x0u, /* moving, false, true: no line */
-            0x2u, /* moving, true, false: lines 2 */
-            0x1u, /* moving, true, true: lines 1 */
+            0x2u, /* moving, true, false: line 2 */
+            0x1u, /* moving, true, true: line 1 */
             0x1cu, /* fingering, false, false: lines 3, 4, 5 */
             0x1cu, /* fingering, false, true: lines 3, 4, 5 */
-            0x2u, /* fingering, true, false: lines 2 */
-            0x1u /* fingering, true, true: lines 1 */
+            0x2u, /* fingering, true, false: line 2 */
+            0x1u /* fingering, true, true: line 1 */
         },
-        { /* gripper.status */
-            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
-            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
-            0x73u /* failed: lines 1, 2, 5, 6, 7 */
+        { /* primitive/departure_position_fingers.rcs: gripper.status */
+            0x6bu, /* done: all lines but 3, 5 */
+            0x67u, /* executing: all lines but 4, 5 */
+            0x73u /* failed: all lines but 3, 4 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
@@ -1330,13 +1334,15 @@ void primitive_dprt_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32
 /* The line of table goto that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_goto__line(const primitive_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of primitive/goto.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 6a, 6b, 7, 8, 9; each set
+       where its line does not exclude that class. */
     static const struct {
         uint16_t t0[251];
         uint16_t t1[16];
         uint16_t t2[12];
     } t = {
-        { /* waited */
+        { /* primitive/goto.rcs: waited */
+            /* 0 .. 249: all lines but 5, 6b */
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
@@ -1362,35 +1368,35 @@ int32_t primitive_goto__line(const primitive_t *s)
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
             0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x7b7u
+            0x7b7u /* 250: all lines but 4, 6a */
         },
-        { /* cur_state by new_command by goal.known */
-            0x200u, /* d_state, false, false: lines 8 */
-            0x200u, /* d_state, false, true: lines 8 */
-            0x2u, /* d_state, true, false: lines 2 */
-            0x1u, /* d_state, true, true: lines 1 */
-            0x400u, /* f_state, false, false: lines 9 */
-            0x400u, /* f_state, false, true: lines 9 */
-            0x2u, /* f_state, true, false: lines 2 */
-            0x1u, /* f_state, true, true: lines 1 */
-            0x1fcu, /* moving, false, false: lines 3, 4, 5, 6, 6a, 6b, 7 */
-            0x1fcu, /* moving, false, true: lines 3, 4, 5, 6, 6a, 6b, 7 */
-            0x2u, /* moving, true, false: lines 2 */
-            0x1u, /* moving, true, true: lines 1 */
+        { /* primitive/goto.rcs: cur_state, new_command, goal.known */
+            0x200u, /* d_state, false, false: line 8 */
+            0x200u, /* d_state, false, true: line 8 */
+            0x2u, /* d_state, true, false: line 2 */
+            0x1u, /* d_state, true, true: line 1 */
+            0x400u, /* f_state, false, false: line 9 */
+            0x400u, /* f_state, false, true: line 9 */
+            0x2u, /* f_state, true, false: line 2 */
+            0x1u, /* f_state, true, true: line 1 */
+            0x1fcu, /* moving, false, false: all lines but 1, 2, 8, 9 */
+            0x1fcu, /* moving, false, true: all lines but 1, 2, 8, 9 */
+            0x2u, /* moving, true, false: line 2 */
+            0x1u, /* moving, true, true: line 1 */
             0x0u, /* fingering, false, false: no line */
             0x0u, /* fingering, false, true: no line */
-            0x2u, /* fingering, true, false: lines 2 */
-            0x1u /* fingering, true, true: lines 1 */
+            0x2u, /* fingering, true, false: line 2 */
+            0x1u /* fingering, true, true: line 1 */
         },
-        { /* robot.status by there by settled */
+        { /* primitive/goto.rcs: robot.status, there, settled */
             0x607u, /* done, false, false: lines 1, 2, 3, 8, 9 */
             0x607u, /* done, false, true: lines 1, 2, 3, 8, 9 */
-            0x6c3u, /* done, true, false: lines 1, 2, 6a, 6b, 8, 9 */
+            0x6c3u, /* done, true, false: all lines but 3, 4, 5, 6, 7 */
             0x623u, /* done, true, true: lines 1, 2, 6, 8, 9 */
             0x607u, /* executing, false, false: lines 1, 2, 3, 8, 9 */
             0x607u, /* executing, false, true: lines 1, 2, 3, 8, 9 */
-            0x61bu, /* executing, true, false: lines 1, 2, 4, 5, 8, 9 */
-            0x61bu, /* executing, true, true: lines 1, 2, 4, 5, 8, 9 */
+            0x61bu, /* executing, true, false: all lines but 3, 6, 6a, 6b, 7 */
+            0x61bu, /* executing, true, true: all lines but 3, 6, 6a, 6b, 7 */
             0x703u, /* failed, false, false: lines 1, 2, 7, 8, 9 */
             0x703u, /* failed, false, true: lines 1, 2, 7, 8, 9 */
             0x703u, /* failed, true, false: lines 1, 2, 7, 8, 9 */
@@ -1419,36 +1425,37 @@ void primitive_goto__lines(const primitive_t *in, int32_t *out, uint32_t n)
 /* The line of table gothru that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_gothru_line(const primitive_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of primitive/gothru.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each set where its
+       line does not exclude that class. */
     static const struct {
         uint8_t t0[16];
         uint8_t t1[6];
     } t = {
-        { /* cur_state by new_command by goal.known */
+        { /* primitive/gothru.rcs: cur_state, new_command, goal.known */
             0x30u, /* d_state, false, false: lines 5, 6 */
             0x30u, /* d_state, false, true: lines 5, 6 */
-            0x2u, /* d_state, true, false: lines 2 */
-            0x1u, /* d_state, true, true: lines 1 */
-            0x40u, /* f_state, false, false: lines 7 */
-            0x40u, /* f_state, false, true: lines 7 */
-            0x2u, /* f_state, true, false: lines 2 */
-            0x1u, /* f_state, true, true: lines 1 */
+            0x2u, /* d_state, true, false: line 2 */
+            0x1u, /* d_state, true, true: line 1 */
+            0x40u, /* f_state, false, false: line 7 */
+            0x40u, /* f_state, false, true: line 7 */
+            0x2u, /* f_state, true, false: line 2 */
+            0x1u, /* f_state, true, true: line 1 */
             0x2cu, /* moving, false, false: lines 3, 4, 6 */
             0x2cu, /* moving, false, true: lines 3, 4, 6 */
-            0x2u, /* moving, true, false: lines 2 */
-            0x1u, /* moving, true, true: lines 1 */
+            0x2u, /* moving, true, false: line 2 */
+            0x1u, /* moving, true, true: line 1 */
             0x0u, /* fingering, false, false: no line */
             0x0u, /* fingering, false, true: no line */
-            0x2u, /* fingering, true, false: lines 2 */
-            0x1u /* fingering, true, true: lines 1 */
+            0x2u, /* fingering, true, false: line 2 */
+            0x1u /* fingering, true, true: line 1 */
         },
-        { /* robot.status by near */
-            0x57u, /* done, false: lines 1, 2, 3, 5, 7 */
-            0x5bu, /* done, true: lines 1, 2, 4, 5, 7 */
-            0x57u, /* executing, false: lines 1, 2, 3, 5, 7 */
-            0x5bu, /* executing, true: lines 1, 2, 4, 5, 7 */
-            0x63u, /* failed, false: lines 1, 2, 6, 7 */
-            0x63u /* failed, true: lines 1, 2, 6, 7 */
+        { /* primitive/gothru.rcs: robot.status, near */
+            0x57u, /* done, false: all lines but 4, 6 */
+            0x5bu, /* done, true: all lines but 3, 6 */
+            0x57u, /* executing, false: all lines but 4, 6 */
+            0x5bu, /* executing, true: all lines but 3, 6 */
+            0x63u, /* failed, false: all lines but 3, 4, 5 */
+            0x63u /* failed, true: all lines but 3, 4, 5 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
@@ -1472,36 +1479,37 @@ void primitive_gothru_lines(const primitive_t *in, int32_t *out, uint32_t n)
 /* The line of table immed_grasp that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_immed_grasp_line(const primitive_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of primitive/immed_grasp.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7, 8; each set
+       where its line does not exclude that class. */
     static const struct {
         uint8_t t0[16];
         uint8_t t1[6];
     } t = {
-        { /* cur_state by new_command by fingers.known */
-            0x40u, /* d_state, false, false: lines 7 */
-            0x40u, /* d_state, false, true: lines 7 */
-            0x2u, /* d_state, true, false: lines 2 */
-            0x1u, /* d_state, true, true: lines 1 */
-            0x80u, /* f_state, false, false: lines 8 */
-            0x80u, /* f_state, false, true: lines 8 */
-            0x2u, /* f_state, true, false: lines 2 */
-            0x1u, /* f_state, true, true: lines 1 */
+        { /* primitive/immed_grasp.rcs: cur_state, new_command, fingers.known */
+            0x40u, /* d_state, false, false: line 7 */
+            0x40u, /* d_state, false, true: line 7 */
+            0x2u, /* d_state, true, false: line 2 */
+            0x1u, /* d_state, true, true: line 1 */
+            0x80u, /* f_state, false, false: line 8 */
+            0x80u, /* f_state, false, true: line 8 */
+            0x2u, /* f_state, true, false: line 2 */
+            0x1u, /* f_state, true, true: line 1 */
             0x0u, /* moving, false, false: no line */
             0x0u, /* moving, false, true: no line */
-            0x2u, /* moving, true, false: lines 2 */
-            0x1u, /* moving, true, true: lines 1 */
+            0x2u, /* moving, true, false: line 2 */
+            0x1u, /* moving, true, true: line 1 */
             0x3cu, /* fingering, false, false: lines 3, 4, 5, 6 */
             0x3cu, /* fingering, false, true: lines 3, 4, 5, 6 */
-            0x2u, /* fingering, true, false: lines 2 */
-            0x1u /* fingering, true, true: lines 1 */
+            0x2u, /* fingering, true, false: line 2 */
+            0x1u /* fingering, true, true: line 1 */
         },
-        { /* gripper.status by fits */
-            0xd3u, /* done, false: lines 1, 2, 5, 7, 8 */
-            0xcbu, /* done, true: lines 1, 2, 4, 7, 8 */
-            0xc7u, /* executing, false: lines 1, 2, 3, 7, 8 */
-            0xc7u, /* executing, true: lines 1, 2, 3, 7, 8 */
-            0xe3u, /* failed, false: lines 1, 2, 6, 7, 8 */
-            0xe3u /* failed, true: lines 1, 2, 6, 7, 8 */
+        { /* primitive/immed_grasp.rcs: gripper.status, fits */
+            0xd3u, /* done, false: all lines but 3, 4, 6 */
+            0xcbu, /* done, true: all lines but 3, 5, 6 */
+            0xc7u, /* executing, false: all lines but 4, 5, 6 */
+            0xc7u, /* executing, true: all lines but 4, 5, 6 */
+            0xe3u, /* failed, false: all lines but 3, 4, 5 */
+            0xe3u /* failed, true: all lines but 3, 4, 5 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
@@ -1525,13 +1533,14 @@ void primitive_immed_grasp_lines(const primitive_t *in, int32_t *out, uint32_t n
 /* The line of table pause_primitive that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_pause_primitive_line(const primitive_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of primitive/pause.rcs: from the lowest bit, lines 1, 2; each set where its line does not
+       exclude that class. */
     static const struct {
         uint8_t t0[2];
     } t = {
-        { /* idle */
-            0x2u, /* false: lines 2 */
-            0x1u /* true: lines 1 */
+        { /* primitive/pause.rcs: idle */
+            0x2u, /* false: line 2 */
+            0x1u /* true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];

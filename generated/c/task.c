@@ -31,7 +31,7 @@ static inline uint8_t task_u8_of_i32(int32_t a)
     return (uint8_t)a;
 }
 
-/* A command that has not failed has no cause of failure. */
+/* task/common.rcs procedure forget_cause: A command that has not failed has no cause of failure. */
 static void task_do_forget_cause(task_t *s)
 {
     if (s->to_workstation.failure == VOCABULARY_REASON_NONE) {
@@ -39,7 +39,7 @@ static void task_do_forget_cause(task_t *s)
     }
 }
 
-/* Procedure look. */
+/* task/common.rcs procedure look */
 static void task_do_look(task_t *s, bool v_vision)
 {
     if (v_vision) {
@@ -49,8 +49,8 @@ static void task_do_look(task_t *s, bool v_vision)
     }
 }
 
-/* Where the part is to be taken: found once for each command, for `current_loc` is forgotten as soon as
-   the robot moves. */
+/* task/common.rcs procedure find_source: Where the part is to be taken: found once for each command, for
+   `current_loc` is forgotten as soon as the robot moves. */
 static void task_do_find_source(task_t *s)
 {
     if (!s->answered) {
@@ -73,7 +73,8 @@ static void task_do_find_source(task_t *s)
     }
 }
 
-/* The other table test variables that the command and the database give (section 8.1). */
+/* task/common.rcs procedure test_variables: The other table test variables that the command and the
+   database give (section 8.1). */
 static void task_do_test_variables(task_t *s)
 {
     s->dest_spec = ((s->workstation.dest_locpt != 0u) && s->dest.known);
@@ -82,19 +83,19 @@ static void task_do_test_variables(task_t *s)
             ((s->workstation.end_at_locpt == 0u) || s->end_at.known));
 }
 
-/* The WORKSTATION is told what is in the gripper. */
+/* task/common.rcs procedure tell_gripped: The WORKSTATION is told what is in the gripper. */
 static void task_do_tell_gripped(task_t *s)
 {
     s->to_workstation.status_parameter = s->obj_now_in_gripper;
 }
 
-/* Procedure nextstate. */
+/* task/common.rcs procedure nextstate */
 static void task_do_nextstate(task_t *s, task_common_task_state_t v_value)
 {
     s->cur_state_next = v_value;
 }
 
-/* Procedure set_source. */
+/* task/common.rcs procedure set_source */
 static void task_do_set_source(task_t *s)
 {
     s->to_emove.obj_ptr = s->workstation.obj;
@@ -105,7 +106,7 @@ static void task_do_set_source(task_t *s)
     s->current_loc = 0u;
 }
 
-/* Procedure vupos_setup. */
+/* task/common.rcs procedure vupos_setup */
 static void task_do_vupos_setup(task_t *s)
 {
     s->to_emove.sector = s->source_sector;
@@ -117,7 +118,7 @@ static void task_do_vupos_setup(task_t *s)
     s->current_loc = 0u;
 }
 
-/* Procedure locate. */
+/* task/common.rcs procedure locate */
 static void task_do_locate(task_t *s)
 {
     s->to_emove.obj_ptr = s->workstation.obj;
@@ -125,13 +126,13 @@ static void task_do_locate(task_t *s)
     s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_LOCATE;
 }
 
-/* Procedure move_to. */
+/* task/common.rcs procedure move_to */
 static void task_do_move_to(task_t *s)
 {
     s->to_emove.input_command = VCBLRY_EMOVE_CMND_MOVE_TO;
 }
 
-/* Procedure move_to_obj. */
+/* task/common.rcs procedure move_to_obj */
 static void task_do_move_to_obj(task_t *s)
 {
     s->to_emove.obj_ptr = s->workstation.obj;
@@ -139,7 +140,7 @@ static void task_do_move_to_obj(task_t *s)
     s->to_emove.input_command = VCBLRY_EMOVE_CMND_MOVE_TO_OBJ;
 }
 
-/* Nothing is in the gripper. */
+/* task/common.rcs procedure none_acquired: Nothing is in the gripper. */
 static void task_do_none_acquired(task_t *s)
 {
     s->obj_acquired = false;
@@ -147,7 +148,8 @@ static void task_do_none_acquired(task_t *s)
     s->to_emove.gripped_obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
 }
 
-/* Nothing of that type is on the buffer: fail, and let the robot rest. */
+/* task/common.rcs procedure buffer_empty: Nothing of that type is on the buffer: fail, and let the robot
+   rest. */
 static void task_do_buffer_empty(task_t *s)
 {
     s->to_workstation.failure = VOCABULARY_REASON_BUF;
@@ -156,7 +158,8 @@ static void task_do_buffer_empty(task_t *s)
     s->cur_state_next = TASK_COMMON_TASK_STATE_F_STATE;
 }
 
-/* Counts once: the line matches again until PICKUP is echoed, and by then PICKUP is the old workstation. */
+/* task/common.rcs procedure remove_from_buffer_db: Counts once: the line matches again until PICKUP is
+   echoed, and by then PICKUP is the old workstation. */
 static void task_do_remove_from_buffer_db(task_t *s)
 {
     if (s->source_buffer && (s->last_emove.input_command != VOCABULARY_EMOVE_COMMAND_PICKUP)) {
@@ -193,7 +196,8 @@ static void task_do_remove_from_buffer_db(task_t *s)
     }
 }
 
-/* Takes one part off the count of the buffer, or gives up: nothing to pick up. */
+/* task/common.rcs procedure pickup: Takes one part off the count of the buffer, or gives up: nothing to
+   pick up. */
 static void task_do_pickup(task_t *s)
 {
     s->to_emove.obj_ptr = s->workstation.obj;
@@ -207,19 +211,20 @@ static void task_do_pickup(task_t *s)
     task_do_remove_from_buffer_db(s);
 }
 
-/* Procedure cmd_failure. */
+/* task/common.rcs procedure cmd_failure */
 static void task_do_cmd_failure(task_t *s)
 {
     s->to_workstation.failure = VOCABULARY_REASON_CMD;
 }
 
-/* What E-MOVE says went wrong. */
+/* task/common.rcs procedure cause_below: What E-MOVE says went wrong. */
 static void task_do_cause_below(task_t *s)
 {
     s->to_workstation.cause = s->emove.failure;
 }
 
-/* E-MOVE found that the part is not between the fingers any more. */
+/* task/common.rcs procedure lost_on_the_way: E-MOVE found that the part is not between the fingers any
+   more. */
 static void task_do_lost_on_the_way(task_t *s)
 {
     if (s->emove.failure == VOCABULARY_REASON_NOTHING_GRIPPED) {
@@ -228,7 +233,7 @@ static void task_do_lost_on_the_way(task_t *s)
     }
 }
 
-/* Procedure move_failure. */
+/* task/common.rcs procedure move_failure */
 static void task_do_move_failure(task_t *s)
 {
     s->to_workstation.failure = VOCABULARY_REASON_MOVE;
@@ -237,14 +242,14 @@ static void task_do_move_failure(task_t *s)
     task_do_lost_on_the_way(s);
 }
 
-/* Procedure loc_failure. */
+/* task/common.rcs procedure loc_failure */
 static void task_do_loc_failure(task_t *s)
 {
     s->to_workstation.failure = VOCABULARY_REASON_LOC;
     task_do_cause_below(s);
 }
 
-/* One part more on the buffer table. */
+/* task/common.rcs procedure add_to_buffer_db: One part more on the buffer table. */
 static void task_do_add_to_buffer_db(task_t *s, vocabulary_object_t v_what)
 {
     {
@@ -271,8 +276,8 @@ static void task_do_add_to_buffer_db(task_t *s, vocabulary_object_t v_what)
     }
 }
 
-/* What was counted off and could not be picked up lies there still; once: the order that follows is no
-   PICKUP. */
+/* task/common.rcs procedure back_to_buffer_db: What was counted off and could not be picked up lies there
+   still; once: the order that follows is no PICKUP. */
 static void task_do_back_to_buffer_db(task_t *s)
 {
     if (s->source_buffer && (s->last_emove.input_command == VOCABULARY_EMOVE_COMMAND_PICKUP)) {
@@ -280,7 +285,7 @@ static void task_do_back_to_buffer_db(task_t *s)
     }
 }
 
-/* Nothing, or a part of the wrong size, is in the gripper. */
+/* task/common.rcs procedure pic_failure: Nothing, or a part of the wrong size, is in the gripper. */
 static void task_do_pic_failure(task_t *s)
 {
     s->to_workstation.failure = VOCABULARY_REASON_PIC;
@@ -294,13 +299,13 @@ static void task_do_pic_failure(task_t *s)
     }
 }
 
-/* Procedure state_failure. */
+/* task/common.rcs procedure state_failure */
 static void task_do_state_failure(task_t *s)
 {
     s->to_workstation.failure = VOCABULARY_REASON_STATE;
 }
 
-/* The destination of the workstation. */
+/* task/common.rcs procedure set_dest: The destination of the workstation. */
 static void task_do_set_dest(task_t *s)
 {
     s->to_emove.locpt_ptr = s->workstation.dest_locpt;
@@ -308,14 +313,14 @@ static void task_do_set_dest(task_t *s)
     s->current_loc = 0u;
 }
 
-/* The robot is at the destination. */
+/* task/common.rcs procedure arrived: The robot is at the destination. */
 static void task_do_arrived(task_t *s)
 {
     s->current_loc = s->workstation.dest_locpt;
     s->current_sector = s->workstation.sector;
 }
 
-/* Opens the gripper where it is. */
+/* task/common.rcs procedure release: Opens the gripper where it is. */
 static void task_do_release(task_t *s)
 {
     s->to_emove.obj_ptr = s->obj_now_in_gripper;
@@ -323,8 +328,8 @@ static void task_do_release(task_t *s)
     s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_RELEASE;
 }
 
-/* The part lies where the robot is; on the buffer it is counted, once: by the next cycle none is in the
-   gripper. */
+/* task/common.rcs procedure released: The part lies where the robot is; on the buffer it is counted, once:
+   by the next cycle none is in the gripper. */
 static void task_do_released(task_t *s)
 {
     if (s->here.buffer) {
@@ -333,8 +338,9 @@ static void task_do_released(task_t *s)
     task_do_none_acquired(s);
 }
 
-/* Where to end: as the command says, else at the safe position of the place where the robot is. It leaves
-   that: the line may match again, and by then MOVE-TO is the last order. */
+/* task/common.rcs procedure set_end: Where to end: as the command says, else at the safe position of the
+   place where the robot is. It leaves that: the line may match again, and by then MOVE-TO is the last
+   order. */
 static void task_do_set_end(task_t *s)
 {
     if (s->workstation.end_at_locpt != 0u) {
@@ -348,14 +354,14 @@ static void task_do_set_end(task_t *s)
     s->current_loc = 0u;
 }
 
-/* The robot is at the end position. */
+/* task/common.rcs procedure ended: The robot is at the end position. */
 static void task_do_ended(task_t *s)
 {
     s->current_loc = s->to_emove.locpt_ptr;
     s->current_sector = 0u;
 }
 
-/* Opening the gripper failed: what it holds is not known. */
+/* task/common.rcs procedure release_failure: Opening the gripper failed: what it holds is not known. */
 static void task_do_release_failure(task_t *s)
 {
     s->to_workstation.failure = s->emove.failure;
@@ -363,7 +369,7 @@ static void task_do_release_failure(task_t *s)
     task_do_lost_on_the_way(s);
 }
 
-/* Procedure take_orders. */
+/* task/common.rcs procedure take_orders */
 static void task_do_take_orders(task_t *s)
 {
     s->echoed = (s->from_emove.inc_command_echo == s->to_emove.inc_command);
@@ -388,7 +394,7 @@ static void task_do_take_orders(task_t *s)
             (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
-/* Procedure give_orders. */
+/* task/common.rcs procedure give_orders */
 static void task_do_give_orders(task_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -409,32 +415,32 @@ static void task_do_give_orders(task_t *s)
     s->last_emove.sector = s->to_emove.sector;
 }
 
-/* A new command finds a level below at work: let it rest first. */
+/* task/common.rcs procedure settle: A new command finds a level below at work: let it rest first. */
 static void task_do_settle(task_t *s)
 {
     s->settling = true;
     s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
 }
 
-/* Procedure done. */
+/* task/common.rcs procedure done */
 static void task_do_done(task_t *s)
 {
     s->to_workstation.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
-/* Procedure executing. */
+/* task/common.rcs procedure executing */
 static void task_do_executing(task_t *s)
 {
     s->to_workstation.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
-/* Procedure failed. */
+/* task/common.rcs procedure failed */
 static void task_do_failed(task_t *s)
 {
     s->to_workstation.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
 }
 
-/* Procedure pause. */
+/* task/common.rcs procedure pause */
 static void task_do_pause(task_t *s)
 {
     s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
@@ -482,7 +488,7 @@ static void task_admit(task_t *s)
     }
 }
 
-/* Assumption acquire_in_step: A state goes with the orders that it waits for (section 9). */
+/* task/acquire.rcs assumption acquire_in_step: A state goes with the orders that it waits for (section 9). */
 static bool task_holds_acquire_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -499,7 +505,7 @@ static bool task_holds_acquire_in_step(const task_t *s)
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP));
 }
 
-/* Assumption acquire_resting: What rests says so. */
+/* task/acquire.rcs assumption acquire_resting: What rests says so. */
 static bool task_holds_acquire_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
@@ -507,7 +513,7 @@ static bool task_holds_acquire_resting(const task_t *s)
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
-/* Assumption clear_in_step: A state goes with the orders that it waits for (section 9). */
+/* task/clear.rcs assumption clear_in_step: A state goes with the orders that it waits for (section 9). */
 static bool task_holds_clear_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -521,7 +527,7 @@ static bool task_holds_clear_in_step(const task_t *s)
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE));
 }
 
-/* Assumption clear_resting: What rests says so. */
+/* task/clear.rcs assumption clear_resting: What rests says so. */
 static bool task_holds_clear_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
@@ -529,7 +535,7 @@ static bool task_holds_clear_resting(const task_t *s)
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
-/* Assumption move_in_step: A state goes with the orders that it waits for (section 9). */
+/* task/move.rcs assumption move_in_step: A state goes with the orders that it waits for (section 9). */
 static bool task_holds_move_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -549,7 +555,7 @@ static bool task_holds_move_in_step(const task_t *s)
                     (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ)));
 }
 
-/* Assumption move_resting: What rests says so. */
+/* task/move.rcs assumption move_resting: What rests says so. */
 static bool task_holds_move_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
@@ -557,7 +563,8 @@ static bool task_holds_move_resting(const task_t *s)
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
-/* Assumption release_part_in_step: A state goes with the orders that it waits for (section 9). */
+/* task/release.rcs assumption release_part_in_step: A state goes with the orders that it waits for
+   (section 9). */
 static bool task_holds_release_part_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -570,7 +577,7 @@ static bool task_holds_release_part_in_step(const task_t *s)
                 (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO));
 }
 
-/* Assumption release_part_resting: What rests says so. */
+/* task/release.rcs assumption release_part_resting: What rests says so. */
 static bool task_holds_release_part_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
@@ -578,7 +585,8 @@ static bool task_holds_release_part_resting(const task_t *s)
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
-/* Assumption transfer_in_step: A state goes with the orders that it waits for (section 9). */
+/* task/transfer.rcs assumption transfer_in_step: A state goes with the orders that it waits for (section
+   9). */
 static bool task_holds_transfer_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -599,7 +607,7 @@ static bool task_holds_transfer_in_step(const task_t *s)
                 (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE));
 }
 
-/* Assumption transfer_resting: What rests says so. */
+/* task/transfer.rcs assumption transfer_resting: What rests says so. */
 static bool task_holds_transfer_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
@@ -1535,16 +1543,16 @@ int32_t task_check(const task_t *s)
 /* The line of table acquire that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_acquire_line(const task_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of task/acquire.rcs: bit k is set where line k does not exclude that class. */
     static const struct {
         uint16_t t0[18];
         uint16_t t1[24];
         uint16_t t2[12];
     } t = {
-        { /* cur_state by new_command */
+        { /* task/acquire.rcs: cur_state, new_command */
             0x3e00u, /* d_state, false: lines 9, 10, 11, 12, 13 */
             0x1fu, /* d_state, true: lines 0, 1, 2, 3, 4 */
-            0x4000u, /* f_state, false: lines 14 */
+            0x4000u, /* f_state, false: line 14 */
             0x1fu, /* f_state, true: lines 0, 1, 2, 3, 4 */
             0xbc40u, /* state_2, false: lines 6, 10, 11, 12, 13, 15 */
             0x1fu, /* state_2, true: lines 0, 1, 2, 3, 4 */
@@ -1561,7 +1569,7 @@ int32_t task_acquire_line(const task_t *s)
             0x3c00u, /* state_8, false: lines 10, 11, 12, 13 */
             0x1fu /* state_8, true: lines 0, 1, 2, 3, 4 */
         },
-        { /* emove.command by emove.resting by loc_of_obj */
+        { /* task/acquire.rcs: emove.command, emove.resting, loc_of_obj */
             0xc201u, /* pause, false, vis_reqd: lines 0, 9, 14, 15 */
             0xc201u, /* pause, false, known: lines 0, 9, 14, 15 */
             0xc21cu, /* pause, true, vis_reqd: lines 2, 3, 4, 9, 14, 15 */
@@ -1587,10 +1595,10 @@ int32_t task_acquire_line(const task_t *s)
             0xc000u, /* release, true, vis_reqd: lines 14, 15 */
             0xc000u /* release, true, known: lines 14, 15 */
         },
-        { /* emove.status by source_spec by obj_acquired */
+        { /* task/acquire.rcs: emove.status, source_spec, obj_acquired */
             0x43e9u, /* done, false, false: lines 0, 3, 5, 6, 7, 8, 9, 14 */
             0x43e5u, /* done, false, true: lines 0, 2, 5, 6, 7, 8, 9, 14 */
-            0x43f3u, /* done, true, false: lines 0, 1, 4, 5, 6, 7, 8, 9, 14 */
+            0x43f3u, /* done, true, false: all lines but 2, 3, 10, 11, 12, 13, 15 */
             0x43e5u, /* done, true, true: lines 0, 2, 5, 6, 7, 8, 9, 14 */
             0xc201u, /* executing, false, false: lines 0, 9, 14, 15 */
             0xc201u, /* executing, false, true: lines 0, 9, 14, 15 */
@@ -1624,16 +1632,16 @@ void task_acquire_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table clear that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_clear_line(const task_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of task/clear.rcs: bit k is set where line k does not exclude that class. */
     static const struct {
         uint16_t t0[18];
         uint16_t t1[24];
         uint16_t t2[12];
     } t = {
-        { /* cur_state by new_command */
+        { /* task/clear.rcs: cur_state, new_command */
             0x700u, /* d_state, false: lines 8, 9, 10 */
             0x1fu, /* d_state, true: lines 0, 1, 2, 3, 4 */
-            0x800u, /* f_state, false: lines 11 */
+            0x800u, /* f_state, false: line 11 */
             0x1fu, /* f_state, true: lines 0, 1, 2, 3, 4 */
             0x600u, /* state_2, false: lines 9, 10 */
             0x1fu, /* state_2, true: lines 0, 1, 2, 3, 4 */
@@ -1650,7 +1658,7 @@ int32_t task_clear_line(const task_t *s)
             0x1680u, /* state_8, false: lines 7, 9, 10, 12 */
             0x1fu /* state_8, true: lines 0, 1, 2, 3, 4 */
         },
-        { /* emove.command by emove.resting by dest_spec */
+        { /* task/clear.rcs: emove.command, emove.resting, dest_spec */
             0x1901u, /* pause, false, false: lines 0, 8, 11, 12 */
             0x1901u, /* pause, false, true: lines 0, 8, 11, 12 */
             0x1906u, /* pause, true, false: lines 1, 2, 8, 11, 12 */
@@ -1676,11 +1684,11 @@ int32_t task_clear_line(const task_t *s)
             0x1c40u, /* release, true, false: lines 6, 10, 11, 12 */
             0x1c40u /* release, true, true: lines 6, 10, 11, 12 */
         },
-        { /* emove.status by names_known by obj_acquired */
-            0x9e3u, /* done, false, false: lines 0, 1, 5, 6, 7, 8, 11 */
-            0x9e3u, /* done, false, true: lines 0, 1, 5, 6, 7, 8, 11 */
-            0x9edu, /* done, true, false: lines 0, 2, 3, 5, 6, 7, 8, 11 */
-            0x9f5u, /* done, true, true: lines 0, 2, 4, 5, 6, 7, 8, 11 */
+        { /* task/clear.rcs: emove.status, names_known, obj_acquired */
+            0x9e3u, /* done, false, false: all lines but 2, 3, 4, 9, 10, 12 */
+            0x9e3u, /* done, false, true: all lines but 2, 3, 4, 9, 10, 12 */
+            0x9edu, /* done, true, false: all lines but 1, 4, 9, 10, 12 */
+            0x9f5u, /* done, true, true: all lines but 1, 3, 9, 10, 12 */
             0x1901u, /* executing, false, false: lines 0, 8, 11, 12 */
             0x1901u, /* executing, false, true: lines 0, 8, 11, 12 */
             0x1901u, /* executing, true, false: lines 0, 8, 11, 12 */
@@ -1714,17 +1722,17 @@ void task_clear_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table move that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_move_line(const task_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of task/move.rcs: bit k is set where line k does not exclude that class. */
     static const struct {
         uint32_t t0[18];
         uint32_t t1[16];
         uint32_t t2[24];
         uint32_t t3[24];
     } t = {
-        { /* cur_state by new_command */
+        { /* task/move.rcs: cur_state, new_command */
             0x3c000u, /* d_state, false: lines 14, 15, 16, 17 */
             0x1ffu, /* d_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
-            0x40000u, /* f_state, false: lines 18 */
+            0x40000u, /* f_state, false: line 18 */
             0x1ffu, /* f_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
             0xb8200u, /* state_2, false: lines 9, 15, 16, 17, 19 */
             0x1ffu, /* state_2, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
@@ -1741,27 +1749,25 @@ int32_t task_move_line(const task_t *s)
             0x38000u, /* state_8, false: lines 15, 16, 17 */
             0x1ffu /* state_8, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
         },
-        { /* workstation.obj by emove.resting */
-            0xffe01u, /* null_obj, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7eu, /* null_obj, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe01u, /* tbox, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7eu, /* tbox, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe01u, /* bbox, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7eu, /* bbox, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe01u, /* flag, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7eu, /* flag, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe01u, /* hous, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7eu, /* hous, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe01u, /* close_grip, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            /* close_grip, true: lines 1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xfffbeu,
-            0xffe01u, /* unknown_object, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            /* unknown_object, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7eu,
-            0xffe01u, /* open_grip, false: lines 0, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
-            0xffe7eu /* open_grip, true: lines 1, 2, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19 */
+        { /* task/move.rcs: workstation.obj, emove.resting */
+            0xffe01u, /* null_obj, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xffe7eu, /* null_obj, true: all lines but 0, 7, 8 */
+            0xffe01u, /* tbox, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xffe7eu, /* tbox, true: all lines but 0, 7, 8 */
+            0xffe01u, /* bbox, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xffe7eu, /* bbox, true: all lines but 0, 7, 8 */
+            0xffe01u, /* flag, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xffe7eu, /* flag, true: all lines but 0, 7, 8 */
+            0xffe01u, /* hous, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xffe7eu, /* hous, true: all lines but 0, 7, 8 */
+            0xffe01u, /* close_grip, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xfffbeu, /* close_grip, true: all lines but 0, 6 */
+            0xffe01u, /* unknown_object, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xffe7eu, /* unknown_object, true: all lines but 0, 7, 8 */
+            0xffe01u, /* open_grip, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
+            0xffe7eu /* open_grip, true: all lines but 0, 7, 8 */
         },
-        { /* emove.command by loc_of_obj by source_spec */
+        { /* task/move.rcs: emove.command, loc_of_obj, source_spec */
             0xc41c7u, /* pause, vis_reqd, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
             0xc402fu, /* pause, vis_reqd, true: lines 0, 1, 2, 3, 5, 14, 18, 19 */
             0xc41c7u, /* pause, known, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
@@ -1787,15 +1793,15 @@ int32_t task_move_line(const task_t *s)
             0xc0001u, /* release, known, false: lines 0, 18, 19 */
             0xc0001u /* release, known, true: lines 0, 18, 19 */
         },
-        { /* emove.status by dest_spec by names_known by obj_acquired */
+        { /* task/move.rcs: emove.status, dest_spec, names_known, obj_acquired */
             0x47e03u, /* done, false, false, false: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
             0x47e03u, /* done, false, false, true: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
             0x47e05u, /* done, false, true, false: lines 0, 2, 9, 10, 11, 12, 13, 14, 18 */
             0x47e05u, /* done, false, true, true: lines 0, 2, 9, 10, 11, 12, 13, 14, 18 */
             0x47e03u, /* done, true, false, false: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
             0x47e03u, /* done, true, false, true: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
-            0x47ef1u, /* done, true, true, false: lines 0, 4, 5, 6, 7, 9, 10, 11, 12, 13, 14, 18 */
-            0x47f49u, /* done, true, true, true: lines 0, 3, 6, 8, 9, 10, 11, 12, 13, 14, 18 */
+            0x47ef1u, /* done, true, true, false: all lines but 1, 2, 3, 8, 15, 16, 17, 19 */
+            0x47f49u, /* done, true, true, true: all lines but 1, 2, 4, 5, 7, 15, 16, 17, 19 */
             0xc4001u, /* executing, false, false, false: lines 0, 14, 18, 19 */
             0xc4001u, /* executing, false, false, true: lines 0, 14, 18, 19 */
             0xc4001u, /* executing, false, true, false: lines 0, 14, 18, 19 */
@@ -1838,13 +1844,14 @@ void task_move_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table pause_task that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_pause_task_line(const task_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of task/pause.rcs: from the lowest bit, lines 1, 2; each set where its line does not exclude
+       that class. */
     static const struct {
         uint8_t t0[2];
     } t = {
-        { /* emove.resting */
-            0x2u, /* false: lines 2 */
-            0x1u /* true: lines 1 */
+        { /* task/pause.rcs: emove.resting */
+            0x2u, /* false: line 2 */
+            0x1u /* true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->emove.resting ? 1u : 0u];
@@ -1867,16 +1874,16 @@ void task_pause_task_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table release_part that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_release_part_line(const task_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of task/release.rcs: bit k is set where line k does not exclude that class. */
     static const struct {
         uint16_t t0[18];
         uint16_t t1[24];
         uint16_t t2[6];
     } t = {
-        { /* cur_state by new_command */
+        { /* task/release.rcs: cur_state, new_command */
             0x1c0u, /* d_state, false: lines 6, 7, 8 */
             0xfu, /* d_state, true: lines 0, 1, 2, 3 */
-            0x200u, /* f_state, false: lines 9 */
+            0x200u, /* f_state, false: line 9 */
             0xfu, /* f_state, true: lines 0, 1, 2, 3 */
             0x180u, /* state_2, false: lines 7, 8 */
             0xfu, /* state_2, true: lines 0, 1, 2, 3 */
@@ -1893,7 +1900,7 @@ int32_t task_release_part_line(const task_t *s)
             0x5a0u, /* state_8, false: lines 5, 7, 8, 10 */
             0xfu /* state_8, true: lines 0, 1, 2, 3 */
         },
-        { /* emove.command by emove.resting by names_known */
+        { /* task/release.rcs: emove.command, emove.resting, names_known */
             0x641u, /* pause, false, false: lines 0, 6, 9, 10 */
             0x641u, /* pause, false, true: lines 0, 6, 9, 10 */
             0x642u, /* pause, true, false: lines 1, 6, 9, 10 */
@@ -1919,9 +1926,9 @@ int32_t task_release_part_line(const task_t *s)
             0x690u, /* release, true, false: lines 4, 7, 9, 10 */
             0x690u /* release, true, true: lines 4, 7, 9, 10 */
         },
-        { /* emove.status by obj_acquired */
-            0x277u, /* done, false: lines 0, 1, 2, 4, 5, 6, 9 */
-            0x27bu, /* done, true: lines 0, 1, 3, 4, 5, 6, 9 */
+        { /* task/release.rcs: emove.status, obj_acquired */
+            0x277u, /* done, false: all lines but 3, 7, 8, 10 */
+            0x27bu, /* done, true: all lines but 2, 7, 8, 10 */
             0x641u, /* executing, false: lines 0, 6, 9, 10 */
             0x641u, /* executing, true: lines 0, 6, 9, 10 */
             0x3c1u, /* failed, false: lines 0, 6, 7, 8, 9 */
@@ -1950,17 +1957,17 @@ void task_release_part_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table transfer that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_transfer_line(const task_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of task/transfer.rcs: bit k is set where line k does not exclude that class. */
     static const struct {
         uint32_t t0[18];
         uint32_t t1[24];
         uint32_t t2[24];
         uint32_t t3[2];
     } t = {
-        { /* cur_state by new_command */
+        { /* task/transfer.rcs: cur_state, new_command */
             0xf8000u, /* d_state, false: lines 15, 16, 17, 18, 19 */
             0xffu, /* d_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
-            0x100000u, /* f_state, false: lines 20 */
+            0x100000u, /* f_state, false: line 20 */
             0xffu, /* f_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
             0x2f0100u, /* state_2, false: lines 8, 16, 17, 18, 19, 21 */
             0xffu, /* state_2, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
@@ -1977,7 +1984,7 @@ int32_t task_transfer_line(const task_t *s)
             0x2f4000u, /* state_8, false: lines 14, 16, 17, 18, 19, 21 */
             0xffu /* state_8, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
         },
-        { /* emove.command by emove.resting by loc_of_obj */
+        { /* task/transfer.rcs: emove.command, emove.resting, loc_of_obj */
             0x308001u, /* pause, false, vis_reqd: lines 0, 15, 20, 21 */
             0x308001u, /* pause, false, known: lines 0, 15, 20, 21 */
             0x3080eeu, /* pause, true, vis_reqd: lines 1, 2, 3, 5, 6, 7, 15, 20, 21 */
@@ -2003,15 +2010,15 @@ int32_t task_transfer_line(const task_t *s)
             0x382000u, /* release, true, vis_reqd: lines 13, 19, 20, 21 */
             0x382000u /* release, true, known: lines 13, 19, 20, 21 */
         },
-        { /* emove.status by source_spec by dest_spec by names_known */
+        { /* task/transfer.rcs: emove.status, source_spec, dest_spec, names_known */
             0x10ff03u, /* done, false, false, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
             0x10ff05u, /* done, false, false, true: lines 0, 2, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
             0x10ff03u, /* done, false, true, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
-            0x10ffc1u, /* done, false, true, true: lines 0, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x10ffc1u, /* done, false, true, true: all lines but 1, 2, 3, 4, 5, 16, 17, 18, 19, 21 */
             0x10ff03u, /* done, true, false, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
             0x10ff05u, /* done, true, false, true: lines 0, 2, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
             0x10ff03u, /* done, true, true, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
-            0x10ff39u, /* done, true, true, true: lines 0, 3, 4, 5, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
+            0x10ff39u, /* done, true, true, true: all lines but 1, 2, 6, 7, 16, 17, 18, 19, 21 */
             0x308001u, /* executing, false, false, false: lines 0, 15, 20, 21 */
             0x308001u, /* executing, false, false, true: lines 0, 15, 20, 21 */
             0x308001u, /* executing, false, true, false: lines 0, 15, 20, 21 */
@@ -2029,9 +2036,9 @@ int32_t task_transfer_line(const task_t *s)
             0x1f8001u, /* failed, true, true, false: lines 0, 15, 16, 17, 18, 19, 20 */
             0x1f8001u /* failed, true, true, true: lines 0, 15, 16, 17, 18, 19, 20 */
         },
-        { /* obj_acquired */
-            0x3fffb7u, /* false */
-            0x3fff4fu /* true */
+        { /* task/transfer.rcs: obj_acquired */
+            0x3fffb7u, /* false: all lines but 3, 6 */
+            0x3fff4fu /* true: all lines but 4, 5, 7 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &

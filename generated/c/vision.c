@@ -58,7 +58,7 @@ static inline double vision_abs_f64(double a)
     return (a <= 0.0) ? (0.0 - a) : a;
 }
 
-/* Procedure measure. */
+/* vision/vision.rcs procedure measure */
 static void vision_do_measure(vision_t *s)
 {
     if (s->new_command) {
@@ -72,7 +72,7 @@ static void vision_do_measure(vision_t *s)
             0.9848);
 }
 
-/* Fires a flash; the picture that answers has the next number. */
+/* vision/vision.rcs procedure shoot: Fires a flash; the picture that answers has the next number. */
 static void vision_do_shoot(vision_t *s, vision_flash_t v_which)
 {
     s->to_camera.number = (uint16_t)(((uint32_t)s->to_camera.number + 1u) % 65536u);
@@ -80,13 +80,14 @@ static void vision_do_shoot(vision_t *s, vision_flash_t v_which)
     s->to_camera.obj_ptr = s->emove.obj_ptr;
 }
 
-/* Procedure rest. */
+/* vision/vision.rcs procedure rest */
 static void vision_do_rest(vision_t *s)
 {
     s->to_camera.fire = VISION_FLASH_DARK;
 }
 
-/* Where the part is in camera coordinates, how it is turned, and its range if it lies flat. */
+/* vision/vision.rcs procedure found: Where the part is in camera coordinates, how it is turned, and its
+   range if it lies flat. */
 static void vision_do_found(vision_t *s)
 {
     s->to_emove.x_mm = s->camera.x_mm + 0.0;
@@ -96,43 +97,43 @@ static void vision_do_found(vision_t *s)
     s->to_emove.range_mm = s->camera.range_mm + 0.0;
 }
 
-/* The measured range. */
+/* vision/vision.rcs procedure measured: The measured range. */
 static void vision_do_measured(vision_t *s)
 {
     s->to_emove.range_mm = s->camera.range_mm + 0.0;
 }
 
-/* Procedure no_picture. */
+/* vision/vision.rcs procedure no_picture */
 static void vision_do_no_picture(vision_t *s)
 {
     s->to_emove.failure = VOCABULARY_REASON_NO_PICTURE;
 }
 
-/* Procedure no_match. */
+/* vision/vision.rcs procedure no_match */
 static void vision_do_no_match(vision_t *s)
 {
     s->to_emove.failure = VOCABULARY_REASON_NO_MATCH;
 }
 
-/* Procedure range_failure. */
+/* vision/vision.rcs procedure range_failure */
 static void vision_do_range_failure(vision_t *s)
 {
     s->to_emove.failure = VOCABULARY_REASON_WRONG_RANGE;
 }
 
-/* Procedure surface_failure. */
+/* vision/vision.rcs procedure surface_failure */
 static void vision_do_surface_failure(vision_t *s)
 {
     s->to_emove.failure = VOCABULARY_REASON_WRONG_SURFACE;
 }
 
-/* Procedure state. */
+/* vision/vision.rcs procedure state */
 static void vision_do_state(vision_t *s, vision_vision_state_t v_value)
 {
     s->cur_state = v_value;
 }
 
-/* Procedure wait. */
+/* vision/vision.rcs procedure wait */
 static void vision_do_wait(vision_t *s)
 {
     if (s->waited < 100u) {
@@ -140,7 +141,7 @@ static void vision_do_wait(vision_t *s)
     }
 }
 
-/* Procedure take_orders. */
+/* vision/vision.rcs procedure take_orders */
 static void vision_do_take_orders(vision_t *s)
 {
     if (s->emove.inc_command != s->inc_command_seen) {
@@ -157,7 +158,7 @@ static void vision_do_take_orders(vision_t *s)
     s->settling = false;
 }
 
-/* Procedure give_orders. */
+/* vision/vision.rcs procedure give_orders */
 static void vision_do_give_orders(vision_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -167,19 +168,19 @@ static void vision_do_give_orders(vision_t *s)
     s->to_emove.ref_command_echo = s->emove.input_command;
 }
 
-/* Procedure done. */
+/* vision/vision.rcs procedure done */
 static void vision_do_done(vision_t *s)
 {
     s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_DONE;
 }
 
-/* Procedure executing. */
+/* vision/vision.rcs procedure executing */
 static void vision_do_executing(vision_t *s)
 {
     s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_EXECUTING;
 }
 
-/* Procedure failed. */
+/* vision/vision.rcs procedure failed */
 static void vision_do_failed(vision_t *s)
 {
     s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
@@ -496,12 +497,14 @@ int32_t vision_check(const vision_t *s)
 /* The line of table flood_flash that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t vision_flood_flash_line(const vision_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of vision/vision.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each set where its line
+       does not exclude that class. */
     static const struct {
         uint8_t t0[101];
         uint8_t t1[24];
     } t = {
-        { /* waited */
+        { /* vision/vision.rcs: waited */
+            /* 0 .. 99: all lines but 3 */
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
@@ -510,33 +513,34 @@ int32_t vision_flood_flash_line(const vision_t *s)
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7du
+            0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7du /* 100: all lines but 2 */
         },
-        { /* cur_state by new_command by camera.matched by arrived */
-            0x20u, /* d_state, false, false, false: lines 6 */
-            0x20u, /* d_state, false, false, true: lines 6 */
-            0x20u, /* d_state, false, true, false: lines 6 */
-            0x20u, /* d_state, false, true, true: lines 6 */
-            0x1u, /* d_state, true, false, false: lines 1 */
-            0x1u, /* d_state, true, false, true: lines 1 */
-            0x1u, /* d_state, true, true, false: lines 1 */
-            0x1u, /* d_state, true, true, true: lines 1 */
-            0x40u, /* f_state, false, false, false: lines 7 */
-            0x40u, /* f_state, false, false, true: lines 7 */
-            0x40u, /* f_state, false, true, false: lines 7 */
-            0x40u, /* f_state, false, true, true: lines 7 */
-            0x1u, /* f_state, true, false, false: lines 1 */
-            0x1u, /* f_state, true, false, true: lines 1 */
-            0x1u, /* f_state, true, true, false: lines 1 */
-            0x1u, /* f_state, true, true, true: lines 1 */
+        { /* vision/vision.rcs: cur_state, new_command, camera.matched, arrived */
+            0x20u, /* d_state, false, false, false: line 6 */
+            0x20u, /* d_state, false, false, true: line 6 */
+            0x20u, /* d_state, false, true, false: line 6 */
+            0x20u, /* d_state, false, true, true: line 6 */
+            0x1u, /* d_state, true, false, false: line 1 */
+            0x1u, /* d_state, true, false, true: line 1 */
+            0x1u, /* d_state, true, true, false: line 1 */
+            0x1u, /* d_state, true, true, true: line 1 */
+            0x40u, /* f_state, false, false, false: line 7 */
+            0x40u, /* f_state, false, false, true: line 7 */
+            0x40u, /* f_state, false, true, false: line 7 */
+            0x40u, /* f_state, false, true, true: line 7 */
+            0x1u, /* f_state, true, false, false: line 1 */
+            0x1u, /* f_state, true, false, true: line 1 */
+            0x1u, /* f_state, true, true, false: line 1 */
+            0x1u, /* f_state, true, true, true: line 1 */
             0x6u, /* looking, false, false, false: lines 2, 3 */
-            0x10u, /* looking, false, false, true: lines 5 */
+            0x10u, /* looking, false, false, true: line 5 */
             0x6u, /* looking, false, true, false: lines 2, 3 */
-            0x8u, /* looking, false, true, true: lines 4 */
-            0x1u, /* looking, true, false, false: lines 1 */
-            0x1u, /* looking, true, false, true: lines 1 */
-            0x1u, /* looking, true, true, false: lines 1 */
-            0x1u /* looking, true, true, true: lines 1 */
+            0x8u, /* looking, false, true, true: line 4 */
+            0x1u, /* looking, true, false, false: line 1 */
+            0x1u, /* looking, true, false, true: line 1 */
+            0x1u, /* looking, true, true, false: line 1 */
+            0x1u /* looking, true, true, true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->waited] &
@@ -562,13 +566,15 @@ void vision_flood_flash_lines(const vision_t *in, int32_t *out, uint32_t n)
 /* The line of table line_flash that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t vision_line_flash_line(const vision_t *s)
 {
-    /* The masks: bit k of an entry is set where line k does not exclude that class. */
+    /* Masks of vision/vision.rcs: from the lowest bit, lines 1, 2, 3, 4, 5a, 5b, 6, 7; each set where its
+       line does not exclude that class. */
     static const struct {
         uint8_t t0[101];
         uint8_t t1[24];
         uint8_t t2[2];
     } t = {
-        { /* waited */
+        { /* vision/vision.rcs: waited */
+            /* 0 .. 99: all lines but 3 */
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
@@ -577,37 +583,38 @@ int32_t vision_line_flash_line(const vision_t *s)
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfdu
+            0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfdu /* 100: all lines but 2 */
         },
-        { /* cur_state by new_command by arrived by fits */
-            0x40u, /* d_state, false, false, false: lines 6 */
-            0x40u, /* d_state, false, false, true: lines 6 */
-            0x40u, /* d_state, false, true, false: lines 6 */
-            0x40u, /* d_state, false, true, true: lines 6 */
-            0x1u, /* d_state, true, false, false: lines 1 */
-            0x1u, /* d_state, true, false, true: lines 1 */
-            0x1u, /* d_state, true, true, false: lines 1 */
-            0x1u, /* d_state, true, true, true: lines 1 */
-            0x80u, /* f_state, false, false, false: lines 7 */
-            0x80u, /* f_state, false, false, true: lines 7 */
-            0x80u, /* f_state, false, true, false: lines 7 */
-            0x80u, /* f_state, false, true, true: lines 7 */
-            0x1u, /* f_state, true, false, false: lines 1 */
-            0x1u, /* f_state, true, false, true: lines 1 */
-            0x1u, /* f_state, true, true, false: lines 1 */
-            0x1u, /* f_state, true, true, true: lines 1 */
+        { /* vision/vision.rcs: cur_state, new_command, arrived, fits */
+            0x40u, /* d_state, false, false, false: line 6 */
+            0x40u, /* d_state, false, false, true: line 6 */
+            0x40u, /* d_state, false, true, false: line 6 */
+            0x40u, /* d_state, false, true, true: line 6 */
+            0x1u, /* d_state, true, false, false: line 1 */
+            0x1u, /* d_state, true, false, true: line 1 */
+            0x1u, /* d_state, true, true, false: line 1 */
+            0x1u, /* d_state, true, true, true: line 1 */
+            0x80u, /* f_state, false, false, false: line 7 */
+            0x80u, /* f_state, false, false, true: line 7 */
+            0x80u, /* f_state, false, true, false: line 7 */
+            0x80u, /* f_state, false, true, true: line 7 */
+            0x1u, /* f_state, true, false, false: line 1 */
+            0x1u, /* f_state, true, false, true: line 1 */
+            0x1u, /* f_state, true, true, false: line 1 */
+            0x1u, /* f_state, true, true, true: line 1 */
             0x6u, /* looking, false, false, false: lines 2, 3 */
             0x6u, /* looking, false, false, true: lines 2, 3 */
-            0x10u, /* looking, false, true, false: lines 5a */
+            0x10u, /* looking, false, true, false: line 5a */
             0x28u, /* looking, false, true, true: lines 4, 5b */
-            0x1u, /* looking, true, false, false: lines 1 */
-            0x1u, /* looking, true, false, true: lines 1 */
-            0x1u, /* looking, true, true, false: lines 1 */
-            0x1u /* looking, true, true, true: lines 1 */
+            0x1u, /* looking, true, false, false: line 1 */
+            0x1u, /* looking, true, false, true: line 1 */
+            0x1u, /* looking, true, true, false: line 1 */
+            0x1u /* looking, true, true, true: line 1 */
         },
-        { /* faces */
-            0xf7u, /* false: lines 1, 2, 3, 5a, 5b, 6, 7 */
-            0xdfu /* true: lines 1, 2, 3, 4, 5a, 6, 7 */
+        { /* vision/vision.rcs: faces */
+            0xf7u, /* false: all lines but 4 */
+            0xdfu /* true: all lines but 5b */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->waited] &

@@ -243,31 +243,31 @@ _APPROACH_LINE = (
 
 
 def _do_smooth(s):
-    """Procedure smooth."""
+    """examples/approach.rcs procedure smooth"""
     s.smooth_n = ((0.75 * s.smooth_n) + (0.25 * s.force_n)) + 0.0
 
 
 def _do_full_speed(s):
-    """Procedure full_speed."""
+    """examples/approach.rcs procedure full_speed"""
     s.speed_mm_s = 1000
     s.settled = 0
 
 
 def _do_slow_down(s):
-    """Slows down with the share of the braking distance that is left."""
+    """examples/approach.rcs procedure slow_down: Slows down with the share of the braking distance that is left."""
     v_left_mm = (s.distance_mm - s.tolerance_mm)
     s.speed_mm_s = (50 + _div((900 * v_left_mm), s.braking_mm))
     s.settled = 0
 
 
 def _do_settle(s):
-    """Procedure settle."""
+    """examples/approach.rcs procedure settle"""
     s.speed_mm_s = 0
     s.settled = _min((s.settled + 1), 25)
 
 
 def _do_stop(s):
-    """Procedure stop."""
+    """examples/approach.rcs procedure stop"""
     s.speed_mm_s = 0
     s.settled = 0
 

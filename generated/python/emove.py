@@ -871,12 +871,12 @@ _RELEASE_PART_LINE = (
 
 
 def _do_look_below(s):
-    """Procedure look_below."""
+    """emove/common.rcs procedure look_below"""
     s.idle = (((s.primitive_resting and s.vision_resting) and (s.here == s.here_asked)) and (s.here_sector == s.here_sector_asked))
 
 
 def _do_measure(s):
-    """How long the path would be that begins now; whether the part is still there."""
+    """emove/common.rcs procedure measure: How long the path would be that begins now; whether the part is still there."""
     if s.new_command:
         s.path_length = (s.path_depart_count + s.path_approach_count)
     if ((not s.answered) or (s.last_primitive_input_command in (1, 2,))):
@@ -888,54 +888,54 @@ def _do_measure(s):
 
 
 def _do_asked(s):
-    """Behind the table: the next cycle's question."""
+    """emove/common.rcs procedure asked: Behind the table: the next cycle's question."""
     s.here_asked = s.here
     s.here_sector_asked = s.here_sector
 
 
 def _do_nextstate(s, v_value):
-    """Procedure nextstate."""
+    """emove/common.rcs procedure nextstate"""
     s.cur_state_next = v_value
 
 
 def _do_no_place(s):
-    """Procedure no_place."""
+    """emove/common.rcs procedure no_place"""
     s.to_task_failure = 7
 
 
 def _do_primitive_failure(s):
-    """What PRIMITIVE says went wrong."""
+    """emove/common.rcs procedure primitive_failure: What PRIMITIVE says went wrong."""
     s.to_task_failure = s.primitive_failure
 
 
 def _do_part_lost(s):
-    """The fingers are not where the part would keep them."""
+    """emove/common.rcs procedure part_lost: The fingers are not where the part would keep them."""
     s.to_task_failure = 11
 
 
 def _do_vision_failure(s):
-    """What vision says went wrong."""
+    """emove/common.rcs procedure vision_failure: What vision says went wrong."""
     s.to_task_failure = s.vision_failure
 
 
 def _do_pause(s):
-    """Procedure pause."""
+    """emove/common.rcs procedure pause"""
     s.to_primitive_input_command = 0
     s.to_vision_input_command = 0
 
 
 def _do_goto_(s):
-    """Procedure goto."""
+    """emove/common.rcs procedure goto"""
     s.to_primitive_input_command = 1
 
 
 def _do_gothru(s):
-    """Procedure gothru."""
+    """emove/common.rcs procedure gothru"""
     s.to_primitive_input_command = 2
 
 
 def _do_approach_position_fingers(s):
-    """Procedure approach_position_fingers."""
+    """emove/common.rcs procedure approach_position_fingers"""
     s.to_primitive_obj_ptr = s.task_obj_ptr
     s.to_primitive_grasp = s.task_grasp
     s.to_primitive_input_command = 3
@@ -943,14 +943,14 @@ def _do_approach_position_fingers(s):
 
 
 def _do_departure_position_fingers(s):
-    """Procedure departure_position_fingers."""
+    """emove/common.rcs procedure departure_position_fingers"""
     s.to_primitive_obj_ptr = s.task_obj_ptr
     s.to_primitive_grasp = s.task_grasp
     s.to_primitive_input_command = 4
 
 
 def _do_open_fully(s):
-    """So that vision sees the whole scene (section 4.1)."""
+    """emove/common.rcs procedure open_fully: So that vision sees the whole scene (section 4.1)."""
     s.to_primitive_obj_ptr = 7
     s.to_primitive_grasp = 0
     s.to_primitive_input_command = 4
@@ -958,14 +958,14 @@ def _do_open_fully(s):
 
 
 def _do_immed_grasp(s):
-    """Procedure immed_grasp."""
+    """emove/common.rcs procedure immed_grasp"""
     s.to_primitive_obj_ptr = s.task_obj_ptr
     s.to_primitive_grasp = s.task_grasp
     s.to_primitive_input_command = 5
 
 
 def _do_flood_flash(s):
-    """Procedure flood_flash."""
+    """emove/common.rcs procedure flood_flash"""
     _do_pause(s)
     s.to_vision_obj_ptr = s.task_obj_ptr
     s.to_vision_expected_range_mm = s.object_data_expected_range_mm + 0.0
@@ -973,7 +973,7 @@ def _do_flood_flash(s):
 
 
 def _do_line_flash(s):
-    """Procedure line_flash."""
+    """emove/common.rcs procedure line_flash"""
     _do_pause(s)
     s.to_vision_expected_normal_x = s.object_data_normal_x + 0.0
     s.to_vision_expected_normal_y = s.object_data_normal_y + 0.0
@@ -982,7 +982,7 @@ def _do_line_flash(s):
 
 
 def _do_depart(s):
-    """The path is kept, and the robot is nowhere until it arrives."""
+    """emove/common.rcs procedure depart: The path is kept, and the robot is nowhere until it arrives."""
     s.depart_first = s.path_depart_first
     s.depart_count = s.path_depart_count
     s.approach_first = s.path_approach_first
@@ -990,7 +990,7 @@ def _do_depart(s):
 
 
 def _do_no_displacement(s):
-    """Procedure no_displacement."""
+    """emove/common.rcs procedure no_displacement"""
     s.to_primitive_displaced_x = 0.0 + 0.0
     s.to_primitive_displaced_y = 0.0 + 0.0
     s.to_primitive_displaced_z = 0.0 + 0.0
@@ -999,7 +999,7 @@ def _do_no_displacement(s):
 
 
 def _do_aim(s, v_at):
-    """Point `at` of the path: first the departure, displaced as the part was, then the approach."""
+    """emove/common.rcs procedure aim: Point `at` of the path: first the departure, displaced as the part was, then the approach."""
     _do_no_displacement(s)
     if (v_at < s.depart_count):
         s.to_primitive_pose_ptr = _min((s.depart_first + v_at), 9999)
@@ -1011,25 +1011,25 @@ def _do_aim(s, v_at):
 
 
 def _do_aim_first(s):
-    """The first point of the path."""
+    """emove/common.rcs procedure aim_first: The first point of the path."""
     _do_depart(s)
     _do_aim(s, 0)
     s.path_at_next = 0
 
 
 def _do_aim_next(s):
-    """The next one; `path_at` counts on when PRIMITIVE has echoed the order, so that a line that matches again asks for the same."""
+    """emove/common.rcs procedure aim_next: The next one; `path_at` counts on when PRIMITIVE has echoed the order, so that a line that matches again asks for the same."""
     _do_aim(s, (s.path_at + 1))
     s.path_at_next = _min((s.path_at + 1), 62)
 
 
 def _do_aim_last(s):
-    """The last one."""
+    """emove/common.rcs procedure aim_last: The last one."""
     _do_aim(s, _min((s.path_at + 1), 62))
 
 
 def _do_arrived(s):
-    """The robot is at the location of the task."""
+    """emove/common.rcs procedure arrived: The robot is at the location of the task."""
     s.here_next = s.task_locpt_ptr
     s.here_sector = s.task_sector
     s.displaced_here_x = 0.0 + 0.0
@@ -1037,7 +1037,7 @@ def _do_arrived(s):
 
 
 def _do_aim_view(s):
-    """The camera above the part: the two lines of the second picture are to fall on it."""
+    """emove/common.rcs procedure aim_view: The camera above the part: the two lines of the second picture are to fall on it."""
     s.to_vision_input_command = 0
     _do_no_displacement(s)
     s.to_primitive_pose_ptr = s.target_view_point
@@ -1047,7 +1047,7 @@ def _do_aim_view(s):
 
 
 def _do_aim_above(s):
-    """Above the part, turned with it."""
+    """emove/common.rcs procedure aim_above: Above the part, turned with it."""
     s.to_primitive_pose_ptr = s.target_hover_point
     s.to_primitive_displaced_x = s.from_vision_x_mm + 0.0
     s.to_primitive_displaced_y = s.from_vision_y_mm + 0.0
@@ -1058,13 +1058,13 @@ def _do_aim_above(s):
 
 
 def _do_aim_at_part(s):
-    """Around the part; the pads go as much lower as its top is farther away than one that they would take without."""
+    """emove/common.rcs procedure aim_at_part: Around the part; the pads go as much lower as its top is farther away than one that they would take without."""
     s.to_primitive_pose_ptr = s.target_grasp_point
     s.to_primitive_displaced_z = _max((-500.0), _min(500.0, (s.object_data_grip_range_mm - s.from_vision_range_mm))) + 0.0
 
 
 def _do_located(s):
-    """Procedure located."""
+    """emove/common.rcs procedure located"""
     s.here_next = s.task_locpt_ptr
     s.here_sector = s.task_sector
     s.displaced_here_x = s.to_primitive_displaced_x + 0.0
@@ -1072,7 +1072,7 @@ def _do_located(s):
 
 
 def _do_take_orders(s):
-    """Procedure take_orders."""
+    """emove/common.rcs procedure take_orders"""
     s.echoed = ((s.from_primitive_inc_command_echo == s.to_primitive_inc_command) and (s.from_vision_inc_command_echo == s.to_vision_inc_command))
     if (s.task_inc_command != s.inc_command_seen):
         s.inc_command_seen = s.task_inc_command
@@ -1096,7 +1096,7 @@ def _do_take_orders(s):
 
 
 def _do_give_orders(s):
-    """Procedure give_orders."""
+    """emove/common.rcs procedure give_orders"""
     if (s.new_command and (not s.settling)):
         s.answered = True
     s.to_task_inc_command_echo = s.inc_command_seen
@@ -1119,24 +1119,24 @@ def _do_give_orders(s):
 
 
 def _do_settle(s):
-    """A new command finds a level below at work: let it rest first."""
+    """emove/common.rcs procedure settle: A new command finds a level below at work: let it rest first."""
     s.settling = True
     s.to_primitive_input_command = 0
     s.to_vision_input_command = 0
 
 
 def _do_done(s):
-    """Procedure done."""
+    """emove/common.rcs procedure done"""
     s.to_task_status_report = 0
 
 
 def _do_executing(s):
-    """Procedure executing."""
+    """emove/common.rcs procedure executing"""
     s.to_task_status_report = 1
 
 
 def _do_failed(s):
-    """Procedure failed."""
+    """emove/common.rcs procedure failed"""
     s.to_task_status_report = 2
 
 

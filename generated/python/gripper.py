@@ -623,7 +623,7 @@ _PAUSE_GRIPPER_ONE = (
 
 
 def _do_measure(s):
-    """Within half a millimetre; the force met but for a twentieth: fingers come to rest a little before they push all of it."""
+    """gripper/gripper.rcs procedure measure: Within half a millimetre; the force met but for a twentieth: fingers come to rest a little before they push all of it."""
     if s.new_command:
         s.waited = 0
     s.at_opening = (abs((s.hand_opening_mm - s.primitive_opening_mm)) <= 0.5)
@@ -632,17 +632,17 @@ def _do_measure(s):
 
 
 def _do_show_opening(s):
-    """Procedure show_opening."""
+    """gripper/gripper.rcs procedure show_opening"""
     s.to_primitive_opening_mm = s.hand_opening_mm + 0.0
 
 
 def _do_hold(s):
-    """Lets go of nothing: the fingers stay as they are, with the force that they have."""
+    """gripper/gripper.rcs procedure hold: Lets go of nothing: the fingers stay as they are, with the force that they have."""
     s.to_hand_drive = False
 
 
 def _do_drive(s):
-    """Procedure drive."""
+    """gripper/gripper.rcs procedure drive"""
     s.to_hand_drive = True
     s.to_hand_opening_mm = s.primitive_opening_mm + 0.0
     s.to_hand_force_n = s.primitive_force_n + 0.0
@@ -650,23 +650,23 @@ def _do_drive(s):
 
 
 def _do_state(s, v_value):
-    """Procedure state."""
+    """gripper/gripper.rcs procedure state"""
     s.cur_state = v_value
 
 
 def _do_grip_failure(s):
-    """Procedure grip_failure."""
+    """gripper/gripper.rcs procedure grip_failure"""
     s.to_primitive_failure = 10
 
 
 def _do_wait(s):
-    """Procedure wait."""
+    """gripper/gripper.rcs procedure wait"""
     if (s.waited < 150):
         s.waited = (s.waited + 1)
 
 
 def _do_take_orders(s):
-    """Procedure take_orders."""
+    """gripper/gripper.rcs procedure take_orders"""
     if (s.primitive_inc_command != s.inc_command_seen):
         s.inc_command_seen = s.primitive_inc_command
         s.new_command = True
@@ -680,7 +680,7 @@ def _do_take_orders(s):
 
 
 def _do_give_orders(s):
-    """Procedure give_orders."""
+    """gripper/gripper.rcs procedure give_orders"""
     if (s.new_command and (not s.settling)):
         s.answered = True
     s.to_primitive_inc_command_echo = s.inc_command_seen
@@ -688,17 +688,17 @@ def _do_give_orders(s):
 
 
 def _do_done(s):
-    """Procedure done."""
+    """gripper/gripper.rcs procedure done"""
     s.to_primitive_status_report = 0
 
 
 def _do_executing(s):
-    """Procedure executing."""
+    """gripper/gripper.rcs procedure executing"""
     s.to_primitive_status_report = 1
 
 
 def _do_failed(s):
-    """Procedure failed."""
+    """gripper/gripper.rcs procedure failed"""
     s.to_primitive_status_report = 2
 
 

@@ -869,14 +869,14 @@ _PAUSE_PRIMITIVE_LINE = (
 
 
 def _do_start_waiting(s):
-    """Procedure start_waiting."""
+    """primitive/common.rcs procedure start_waiting"""
     if (s.new_command and (not s.answered)):
         s.waited = 0
     s.idle = ((s.robot_resting and s.gripper_resting) and s.echoed)
 
 
 def _do_measure(s):
-    """Procedure measure."""
+    """primitive/common.rcs procedure measure"""
     s.near = ((s.length_mm - s.travelled_mm) <= s.goal_breakpoint_mm)
     s.there = (s.travelled_mm >= s.length_mm)
     if (s.last_robot_input_command == 1):
@@ -889,32 +889,32 @@ def _do_measure(s):
 
 
 def _do_hold_part(s):
-    """Procedure hold_part."""
+    """primitive/common.rcs procedure hold_part"""
     s.to_emove_holds = (s.fits and (not s.closed))
 
 
 def _do_nextstate(s, v_value):
-    """Procedure nextstate."""
+    """primitive/common.rcs procedure nextstate"""
     s.cur_state_next = v_value
 
 
 def _do_no_pose(s):
-    """Procedure no_pose."""
+    """primitive/common.rcs procedure no_pose"""
     s.to_emove_failure = 8
 
 
 def _do_robot_failure(s):
-    """Procedure robot_failure."""
+    """primitive/common.rcs procedure robot_failure"""
     s.to_emove_failure = 9
 
 
 def _do_grip_failure(s):
-    """Procedure grip_failure."""
+    """primitive/common.rcs procedure grip_failure"""
     s.to_emove_failure = 10
 
 
 def _do_misfit_failure(s):
-    """The spacing is not that of the part."""
+    """primitive/common.rcs procedure misfit_failure: The spacing is not that of the part."""
     if s.closed:
         s.to_emove_failure = 11
     else:
@@ -922,27 +922,27 @@ def _do_misfit_failure(s):
 
 
 def _do_wait(s):
-    """Procedure wait."""
+    """primitive/common.rcs procedure wait"""
     if (s.waited < 250):
         s.waited = (s.waited + 1)
 
 
 def _do_pause(s):
-    """Procedure pause."""
+    """primitive/common.rcs procedure pause"""
     s.to_robot_input_command = 0
     s.to_gripper_input_command = 0
     s.speed_mm_s = 0.0 + 0.0
 
 
 def _do_follow(s):
-    """Procedure follow."""
+    """primitive/common.rcs procedure follow"""
     s.display = 0
     s.to_robot_input_command = 1
     s.to_gripper_input_command = 0
 
 
 def _do_position(s, v_opening_mm):
-    """To an opening; fails if the force is met first."""
+    """primitive/common.rcs procedure position: To an opening; fails if the force is met first."""
     _do_pause(s)
     s.display = 1
     s.to_gripper_opening_mm = v_opening_mm + 0.0
@@ -952,7 +952,7 @@ def _do_position(s, v_opening_mm):
 
 
 def _do_grasp(s):
-    """Until the force is met (section 6.5: 100 lb, from the database)."""
+    """primitive/common.rcs procedure grasp: Until the force is met (section 6.5: 100 lb, from the database)."""
     _do_pause(s)
     s.display = 1
     s.to_gripper_opening_mm = 0.0 + 0.0
@@ -962,12 +962,12 @@ def _do_grasp(s):
 
 
 def _do_within(s, v_at, v_value):
-    """Procedure within."""
+    """primitive/common.rcs procedure within"""
     setattr(s, ('to_0', 'to_1', 'to_2', 'to_3', 'to_4', 'to_5', 'to_6', 'to_7', 'to_8',)[v_at], _max((-4000.0), _min(4000.0, v_value)) + 0.0)
 
 
 def _do_start(s):
-    """From where the robot is, or was last told to be, to the point displaced: the centre by `x` along the plate's x axis, by `y` to the left of it, and by `z` upward; the two other points of the plate turned about the vertical through it."""
+    """primitive/common.rcs procedure start: From where the robot is, or was last told to be, to the point displaced: the centre by `x` along the plate's x axis, by `y` to the left of it, and by `z` upward; the two other points of the plate turned about the vertical through it."""
     if (s.last_robot_input_command != 1):
         for v_i in range(0, 9):
             setattr(s, ('to_robot_plate_0', 'to_robot_plate_1', 'to_robot_plate_2', 'to_robot_plate_3', 'to_robot_plate_4', 'to_robot_plate_5', 'to_robot_plate_6', 'to_robot_plate_7', 'to_robot_plate_8',)[v_i], (s.from_robot_plate_0, s.from_robot_plate_1, s.from_robot_plate_2, s.from_robot_plate_3, s.from_robot_plate_4, s.from_robot_plate_5, s.from_robot_plate_6, s.from_robot_plate_7, s.from_robot_plate_8,)[v_i] + 0.0)
@@ -990,7 +990,7 @@ def _do_start(s):
 
 
 def _do_measure_length(s):
-    """The length of the centre's path by four steps of Newton's square root, from at most the third root of three above it; never less than the farthest that a coordinate goes, so that a turn on the spot takes its time too."""
+    """primitive/common.rcs procedure measure_length: The length of the centre's path by four steps of Newton's square root, from at most the third root of three above it; never less than the farthest that a coordinate goes, so that a turn on the spot takes its time too."""
     v_square = 0.0 + 0.0
     v_most = 1.0 + 0.0
     v_root = 1.0 + 0.0
@@ -1004,7 +1004,7 @@ def _do_measure_length(s):
 
 
 def _do_advance_at(s, v_v):
-    """One cycle along the line at `v`."""
+    """primitive/common.rcs procedure advance_at: One cycle along the line at `v`."""
     s.speed_mm_s = v_v + 0.0
     s.travelled_mm = _min(s.length_mm, (s.travelled_mm + (v_v * 0.04))) + 0.0
     v_share = _max(0.0, _min(1.0, (s.travelled_mm / s.length_mm))) + 0.0
@@ -1013,12 +1013,12 @@ def _do_advance_at(s, v_v):
 
 
 def _do_advance_thru(s):
-    """Faster, up to the point's speed."""
+    """primitive/common.rcs procedure advance_thru: Faster, up to the point's speed."""
     _do_advance_at(s, _max(0.0, _min(s.goal_speed_mm_s, (s.speed_mm_s + (s.goal_accel_mm_s2 * 0.04)))) + 0.0)
 
 
 def _do_advance(s):
-    """The same, but slower where what is left is needed to stop."""
+    """primitive/common.rcs procedure advance: The same, but slower where what is left is needed to stop."""
     if ((s.speed_mm_s * s.speed_mm_s) >= ((2.0 * s.goal_decel_mm_s2) * _max(0.0, (s.length_mm - s.travelled_mm)))):
         _do_advance_at(s, _max(20.0, (s.speed_mm_s - (s.goal_decel_mm_s2 * 0.04))) + 0.0)
     else:
@@ -1026,12 +1026,12 @@ def _do_advance(s):
 
 
 def _do_stop(s):
-    """At the end of the line."""
+    """primitive/common.rcs procedure stop: At the end of the line."""
     s.speed_mm_s = 0.0 + 0.0
 
 
 def _do_take_orders(s):
-    """Procedure take_orders."""
+    """primitive/common.rcs procedure take_orders"""
     s.echoed = ((s.from_robot_inc_command_echo == s.to_robot_inc_command) and (s.from_gripper_inc_command_echo == s.to_gripper_inc_command))
     if (s.emove_inc_command != s.inc_command_seen):
         s.inc_command_seen = s.emove_inc_command
@@ -1055,7 +1055,7 @@ def _do_take_orders(s):
 
 
 def _do_give_orders(s):
-    """Procedure give_orders."""
+    """primitive/common.rcs procedure give_orders"""
     if (s.new_command and (not s.settling)):
         s.answered = True
     s.to_emove_inc_command_echo = s.inc_command_seen
@@ -1072,24 +1072,24 @@ def _do_give_orders(s):
 
 
 def _do_settle(s):
-    """A new command finds a level below at work: let it rest first."""
+    """primitive/common.rcs procedure settle: A new command finds a level below at work: let it rest first."""
     s.settling = True
     s.to_robot_input_command = 0
     s.to_gripper_input_command = 0
 
 
 def _do_done(s):
-    """Procedure done."""
+    """primitive/common.rcs procedure done"""
     s.to_emove_status_report = 0
 
 
 def _do_executing(s):
-    """Procedure executing."""
+    """primitive/common.rcs procedure executing"""
     s.to_emove_status_report = 1
 
 
 def _do_failed(s):
-    """Procedure failed."""
+    """primitive/common.rcs procedure failed"""
     s.to_emove_status_report = 2
 
 

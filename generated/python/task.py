@@ -685,13 +685,13 @@ _TRANSFER_ONE = (
 
 
 def _do_forget_cause(s):
-    """A command that has not failed has no cause of failure."""
+    """task/common.rcs procedure forget_cause: A command that has not failed has no cause of failure."""
     if (s.to_workstation_failure == 0):
         s.to_workstation_cause = 0
 
 
 def _do_look(s, v_vision):
-    """Procedure look."""
+    """task/common.rcs procedure look"""
     if v_vision:
         s.loc_of_obj = 0
     else:
@@ -699,7 +699,7 @@ def _do_look(s, v_vision):
 
 
 def _do_find_source(s):
-    """Where the part is to be taken: found once for each command, for `current_loc` is forgotten as soon as the robot moves."""
+    """task/common.rcs procedure find_source: Where the part is to be taken: found once for each command, for `current_loc` is forgotten as soon as the robot moves."""
     if (not s.answered):
         if ((s.workstation_input_command == 1) and (s.workstation_source_locpt == 0)):
             s.source_spec = ((s.current_loc != 0) and s.here_known)
@@ -718,23 +718,23 @@ def _do_find_source(s):
 
 
 def _do_test_variables(s):
-    """The other table test variables that the command and the database give (section 8.1)."""
+    """task/common.rcs procedure test_variables: The other table test variables that the command and the database give (section 8.1)."""
     s.dest_spec = ((s.workstation_dest_locpt != 0) and s.dest_known)
     s.names_known = ((((s.workstation_source_locpt == 0) or s.source_known) and ((s.workstation_dest_locpt == 0) or s.dest_known)) and ((s.workstation_end_at_locpt == 0) or s.end_at_known))
 
 
 def _do_tell_gripped(s):
-    """The WORKSTATION is told what is in the gripper."""
+    """task/common.rcs procedure tell_gripped: The WORKSTATION is told what is in the gripper."""
     s.to_workstation_status_parameter = s.obj_now_in_gripper
 
 
 def _do_nextstate(s, v_value):
-    """Procedure nextstate."""
+    """task/common.rcs procedure nextstate"""
     s.cur_state_next = v_value
 
 
 def _do_set_source(s):
-    """Procedure set_source."""
+    """task/common.rcs procedure set_source"""
     s.to_emove_obj_ptr = s.workstation_obj
     s.to_emove_grasp = s.workstation_grasp
     s.to_emove_locpt_ptr = s.source_loc
@@ -744,7 +744,7 @@ def _do_set_source(s):
 
 
 def _do_vupos_setup(s):
-    """Procedure vupos_setup."""
+    """task/common.rcs procedure vupos_setup"""
     s.to_emove_sector = s.source_sector
     s.to_emove_locpt_ptr = s.source_vupos
     s.remember_current_loc = s.source_loc
@@ -755,26 +755,26 @@ def _do_vupos_setup(s):
 
 
 def _do_locate(s):
-    """Procedure locate."""
+    """task/common.rcs procedure locate"""
     s.to_emove_obj_ptr = s.workstation_obj
     s.to_emove_locpt_ptr = s.source_loc
     s.to_emove_input_command = 3
 
 
 def _do_move_to(s):
-    """Procedure move_to."""
+    """task/common.rcs procedure move_to"""
     s.to_emove_input_command = 1
 
 
 def _do_move_to_obj(s):
-    """Procedure move_to_obj."""
+    """task/common.rcs procedure move_to_obj"""
     s.to_emove_obj_ptr = s.workstation_obj
     s.to_emove_grasp = s.workstation_grasp
     s.to_emove_input_command = 2
 
 
 def _do_pickup(s):
-    """Takes one part off the count of the buffer, or gives up: nothing to pick up."""
+    """task/common.rcs procedure pickup: Takes one part off the count of the buffer, or gives up: nothing to pick up."""
     s.to_emove_obj_ptr = s.workstation_obj
     s.to_emove_input_command = 4
     s.obj_acquired = True
@@ -787,7 +787,7 @@ def _do_pickup(s):
 
 
 def _do_remove_from_buffer_db(s):
-    """Counts once: the line matches again until PICKUP is echoed, and by then PICKUP is the old workstation."""
+    """task/common.rcs procedure remove_from_buffer_db: Counts once: the line matches again until PICKUP is echoed, and by then PICKUP is the old workstation."""
     if (s.source_buffer and (s.last_emove_input_command != 4)):
         case_1 = s.workstation_obj
         if case_1 in (1,):
@@ -813,7 +813,7 @@ def _do_remove_from_buffer_db(s):
 
 
 def _do_buffer_empty(s):
-    """Nothing of that type is on the buffer: fail, and let the robot rest."""
+    """task/common.rcs procedure buffer_empty: Nothing of that type is on the buffer: fail, and let the robot rest."""
     s.to_workstation_failure = 6
     _do_none_acquired(s)
     s.to_emove_input_command = 0
@@ -821,31 +821,31 @@ def _do_buffer_empty(s):
 
 
 def _do_none_acquired(s):
-    """Nothing is in the gripper."""
+    """task/common.rcs procedure none_acquired: Nothing is in the gripper."""
     s.obj_acquired = False
     s.obj_now_in_gripper = 0
     s.to_emove_gripped_obj_ptr = 0
 
 
 def _do_cmd_failure(s):
-    """Procedure cmd_failure."""
+    """task/common.rcs procedure cmd_failure"""
     s.to_workstation_failure = 1
 
 
 def _do_cause_below(s):
-    """What E-MOVE says went wrong."""
+    """task/common.rcs procedure cause_below: What E-MOVE says went wrong."""
     s.to_workstation_cause = s.emove_failure
 
 
 def _do_lost_on_the_way(s):
-    """E-MOVE found that the part is not between the fingers any more."""
+    """task/common.rcs procedure lost_on_the_way: E-MOVE found that the part is not between the fingers any more."""
     if (s.emove_failure == 11):
         s.to_workstation_failure = 11
         _do_none_acquired(s)
 
 
 def _do_move_failure(s):
-    """Procedure move_failure."""
+    """task/common.rcs procedure move_failure"""
     s.to_workstation_failure = 2
     _do_cause_below(s)
     s.remember_current_loc = 0
@@ -853,13 +853,13 @@ def _do_move_failure(s):
 
 
 def _do_loc_failure(s):
-    """Procedure loc_failure."""
+    """task/common.rcs procedure loc_failure"""
     s.to_workstation_failure = 3
     _do_cause_below(s)
 
 
 def _do_add_to_buffer_db(s, v_what):
-    """One part more on the buffer table."""
+    """task/common.rcs procedure add_to_buffer_db: One part more on the buffer table."""
     case_2 = v_what
     if case_2 in (1,):
         if (s.tbuffer_boxt < 99):
@@ -876,13 +876,13 @@ def _do_add_to_buffer_db(s, v_what):
 
 
 def _do_back_to_buffer_db(s):
-    """What was counted off and could not be picked up lies there still; once: the order that follows is no PICKUP."""
+    """task/common.rcs procedure back_to_buffer_db: What was counted off and could not be picked up lies there still; once: the order that follows is no PICKUP."""
     if (s.source_buffer and (s.last_emove_input_command == 4)):
         _do_add_to_buffer_db(s, s.workstation_obj)
 
 
 def _do_pic_failure(s):
-    """Nothing, or a part of the wrong size, is in the gripper."""
+    """task/common.rcs procedure pic_failure: Nothing, or a part of the wrong size, is in the gripper."""
     s.to_workstation_failure = 4
     _do_cause_below(s)
     _do_back_to_buffer_db(s)
@@ -894,39 +894,39 @@ def _do_pic_failure(s):
 
 
 def _do_state_failure(s):
-    """Procedure state_failure."""
+    """task/common.rcs procedure state_failure"""
     s.to_workstation_failure = 5
 
 
 def _do_set_dest(s):
-    """The destination of the workstation."""
+    """task/common.rcs procedure set_dest: The destination of the workstation."""
     s.to_emove_locpt_ptr = s.workstation_dest_locpt
     s.to_emove_sector = s.workstation_sector
     s.current_loc = 0
 
 
 def _do_arrived(s):
-    """The robot is at the destination."""
+    """task/common.rcs procedure arrived: The robot is at the destination."""
     s.current_loc = s.workstation_dest_locpt
     s.current_sector = s.workstation_sector
 
 
 def _do_release(s):
-    """Opens the gripper where it is."""
+    """task/common.rcs procedure release: Opens the gripper where it is."""
     s.to_emove_obj_ptr = s.obj_now_in_gripper
     s.to_emove_grasp = s.grasp_now
     s.to_emove_input_command = 5
 
 
 def _do_released(s):
-    """The part lies where the robot is; on the buffer it is counted, once: by the next cycle none is in the gripper."""
+    """task/common.rcs procedure released: The part lies where the robot is; on the buffer it is counted, once: by the next cycle none is in the gripper."""
     if s.here_buffer:
         _do_add_to_buffer_db(s, s.obj_now_in_gripper)
     _do_none_acquired(s)
 
 
 def _do_set_end(s):
-    """Where to end: as the command says, else at the safe position of the place where the robot is. It leaves that: the line may match again, and by then MOVE-TO is the last order."""
+    """task/common.rcs procedure set_end: Where to end: as the command says, else at the safe position of the place where the robot is. It leaves that: the line may match again, and by then MOVE-TO is the last order."""
     if (s.workstation_end_at_locpt != 0):
         s.to_emove_locpt_ptr = s.workstation_end_at_locpt
     else:
@@ -937,20 +937,20 @@ def _do_set_end(s):
 
 
 def _do_ended(s):
-    """The robot is at the end position."""
+    """task/common.rcs procedure ended: The robot is at the end position."""
     s.current_loc = s.to_emove_locpt_ptr
     s.current_sector = 0
 
 
 def _do_release_failure(s):
-    """Opening the gripper failed: what it holds is not known."""
+    """task/common.rcs procedure release_failure: Opening the gripper failed: what it holds is not known."""
     s.to_workstation_failure = s.emove_failure
     _do_cause_below(s)
     _do_lost_on_the_way(s)
 
 
 def _do_take_orders(s):
-    """Procedure take_orders."""
+    """task/common.rcs procedure take_orders"""
     s.echoed = (s.from_emove_inc_command_echo == s.to_emove_inc_command)
     if (s.workstation_inc_command != s.inc_command_seen):
         s.inc_command_seen = s.workstation_inc_command
@@ -970,7 +970,7 @@ def _do_take_orders(s):
 
 
 def _do_give_orders(s):
-    """Procedure give_orders."""
+    """task/common.rcs procedure give_orders"""
     if (s.new_command and (not s.settling)):
         s.answered = True
     s.to_workstation_inc_command_echo = s.inc_command_seen
@@ -985,28 +985,28 @@ def _do_give_orders(s):
 
 
 def _do_settle(s):
-    """A new command finds a level below at work: let it rest first."""
+    """task/common.rcs procedure settle: A new command finds a level below at work: let it rest first."""
     s.settling = True
     s.to_emove_input_command = 0
 
 
 def _do_done(s):
-    """Procedure done."""
+    """task/common.rcs procedure done"""
     s.to_workstation_status_report = 0
 
 
 def _do_executing(s):
-    """Procedure executing."""
+    """task/common.rcs procedure executing"""
     s.to_workstation_status_report = 1
 
 
 def _do_failed(s):
-    """Procedure failed."""
+    """task/common.rcs procedure failed"""
     s.to_workstation_status_report = 2
 
 
 def _do_pause(s):
-    """Procedure pause."""
+    """task/common.rcs procedure pause"""
     s.to_emove_input_command = 0
 
 

@@ -561,7 +561,7 @@ _PAUSE_VISION_ONE = (
 
 
 def _do_measure(s):
-    """Procedure measure."""
+    """vision/vision.rcs procedure measure"""
     if s.new_command:
         s.waited = 0
     s.arrived = (s.camera_number == s.to_camera_number)
@@ -570,19 +570,19 @@ def _do_measure(s):
 
 
 def _do_shoot(s, v_which):
-    """Fires a flash; the picture that answers has the next number."""
+    """vision/vision.rcs procedure shoot: Fires a flash; the picture that answers has the next number."""
     s.to_camera_number = _mod((s.to_camera_number + 1), 65536)
     s.to_camera_fire = v_which
     s.to_camera_obj_ptr = s.emove_obj_ptr
 
 
 def _do_rest(s):
-    """Procedure rest."""
+    """vision/vision.rcs procedure rest"""
     s.to_camera_fire = 0
 
 
 def _do_found(s):
-    """Where the part is in camera coordinates, how it is turned, and its range if it lies flat."""
+    """vision/vision.rcs procedure found: Where the part is in camera coordinates, how it is turned, and its range if it lies flat."""
     s.to_emove_x_mm = s.camera_x_mm + 0.0
     s.to_emove_y_mm = s.camera_y_mm + 0.0
     s.to_emove_c = s.camera_c + 0.0
@@ -591,43 +591,43 @@ def _do_found(s):
 
 
 def _do_measured(s):
-    """The measured range."""
+    """vision/vision.rcs procedure measured: The measured range."""
     s.to_emove_range_mm = s.camera_range_mm + 0.0
 
 
 def _do_no_picture(s):
-    """Procedure no_picture."""
+    """vision/vision.rcs procedure no_picture"""
     s.to_emove_failure = 17
 
 
 def _do_no_match(s):
-    """Procedure no_match."""
+    """vision/vision.rcs procedure no_match"""
     s.to_emove_failure = 13
 
 
 def _do_range_failure(s):
-    """Procedure range_failure."""
+    """vision/vision.rcs procedure range_failure"""
     s.to_emove_failure = 14
 
 
 def _do_surface_failure(s):
-    """Procedure surface_failure."""
+    """vision/vision.rcs procedure surface_failure"""
     s.to_emove_failure = 16
 
 
 def _do_state(s, v_value):
-    """Procedure state."""
+    """vision/vision.rcs procedure state"""
     s.cur_state = v_value
 
 
 def _do_wait(s):
-    """Procedure wait."""
+    """vision/vision.rcs procedure wait"""
     if (s.waited < 100):
         s.waited = (s.waited + 1)
 
 
 def _do_take_orders(s):
-    """Procedure take_orders."""
+    """vision/vision.rcs procedure take_orders"""
     if (s.emove_inc_command != s.inc_command_seen):
         s.inc_command_seen = s.emove_inc_command
         s.new_command = True
@@ -641,7 +641,7 @@ def _do_take_orders(s):
 
 
 def _do_give_orders(s):
-    """Procedure give_orders."""
+    """vision/vision.rcs procedure give_orders"""
     if (s.new_command and (not s.settling)):
         s.answered = True
     s.to_emove_inc_command_echo = s.inc_command_seen
@@ -649,17 +649,17 @@ def _do_give_orders(s):
 
 
 def _do_done(s):
-    """Procedure done."""
+    """vision/vision.rcs procedure done"""
     s.to_emove_status_report = 0
 
 
 def _do_executing(s):
-    """Procedure executing."""
+    """vision/vision.rcs procedure executing"""
     s.to_emove_status_report = 1
 
 
 def _do_failed(s):
-    """Procedure failed."""
+    """vision/vision.rcs procedure failed"""
     s.to_emove_status_report = 2
 
 

@@ -69,7 +69,11 @@ def _plan(program: Program, root: str, *, proved: bool) -> Plan:
     tables = tuple(_table(program, table, monitored, _seen(table.file, root)) for table in program.tables)
     types = dict.fromkeys(one.file for one in program.types)
     places = {file: _place(file, root) for file in types if file}
-    return Plan(program, _seen(program.file, root), tables, monitored, proved, places=places)
+    declared = dict.fromkeys(
+        [p.span.file for p in program.procedures] + [a.span.file for a in program.assumptions]
+    )
+    files = {file: _seen(file, root) for file in declared if file}
+    return Plan(program, _seen(program.file, root), tables, monitored, proved, places=places, files=files)
 
 
 def _seen(file: str, root: str) -> str:
@@ -105,7 +109,7 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
         for place, assumption in named
         if place in stops or (assumption.standing.checked and assumption.name in table.assumptions)
     )
-    return PlanTable(table, _matcher(program, table), tuple(lines), relied, stops)
+    return PlanTable(table, file, _matcher(program, table), tuple(lines), relied, stops)
 
 
 def _conditions(table: Table, line: Line) -> tuple[str, ...]:

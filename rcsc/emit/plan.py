@@ -168,9 +168,15 @@ def answering(requirements: Iterable[str]) -> str:
     return f" [{names}]" if names else ""
 
 
-def stated(procedure: Procedure) -> str:
-    """What a procedure is, in words, and what for."""
-    return (procedure.doc or f"Procedure {procedure.name}.") + answering(procedure.requirements)
+def stated(procedure: Procedure, files: Mapping[str, str]) -> str:
+    """Where a procedure stands, what for, and what it is, in words; the protocol's own stand in no file.
+
+    Args:
+        procedure: The procedure.
+        files: `Plan.files`.
+    """
+    words = f"{files.get(procedure.span.file, '')} procedure {procedure.name}{answering(procedure.requirements)}".lstrip()
+    return f"{words}: {procedure.doc}" if procedure.doc else words
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,11 +184,13 @@ class PlanTable:
     """A table to be emitted.
 
     Attributes:
+        source: Its file, relative.
         monitored: Positions in `Plan.monitored` of the assumptions that it checks.
         stops: Those of them that end the cycle where they fail.
     """
 
     table: Table
+    source: str
     matcher: Matcher
     lines: tuple[PlanLine, ...]
     monitored: tuple[int, ...]
@@ -203,6 +211,7 @@ class Plan:
         source: The root file, relative, with `/`.
         monitored: Positions in `program.assumptions` of those that the executors check: monitored ones, and those that stop some table.
         places: For each file that declares a type, its place in the project, relative, with `/` and without its ending.
+        files: For each file that declares a procedure or an assumption, its name, relative, with `/`.
         proved: Whether it is proved; otherwise every file is marked (`UNPROVED`).
         defensive: Whether every cycle begins with a check of the state.
     """
@@ -214,6 +223,7 @@ class Plan:
     proved: bool = True
     defensive: bool = False
     places: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def checked(self) -> tuple[str, ...]:

@@ -133,7 +133,7 @@ class _Maker:
         params = ", ".join(["s", *(local_word(p.name) for p in procedure.params)])
         body = self._extern(procedure) if procedure.extern is not None else self.text.block(procedure.body)
         head = f"_do_{self.names.procedures[procedure.name]}({params})"
-        return Function(comment(stated(procedure)), head, tuple(body))
+        return Function(comment(stated(procedure, self.plan.files)), head, tuple(body))
 
     def _extern(self, procedure: Procedure) -> Iterator[Stmt]:
         assert procedure.extern is not None

@@ -76,7 +76,7 @@ def test_generated_code_names_them_and_nothing_in_a_name_ends_a_comment() -> Non
     for text in (c, python):
         assert "line yes [SR-2, SR-3]" in text
         assert "line no [* / error]" in text
-        assert "Procedure q. [Q]" in text
+        assert "procedure q [Q]" in text
         assert "runs the line. [T]" in text
     plain_c = [
         text for path, text in emitted(lower_by_force(program_of(TEXT))).items() if path.endswith(".c")

@@ -81,10 +81,43 @@ def test_arithmetic_is_done_in_the_smallest_type_that_holds_it(mixed: dict[str, 
 def test_a_mask_says_of_which_class_it_is_and_which_lines_it_leaves(mixed: dict[str, str]) -> None:
     rows = re.findall(r"(0x\w+)u,? /\* (.*) \*/", mixed[".c"])
     assert ("0x6", "moving: lines low, high") in rows
+    assert re.search(r"/\* case\.rcs: .*told", mixed[".c"])
+    assert mixed[".c"].count("from the lowest bit, lines rests, low, high, fails;") == 1
     lines = ["rests", "low", "high", "fails"]
     for mask, told in rows:
         left = [line for at, line in enumerate(lines) if int(mask, 16) >> at & 1]
-        assert told.endswith("every line" if len(left) == 4 else f"lines {', '.join(left)}")
+        out = [line for line in lines if line not in left]
+        few = (
+            f"all lines but {', '.join(out)}"
+            if len(left) > len(out)
+            else f"line{'s' * (len(left) > 1)} {', '.join(left)}"
+        )
+        assert told.endswith(": every line" if not out else ": no line" if not left else f": {few}")
+
+
+WIDE = """input at : int 0 .. 199
+output o : int 0 .. 3
+table where {
+  | line | at          || o |
+  |------|-------------||---|
+  | few  | < 3         || 0 |
+  | some | 3 .. 149    || 1 |
+  | many | >= 150      || 2 |
+}
+"""
+
+
+def test_many_masks_are_told_in_runs() -> None:
+    verdict = verdict_of(WIDE)
+    assert verdict.proved is not None
+    (text,) = (text for name, text in emitted(lower(verdict.proved)).items() if name.endswith(".c"))
+    body = text[text.index("t0[200]") : text.index("} t = {") + 4000]
+    told = re.findall(r"/\* (\d+ .. \d+: .*) \*/\n((?: +(?:0x\w+u,? ?)+\n)+)", body)
+    assert [(words, rows.count("0x"), set(re.findall(r"0x\w+", rows))) for words, rows in told] == [
+        ("0 .. 2: line few", 3, {"0x1u"}),
+        ("3 .. 149: line some", 147, {"0x2u"}),
+        ("150 .. 199: line many", 50, {"0x4u"}),
+    ]
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -85,8 +85,9 @@ def assumption_functions(c: CProgram) -> Iterator[Function]:
     told = {place for table in c.plan.tables for place in table.monitored}
     for place in sorted(told):
         name, assumption = c.names.holding[place], c.program.assumptions[c.plan.monitored[place]]
-        words = comment(f"{assumption.doc}{answering(assumption.requirements)}".strip())
-        doc = f"Assumption {assumption.name}{f': {words}' if words else ' holds.'}"
+        file = c.plan.files.get(assumption.span.file, "")
+        words = f"{file} assumption {assumption.name}{answering(assumption.requirements)}".lstrip()
+        doc = comment(f"{words}: {assumption.doc}" if assumption.doc else words)
         body: Body = (Leave(c.text.expr(assumption.condition)),)
         unread = () if touches_state(body) else (discarded(STATE),)
         yield Function(doc, f"bool {name}(const {c.p}_t *s)", (*unread, *body))

@@ -1,7 +1,9 @@
 """The function that finds the line of a table: masks, the classes that choose among them, the bit that is left."""
 
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import product
+from itertools import groupby, product
+from operator import itemgetter
 from typing import assert_never
 
 from rcsc.emit.c.cprogram import AT, NONE, ONE, CProgram, counted_loop, discarded, touches_state
@@ -39,8 +41,6 @@ from rcsc.lang.model import Bool, key_bounds, spell, value_of_key
 
 MOST_TOLD = 32
 """Masks in a table up to which each stands in a line of its own, with its class."""
-MOST_NAMED = 72
-"""Characters up to which the lines that a mask leaves are named."""
 SEVERAL = Constant(-2)
 NOTHING = Constant(0, "uint64_t")
 FOUND, M = Name("line"), Name("m")
@@ -64,8 +64,8 @@ def match_functions(c: CProgram, table: PlanTable) -> Iterator[Function]:
 def _match(c: CProgram, table: PlanTable, name: str) -> Iterator[Stmt]:
     matcher = table.matcher
     if matcher.groups:
-        yield Line("/* The masks: bit k of an entry is set where line k does not exclude that class. */")
-        yield from _masks(matcher, [line.name for line in table.lines])
+        yield Line(f"/* {_meaning(table)} */")
+        yield from _masks(table)
     indices = [_index(c, group, f"{name}_{at}") for at, group in enumerate(matcher.groups)]
     masks = [Element(Name(f"t.t{at}"), index) for at, index in enumerate(indices)]
     yield from (_one_word if matcher.words <= 1 else _many_words)(c, matcher, masks)
@@ -184,18 +184,28 @@ def _width(lines: int) -> int:
     return next(bits for bits in (8, 16, 32, 64) if lines <= bits)
 
 
-def _masks(matcher: Matcher, lines: Sequence[str]) -> Iterator[Stmt]:
+def _meaning(table: PlanTable) -> str:
+    """What a bit of a mask says, and of which line it is where its name does not tell."""
+    lines = table.lines[: table.matcher.lines]
+    numbered = all(line.name == str(at) for at, line in enumerate(lines))
+    bits = "bit k" if numbered else f"from the lowest bit, lines {', '.join(line.name for line in lines)}"
+    what = "is set where line k does not exclude" if numbered else "each set where its line does not exclude"
+    return comment(f"Masks of {table.source}: {bits}{' ' if numbered else '; '}{what} that class.")
+
+
+def _masks(table: PlanTable) -> Iterator[Stmt]:
     """All tables of masks as one object: one address to load."""
+    matcher = table.matcher
+    lines = [line.name for line in table.lines[: matcher.lines]]
     bits = _width(matcher.lines) if matcher.words <= 1 else WORD
     words = "" if matcher.words <= 1 else f"[{matcher.words}]"
-    masks = [joined(group) for group in matcher.groups]
     masks = [joined(group) for group in matcher.groups]
     members = (Line(f"uint{bits}_t t{at}[{len(entries)}]{words};") for at, entries in enumerate(masks))
     yield Frame(("static const struct {",), tuple(members))
     rows = (
         Frame(
-            (f"{{ /* {_leaves(group)} */",),
-            tuple(_rows(entries, matcher.words, bits, _told(group, entries, lines))),
+            (f"{{ /* {comment(f'{table.source}: {_leaves(group)}')} */",),
+            tuple(_rows(group, entries, lines, (matcher.words, bits))),
             "},",
         )
         for group, entries in zip(matcher.groups, masks, strict=True)
@@ -205,38 +215,50 @@ def _masks(matcher: Matcher, lines: Sequence[str]) -> Iterator[Stmt]:
 
 def _leaves(group: Group) -> str:
     """What the classes of a group are of, in words."""
-    return comment(
-        " by ".join(
-            probe.index.text if isinstance(probe.index, Truth) else probe.index.leaf for probe in group
-        )
+    return ", ".join(
+        probe.index.text if isinstance(probe.index, Truth) else probe.index.leaf for probe in group
     )
 
 
-def _rows(entries: tuple[int, ...], words: int, bits: int, told: Sequence[str]) -> Iterator[Line]:
-    """Masks, or the words of each, from the lowest; each in a line with what is told of it, if anything is."""
-    if words <= 1 and not told:
+def _rows(
+    group: Group, entries: tuple[int, ...], lines: Sequence[str], size: tuple[int, int]
+) -> Iterator[Line]:
+    """Masks, or the words of each, from the lowest: each in a line with its class and its lines, or each run of equal ones."""
+    (words, bits), classes = size, _classes(group)
+    runs = [[at for at, _ in run] for _, run in groupby(enumerate(entries), key=itemgetter(1))]
+    if len(entries) <= MOST_TOLD:
+        runs = [[at] for at, _ in enumerate(entries)]
+    elif words > 1:
+        yield from (Line(f"{_mask_code(mask, words, bits)},") for mask in entries)
+        return
+    elif len(runs) > MOST_TOLD:
         yield from _wrapped([_word(mask, bits) for mask in entries], 84)
         return
-    ends = [f" /* {comment(text)} */" for text in told] or [""] * len(entries)
-    for at, (mask, end) in enumerate(zip(entries, ends, strict=True), 1):
-        parts = Items(tuple(_word(mask >> (WORD * w) & (2**WORD - 1), WORD) for w in range(words)))
-        code = IN_C.code(parts if words > 1 else _word(mask, bits))
-        yield Line(f"{code}{',' if words > 1 or at < len(entries) else ''}{end}")
+    for run in runs:
+        of = " .. ".join(dict.fromkeys((classes[run[0]], classes[run[-1]])))
+        told = f"/* {comment(f'{of}: {_left(entries[run[0]], lines)}')} */"
+        code = [_mask_code(entries[at], words, bits) for at in run]
+        comma = "," if words > 1 or run[-1] + 1 < len(entries) else ""
+        if len(run) == 1:
+            yield Line(f"{code[0]}{comma} {told}")
+        else:
+            yield from (Line(told), *(Line(row) for row in textwrap.wrap(f"{', '.join(code)}{comma}", 86)))
 
 
-def _told(group: Group, entries: Sequence[int], lines: Sequence[str]) -> list[str]:
-    """Of each mask its class and the lines that it leaves, by name, where that is short; nothing of many masks."""
-    if len(entries) > MOST_TOLD:
-        return []
-    left = ([line for at, line in enumerate(lines) if mask >> at & 1] for mask in entries)
-    named = (
-        "every line" if len(some) == len(lines) else f"lines {', '.join(some)}" if some else "no line"
-        for some in left
-    )
-    return [
-        f"{words}: {names}" if len(names) <= MOST_NAMED else words
-        for words, names in zip(_classes(group), named, strict=True)
-    ]
+def _mask_code(mask: int, words: int, bits: int) -> str:
+    parts = Items(tuple(_word(mask >> (WORD * w) & (2**WORD - 1), WORD) for w in range(words)))
+    return IN_C.code(parts if words > 1 else _word(mask, bits))
+
+
+def _left(mask: int, lines: Sequence[str]) -> str:
+    """The lines that a mask leaves, by name, or those that it does not: whichever are fewer."""
+    left = [line for at, line in enumerate(lines) if mask >> at & 1]
+    out = [line for at, line in enumerate(lines) if not mask >> at & 1]
+    if not left or not out:
+        return "every line" if left else "no line"
+    if len(left) > len(out):
+        return f"all lines but {', '.join(out)}"
+    return f"line{'s' if len(left) > 1 else ''} {', '.join(left)}"
 
 
 def _classes(group: Group) -> list[str]:

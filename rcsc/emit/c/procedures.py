@@ -20,7 +20,7 @@ def procedure_function(c: CProgram, procedure: Procedure) -> Function:
     params = [f"{c.p}_t *s", *(f"{_held(c, p.type)} {local_word(p.name)}" for p in procedure.params)]
     head = f"void {c.p}_do_{c.names.procedures[procedure.name]}({', '.join(params)})"
     body = _extern_body(c, procedure) if procedure.extern else _body(c, procedure)
-    return Function(comment(stated(procedure)), head, tuple(body))
+    return Function(comment(stated(procedure, c.plan.files)), head, tuple(body))
 
 
 def _body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:
