@@ -44,6 +44,7 @@ COMMANDS = {
     "systems.shell": "Run, step and change a system by hand.",
     "tables.table": "Make a table of a state graph.",
     "tables.test": "Test the generated executors against the tables.",
+    "tables.trace": "Trace lines to requirements, code, tests and proofs, and code back to lines.",
 }
 """The module of each command, whose last name is the command's, and what `rcsc --help` says of it."""
 

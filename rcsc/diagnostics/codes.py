@@ -1397,6 +1397,23 @@ class Code(StrEnum):
     place and its reason; the files that were made say the same. Where a tool is not installed, the kind shows nothing: install it, or
     leave the kind out with `--only`, and the index does not list it.
     """
+    NOT_TRACED = """RCS606: generated code that comes from nothing in the tables
+
+    `rcsc trace` reads the generated files back: each function, case, constant and member has the name of a line, a procedure or a
+    declaration, or a comment that says what it serves. A line of code that has neither is named here. In code that rcsc wrote this is a
+    bug in rcsc: please report it.
+    """
+    REQUIREMENT_OPEN = """RCS607: requirements and tables do not fit
+
+    `rcsc trace --requirements FILE` holds the names that the tables give after `req` against the list. A listed requirement that nothing
+    names, and a name that is not in the list, are errors; lines that name none, and whose table names none, are a warning. Name the
+    requirement where it is answered, or mend the list.
+    """
+    MATRIX_OLD = """RCS608: a matrix of another version
+
+    `rcsc trace --against FILE` holds a kept matrix against these tables and the code that is made of them now. It is of another
+    version where the meaning of a program or a byte of a generated file differs. Make it anew, and review what changed with `rcsc diff`.
+    """
     LOG_UNREADABLE = """RCS701: a log cannot be read
 
     The file is not there, is no MCAP file, or holds no run that rcsc recorded: a name in it is none, or it unpacks to more than a log

@@ -89,7 +89,7 @@ class _Seen:
 
     def table(self, table: TableReport) -> TableReport:
         """The table, with what the nearest system that runs it makes of it."""
-        for system in _systems_above(table.file):
+        for system in systems_above(table.file):
             name = _shown(str(system), table.file)
             known_system = self._standing(system)
             if known_system is None:
@@ -218,7 +218,7 @@ class _Seen:
 # --- which system a table belongs to ---------------------------------------------------------
 
 
-def _systems_above(file: str) -> list[Path]:
+def systems_above(file: str) -> list[Path]:
     """Descriptions beside the file and above it, up to the project's folder, or one up where there is no project."""
     here = Path(os.path.dirname(file) or ".").resolve()
     folders = [here, *here.parents]

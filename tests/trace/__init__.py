@@ -1,0 +1,1 @@
+"""Traceability of tables, generated code, tests and requirements."""

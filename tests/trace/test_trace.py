@@ -1,0 +1,231 @@
+"""`rcsc trace`: every line of generated code comes from somewhere, both ways agree, and what does not fit is told."""
+
+import csv
+import io
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.driver.compile import planned
+from rcsc.driver.pipeline import proved
+from rcsc.driver.settings import Settings
+from rcsc.emit import emitted
+from rcsc.emit.plan import Plan
+from rcsc.solvers.options import Options
+from rcsc.trace.c_code import c_names, c_pieces
+from rcsc.trace.chunks import chunks
+from rcsc.trace.matrix import Known, matrix, untraced
+from rcsc.trace.origin import Origin, Sort
+from rcsc.trace.page import page
+from tests.support.programs.texts import edited
+
+REPO = Path(__file__).parents[2]
+DOOR = """\
+input door_shut : bool
+input button : bool
+input count : int 0 .. 1000000
+output press : bool safe false
+assume door_seen assumed monitored req "SR-3" : door_shut or not button
+invariant steady req "SR-9" : press in {true, false}
+property opened req "SR-12", "<script>alert(1)</script>" : press implies door_shut
+procedure hold req "SR-4" { quiet }
+procedure quiet { press := false }
+table press_once assuming door_seen req "SR-1" {
+  | line | door_shut | button | count ||  procedures | press | req              |
+  | go   | true      | true   |       ||             | true  | "SR-12", "SR-13" |
+  | wait | true      | false  | > 7   ||  hold       |       | "SR-4"           |
+  | more | true      | false  | <= 7  ||  hold       |       |                  |
+  | open | DEFAULT   |        |       ||  hold       |       | "SR-12"          |
+}
+"""
+
+
+@pytest.fixture
+def door(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the program, and nothing kept from elsewhere."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    path = tmp_path / "door.rcs"
+    path.write_text(DOOR, encoding="utf-8")
+    return path
+
+
+def plans(*paths: str) -> list[Plan]:
+    project = proved(Settings(paths, Options(solver="boxes")))
+    assert not project.report().failed
+    return [planned(program) for _, program in project.executable]
+
+
+SHIPPED = [
+    f"tables/{name}" for name in ("task", "emove", "primitive", "vision", "gripper", "examples/approach.rcs")
+]
+
+
+@pytest.mark.parametrize("path", SHIPPED)
+def test_all_shipped_code_is_traced_and_each_case_is_of_the_line_that_its_comment_names(path: str) -> None:
+    for plan in plans(str(REPO / path)):
+        files = emitted(plan)
+        one = matrix(plan, files, Known({}))
+        assert one.untraced == ()
+        texts = {name: text.splitlines() for name, text in files.items()}
+        lines = {(line.table, line.name) for line in one.lines}
+        seen = set()
+        for piece in (piece for piece in one.pieces if piece.name.startswith("case ")):
+            said = " ".join(" ".join(texts[piece.file][piece.first - 1 : piece.last]).split())
+            assert re.search(rf"\.rcs line {re.escape(piece.origin.line)}\b", said), (piece, said)
+            assert said.endswith("break;") or "break; }" in said
+            seen.add((piece.origin.name, piece.origin.line))
+        assert seen == lines
+        python = {
+            (p.origin.name, p.origin.line)
+            for p in one.pieces
+            if p.file.endswith(".py") and p.origin.sort is Sort.LINE
+        }
+        assert python == lines
+
+
+def test_code_that_nothing_in_the_tables_stands_for_is_told(door: Path) -> None:
+    [plan] = plans(str(door))
+    [(name, text)] = [(name, text) for name, text in emitted(plan).items() if name.endswith(".c")]
+    names = c_names(plan)
+    for foreign in (
+        "int door_more(void)\n{\n    return 1;\n}\n",
+        "/* Says nothing of whose it is. */\nstatic int other;\n",
+        "static void door_unsaid(void)\n{\n}\n",
+        "enum { DOOR_STRANGE = 3 };\n",
+    ):
+        changed = f"{text}\n{foreign}"
+        left = list(untraced({name: changed}, c_pieces(names, name, changed)))
+        first = text.count("\n") + 2
+        assert left[-1] == f"{name}:{first + foreign.count(chr(10)) - 1}"
+        assert all(int(where.rpartition(":")[2]) >= first for where in left)
+    said = "/* A helper that says what it serves. */\nstatic inline void door_said(void)\n{\n}\n"
+    assert not list(untraced({name: text + said}, c_pieces(names, name, text + said)))
+
+
+def test_a_case_whose_label_is_gone_leaves_its_line_without_code(door: Path) -> None:
+    [plan] = plans(str(door))
+    [(name, text)] = [(name, text) for name, text in emitted(plan).items() if name.endswith(".c")]
+    case = Origin(Sort.LINE, "press_once", "wait")
+    assert [piece for piece in c_pieces(c_names(plan), name, text) if piece.origin == case]
+    without = text.replace("case DOOR_LINE_PRESS_ONCE_WAIT:", "case 1:")
+    assert not [piece for piece in c_pieces(c_names(plan), name, without) if piece.origin == case]
+
+
+def test_chunks_leave_out_blank_lines_alone(door: Path) -> None:
+    [plan] = plans(str(door))
+    for name, text in emitted(plan).items():
+        if name.endswith((".c", ".h")):
+            inside = [at for chunk in chunks(text) for at in range(chunk.first, chunk.last + 1)]
+            assert len(inside) == len(set(inside))
+            filled = {at for at, line in enumerate(text.splitlines(), 1) if line.strip()}
+            assert filled <= set(inside)
+
+
+def test_the_matrix_leads_from_a_requirement_to_code_tests_and_proof_and_back(door: Path) -> None:
+    assert run(["trace", str(door), "-q"]) == 0
+    document = json.loads(Path("trace/trace.json").read_text(encoding="utf-8"))
+    assert document["requirements"]["SR-12"] == [
+        "press_once line go",
+        "press_once line open",
+        "property opened",
+    ]
+    [program] = document["programs"]
+    [table] = program["tables"]
+    assert table["verdict"] == "proved"
+    lines = {line["line"]: line for line in program["lines"]}
+    assert list(lines) == ["go", "wait", "more", "open"]
+    go, wait = lines["go"], lines["wait"]
+    assert (go["requirements"], go["requirements_of_table"]) == (["SR-12", "SR-13"], ["SR-1"])
+    assert go["place"].endswith("door.rcs:12")
+    assert go["properties"] == {"opened": "changes press; tests door_shut"}
+    assert wait["procedures"] == ["hold", "quiet"]
+    assert wait["vectors"]["conditions"] == wait["vectors"]["shown"] + len(wait["vectors"]["not_shown"]) == 3
+    assert wait["vectors"]["made"]
+    assert wait["vectors"]["taken"]
+    [runs] = [piece for piece in go["code"]["runs"] if piece["file"] == "c/door.c"]
+    back = [
+        piece for piece in program["code"] if (piece["file"], piece["first"]) == ("c/door.c", runs["first"])
+    ]
+    assert [(piece["sort"], piece["line"], piece["requirements"]) for piece in back] == [
+        ("line", "go", ["SR-12", "SR-13", "SR-1"])
+    ]
+    quiet = {piece["name"]: piece for piece in program["code"] if piece["of"] == "quiet"}
+    assert quiet["door_do_quiet"]["requirements"] == ["SR-4", "SR-1", "SR-12"]
+    assert not program["untraced"]
+
+
+def test_tables_and_page_say_the_same_and_nothing_in_a_name_is_markup(door: Path) -> None:
+    run(["trace", str(door), "-q", "--no-vectors"])
+    forward = list(csv.DictReader(io.StringIO(Path("trace/lines.csv").read_text(encoding="utf-8"))))
+    backward = list(csv.DictReader(io.StringIO(Path("trace/code.csv").read_text(encoding="utf-8"))))
+    assert [row["line"] for row in forward] == ["go", "wait", "more", "open"]
+    [case] = [row for row in backward if row["name"] == "case DOOR_LINE_PRESS_ONCE_GO"]
+    assert f"c/door.c:{case['first']}-{case['last']}" == forward[0]["C runs"]
+    assert case["requirements"] == "SR-12; SR-13; SR-1"
+    html = Path("trace/trace.html").read_text(encoding="utf-8")
+    assert "<script" not in html
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in html
+    assert f"{case['first']}-{case['last']}" in html
+    assert page((), ()).startswith("<!doctype html>")
+
+
+def test_one_question_is_answered_in_both_directions(door: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = emitted(plans(str(door))[0])["c/door.c"].splitlines()
+    at = 1 + next(n for n, line in enumerate(text) if "case DOOR_LINE_PRESS_ONCE_WAIT" in line)
+    ask = ["trace", str(door), "--no-vectors", "--find"]
+    assert run([*ask, f"door.c:{at}"]) == 0
+    told = capsys.readouterr().out
+    assert "press_once line wait, " in told
+    assert "for SR-4, SR-1" in told
+    assert not Path("trace").exists()
+    assert run([*ask, "SR-4"]) == 0
+    told = capsys.readouterr().out
+    assert "press_once line wait" in told
+    assert "procedure hold" in told
+    assert "press_once line go" not in told
+    assert run([*ask, "door_do_quiet"]) == 0
+    assert (
+        "run by press_once line wait, press_once line more, press_once line open" in capsys.readouterr().out
+    )
+    assert run([*ask, "door_do_quite"]) == 2
+    assert "did you mean `door_do_quiet`" in capsys.readouterr().err
+
+
+def test_a_list_of_requirements_must_fit(door: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names = ["SR-1", "SR-3", "SR-4", "SR-9", "SR-12", "SR-13", "<script>alert(1)</script>"]
+    listed = door.parent / "names.txt"
+    check = ["trace", str(door), "--no-vectors", "-q", "--format", "line", "--requirements", str(listed)]
+    listed.write_text("# all\n" + "\n".join(names) + "\n\n", encoding="utf-8")
+    assert run(check) == 0
+    listed.write_text("\n".join([*names[1:], "SR-21"]) + "\n", encoding="utf-8")
+    assert run(check) == 1
+    told = capsys.readouterr().out
+    assert "nothing in the tables is for requirement `SR-21`" in told
+    assert "requirement `SR-1` is not in the list" in told
+    door.write_text(edited(DOOR, (' req "SR-1" {', " {")), encoding="utf-8")
+    listed.write_text("\n".join(names[1:]) + "\n", encoding="utf-8")
+    assert run(check) == 0
+    assert "1 of 4 lines of program `door` name no requirement" in capsys.readouterr().out
+    listed.write_bytes(b"\xff\xfe\x00")
+    assert run(check) == 2
+
+
+def test_a_kept_matrix_of_another_version_is_recognised(
+    door: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(["trace", str(door), "-q", "--no-vectors"])
+    check = ["trace", str(door), "-q", "--format", "line", "--against", "trace/trace.json"]
+    assert run(check) == 0
+    capsys.readouterr()
+    door.write_text(edited(DOOR, ('| "SR-4" ', '| "SR-5" ')), encoding="utf-8")
+    assert run(check) == 1
+    assert "is of other code of `door`" in capsys.readouterr().out
+    door.write_text(edited(DOOR, ("press := false", "press := button and not button")), encoding="utf-8")
+    assert run(check) == 1
+    assert "with another meaning" in capsys.readouterr().out
+    Path("trace/trace.json").write_text("[]", encoding="utf-8")
+    assert run(check) == 2
