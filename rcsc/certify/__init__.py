@@ -48,10 +48,21 @@ from rcsc.certify.known import Known
 from rcsc.certify.owed import Debt, Debts
 from rcsc.certify.settle import Ask, CaseAnswer, Fails, Left, Outcome, Settler, Shown, values_in, variables
 from rcsc.certify.table import RejectedError, TableChecker
-from rcsc.certify.values import BOOL, INT, REAL, Term
+from rcsc.certify.values import BOOL, INT, REAL, REALS, SINGLE, Term, nearest_single
 from rcsc.diagnostics.source import Span
 from rcsc.lang.meaning import digest, relying
-from rcsc.lang.model import AssumptionName, Bool, Program, Real, Scalar, Standing, Table, Value, key_bounds
+from rcsc.lang.model import (
+    AssumptionName,
+    Bool,
+    Program,
+    Real,
+    Scalar,
+    Single,
+    Standing,
+    Table,
+    Value,
+    key_bounds,
+)
 
 __all__ = ["Ask", "CaseAnswer", "Certified", "Unchecked", "certify", "check_certificate"]
 
@@ -270,14 +281,17 @@ def _is_value(kind: Scalar, value: object) -> bool:
     if isinstance(kind, Bool):
         return isinstance(value, bool)
     if isinstance(kind, Real):
-        return isinstance(value, float) and kind.low <= value <= kind.high
+        of_kind = isinstance(value, float) and (
+            not isinstance(kind, Single) or nearest_single(value) == value
+        )
+        return of_kind and kind.low <= value <= kind.high  # type: ignore[operator] # of_kind says it is a number
     return type(value) is int and key_bounds(kind)[0] <= value <= key_bounds(kind)[1]
 
 
 def _column(leaf: Term, value: Value) -> Any:
     """One case of the leaf, as `values_in` takes it."""
-    kinds = {BOOL: bool, INT: object, REAL: float}
-    return np.array([float(value) if leaf.sort == REAL else value], dtype=kinds[leaf.sort])
+    kinds = {BOOL: bool, INT: object, REAL: float, SINGLE: np.float32}
+    return np.array([float(value) if leaf.sort in REALS else value], dtype=kinds[leaf.sort])
 
 
 def _stopping(program: Program, entries: Mapping[str, Mapping[str, Any]]) -> Program:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias, assert_never
 
-from rcsc.certify.values import BOOL, INT, REAL, Number, Term, Terms, ends_of, sort_of
+from rcsc.certify.values import BOOL, INT, Number, Term, Terms, ends_of, sort_of
 from rcsc.diagnostics.source import Span as Written
 from rcsc.lang.model import (
     COMPARISONS,
@@ -226,7 +226,7 @@ class Run:
 
     def _applied(self, expr: Apply, op: Strict, args: list[Term]) -> Term:
         kinds = [kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int)]
-        whole = isinstance(expr.args[0].type, Int) and op is not Op.TO_REAL
+        whole = isinstance(expr.args[0].type, Int) and op not in (Op.TO_REAL, Op.TO_SINGLE)
         if op in (Op.DIV, Op.MOD):
             zero = self.terms.constant(args[1].sort, 0)
             nonzero = self.terms.negation(self.terms.make("=", args[1], zero))
@@ -259,8 +259,9 @@ class Run:
         """The whole number of a double; owed that it fits its 64 bits, which a NaN never does."""
         low, high = _word(kinds)
         make, real = self.terms.make, self.terms.constant
-        above = make("<", real(REAL, -1.0), value) if low == 0 else make("<=", real(REAL, float(low)), value)
-        fits = self.terms.every((above, make("<", value, real(REAL, float(high)))))
+        sort = value.sort
+        above = make("<", real(sort, -1.0), value) if low == 0 else make("<=", real(sort, float(low)), value)
+        fits = self.terms.every((above, make("<", value, real(sort, float(high)))))
         self.owe("the whole number stays in its 64 bits", fits, written)
         return make("int", value)
 
@@ -288,10 +289,8 @@ class Run:
                 return make("abs", *args)
             case Op.NEG:
                 return make("neg", *args)
-            case Op.TO_INT:
-                return make("int", *args)
-            case Op.TO_REAL:
-                return make("real", *args)
+            case Op.TO_INT | Op.TO_REAL | Op.TO_SINGLE:
+                return make(op.value, *args)
 
     # --- statements ---
 

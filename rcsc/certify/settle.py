@@ -17,7 +17,18 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from rcsc.certify.known import Known
-from rcsc.certify.values import BOOL, INT, REAL, Number, Term, Terms, parts_first
+from rcsc.certify.values import (
+    BOOL,
+    INT,
+    REAL,
+    REALS,
+    SINGLE,
+    Number,
+    Term,
+    Terms,
+    nearest_single,
+    parts_first,
+)
 
 MOST_WORK = 4_000_000
 """Cases times terms that are tried for one obligation."""
@@ -191,9 +202,9 @@ def _few(wanted: Iterable[Term], known: Known, size: int) -> bool:
     total = size
     for term in wanted:
         low, high = _extent(term, known)
-        if term.sort == REAL and low != high:
+        if term.sort in REALS and low != high:
             return False
-        total *= 1 if term.sort == REAL else max(0, int(high) - int(low) + 1)
+        total *= 1 if term.sort in REALS else max(0, int(high) - int(low) + 1)
         if total > MOST_WORK:
             return False
     return True
@@ -204,7 +215,7 @@ def _crossed(wanted: Sequence[Term], known: Known) -> dict[Term, Any]:
     axes = []
     for term in wanted:
         low, high = _extent(term, known)
-        values = [low] if term.sort == REAL else range(int(low), int(high) + 1)
+        values = [low] if term.sort in REALS else range(int(low), int(high) + 1)
         axes.append(_array(term.sort, values))
     total = prod(len(axis) for axis in axes)
     if not total:  # a variable that cannot have a value
@@ -216,12 +227,15 @@ def _crossed(wanted: Sequence[Term], known: Known) -> dict[Term, Any]:
     return crossed
 
 
+_FLOATS: Mapping[str, Any] = {REAL: np.float64, SINGLE: np.float32}
+
+
 def _array(sort: str, values: Iterable[Number], *, wide: bool = False) -> Any:
     listed = list(values)
     if sort == BOOL:
         return np.array(listed, dtype=bool)
-    if sort == REAL:
-        return np.array(listed, dtype=np.float64)
+    if sort in REALS:
+        return np.array(listed, dtype=_FLOATS[sort])
     narrow = not wide and all(abs(value) < _FIT for value in listed)
     return np.array(listed, dtype=np.int64 if narrow else object)
 
@@ -233,7 +247,12 @@ def _row(cases: Cases, at: int) -> Iterator[tuple[str, Number]]:
 
 def _edges(term: Term) -> Mapping[str, list[Number]]:
     """Constants in the term and their neighbours, by sort."""
-    edges: dict[str, list[Number]] = {BOOL: [0, 1], INT: [0, 1, -1], REAL: [0.0, 1.0, -1.0]}
+    edges: dict[str, list[Number]] = {
+        BOOL: [0, 1],
+        INT: [0, 1, -1],
+        REAL: [0.0, 1.0, -1.0],
+        SINGLE: [0.0, 1.0, -1.0],
+    }
     for part in parts_first(term):
         if part.op == "constant" and part.sort != BOOL:
             edges[part.sort] += [part.low, part.low - 1, part.low + 1]
@@ -281,8 +300,12 @@ def _computed(term: Term, args: Sequence[Any], wide: bool) -> Any:
         case "=" | "<" | "<=":
             compare = {"=": operator.eq, "<": operator.lt, "<=": operator.le}[term.op]
             return compare(first, last).astype(bool)
+        case "real" | "single" if first.dtype.kind == "f":
+            return first.astype(_FLOATS[term.sort])
         case "real":
             return np.array([float(value) for value in first.tolist()], dtype=np.float64)
+        case "single":
+            return np.array([nearest_single(int(value)) for value in first.tolist()], dtype=np.float32)
         case "int":
             whole = [int(value) if isfinite(value) else 0 for value in first.tolist()]
             return np.array(whole, dtype=object if wide else np.int64)
@@ -316,7 +339,7 @@ _DOUBLES = {
     "/": "fp.div RNE", "neg": "fp.neg", "abs": "fp.abs", "ite": "ite",
 }  # fmt: skip
 _WHOLE = {"/": "over", "mod": "rest", "neg": "-"}
-_SORTS = {BOOL: "Bool", INT: "Int", REAL: "Float64"}
+_SORTS = {BOOL: "Bool", INT: "Int", REAL: "Float64", SINGLE: "Float32"}
 
 
 def script(conditions: Collection[Term]) -> str:
@@ -343,6 +366,9 @@ def script(conditions: Collection[Term]) -> str:
 def _constant(sort: str, value: Number) -> str:
     if sort == BOOL:
         return "true" if value else "false"
+    if sort == SINGLE:
+        bits = f"{struct.unpack('<I', struct.pack('<f', value))[0]:032b}"
+        return f"(fp #b{bits[0]} #b{bits[1:9]} #b{bits[9:]})"
     if sort == REAL:
         bits = f"{struct.unpack('<Q', struct.pack('<d', value))[0]:064b}"
         return f"(fp #b{bits[0]} #b{bits[1:12]} #b{bits[12:]})"
@@ -361,10 +387,11 @@ def _ranged(name: str, term: Term) -> str:
 
 def _spelled(term: Term, args: Sequence[str]) -> str:
     shown = " ".join(args)
-    if term.op == "real":
-        return f"((_ to_fp 11 53) RNE (to_real {shown}))"
+    if term.op in ("real", "single"):
+        given = shown if term.args[0].sort in REALS else f"(to_real {shown})"
+        return f"((_ to_fp {'11 53' if term.op == 'real' else '8 24'}) RNE {given})"
     if term.op == "int":
         nothing = f"(or (fp.isNaN {shown}) (fp.isInfinite {shown}))"
         return f"(ite {nothing} 0 (to_int (fp.to_real (fp.roundToIntegral RTZ {shown}))))"
-    of = _DOUBLES if term.args[0].sort == REAL else _WHOLE
+    of = _DOUBLES if term.args[0].sort in REALS else _WHOLE
     return f"({of.get(term.op, term.op)} {shown})"

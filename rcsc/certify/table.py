@@ -18,7 +18,7 @@ import numpy as np
 from rcsc.certify.execution import PAIRS, Owed, Run, Start, true_of
 from rcsc.certify.owed import Debt
 from rcsc.certify.settle import values_in
-from rcsc.certify.values import BOOL, INT, REAL, Term
+from rcsc.certify.values import BOOL, INT, REALS, SINGLE, Term
 from rcsc.lang.leaves import read_by
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
@@ -36,6 +36,7 @@ from rcsc.lang.model import (
     key_bounds,
     key_of,
     real_of_key,
+    single_of_key,
 )
 from rcsc.lang.operator_table import Comparison, Op, is_comparison, is_logic
 
@@ -216,7 +217,7 @@ class TableChecker:
         """The keys for which the condition holds, each tried; None where there are many, or it is undefined for one."""
         low, high = self.terms.range[name]
         leaf = self.start.leaves[name]
-        if high - low >= SMALL or leaf.sort == REAL:
+        if high - low >= SMALL or leaf.sort in REALS:
             return None
         run = Run(self.start, "")
         holds = run.evaluate(expr)
@@ -371,13 +372,15 @@ class TableChecker:
         """`low <= form <= high` as far as terms say it; of the distance of two doubles only which is greater."""
         make, terms = self.start.terms.make, self.start.terms
         parts = [(self.start.condition(self.terms.terms[name]), k) for name, k in form]
-        if any(term.sort == REAL for term, _ in parts):
+        sort = parts[0][0].sort
+        if sort in REALS:
             if len(parts) == 1:
+                of_key = single_of_key if sort == SINGLE else real_of_key
                 ends = [
-                    real_of_key(max(low, self.terms.span(form)[0])),
-                    real_of_key(min(high, self.terms.span(form)[1])),
+                    of_key(max(low, self.terms.span(form)[0])),
+                    of_key(min(high, self.terms.span(form)[1])),
                 ]
-                least, greatest = (terms.constant(REAL, end) for end in ends)
+                least, greatest = (terms.constant(sort, end) for end in ends)
                 return [make("<=", least, parts[0][0]), make("<=", parts[0][0], greatest)]
             if [k for _, k in parts] != [1, -1]:
                 return []

@@ -5,7 +5,7 @@ total here: `a / 0` and `a mod 0` are 0, and the whole number of a NaN or an inf
 is an obligation of its own (`execution`), and no other obligation then depends on what stands there.
 
 A *span* is the least and the greatest value of a term; it is None where the term may be a NaN. Infinite ends
-are no NaN. Doubles round to nearest even, which is monotone: the ends of a result are results of ends.
+are no NaN. Doubles and singles round to nearest even, which is monotone: the ends of a result are results of ends.
 """
 
 import math
@@ -13,12 +13,15 @@ from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from rcsc.lang.model import Bool, Real, Scalar, Value, key_bounds
+import numpy as np
+
+from rcsc.lang.model import Bool, Real, Scalar, Single, Value, key_bounds
 
 Number: TypeAlias = int | float
 Span: TypeAlias = tuple[Number, Number] | None
 
-BOOL, INT, REAL = "Bool", "Int", "Real"
+BOOL, INT, REAL, SINGLE = "Bool", "Int", "Real", "Single"
+REALS = REAL, SINGLE
 FREE: tuple[Number, Number] = (-math.inf, math.inf)
 TRUTHS: tuple[Number, Number] = (0, 1)
 
@@ -29,8 +32,8 @@ class Term:
 
     Attributes:
         op: `constant`, `variable`, `not`, `and`, `or`, `ite`, `=`, `<`, `<=`, `+`, `-`, `*`, `/`, `mod`, `neg`, `abs`, `int`,
-            `real`, or `kept`: its only part, which obligation number `debt` owes to lie in `low .. high`.
-        sort: `Bool`, `Int` (enumeration members too) or `Real`.
+            `real`, `single`, or `kept`: its only part, which obligation number `debt` owes to lie in `low .. high`.
+        sort: `Bool`, `Int` (enumeration members too), `Real` or `Single`.
         low, high: Of a constant its value twice, of a variable the ends of its type.
         name: Of a variable.
     """
@@ -46,12 +49,25 @@ class Term:
 
 def sort_of(kind: Scalar) -> str:
     """The sort of the type's values."""
-    return BOOL if isinstance(kind, Bool) else REAL if isinstance(kind, Real) else INT
+    if isinstance(kind, Real):
+        return SINGLE if isinstance(kind, Single) else REAL
+    return BOOL if isinstance(kind, Bool) else INT
 
 
 def ends_of(kind: Scalar) -> tuple[Number, Number]:
     """Least and greatest value of the type, truths and members as integers."""
     return (kind.low, kind.high) if isinstance(kind, Real) else key_bounds(kind)
+
+
+def nearest_single(value: Number) -> float:
+    """The nearest binary32, ties to even: of a double by the machine's rounding, of a whole number by its 24 leading digits."""
+    if isinstance(value, float):
+        with np.errstate(over="ignore"):  # an infinity
+            return float(np.float32(value))
+    size = max(abs(value).bit_length() - 24, 0)
+    digits, rest = divmod(abs(value), 1 << size)
+    digits += 2 * rest + digits % 2 > 1 << size  # past the middle, or there and odd
+    return math.copysign(float(digits << size) if size < 105 and digits << size < 2**128 else math.inf, value)
 
 
 class Terms:
@@ -68,7 +84,7 @@ class Terms:
 
     def constant(self, sort: str, value: Value) -> Term:
         """A constant."""
-        point = float(value) if sort == REAL else int(value)
+        point = float(value) if sort in REALS else int(value)
         return self._interned(Term("constant", (), sort, point, point))
 
     def variable(self, name: str, kind: Scalar) -> Term:
@@ -81,7 +97,11 @@ class Terms:
 
     def make(self, op: str, *args: Term) -> Term:
         """An operation on numbers, or a comparison."""
-        sort = BOOL if op in ("=", "<", "<=") else {"int": INT, "real": REAL}.get(op, args[0].sort)
+        sort = (
+            BOOL
+            if op in ("=", "<", "<=")
+            else {"int": INT, "real": REAL, "single": SINGLE}.get(op, args[0].sort)
+        )
         term = Term(op, args, sort)
         if all(arg.op == "constant" for arg in args):
             span = spanned(term, [spanned(arg, ()) for arg in args])
@@ -139,9 +159,14 @@ def spanned(term: Term, spans: Sequence[Span]) -> Span:
     known = [span for span in spans if span is not None]
     if term.op in ("=", "<", "<="):
         return _compared(term.op, term.args, *known)
-    if term.args[0].sort == REAL:
-        return _of_doubles(term.op, known)
-    return _of_integers(term.op, known)
+    if term.op == "single" and term.args[0].sort == INT:
+        return nearest_single(known[0][0]), nearest_single(known[0][1])
+    span = (_of_doubles if term.args[0].sort in REALS else _of_integers)(term.op, known)
+    return (
+        (nearest_single(span[0]), nearest_single(span[1]))
+        if span is not None and term.sort == SINGLE
+        else span
+    )
 
 
 def _logic(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
@@ -237,6 +262,8 @@ def _of_integers(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
 
 def _of_doubles(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
     (a, b), *rest = [(float(low), float(high)) for low, high in spans]
+    if op in ("real", "single"):
+        return a, b
     if op == "int":
         return (int(a), int(b)) if math.isfinite(a) and math.isfinite(b) else FREE
     if op == "neg":

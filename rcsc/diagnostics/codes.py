@@ -629,7 +629,7 @@ class Code(StrEnum):
     KIND = """RCS301: the wrong kind of value
 
     A bool, a number, a member of an enumeration stands where another kind is wanted. Nothing converts by itself: compare (`n > 0`) to
-    get a bool, and use `int(...)` and `real(...)` between whole numbers and doubles.
+    get a bool, and use `int(...)`, `real(...)` and `single(...)` between whole numbers, doubles and singles.
 
         input n : int 0 .. 9
         output go : bool
@@ -701,9 +701,10 @@ class Code(StrEnum):
 
         state n : int 0 .. 9 = 9
     """
-    SAME_DOUBLE = """RCS307: two constants that are the same double
+    SAME_DOUBLE = """RCS307: two constants that are the same double, or the same single
 
-    Two different decimal texts denote one IEEE double. They look like two cases and are one; nothing is merged silently.
+    Two different decimal texts denote one IEEE double, or meet variables that are `single` and denote one single. They look like two
+    cases and are one; nothing is merged silently.
 
         input x : real 0.0 .. 1.0
         output y : int 0 .. 2
@@ -733,9 +734,10 @@ class Code(StrEnum):
 
         state counts : array[4] of int 0 .. 9
     """
-    NOT_FINITE = """RCS309: not a finite double
+    NOT_FINITE = """RCS309: not a finite double or single
 
-    The literal is too large for an IEEE double, or constant arithmetic gives infinity or no number. Ranges of `real` are finite.
+    The literal is too large for an IEEE double, or for the single that it meets, or constant arithmetic gives infinity or no number.
+    Ranges of `real` and `single` are finite.
 
         input x : real 0.0 .. 1e999
 

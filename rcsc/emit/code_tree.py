@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import ClassVar, TypeAlias, assert_never
 
 from rcsc.lang.model import I64_MAX, I64_MIN, Value
+from rcsc.lang.operator_table import spell_single
 
 # --- expressions ---------------------------------------------------------------------
 
@@ -27,7 +28,7 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A number or a truth; `type` says how C spells it: `bool`, `double`, or an integer type."""
+    """A number or a truth; `type` says how C spells it: `bool`, `double`, `float`, or an integer type."""
 
     value: Value
     type: str = "int32_t"
@@ -362,9 +363,9 @@ class C(Language):
         match constant.type:
             case "bool":
                 return "true" if value else "false"
-            case "double":
-                text = repr(abs(float(value)))
-                text = text if any(c in text for c in ".e") else f"{text}.0"
+            case "double" | "float":
+                magnitude, single = abs(float(value)), constant.type == "float"
+                text = f"{spell_single(magnitude)}f" if single else repr(magnitude)
                 return f"(-{text})" if value < 0 else text
             case "int64_t" | "uint64_t":
                 if value == I64_MIN:
@@ -419,7 +420,7 @@ class Python(Language):
 
     def constant(self, constant: Constant) -> str:
         """A number has no type of C."""
-        kind = {"bool": bool, "double": float}.get(constant.type, int)
+        kind = {"bool": bool, "double": float, "float": float}.get(constant.type, int)
         return repr(kind(constant.value))
 
     def own(self, code: Cast | Choice | Items) -> str:

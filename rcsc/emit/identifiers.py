@@ -35,7 +35,7 @@ _FILES = (
 )
 _MODULE = frozenset(
     """IntEnum State _Refused _bisect _reduce _product _and _div _mod _min _max _refused _line_of _one_of _joined _lines_of
-    _nan _whole _real _exactly _admit _settle _safe _begin check
+    _nan _whole _real _single _float32 _Struct _inf _copysign _odd _exactly _admit _settle _safe _begin check
     DIGEST FOREIGN""".split()
 )
 """What the Python module calls its own."""

@@ -29,6 +29,7 @@ from rcsc.emit.code_tree import (
     Set,
     Stmt,
     infix,
+    read,
     when,
 )
 from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment, names_of
@@ -62,7 +63,7 @@ from rcsc.emit.translate import (
 )
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
-from rcsc.lang.model import Bool, Procedure, Real, Variable, key_bounds, pending
+from rcsc.lang.model import Bool, Procedure, Real, Single, Variable, key_bounds, pending
 
 MOST_KEYS = 8192
 """Up to so many combinations of classes the line of each is looked up at once."""
@@ -115,6 +116,9 @@ class _Maker:
             "constants": self.constants,
             "functions": functions,
             "lines": self.lines,
+            "singles": any(
+                isinstance(node, Invoke) and node.function == "_single" for node in read(tuple(functions))
+            ),
         }
 
     def _modules(self) -> Iterator[str]:
@@ -185,6 +189,8 @@ class _Maker:
                 place = self.text.place(variable.name)
                 types = Name("(int, float)" if isinstance(variable.type, Real) else "int")
                 fits = infix("and", Invoke("isinstance", (place, types)), _within(variable.type, place))
+                if isinstance(variable.type, Single):
+                    fits = infix("and", fits, infix("==", Invoke("_single", (place,)), place))
                 body.append(when(Prefix("not ", fits), Leave(Constant(at))))
         for at, invariant in enumerate(self.program.invariants, len(self.program.variables)):
             body.append(when(Prefix("not ", self.text.expr(invariant.condition)), Leave(Constant(at))))
@@ -434,4 +440,6 @@ def _joined(group: Group, names: dict[int, Name]) -> str:
 
 def _typed(kind: model.Scalar, value: Code) -> Code:
     """Code that gives the value as one of its kind, else a NaN, which no range holds."""
+    if isinstance(kind, Single):
+        return Invoke("_single", (Invoke("_real", (value,)),))
     return Invoke("_real" if isinstance(kind, Real) else "_whole", (value,))

@@ -29,7 +29,7 @@ from rcsc.emit.code_tree import (
 from rcsc.emit.identifiers import Names
 from rcsc.emit.scope import SIGNIFICANT, hashed
 from rcsc.lang import model
-from rcsc.lang.model import Expr, Int, Op, Real, Scalar, Statement, Value
+from rcsc.lang.model import Expr, Int, Op, Real, Scalar, Single, Statement, Value
 from rcsc.lang.operator_table import Operator
 
 STATE, FAULT, FAULT_AT, LINE = Name("s"), Place(("fault",)), Place(("fault_at",)), Place(("line",))
@@ -38,7 +38,7 @@ FAULTLESS, FAULTED = infix("==", FAULT, Constant(0)), infix("!=", FAULT, Constan
 
 def constant(kind: Scalar, value: Value) -> Constant:
     """A constant in the type that values of the kind are computed in."""
-    return Constant(value, {model.Bool: "bool", Real: "double"}.get(type(kind), "int64_t"))
+    return Constant(value, {model.Bool: "bool", Real: "double", Single: "float"}.get(type(kind), "int64_t"))
 
 
 def local(name: str) -> Name:
@@ -135,6 +135,15 @@ _INFIX = {
 }  # fmt: skip
 
 
+_ROUNDED = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV})
+"""Operations on singles whose double is rounded once more."""
+
+
+def _many_digits(kind: Int) -> bool:
+    """Whether a double holds not every number of the type."""
+    return max(abs(kind.low), abs(kind.high)) > 1 << 53
+
+
 @dataclass
 class PyText(Text):
     """Python; leaves are attributes of `s`, `/` and `mod` go toward zero as in C."""
@@ -164,7 +173,10 @@ class PyText(Text):
             case model.Among(subject=subject, values=values):
                 return Round(self.among(self.expr(subject), subject.type, values))
             case model.Apply(op=op, args=args):
-                return self._applied(op, tuple(map(self.expr, args)), args[0].type)
+                result = self._applied(op, tuple(map(self.expr, args)), args[0].type)
+                rounds = op in _ROUNDED if isinstance(args[0].type, Single) else op is Op.TO_SINGLE
+                bare = result.inner if isinstance(result, Round) else result
+                return Invoke("_single", (bare,)) if rounds else result
             case _:
                 assert_never(expr)
 
@@ -184,7 +196,9 @@ class PyText(Text):
             case Op.TO_INT:
                 return Cast("int", args[0])
             case Op.TO_REAL:
-                return Cast("float", args[0])
+                return args[0] if isinstance(kind, Real) else Cast("float", args[0])
+            case Op.TO_SINGLE:
+                return Invoke("_odd", args) if isinstance(kind, Int) and _many_digits(kind) else args[0]
             case Op.ABS:
                 return Invoke("abs", args)
             case Op.MIN | Op.MAX | Op.MOD:

@@ -11,7 +11,7 @@ from rcsc.episodes.outcome import RowEnd
 from rcsc.run.orders.numbered import Latest, Orders
 from rcsc.run.orders.operator import answer_reason, line_to
 from rcsc.run.orders.roles import COMMAND, DONE, FAILED, Served
-from rcsc.run.signature import Leaf, Value, Values
+from rcsc.run.signature import REALS, Leaf, Value, Values
 
 CHANGED, WAITING = "changed", "waiting"
 
@@ -26,9 +26,10 @@ def value_of(leaf: Leaf, setting: Setting) -> Value:
         if setting not in leaf.members:
             raise ValueError(f"`{setting}` is no value of `{leaf.name}`")
         return leaf.members.index(str(setting))
-    kind = {"bool": bool, "double": float}.get(leaf.c_type, int)
-    if type(setting) is kind or (kind is float and type(setting) is int):
-        return kind(setting)
+    if leaf.c_type in REALS and type(setting) in (int, float):
+        return leaf.held(float(setting))
+    if type(setting) is (bool if leaf.c_type == "bool" else int):
+        return setting
     raise ValueError(f"`{setting}` is no value of `{leaf.name}`")
 
 

@@ -25,7 +25,7 @@ from rcsc.episodes.operator import setting_of
 from rcsc.episodes.stand import Stand, stand, switches
 from rcsc.run.orders.roles import Served, field_of
 from rcsc.run.orders.script import read_script, script_path
-from rcsc.run.signature import Leaf, Value
+from rcsc.run.signature import REALS, Leaf, Value
 
 NOMINAL, SCRIPTED, PLAIN = 0.2, 0.3, 0.5
 """How often nothing goes wrong, orders are those of a script, and a field is as at first."""
@@ -117,7 +117,9 @@ def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
     low, high = leaf.low, leaf.high
     if leaf.members or leaf.c_type == "bool" or low is None or high is None or random.random() < 0.6:
         return random.choice(edges)
-    return random.uniform(low, high) if leaf.c_type == "double" else random.randint(int(low), int(high))
+    return (
+        leaf.held(random.uniform(low, high)) if leaf.c_type in REALS else random.randint(int(low), int(high))
+    )
 
 
 def scripted(its: Stand, script: str) -> tuple[OrderSpec, ...]:

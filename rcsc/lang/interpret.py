@@ -37,6 +37,7 @@ from rcsc.lang.model import (
     Real,
     Scalar,
     Select,
+    Single,
     Snapshot,
     Statement,
     Table,
@@ -50,7 +51,7 @@ from rcsc.lang.model import (
     key_bounds,
     pending,
 )
-from rcsc.lang.operator_table import UNDECIDED, Op, is_logic
+from rcsc.lang.operator_table import UNDECIDED, Op, is_logic, single
 
 
 class Fault(IntEnum):
@@ -110,7 +111,7 @@ def operated(op: Op, kind: Scalar, *operands: Value) -> Value:
     """
     reals = isinstance(kind, Real)
     result: Value = op.meaning(*map(float, operands)) if reals else op.meaning(*operands)
-    return result
+    return single(result) if isinstance(kind, Single) and isinstance(result, float) else result
 
 
 def evaluate(expr: Expr, snapshot: Snapshot, local: Mapping[str, Value] | None = None) -> Value:
@@ -269,7 +270,7 @@ def _admitted(variable: Variable, value: Value) -> Value | None:
     value = given
     if isinstance(variable.type, Real):
         low, high = variable.type.low, variable.type.high
-        value = value + 0.0
+        value = (single(value) if isinstance(variable.type, Single) else value) + 0.0
     else:
         low, high = key_bounds(variable.type)
     if low <= value <= high:
@@ -311,6 +312,7 @@ def unfit(program: Program, snapshot: Snapshot) -> str:
         value, kind = snapshot[variable.name], variable.type
         low, high = (kind.low, kind.high) if isinstance(kind, Real) else key_bounds(kind)
         of_kind = isinstance(value, int | float if isinstance(kind, Real) else int)
+        of_kind = of_kind and (not isinstance(kind, Single) or single(value) == value)
         if variable.kind is not Kind.INPUT and not (of_kind and low <= value <= high):
             return variable.name
     broken = (

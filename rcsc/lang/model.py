@@ -3,13 +3,14 @@
 In: nothing. Out: the frozen values that `resolve` makes and every later stage reads.
 Records and arrays are flattened: each scalar leaf is a `Variable` of its own, named by its
 path (`emove_status.echo`, `counts[2]`), in declared order. Values of a leaf at run time
-are Python `bool` (bool), `int` (int, and enum members by their index) and `float` (real).
+are Python `bool` (bool), `int` (int, and enum members by their index) and `float` (real, and single).
 
 A *key* is a leaf's value as an integer in an order-preserving numbering (`key_of`): bool 0/1, enum
-index, the integer itself, and for a double its rank among doubles (`real_key`). Over
+index, the integer itself, for a double its rank among doubles (`real_key`), for a single its rank among singles. Over
 keys every leaf is a bounded integer, so that conditions on one leaf are sets of intervals.
 """
 
+import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ from typing import NewType, TypeAlias
 from rcsc.diagnostics.source import Span
 from rcsc.lang.operator_table import COMPARISONS as COMPARISONS  # noqa: PLC0414 - part of the model
 from rcsc.lang.operator_table import Op as Op  # noqa: PLC0414 - as above
-from rcsc.lang.operator_table import Operator
+from rcsc.lang.operator_table import Operator, single, spell_single
 from rcsc.lang.restart import Adopted, Part, by_names
 
 VariableName = NewType("VariableName", str)
@@ -84,6 +85,11 @@ class Real:
     unit: Unit = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Single(Real):
+    """An IEEE binary32 in `low .. high`, both finite and included; -0.0 is 0.0. Whatever asks for a `Real` takes it, too."""
+
+
 Scalar: TypeAlias = Bool | Enum | Int | Real
 
 
@@ -128,8 +134,38 @@ def real_of_key(key: int) -> float:
     return magnitude if key >= 0 else -magnitude
 
 
+def single_key(value: float) -> int:
+    """The rank of a finite single among singles, as `real_key`.
+
+    Raises:
+        ValueError: It is no single.
+    """
+    word = struct.pack("<f", value)
+    if struct.unpack("<f", word)[0] != value:
+        raise ValueError(value)
+    bits: int = struct.unpack("<i", word)[0]
+    return bits if bits >= 0 else -(bits & 0x7FFF_FFFF)
+
+
+def single_of_key(key: int) -> float:
+    """The single of rank `key`; the inverse of `single_key` (with 0.0 for -0.0); past the greatest an infinity, then none."""
+    magnitude: float = struct.unpack("<f", struct.pack("<i", abs(key)))[0]
+    return magnitude if key >= 0 else -magnitude
+
+
+def next_value(kind: Scalar, value: int | float, by: int) -> int | float:
+    """The value after (`by` 1) or before (-1) this number of the kind; an infinity is its own."""
+    if not isinstance(kind, Real):
+        return value + by
+    if not isinstance(kind, Single):
+        return math.nextafter(value, math.inf * by)
+    return value if value == math.inf * by else single_of_key(single_key(value) + by)
+
+
 def key_of(kind: Scalar, value: Value) -> int:
     """The key of `value`, a value of type `kind`."""
+    if isinstance(kind, Single):
+        return single_key(float(value))
     return real_key(float(value)) if isinstance(kind, Real) else int(value)
 
 
@@ -137,6 +173,8 @@ def value_of_key(kind: Scalar, key: int) -> Value:
     """The value of type `kind` with this key."""
     if isinstance(kind, Bool):
         return bool(key)
+    if isinstance(kind, Single):
+        return single_of_key(key)
     return real_of_key(key) if isinstance(kind, Real) else key
 
 
@@ -150,7 +188,7 @@ def key_bounds(kind: Scalar) -> tuple[int, int]:
         case Int(low, high):
             return low, high
         case Real(low, high):
-            return real_key(low), real_key(high)
+            return key_of(kind, low), key_of(kind, high)
 
 
 def spell(kind: Scalar, value: Value) -> str:
@@ -162,6 +200,8 @@ def spell(kind: Scalar, value: Value) -> str:
             return members[int(value)]
         case Int():
             return str(int(value))
+        case Single():
+            return spell_single(float(value))
         case Real():
             return repr(float(value))
 
@@ -177,6 +217,8 @@ def value_of_text(kind: Scalar, text: str) -> Value | None:
                 value = members.index(text)
             case Int():
                 value = int(text)
+            case Single():
+                value = single(float(text))
             case Real():
                 value = float(text)
         low, high = key_bounds(kind)
@@ -272,7 +314,8 @@ class Declared:
 # Every expression has a `type`; for Int and Real its bounds enclose every value it can
 # take over the declared ranges (interval arithmetic). Arithmetic is exact on integers
 # (`/` truncates toward zero, `mod` has the sign of the dividend, as in C) and IEEE
-# binary64, round to nearest even, on reals. No implicit conversion between the two.
+# binary64, round to nearest even, on reals; IEEE binary32 on singles. No implicit conversion
+# between the three.
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,9 @@ operators that are treated alike, as types, so that mypy names the operator that
 `truth_function`, by which stages that know conjunction, disjunction and negation know every operator on truth values.
 """
 
+import math
 import operator
+import struct
 from collections.abc import Callable
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, TypeVar, get_args
@@ -25,14 +27,60 @@ def divide(a: int, b: int) -> int:
     return quotient if (a < 0) == (b < 0) else -quotient
 
 
+_SINGLE = struct.Struct("<f")
+
+
+def single(number: float) -> float:
+    """The nearest IEEE binary32, ties to even, as a float; infinite beyond all of them.
+
+    Of the binary64 of a sum, difference, product or quotient of two binary32 it is that of the exact one, subnormal or not.
+
+    >>> single(0.1), single(2**24 + 1), single(1e39)
+    (0.10000000149011612, 16777216.0, inf)
+
+    Source: Figueroa, When is double rounding innocuous? SIGNUM Newsletter 30(3), 1995; Roux, Innocuous double rounding of basic
+    arithmetic operations, Journal of Formalized Reasoning 7(1), 2014, for subnormal results.
+    """
+    if isinstance(number, int) and abs(number) >> 53:
+        # rounded to odd, so that the second rounding is the only one
+        dropped = abs(number).bit_length() - 53
+        odd = abs(number) >> dropped | bool(abs(number) & (1 << dropped) - 1)
+        number = (odd if number > 0 else -odd) << dropped
+    try:
+        nearest: float = _SINGLE.unpack(_SINGLE.pack(number))[0]
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
+    return nearest
+
+
+def spell_single(value: float) -> str:
+    """The shortest decimal that is read back as this single, whether it is rounded once or by way of a double.
+
+    >>> spell_single(0.10000000149011612), spell_single(16777216.0)
+    ('0.1', '16777216.0')
+    """
+    for digits in range(1, 10):
+        text = repr(float(f"{value:.{digits}g}"))
+        if single(float(text)) == value and not _halfway(float(text)):
+            return text
+    return repr(value)  # an infinity, a NaN
+
+
+def _halfway(value: float) -> bool:
+    """Whether a double lies halfway between two singles, so that its own error may decide."""
+    return (
+        math.isfinite(value) and struct.unpack("<Q", struct.pack("<d", value))[0] & 0x1FFF_FFFF == 0x1000_0000
+    )
+
+
 class Op(StrEnum):
     """Operators; the value is the spelling in the source, except of the negative.
 
     The meanings are those of every stage: folding, bounds and interpreter compute with them, and executors, solvers and reference are
-    held against them. Reals are IEEE 754 binary64, rounded to nearest even. Comparisons with a NaN are false, but `/=`, which is
-    true. `min` and `max` keep their first operand where it is a NaN, and drop a second one. `abs` and `-` act on the sign, of
-    zeros too. `int` is undefined of a NaN or an infinity, and 0 or 1 of a truth value; `/` and `mod` are undefined of a divisor that is
-    zero.
+    held against them. Reals are IEEE 754 binary64, rounded to nearest even; `interpret.operated` rounds each result of singles once
+    more, to binary32. Comparisons with a NaN are false, but `/=`, which is true. `min` and `max` keep their first operand where it
+    is a NaN, and drop a second one. `abs` and `-` act on the sign, of zeros too. `int` is undefined of a NaN or an infinity, and 0
+    or 1 of a truth value; `/` and `mod` are undefined of a divisor that is zero.
 
     Attributes:
         strength: How tightly it binds.
@@ -70,6 +118,7 @@ class Op(StrEnum):
     MAX = "max", POSTFIX, lambda a, b: b if b > a else a  # noqa: FURB136 - as above
     TO_INT = "int", POSTFIX, int
     TO_REAL = "real", POSTFIX, float
+    TO_SINGLE = "single", POSTFIX, single
 
 
 BITWISE = {"&": PRODUCT, "<<": PRODUCT, ">>": PRODUCT, "|": SUM}
@@ -82,7 +131,7 @@ Ordering: TypeAlias = Literal[Op.EQ, Op.LT, Op.LE]
 """Comparisons that express the others, for a NaN too."""
 Arithmetic: TypeAlias = Literal[Op.NEG, Op.ABS, Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX]
 """From numbers of one kind to a number of it."""
-Conversion: TypeAlias = Literal[Op.TO_INT, Op.TO_REAL]
+Conversion: TypeAlias = Literal[Op.TO_INT, Op.TO_REAL, Op.TO_SINGLE]
 Strict: TypeAlias = Literal[Op.NOT] | Comparison | Arithmetic | Conversion
 """Operators that always evaluate all operands."""
 Operator: TypeAlias = Logic | Strict

@@ -27,7 +27,7 @@ from rcsc.lang.model import (
     Real,
     Table,
     key_bounds,
-    real_of_key,
+    value_of_key,
 )
 
 _TRUE = Literal(True, Bool())
@@ -119,7 +119,7 @@ def _bounded(term: Expr, low: int, high: int) -> list[Expr]:
             return [_compare(Op.GE, term, _integer(low)), _compare(Op.LE, term, _integer(high))]
         case Real():
             ends = (Op.GE, max(low, key_bounds(term.type)[0])), (Op.LE, min(high, key_bounds(term.type)[1]))
-            return [_compare(op, term, Literal(real_of_key(end), term.type)) for op, end in ends]
+            return [_compare(op, term, Literal(value_of_key(term.type, end), term.type)) for op, end in ends]
 
 
 def _compare(op: Op, left: Expr, right: Expr) -> Expr:

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from rcsc.emit.code_tree import type_bounds
 from rcsc.run.description import Description
-from rcsc.run.signature import Leaf, Signature, Value, Values
+from rcsc.run.signature import REALS, Leaf, Signature, Value, Values
 
 Published: TypeAlias = dict[str, Values]
 Begin: TypeAlias = tuple[str, int | None, tuple[int, Value] | None]
@@ -41,8 +41,8 @@ def edges(leaf: Leaf) -> list[Value]:
     if leaf.c_type == "bool":
         return [False, True]
     low, high = (0.0, len(leaf.members) - 1.0) if leaf.members else (leaf.low or 0, leaf.high or 0)
-    if leaf.c_type == "double":
-        return [low, high, (low + high) / 2, low - 0.5, high + 0.5, math.nan]
+    if leaf.c_type in REALS:
+        return [*map(leaf.held, (low, high, (low + high) / 2, low - 0.5, high + 0.5)), math.nan]
     least, most = type_bounds(leaf.c_type)
     near = [int(end) + by for end in (low, high) for by in (-1, 0, 1)]
     return [value for value in near if least <= value <= most]
@@ -59,8 +59,8 @@ def drawn(random: Random, leaf: Leaf, before: Value, wild: float) -> Value:
         return random.choice(edges(leaf))
     if way < 0.5 or leaf.c_type == "bool":
         return random.choice(inside)
-    if leaf.c_type == "double":
-        return random.uniform(low, high)
+    if leaf.c_type in REALS:
+        return leaf.held(random.uniform(low, high))
     return random.randint(int(low), int(high))
 
 
@@ -107,7 +107,7 @@ def begins(
         wrong = [
             (at, value)
             for at, leaf in enumerate(sign.leaves)
-            if leaf.kind != "input" and leaf.c_type != "double"
+            if leaf.kind != "input" and leaf.c_type not in REALS
             for value in edges(leaf)[-1:]
             if leaf.c_type != "bool" and value > (len(leaf.members) - 1 if leaf.members else leaf.high or 0)
         ]

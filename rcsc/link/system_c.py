@@ -33,6 +33,7 @@ from rcsc.emit.translate import constant
 from rcsc.lang.model import Admit, Array, Bool, Enum, Real, Record, Scalar, Type, Value
 from rcsc.link.wiring import BETWEEN, IN, OUT, OWN, TICK, Buffer, End, LevelProgram, Linked, LinkedLevel
 from rcsc.run.adopt import NUMBERS, Copied, Fixed, Numbered, Start, adoption
+from rcsc.run.signature import REALS
 
 Fields: TypeAlias = list[tuple[str, str]]
 """Members of a struct, or constants: the declaration of each, and its doc."""
@@ -333,7 +334,7 @@ class _Maker:
 
 
 def _has_reals(program: LevelProgram) -> bool:
-    return any(leaf.c_type == "double" for leaf in program.sign.leaves)
+    return any(leaf.c_type in REALS for leaf in program.sign.leaves)
 
 
 def _doc(buffer: Buffer) -> str:

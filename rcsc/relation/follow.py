@@ -23,6 +23,7 @@ from rcsc.lang.model import (
     Op,
     Program,
     Real,
+    Single,
     Table,
     TableByCommand,
     Value,
@@ -39,7 +40,7 @@ from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node
 
 _ARITHMETIC = frozenset(
-    {Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.ABS, Op.MIN, Op.MAX, Op.TO_INT, Op.TO_REAL}
+    {Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.ABS, Op.MIN, Op.MAX, Op.TO_INT, Op.TO_REAL, Op.TO_SINGLE}
 )
 
 
@@ -103,7 +104,7 @@ def loosened(nodes: Sequence[Node], numbers: Iterator[int]) -> Iterator[Term]:
                 ends = (
                     Int(int(node.low), int(node.high))
                     if isinstance(node.kind, Int)
-                    else Real(node.low, node.high)
+                    else (Single if isinstance(node.kind, Single) else Real)(node.low, node.high)
                 )
                 yield within(node.term, ends)
 

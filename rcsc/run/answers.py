@@ -80,7 +80,11 @@ def stand_in(function: str, given: Iterable[tuple[str, str]], results: Iterable[
     parameters = [*(f"{kind} {name}" for kind, name in ins), *(f"{kind} *{name}_out" for kind, name in outs)]
     body = [f"    (void){name};" for _, name in ins]
     for kind, name in outs:
-        if kind == "double":
+        if kind == "float":
+            body.append("    double given;")
+            body.append("    (void)memcpy(&given, &rcsc_answers[rcsc_answer], sizeof(double));")
+            body.append(f"    *{name}_out = (float)given;")
+        elif kind == "double":
             body.append(f"    (void)memcpy({name}_out, &rcsc_answers[rcsc_answer], sizeof(double));")
         else:
             body.append(f"    *{name}_out = ({kind})rcsc_answers[rcsc_answer];")

@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 from rcsc.host.files.names import BadName, identifier, inside, shown
 from rcsc.host.files.read import MIB, CheckedFields, Malformed, json_of, text
+from rcsc.lang.operator_table import single, spell_single
 from rcsc.lang.restart import Adopted, After, Fixed, Part, SameAs, by_names
 from rcsc.run.description import BadDescription
 
@@ -22,8 +23,10 @@ Values: TypeAlias = tuple[Value, ...]
 
 FORMATS = {
     "bool": "?", "uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i",
-    "uint64_t": "Q", "int64_t": "q", "double": "d",
+    "uint64_t": "Q", "int64_t": "q", "double": "d", "float": "f",
 }  # fmt: skip
+REALS = ("double", "float")
+"""C types of numbers with a fraction."""
 TRACE = ("line", "fault", "fault_at")
 """What a cycle leaves beside the leaves; the words of failed assumptions come after it."""
 FAILED = ("assumptions_failed",)
@@ -81,7 +84,7 @@ class Leaf:
         """What its name may mean when the program starts anew."""
         whole = (
             None
-            if self.members or self.c_type in {"bool", "double"}
+            if self.members or self.c_type in {"bool", *REALS}
             else (int(self.low or 0), int(self.high or 0))
         )
         return Part(self.kind == "output", self.members, whole)
@@ -90,7 +93,13 @@ class Leaf:
         """The value in the table's words."""
         if self.members:
             return self.members[int(value)] if 0 <= value < len(self.members) else f"{int(value)}?"
+        if self.c_type == "float":
+            return spell_single(float(value))
         return ("false", "true")[bool(value)] if self.c_type == "bool" else repr(value)
+
+    def held(self, value: float) -> float:
+        """A number with a fraction as the variable's C type holds it: of a single, rounded to it."""
+        return single(value) if self.c_type == "float" else value
 
     def read(self, text: str) -> Value:
         """The value that a text means.
@@ -102,10 +111,15 @@ class Leaf:
             return self.members.index(text)
         if self.c_type == "bool":
             return ("false", "true").index(text) == 1
-        value: Value = float(text) if self.c_type == "double" else int(text)
+        value: Value = self.held(float(text)) if self.c_type in REALS else int(text)
         if self.low is not None and self.high is not None and not self.low <= value <= self.high:
             raise ValueError(f"{text} lies outside {self.low} .. {self.high}")
         return value
+
+
+def number_word(leaf: Leaf) -> str:
+    """The language's word for the type of a number."""
+    return {"double": "real", "float": "single"}.get(leaf.c_type, "int")
 
 
 @dataclass(frozen=True, slots=True)
@@ -515,13 +529,13 @@ def _leaf(entry: CheckedFields) -> Leaf:
 
 def _fits(c_type: str, value: object) -> bool:
     """Return whether a value is of the type, not an equal one of another type."""
-    if type(value) is not {"bool": bool, "double": float}.get(c_type, int):
+    if type(value) is not {"bool": bool, "double": float, "float": float}.get(c_type, int):
         return False
     try:
-        struct.pack(f"<{FORMATS[c_type]}", value)
-    except struct.error:
+        held = struct.unpack(f"<{FORMATS[c_type]}", struct.pack(f"<{FORMATS[c_type]}", value))[0]
+    except (struct.error, OverflowError):
         return False
-    return True
+    return bool(held == value)
 
 
 def _tables(symbols: CheckedFields) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:

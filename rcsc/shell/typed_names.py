@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
 from rcsc.run.levels import RunningLevel
-from rcsc.run.signature import Leaf, Signature, Value
+from rcsc.run.signature import Leaf, Signature, Value, number_word
 from rcsc.shell.reload.refusal import Refused
 
 NAME = r"[A-Za-z_][\w-]*(?:\[\d+\])*(?:\.[\w-]+(?:\[\d+\])*)*"
@@ -167,7 +167,7 @@ def kind_of(leaf: Leaf) -> str:
     if leaf.c_type == "bool":
         return "false or true"
     unit = f" [{leaf.unit}]" if leaf.unit else ""
-    return f"{'real' if leaf.c_type == 'double' else 'int'} {leaf.low} .. {leaf.high}{unit}"
+    return f"{number_word(leaf)} {leaf.low} .. {leaf.high}{unit}"
 
 
 def shown(level: RunningLevel, at: int) -> str:

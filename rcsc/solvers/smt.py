@@ -16,7 +16,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, NewType
 
-from rcsc.lang.model import Bool, Real, Scalar, Value
+from rcsc.lang.model import Bool, Real, Scalar, Single, Value
 
 Term = NewType("Term", object)
 """A Z3 expression; only this module looks inside."""
@@ -113,16 +113,16 @@ def troubles() -> tuple[type[BaseException], ...]:
     return (MemoryError,) if loaded is None else (MemoryError, loaded.Z3Exception)
 
 
-def _double_sort() -> Any:
-    return _z3().Float64()
+def _float_sort(kind: Real) -> Any:
+    return _z3().Float32() if isinstance(kind, Single) else _z3().Float64()
 
 
 def variable(name: str, kind: Scalar) -> Term:
-    """A fresh constant: Bool, IEEE double, or a mathematical integer (also for enumerations)."""
+    """A fresh constant: Bool, IEEE double or single, or a mathematical integer (also for enumerations)."""
     z3 = _z3()
     if isinstance(kind, Bool):
         return Term(z3.Bool(name))
-    return Term(z3.FP(name, _double_sort()) if isinstance(kind, Real) else z3.Int(name))
+    return Term(z3.FP(name, _float_sort(kind)) if isinstance(kind, Real) else z3.Int(name))
 
 
 def literal(kind: Scalar, value: Value) -> Term:
@@ -130,7 +130,9 @@ def literal(kind: Scalar, value: Value) -> Term:
     z3 = _z3()
     if isinstance(kind, Bool):
         return Term(z3.BoolVal(bool(value)))
-    return Term(z3.FPVal(float(value), _double_sort()) if isinstance(kind, Real) else z3.IntVal(int(value)))
+    return Term(
+        z3.FPVal(float(value), _float_sort(kind)) if isinstance(kind, Real) else z3.IntVal(int(value))
+    )
 
 
 def member(name: str) -> Term:
@@ -231,8 +233,8 @@ def quotient(left: Term, right: float) -> Term:
     return Term(a / _z3().RealVal(str(Fraction(right))))
 
 
-def double_operation(op: str, left: Term, right: Term) -> Term:
-    """`+ - * /` of doubles, rounded to nearest even."""
+def float_operation(op: str, left: Term, right: Term) -> Term:
+    """`+ - * /` of doubles, or of singles, rounded to nearest even."""
     z3: Any = _z3()
     operation = {"+": z3.fpAdd, "-": z3.fpSub, "*": z3.fpMul, "/": z3.fpDiv}[op]
     return Term(operation(z3.RNE(), left, right))
@@ -251,14 +253,16 @@ def absolute(term: Term, kind: Scalar) -> Term:
     return Term(z3.fpAbs(a) if isinstance(kind, Real) else z3.If(a < 0, -a, a))
 
 
-def to_double(term: Term) -> Term:
-    """The nearest double of an integer."""
+def to_float(term: Term, kind: Scalar, target: Real) -> Term:
+    """The nearest double or single, as `target` is, of a term of this kind: an integer, a double or a single."""
     z3: Any = _z3()
-    return Term(z3.fpRealToFP(z3.RNE(), z3.ToReal(term), _double_sort()))
+    if isinstance(kind, Real):
+        return Term(z3.fpFPToFP(z3.RNE(), term, _float_sort(target)))
+    return Term(z3.fpRealToFP(z3.RNE(), z3.ToReal(term), _float_sort(target)))
 
 
 def to_integer(term: Term) -> Term:
-    """A finite double without its fraction."""
+    """A finite double or single without its fraction."""
     z3: Any = _z3()
     return Term(z3.ToInt(z3.fpToReal(z3.fpRoundToIntegral(z3.RTZ(), term))))
 
@@ -382,6 +386,7 @@ class Solver:
             return bool(z3.is_true(evaluated))
         if isinstance(kind, Real):
             bits = z3.simplify(z3.fpToIEEEBV(evaluated)).as_long()
-            double: float = struct.unpack("<d", struct.pack("<Q", bits))[0]
-            return double + 0.0
+            sizes = ("<f", "<I") if isinstance(kind, Single) else ("<d", "<Q")
+            number: float = struct.unpack(sizes[0], struct.pack(sizes[1], bits))[0]
+            return number + 0.0
         return int(evaluated.as_long())

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
-from rcsc.lang.model import Bool, Enum, Real, Scalar, key_bounds, real_key
+from rcsc.lang.model import Bool, Enum, Real, Scalar, key_bounds, key_of
 from rcsc.lang.operator_table import COMPARISONS, Arithmetic, Conversion, Op, Ordering
 from rcsc.symbolic.values import Alike, Node, Shape, parts_first, takes_bits, wraps_once
 
@@ -254,7 +254,7 @@ class Bits:
                 return a[int(right.low).bit_length() - 1 :] or (FALSE,)
             case Op.MOD if takes_bits(node):
                 return (*a[: int(right.low).bit_length() - 1], FALSE)
-            case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL:
+            case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL | Op.TO_SINGLE:
                 return self._any(node)
 
     def _any(self, node: Node) -> Word:
@@ -269,10 +269,7 @@ class Bits:
             return (self.fresh(),)
         if not (math.isfinite(node.low) and math.isfinite(node.high)):
             return tuple(self.fresh() for _ in range(WIDEST))
-        real = isinstance(node.kind, Real)
-        return self._within(
-            *((real_key(node.low), real_key(node.high)) if real else (int(node.low), int(node.high)))
-        )
+        return self._within(key_of(node.kind, node.low), key_of(node.kind, node.high))
 
 
 def constant(key: int) -> Word:
@@ -283,7 +280,7 @@ def constant(key: int) -> Word:
 def _constant(kind: Scalar, value: int | float) -> Word:
     if isinstance(kind, Bool):
         return (TRUE if value else FALSE,)
-    return constant(real_key(float(value)) if isinstance(kind, Real) else int(value))
+    return constant(key_of(kind, value))
 
 
 def _aligned(a: Word, b: Word) -> Iterable[tuple[Literal, Literal]]:

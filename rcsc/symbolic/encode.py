@@ -20,6 +20,7 @@ from rcsc.lang.model import (
     Real,
     Scalar,
     Select,
+    Single,
     Value,
     Variable,
     key_bounds,
@@ -84,13 +85,15 @@ def operation(op: Operator, kind: Scalar, terms: list[Term]) -> Term:
         case Op.MAX:
             return smt.choice(smt.below(terms[0], terms[1], kind), terms[1], terms[0])
         case Op.TO_REAL:
-            return smt.to_double(terms[0])
+            return smt.to_float(terms[0], kind, Real(0.0, 0.0))
+        case Op.TO_SINGLE:
+            return smt.to_float(terms[0], kind, Single(0.0, 0.0))
         case Op.TO_INT if isinstance(kind, Bool):
             return smt.choice(terms[0], *(smt.literal(Int(0, 1), number) for number in (1, 0)))
         case Op.TO_INT:
             return smt.to_integer(terms[0])
         case Op.ADD | Op.SUB | Op.MUL | Op.DIV | Op.MOD:
-            arithmetic = smt.double_operation if isinstance(kind, Real) else smt.integer_operation
+            arithmetic = smt.float_operation if isinstance(kind, Real) else smt.integer_operation
             return arithmetic(op.value, terms[0], terms[1])
 
 

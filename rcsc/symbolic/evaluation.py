@@ -279,7 +279,7 @@ class Evaluation:
             case Op.TO_INT:
                 assert isinstance(expr.type, Int)
                 return self._truncated(expr, args[0], expr.type)
-            case Op.TO_REAL:
+            case Op.TO_REAL | Op.TO_SINGLE:
                 return values.arithmetic(op, args, expr.type)
             case _:
                 return self._number(op, expr, args)

@@ -3,7 +3,7 @@
 In: nodes (`symbolic.values`). Out: terms, and the ranges of the variables they read. What is exact and what is not:
 
 - Booleans, enumerations (by index) and integers are exact; `mod` of a value below twice its divisor is a choice.
-- A real is its *key* (`model.real_key`): an integer that orders as the doubles do. Equality and order, least,
+- A real is its *key* (`model.key_of`): an integer that orders as the doubles do, of a single as the singles do. Equality and order, least,
   greatest, opposite and absolute value of reals are therefore exact.
 - Any other operation (arithmetic of reals, products and quotients of variables) gives *any* value within the bounds of the
   node, the same one for the same operation on the same operands, where as much is known of them; a comparison with what may be a
@@ -14,7 +14,7 @@ In: nodes (`symbolic.values`). Out: terms, and the ranges of the variables they 
 import math
 from dataclasses import dataclass, field
 
-from rcsc.lang.model import Bool, Enum, Int, Real, Scalar, real_key
+from rcsc.lang.model import Bool, Enum, Int, Real, Scalar, key_of
 from rcsc.lang.operator_table import Arithmetic, Conversion, Op
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Term
@@ -69,7 +69,7 @@ class Keyed:
         """A constant."""
         if isinstance(kind, Bool):
             return smt.truth(bool(value))
-        return _key(kind, real_key(float(value)) if isinstance(kind, Real) else int(value))
+        return _key(kind, key_of(kind, value))
 
     def equal(self, term: Term, node: Node) -> Term:
         """State that the term is the node's value."""
@@ -137,7 +137,7 @@ class Keyed:
                 return smt.choice(smt.below(parts[0], parts[1], KEY), parts[0], wrapped)
             case Op.DIV | Op.MOD if takes_bits(node):
                 return smt.integer_operation(op.value, parts[0], parts[1])
-            case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL:
+            case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL | Op.TO_SINGLE:
                 return self.any(node)
 
     def of_reals(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:  # noqa: ARG002 - for those who know more

@@ -11,15 +11,15 @@ Slower than `keyed`, for the solver has to reason in fractions; asked only where
 
 import math
 
-from rcsc.lang.model import Real, Scalar
+from rcsc.lang.model import Real, Scalar, Single
 from rcsc.lang.operator_table import Arithmetic, Conversion, Op
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Term
 from rcsc.symbolic.keyed import KEY, Keyed
 from rcsc.symbolic.values import CONSTANT, VARIABLE, Node
 
-ULP = 2.0**-52
-"""Twice the greatest error of a rounded result, as a share of it."""
+ULP, SINGLE_ULP = 2.0**-52, 2.0**-23
+"""Twice the greatest error of a rounded result, as a share of it: of doubles, and of singles."""
 
 
 class Measured(Keyed):
@@ -35,7 +35,11 @@ class Measured(Keyed):
 
     def of_reals(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:
         """Linear operations, rounded; the others are any value."""
-        if op is Op.TO_REAL:
+        if op is Op.TO_REAL and isinstance(node.args[0].kind, Real):
+            return parts[0]  # a single is a double
+        if op is Op.TO_SINGLE and isinstance(node.args[0].kind, Real):
+            return self._rounded(node, parts[0])
+        if op in (Op.TO_REAL, Op.TO_SINGLE):
             return self._rounded(node, smt.as_number(parts[0]))
         if op in (Op.ADD, Op.SUB) or (op is Op.MUL and any(arg.known for arg in node.args)):
             return self._rounded(node, smt.integer_operation(op.value, parts[0], parts[1]))
@@ -49,7 +53,10 @@ class Measured(Keyed):
         rounded = self.any(node)
         most = max(abs(node.low), abs(node.high), 1.0)
         if math.isfinite(most):
-            slack, zero = smt.fraction(most * ULP), smt.fraction(0.0)
+            slack, zero = (
+                smt.fraction(most * (SINGLE_ULP if isinstance(node.kind, Single) else ULP)),
+                smt.fraction(0.0),
+            )
             least = smt.integer_operation("-", exact, slack)
             greatest = smt.integer_operation("+", exact, slack)
             near = [

@@ -13,13 +13,14 @@ from rcsc.lang.model import (
     Op,
     Real,
     Scalar,
+    Single,
     Value,
     Variable,
     key_bounds,
     key_of,
-    real_key,
     value_of_key,
 )
+from rcsc.lang.operator_table import single
 from rcsc.solvers.search import lowest
 from rcsc.symbolic.values import Node, Shape, parts_first
 from rcsc.symbolic.values import variable as variable_of
@@ -63,12 +64,14 @@ def _pick(variable: Node, number: int, random: Random) -> Value:
     ends = [low, high]
     if number < len(ends):
         return value_of_key(variable.kind, ends[number])
-    near = [key for key in (-1, 0, 1, real_key(1.0), real_key(-1.0)) if low <= key <= high]
+    ones = [key_of(variable.kind, one) for one in (1.0, -1.0) if isinstance(variable.kind, Real)]
+    near = [key for key in (-1, 0, 1, *ones) if low <= key <= high]
     kind = random.randrange(4)
     if kind == 0:
         return value_of_key(variable.kind, random.choice([*ends, *near]))
     if kind == 1 and isinstance(variable.kind, Real):
-        return random.uniform(variable.kind.low, variable.kind.high) + 0.0
+        value = random.uniform(variable.kind.low, variable.kind.high) + 0.0
+        return single(value) if isinstance(variable.kind, Single) else value
     return value_of_key(variable.kind, random.randint(low, high))
 
 

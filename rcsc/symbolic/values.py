@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rcsc.lang.expressions import intervals
-from rcsc.lang.model import Bool, Int, Real, Scalar, Value, key_bounds
+from rcsc.lang.model import Bool, Int, Real, Scalar, Single, Value, key_bounds, next_value
 from rcsc.lang.operator_table import (
     Arithmetic,
     Comparison,
@@ -23,6 +23,7 @@ from rcsc.lang.operator_table import (
     Op,
     Ordering,
     Signed,
+    single,
     truth_function,
 )
 from rcsc.solvers import smt
@@ -50,7 +51,7 @@ class Node:
 
     Attributes:
         op: What it is made by.
-        kind: Bool, Enum, Int or Real; its own bounds are those of the declaration, not of the node.
+        kind: Bool, Enum, Int, Real or Single; its own bounds are those of the declaration, not of the node.
         low: Least value it can have where it is reached; likewise `high`.
         name: Of a variable.
         term: Made on demand.
@@ -234,10 +235,13 @@ def _bounds(op: Arithmetic | Conversion, args: tuple[Node, ...]) -> tuple[int | 
     first = args[0]
     if op is Op.TO_REAL:
         return float(first.low), float(first.high)
+    if op is Op.TO_SINGLE:
+        return single(first.low), single(first.high)
     if op is Op.TO_INT:
         return (int(first.low), int(first.high)) if first.ordered else (-_GREATEST, _GREATEST)
     if isinstance(first.kind, Real):
-        kinds: tuple[Int | Real, ...] = tuple(Real(float(arg.low), float(arg.high)) for arg in args)
+        real = Single if isinstance(first.kind, Single) else Real
+        kinds: tuple[Int | Real, ...] = tuple(real(float(arg.low), float(arg.high)) for arg in args)
     else:
         kinds = tuple(Int(int(arg.low), int(arg.high)) for arg in args)
     if op is Op.MOD and all(arg.known for arg in args) and args[1].low:
@@ -392,8 +396,8 @@ def _learn_compared(op: Ordering, sides: tuple[Node, Node], facts: dict[Node, Fa
     if not yes:
         op, left, right = (Op.LE if op is Op.LT else Op.LT), right, left
     strict = op is Op.LT
-    _meet(facts, left, left.low, _step(right.high, -1, left.kind) if strict else right.high)
-    _meet(facts, right, _step(left.low, 1, right.kind) if strict else left.low, right.high)
+    _meet(facts, left, left.low, next_value(left.kind, right.high, -1) if strict else right.high)
+    _meet(facts, right, next_value(right.kind, left.low, 1) if strict else left.low, right.high)
 
 
 def _learn_equal(left: Node, right: Node, facts: dict[Node, Fact]) -> None:
@@ -405,17 +409,12 @@ def _learn_equal(left: Node, right: Node, facts: dict[Node, Fact]) -> None:
 def _learn_unequal(left: Node, right: Node, facts: dict[Node, Fact]) -> None:
     for node, other in ((left, right), (right, left)):
         if other.known and node.low == other.low:
-            _meet(facts, node, _step(node.low, 1, node.kind), node.high)
+            _meet(facts, node, next_value(node.kind, node.low, 1), node.high)
         elif other.known and node.high == other.low:
-            _meet(facts, node, node.low, _step(node.high, -1, node.kind))
+            _meet(facts, node, node.low, next_value(node.kind, node.high, -1))
 
 
 def _meet(facts: dict[Node, Fact], node: Node, low: int | float, high: int | float) -> None:
     key = root(node)
     before = facts.get(key, (key.low, key.high))
     facts[key] = max(before[0], low), min(before[1], high)
-
-
-def _step(value: int | float, by: int, kind: Scalar) -> int | float:
-    """The next value of the kind."""
-    return math.nextafter(value, math.inf * by) if isinstance(kind, Real) else value + by

@@ -37,7 +37,7 @@ FLAGS = ("-std=gnu11", "-O0", "-w", "-ffp-contract=off")
 
 TOKEN = re.compile(
     r"""(?P<skip>/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|^\s*\#[^\n]*)
-    |(?P<number>0[xX][0-9a-fA-F.]+(?:[pP][+-]?\d+)?[uUlL]*|\d[\d.]*(?:[eE][+-]?\d+)?[uUlL]*)
+    |(?P<number>0[xX][0-9a-fA-F.]+(?:[pP][+-]?\d+)?[uUlLfF]*|\d[\d.]*(?:[eE][+-]?\d+)?[uUlLfF]*)
     |(?P<word>[A-Za-z_]\w*)
     |(?P<operator>->|<<=|>>=|<<|>>|<=|>=|==|!=|&&|\|\||\+\+|--|[-+*/%&|^]=|[-+*/%&|^<>!~=?:;,.(){}\[\]])""",
     re.VERBOSE | re.MULTILINE | re.DOTALL,
@@ -161,7 +161,7 @@ def _binary(tokens: Sequence[_Token], at: int) -> bool:
     before = tokens[at - 1]
     operand = before.kind in ("word", "number") or before.text in (")", "]")
     declared = before.kind == "word" and (
-        before.text.endswith("_t") or before.text in ("const", "void", "double")
+        before.text.endswith("_t") or before.text in ("const", "void", "double", "float")
     )
     return operand and not declared and before.text not in ("return", "case")
 

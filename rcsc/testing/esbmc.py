@@ -112,7 +112,11 @@ def _externs(program: Program, symbols: Symbols) -> Iterator[str]:
         yield from (f"e{at}_w{i}[n] = {_any(c_type)}();" for i, c_type in enumerate(written))
         yield "} else {"
         for i, c_type in enumerate(read):
-            same = f"ref_same(e{at}_a{i}[n], a{i})" if c_type == "double" else f"e{at}_a{i}[n] == a{i}"
+            same = (
+                f"ref_same(e{at}_a{i}[n], a{i})"
+                if c_type in ("double", "float")
+                else f"e{at}_a{i}[n] == a{i}"
+            )
             yield f'__ESBMC_assert({same}, "an extern is given what the reference gives it");'
         yield "}"
         yield from (f"*w{i} = e{at}_w{i}[n];" for i, _ in enumerate(written))

@@ -30,6 +30,7 @@ from rcsc.host.files.read import CheckedFields, json_of
 from rcsc.host.tools import Absent
 from rcsc.lang import reserved
 from rcsc.lang.interpret import Fault, initial, run_table
+from rcsc.lang.operator_table import single
 from rcsc.lang.resolve import compile_text
 from rcsc.run.signature import generated_files, signature_of
 from rcsc.testing.cortex import CortexRun, run_cortex
@@ -718,8 +719,17 @@ int main(int argc, char **argv) {
 """
 
 
-def drawn_reals() -> list[tuple[float, ...]]:
+def sums_of(word: str) -> str:
+    """The sums with numbers of this type."""
+    return SUMS.replace("real", word)
+
+
+def drawn_reals(word: str) -> list[tuple[float, ...]]:
     """Products that cancel against a sum up to one rounding, and subnormal values."""
+    if word == "single":
+        doubles = drawn_reals("real")
+        tiny = {5e-324: 2.0**-149, 3e-320: 1e-42, 1e-300: 1e-30}
+        return [(*(single(value) for value in row[:3]), single(tiny[row[3]])) for row in doubles]
     rng = Random(7)  # noqa: S311  # repeatable on purpose
     found: list[tuple[float, ...]] = []
     for _ in range(60):
@@ -746,10 +756,11 @@ OFTEN = ("-O0", "-O2", "-O3 -march=native", "-O3 -march=native -ffp-contract=fas
 OTHERWISE = ("-O2 -ffast-math", "-O1 -mfpmath=387", "-O2 -funsafe-math-optimizations -march=native")
 
 
+@pytest.mark.parametrize("word", ["real", "single"])
 @pytest.mark.parametrize("cc", COMPILERS)
-def test_c_computes_reals_as_python_does_or_says_that_it_does_not(cc: str, tmp_path: Path) -> None:
-    files = emitted(program_of(SUMS))
-    values = drawn_reals()
+def test_c_computes_reals_as_python_does_or_says_that_it_does_not(cc: str, word: str, tmp_path: Path) -> None:
+    files = emitted(program_of(sums_of(word)))
+    values = drawn_reals(word)
     compiled(files, tmp_path, "-march=native" if platform.machine() == "x86_64" else "-O2", cc=cc)
     rows = ", ".join("{ " + ", ".join(one.hex() for one in row) + " }" for row in values)
     (tmp_path / "main.c").write_text(edited(DRIVER, ("@VALUES@", rows)))
@@ -781,8 +792,9 @@ def test_c_computes_reals_as_python_does_or_says_that_it_does_not(cc: str, tmp_p
 
 
 @pytest.mark.needs("arm-none-eabi-gcc", "qemu-system-arm")
-def test_reals_are_the_same_on_a_processor_without_them() -> None:
-    text = edited(SUMS, ("| o ||", "| n ||"), ("|   || p", "| < 90 || p"))
+@pytest.mark.parametrize("word", ["real", "single"])
+def test_reals_are_the_same_on_a_processor_without_them(word: str) -> None:
+    text = edited(sums_of(word), ("| o ||", "| n ||"), ("|   || p", "| < 90 || p"))
     text = "input n : int 0 .. 255\n" + edited(
         text, ("| p          |\n", "| p          |\n| b | >= 90 || p |\n")
     )

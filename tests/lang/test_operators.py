@@ -7,6 +7,7 @@ import math
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from itertools import combinations_with_replacement, product
 from pathlib import Path
@@ -44,10 +45,13 @@ from rcsc.lang.model import (
     ReadLocal,
     Real,
     Scalar,
+    Single,
     Value,
-    real_key,
+    key_of,
+    single_key,
+    single_of_key,
 )
-from rcsc.lang.operator_table import LOGIC, Arithmetic, Comparison, Core, is_comparison
+from rcsc.lang.operator_table import LOGIC, Arithmetic, Comparison, Core, is_comparison, single, spell_single
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.sat import Sat
@@ -70,6 +74,12 @@ from tests.support.programs.stages import emitted, program_of
 
 NAN, INF, GREATEST = math.nan, math.inf, 1.7976931348623157e308
 REAL, SIGNED, UNSIGNED = Real(-INF, INF), Int(I64_MIN, I64_MAX), Int(0, U64_MAX)
+SINGLE = Single(-INF, INF)
+GREATEST_SINGLE, LEAST_SINGLE, LEAST_NORMAL, STEP = 2.0**128 - 2.0**104, 2.0**-149, 2.0**-126, 2.0**-23
+HALFWAY = (("halfway", 1),)
+"""The unit of operands that are rounded to a single: ties, and what decides them far behind."""
+ROUNDED, SIGNED_ROUNDED = Real(-INF, INF, HALFWAY), Int(I64_MIN, I64_MAX, HALFWAY)
+UNSIGNED_ROUNDED = Int(0, U64_MAX, HALFWAY)
 FINITE = (
     -GREATEST, -1e308, -(2.0**63), -1.0, -0.1, -5e-324, -0.0, 0.0, 5e-324, 2.2250738585072014e-308, 0.1, 1.0, 1.5,
     2.0**53, 2.0**63, 2.0**64, 1e308, GREATEST,
@@ -80,6 +90,71 @@ EDGES: dict[Scalar, tuple[Value, ...]] = {
     SIGNED: (I64_MIN, I64_MIN + 1, -(2**53) - 1, -7, -1, 0, 1, 2, 7, 2**53 + 1, I64_MAX - 1, I64_MAX),
     UNSIGNED: (0, 1, 2, 7, 2**53 + 1, I64_MAX, I64_MAX + 1, U64_MAX - 1, U64_MAX),
     Bool(): (False, True),
+    SINGLE: (
+        NAN,
+        -INF,
+        -GREATEST_SINGLE,
+        -1.0,
+        -LEAST_SINGLE,
+        -0.0,
+        0.0,
+        LEAST_SINGLE,
+        3.0 * LEAST_SINGLE,
+        LEAST_NORMAL - LEAST_SINGLE,
+        LEAST_NORMAL,
+        STEP / 2,
+        0.75 * STEP,
+        single(0.1),
+        0.5,
+        1.0 - STEP / 2,
+        1.0,
+        1.0 + STEP,
+        1.5,
+        3.0,
+        2.0**24 - 1,
+        2.0**63,
+        2.0**64,
+        single(1e38),
+        GREATEST_SINGLE,
+        INF,
+    ),
+    ROUNDED: (
+        NAN,
+        -INF,
+        -1e308,
+        -1.0 - STEP / 2,
+        -5e-324,
+        -0.0,
+        0.0,
+        LEAST_SINGLE / 2,
+        math.nextafter(LEAST_SINGLE / 2, 1.0),
+        0.1,
+        math.nextafter(1.0 + STEP / 2, 0.0),
+        1.0 + STEP / 2,
+        math.nextafter(1.0 + STEP / 2, 2.0),
+        1.0 + 1.5 * STEP,
+        LEAST_NORMAL - LEAST_SINGLE / 2,
+        GREATEST_SINGLE,
+        math.nextafter(2.0**128 - 2.0**103, 0.0),
+        2.0**128 - 2.0**103,
+        INF,
+    ),
+    SIGNED_ROUNDED: (
+        I64_MIN,
+        -(2**62 + 2**38 + 1),
+        -(2**62 + 2**38),
+        -(2**24) - 1,
+        0,
+        1,
+        2**24 + 1,
+        2**24 + 3,
+        2**53 + 1,
+        2**62 + 2**38,
+        2**62 + 2**38 + 1,
+        2**62 + 3 * 2**38 - 1,
+        I64_MAX,
+    ),
+    UNSIGNED_ROUNDED: (0, 2**24 + 1, 2**63 + 2**39, 2**63 + 2**39 + 1, 2**63 + 3 * 2**39 - 1, U64_MAX),
 }
 ON_REALS: tuple[Comparison | Arithmetic, ...] = (
     *sorted(COMPARISONS),
@@ -92,7 +167,12 @@ ON_REALS: tuple[Comparison | Arithmetic, ...] = (
     Op.NEG,
     Op.ABS,
 )
-UNARY = {Op.NEG, Op.ABS, Op.TO_INT, Op.TO_REAL, Op.NOT}
+UNARY = {Op.NEG, Op.ABS, Op.TO_INT, Op.TO_REAL, Op.TO_SINGLE, Op.NOT}
+
+
+MEMBERS: dict[Scalar, tuple[Value, ...]] = {
+    SIGNED: (-1, 0, 7), REAL: (-0.0, 0.1, 1e308), SINGLE: (-0.0, single(0.1), single(1e38)),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -106,7 +186,7 @@ class Case:
     def of(self, *args: Expr) -> Expr:
         """The operator applied."""
         if self.op is None:
-            return Among(args[0], (-1, 0, 7) if self.kind is SIGNED else (-0.0, 0.1, 1e308))
+            return Among(args[0], MEMBERS[self.kind])
         return Apply(self.op, args, self.made)
 
     @property
@@ -121,7 +201,7 @@ class Case:
 
     def defined(self, operands: tuple[Value, ...]) -> bool:
         """Whether nothing is owed that these operands do not pay."""
-        if self.op is Op.DIV and self.kind is REAL:
+        if self.op is Op.DIV and self.kind in (REAL, SINGLE):
             return operands[1] != 0.0
         run = Evaluation({}, {}, {})
         run.evaluate(self.literals(operands))
@@ -144,6 +224,15 @@ def cases() -> Iterator[Case]:
     yield Case(Op.TO_INT, Bool(), Int(0, 1))
     yield from (Case(Op.TO_REAL, kind, REAL) for kind in (SIGNED, UNSIGNED))
     yield Case(None, SIGNED, Bool())
+    for op in ON_REALS:
+        yield Case(op, SINGLE, Bool() if op in COMPARISONS else SINGLE)
+    yield from (
+        Case(Op.TO_INT, SINGLE, SIGNED),
+        Case(Op.TO_INT, SINGLE, UNSIGNED),
+        Case(None, SINGLE, Bool()),
+    )
+    yield Case(Op.TO_REAL, SINGLE, REAL)
+    yield from (Case(Op.TO_SINGLE, kind, SINGLE) for kind in (ROUNDED, SIGNED_ROUNDED, UNSIGNED_ROUNDED))
     yield from (Case(op, Bool(), Bool()) for op in (Op.NOT, *sorted(LOGIC), Op.EQ, Op.NE))
 
 
@@ -201,6 +290,53 @@ def test_facts_of_integers(op: Op, operands: tuple[int, ...], value: Value) -> N
     )
 
 
+@pytest.mark.parametrize(
+    ("op", "operands", "value"),
+    [
+        (Op.ADD, (1.0, STEP / 2), 1.0), (Op.ADD, (1.0 + STEP, STEP / 2), 1.0 + 2 * STEP), (Op.ADD, (1.0, 0.75 * STEP), 1.0 + STEP),
+        (Op.SUB, (1.0, STEP / 8), 1.0), (Op.MUL, (single(0.1), 3.0), 0.30000001192092896), (Op.DIV, (1.0, 3.0), single(1 / 3)),
+        (Op.DIV, (LEAST_SINGLE, 2.0), 0.0), (Op.DIV, (3.0 * LEAST_SINGLE, 2.0), 2 * LEAST_SINGLE), (Op.MUL, (-LEAST_SINGLE, 0.5), -0.0),
+        (Op.ADD, (GREATEST_SINGLE, GREATEST_SINGLE), INF), (Op.NEG, (LEAST_SINGLE,), -LEAST_SINGLE), (Op.SUB, (INF, INF), NAN),
+        (Op.MIN, (NAN, 1.0), NAN), (Op.MAX, (1.0, NAN), 1.0), (Op.TO_REAL, (single(0.1),), 0.10000000149011612), (Op.TO_INT, (-1.5,), -1),
+    ],
+)  # fmt: skip
+def test_facts_of_singles(op: Op, operands: tuple[float, ...], value: Value) -> None:
+    made = Apply(op, tuple(Literal(operand, SINGLE) for operand in operands), SINGLE)
+    assert same(evaluate(made, {}), value)
+
+
+def test_two_roundings_of_an_operation_on_singles_are_one() -> None:
+    """Against exact fractions, over edges and their neighbours, subnormal results too; a whole number is rounded once."""
+
+    def rounded(exact: Fraction) -> float:
+        down = single(float(exact))  # at most one off
+        near = [down, single_of_key(single_key(down) - 1), single_of_key(single_key(down) + 1)]
+        return min(near, key=lambda one: (abs(Fraction(one) - exact), single_key(one) % 2))
+
+    finite = [value for value in EDGES[SINGLE] if isinstance(value, float) and 0.0 < abs(value) < 2.0**60]
+    near = {single_of_key(single_key(value) + by) for value in finite for by in (-1, 0, 1)} - {0.0}
+    for op, (a, b) in product((Op.ADD, Op.SUB, Op.MUL, Op.DIV), product(sorted(near), repeat=2)):
+        exact = op.meaning(Fraction(a), Fraction(b)) if op is not Op.DIV else Fraction(a) / Fraction(b)
+        made = Apply(op, (Literal(a, SINGLE), Literal(b, SINGLE)), SINGLE)
+        assert abs(exact) >= 2**127 or evaluate(made, {}) == rounded(exact), (op, a, b)
+    for number in (*EDGES[SIGNED_ROUNDED], *EDGES[UNSIGNED_ROUNDED]):
+        assert single(number) == rounded(Fraction(number)), number
+
+
+def test_a_single_is_spelled_as_the_shortest_number_that_is_read_back() -> None:
+    assert [spell_single(single(value)) for value in (0.1, 1e38, 16777216.0, -2.5, 1 / 3)] == [
+        "0.1", "1e+38", "16777216.0", "-2.5", "0.33333334",
+    ]  # fmt: skip
+    finite = [float(value) for value in EDGES[SINGLE] if math.isfinite(value)]
+    for value in [
+        single_of_key(single_key(one) + by) for one in finite for by in (-2, -1, 0, 1, 2) if abs(one) < 1e38
+    ]:
+        text = spell_single(value)
+        exact = abs(Fraction(text) - Fraction(value))
+        others = [single_of_key(single_key(value) + by) for by in (-1, 1)]
+        assert all(exact < abs(Fraction(text) - Fraction(other)) for other in others), (value, text)
+
+
 def test_what_no_machine_can_do_is_owed() -> None:
     def defined(op: Op, kind: Scalar, made: Scalar, *operands: Value) -> bool:
         return Case(op, kind, made).defined(operands)
@@ -240,22 +376,37 @@ def test_symbolic_values_fold_to_the_same(case: Case) -> None:
         assert node.known or not plain or not all(map(math.isfinite, operands)), operands
 
 
+BOUNDED: dict[type[Int | Real], tuple[Value, ...]] = {
+    Int: (I64_MIN, -7, -2, -1, 0, 1, 3, 7, I64_MAX),
+    Real: (-GREATEST, -1e308, -1.0, -5e-324, -0.0, 0.1, 1.5, 1e308, GREATEST),
+    Single: (
+        -GREATEST_SINGLE,
+        -1.0,
+        -LEAST_SINGLE,
+        -0.0,
+        single(0.1),
+        1.0 + STEP,
+        single(1e38),
+        GREATEST_SINGLE,
+    ),
+}
+
+
 @pytest.mark.parametrize("op", [op for op in ON_REALS if op not in COMPARISONS] + [Op.MOD])
-@pytest.mark.parametrize("whole", [False, True])
-def test_bounds_enclose_every_result(op: Op, whole: bool) -> None:
-    if op is Op.MOD and not whole:
+@pytest.mark.parametrize("of", BOUNDED)
+def test_bounds_enclose_every_result(op: Op, of: type[Int | Real]) -> None:
+    if op is Op.MOD and of is not Int:
         return  # not an operator of reals
-    edges = (-GREATEST, -1e308, -1.0, -5e-324, -0.0, 0.1, 1.5, 1e308, GREATEST)
-    found = (I64_MIN, -7, -2, -1, 0, 1, 3, 7, I64_MAX) if whole else edges
+    found = BOUNDED[of]
     ranges = list(combinations_with_replacement(found, 2))
     for kinds in product(ranges, repeat=1 if op in UNARY else 2):
-        made = intervals.apply(op, tuple(Int(*one) if whole else Real(*one) for one in kinds), ())  # type: ignore[arg-type]  # one or the other
+        made = intervals.apply(op, tuple(of(*one) for one in kinds), ())  # type: ignore[arg-type]  # values of the kind
         assert isinstance(made, Int | Real)
         sides = [[value for value in found if low <= value <= high] for low, high in kinds]
         for operands in product(*sides):
             if op in (Op.DIV, Op.MOD) and operands[1] == 0:
                 continue
-            kind = SIGNED if whole else REAL
+            kind: Scalar = SIGNED if of is Int else SINGLE if of is Single else REAL
             value = evaluate(Apply(op, tuple(Literal(operand, kind) for operand in operands), kind), {})
             unbounded = not (math.isfinite(made.low) and math.isfinite(made.high))
             assert made.low <= value <= made.high or (unbounded and math.isnan(value)), (kinds, operands)
@@ -269,7 +420,8 @@ def z3_value(found: Any, kind: Scalar) -> Value:
         if z3.is_true(z3.simplify(z3.fpIsNaN(found))):
             return NAN
         bits = z3.simplify(z3.fpToIEEEBV(found)).as_long()
-        value: float = struct.unpack("<d", struct.pack("<Q", bits))[0]
+        sizes = ("<f", "<I") if isinstance(kind, Single) else ("<d", "<Q")
+        value: float = struct.unpack(sizes[0], struct.pack(sizes[1], bits))[0]
         return value
     simple = z3.simplify(found)
     return z3.is_true(simple) if isinstance(kind, Bool) else int(simple.as_long())
@@ -328,10 +480,10 @@ ORDERED = (Op.LT, Op.LE, Op.EQ, Op.MIN, Op.MAX, Op.NEG, Op.ABS)
 """What the terms of composed levels say exactly of reals; of integers also sums, differences, and `mod` by constants."""
 
 
-def composed(op: Core, whole: bool) -> Iterator[tuple[Node, tuple[Value, ...], Value]]:
+def composed(op: Core, of: str) -> Iterator[tuple[Node, tuple[Value, ...], Value]]:
     """Operations on variables of which nothing is known, with values for them, and the result."""
-    kind = Int(-(2**40), 2**40) if whole else Real(-GREATEST, GREATEST)
-    edges: tuple[Value, ...] = (-(2**40), -7, -1, 0, 1, 2, 7, 2**40) if whole else FEW
+    whole = of == "int"
+    kind, edges = COMPOSED[of]
     known: dict[str, Node] = {}
     for operands in product(edges, repeat=1 if op in UNARY else 2):
         args = tuple(known.setdefault(one, values.variable(f"{one!r}", kind)) for one in map(repr, operands))
@@ -344,21 +496,25 @@ def composed(op: Core, whole: bool) -> Iterator[tuple[Node, tuple[Value, ...], V
         )
 
 
-def key(value: Value) -> int:
-    return real_key(value) if isinstance(value, float) else int(value)
-
-
+COMPOSED: dict[str, tuple[Scalar, tuple[Value, ...]]] = {
+    "int": (Int(-(2**40), 2**40), (-(2**40), -7, -1, 0, 1, 2, 7, 2**40)),
+    "real": (Real(-GREATEST, GREATEST), FEW),
+    "single": (
+        Single(-GREATEST_SINGLE, GREATEST_SINGLE),
+        (-GREATEST_SINGLE, -1.0, -LEAST_SINGLE, -0.0, 0.0, LEAST_SINGLE, single(0.1), 1.0, GREATEST_SINGLE),
+    ),
+}
 composed_cases = pytest.mark.parametrize(
-    ("op", "whole"),
-    [*product(ORDERED, (False, True)), (Op.ADD, True), (Op.SUB, True)],
+    ("op", "of"),
+    [*product(ORDERED, COMPOSED), (Op.ADD, "int"), (Op.SUB, "int")],
 )
 
 
 @composed_cases
 @pytest.mark.parametrize("maker", [Keyed, Measured])
-def test_terms_of_composed_levels(maker: type[Keyed], op: Core, whole: bool) -> None:
+def test_terms_of_composed_levels(maker: type[Keyed], op: Core, of: str) -> None:
     terms, solver, wrong = maker(), smt.Solver(), []
-    for node, operands, value in composed(op, whole):
+    for node, operands, value in composed(op, of):
         for arg, worth in zip(node.args, operands, strict=True):
             solver.add(terms.equal(terms.term(arg), values.constant(arg.kind, worth)))
         wrong.append(smt.negation(terms.equal(terms.term(node), values.constant(node.kind, value))))
@@ -368,12 +524,12 @@ def test_terms_of_composed_levels(maker: type[Keyed], op: Core, whole: bool) -> 
 
 
 @composed_cases
-def test_bits_of_composed_levels(op: Core, whole: bool) -> None:
-    rows = list(composed(op, whole))
+def test_bits_of_composed_levels(op: Core, of: str) -> None:
+    rows = list(composed(op, of))
     bits = Bits()
     words = [bits.word(node) for node, _, _ in rows]
     given = [
-        bits.equals(bits.word(arg), arg.kind, key(value))
+        bits.equals(bits.word(arg), arg.kind, key_of(arg.kind, value))
         for node, operands, _ in rows
         for arg, value in zip(node.args, operands, strict=True)
     ]
@@ -381,7 +537,9 @@ def test_bits_of_composed_levels(op: Core, whole: bool) -> None:
     assert solver.holds(given)
     for (node, operands, value), word in zip(rows, words, strict=True):
         found = [solver.value(one) for one in word]
-        assert (found[0] if isinstance(node.kind, Bool) else key_of_bits(found)) == key(value), operands
+        assert (found[0] if isinstance(node.kind, Bool) else key_of_bits(found)) == key_of(
+            node.kind, value
+        ), operands
 
 
 @pytest.mark.parametrize("divisor", [1, 2, 3, 7, 8])
@@ -442,6 +600,7 @@ def test_quotients_of_composed_levels_by_powers_of_two(divisor: int) -> None:
 
 SMALL = """
 input a : real -1.0 .. 1.0
+input f : single -1.0 .. 1.0
 output n : int 0 .. 9
 output r : real -9.0 .. 9.0
 table t {
@@ -496,7 +655,7 @@ def c_program() -> str:
         f"static {function.head} {{\n" + "\n".join(IN_C.lines(function.body)) + "\n}"
         for function in (helper(text.names.program, name) for name in sorted(used))
     ]
-    extremes = [EXTREMES.format(T=name) for name in ("int32_t", "int64_t", "ref_wide", "double")]
+    extremes = [EXTREMES.format(T=name) for name in ("int32_t", "int64_t", "ref_wide", "double", "float")]
     head = ["#include <stdio.h>\n#include <stdint.h>\n#include <stdbool.h>\n#include <string.h>", SHOW]
     main = "int main(void) {\n" + "\n".join(calls) + "\nreturn 0; }"
     prelude = ["#define REF_ASSUMPTIONS 1", C_PRELUDE]
@@ -509,6 +668,7 @@ static uint64_t bits_of(double d) { uint64_t u; if (d != d) { return 1; } memcpy
 static void show_int64_t(int64_t a, int64_t b) { printf("%lld %lld\\n", (long long)a, (long long)b); }
 static void show_uint64_t(uint64_t a, uint64_t b) { printf("%llu %llu\\n", (unsigned long long)a, (unsigned long long)b); }
 static void show_bool(bool a, bool b) { printf("%d %d\\n", a, b); }
+static void show_float(float a, float b) { printf("d%llu d%llu\\n", (unsigned long long)bits_of(a), (unsigned long long)bits_of(b)); }
 static void show_double(double a, double b) { printf("d%llu d%llu\\n", (unsigned long long)bits_of(a), (unsigned long long)bits_of(b)); }
 """
 
@@ -527,7 +687,7 @@ def c_bits(kind: Scalar, value: Value) -> str:
 
 def c_value(kind: Scalar, bits: str) -> str:
     """The value of 64 bits."""
-    return f"of_bits({bits})" if isinstance(kind, Real) else f"({wide_type(kind)}){bits}"
+    return f"({wide_type(kind)})of_bits({bits})" if isinstance(kind, Real) else f"({wide_type(kind)}){bits}"
 
 
 def shown(value: Value, kind: Scalar) -> str:

@@ -631,7 +631,7 @@ def test_counts_mean_how_many_hold(cell: str, plain: str) -> None:
     ("cell", "code", "message"),
     [
         ("count(a, n) = 1", "RCS301", "a condition is a bool, this is int"),
-        ("int(n) = 1", "RCS301", "`int` converts a real number or a bool"),
+        ("int(n) = 1", "RCS301", "`int` converts a real number, a single or a bool"),
         ("count(a, b) = 3.0", "RCS301", ""),
         ("abs(a) = 1", "RCS301", "arithmetic takes numbers, this is bool"),
     ],

@@ -12,7 +12,7 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.interpret import initial, unfit
-from rcsc.lang.model import Bool, Enum, Int, Real, Scalar, Value, pending, value_of_text
+from rcsc.lang.model import Bool, Enum, Int, Real, Scalar, Value, pending, spell, value_of_text
 
 Starts: TypeAlias = Mapping[str, Mapping[str, Value]]
 """For each level the values with which leaves begin."""
@@ -88,7 +88,7 @@ def _values(kind: Scalar, text: str) -> Iterator[str]:
         case Bool():
             yield "it is true or false"
         case Int() | Real():
-            yield f"it is a number from {kind.low} to {kind.high}"
+            yield f"it is a number from {spell(kind, kind.low)} to {spell(kind, kind.high)}"
 
 
 def _whole(ts: TransitionSystem, given: Mapping[str, Value]) -> dict[str, Value]:

@@ -366,9 +366,7 @@ def _admits(taken: Scalar, given: Scalar) -> bool:
     """Return whether each value of the given type has the same meaning in the taking type."""
     if isinstance(taken, Enum) and isinstance(given, Enum):
         return taken.members == given.members
-    if (isinstance(taken, Int) and isinstance(given, Int)) or (
-        isinstance(taken, Real) and isinstance(given, Real)
-    ):
+    if isinstance(taken, Int | Real) and isinstance(given, Int | Real) and type(taken) is type(given):
         return taken.unit == given.unit and taken.low <= given.low and given.high <= taken.high
     return taken == given
 

@@ -87,9 +87,9 @@ def _both(first: Scalar, second: Scalar, shared: "Mapping[Enum, _Members]") -> S
         case Int(unit=unit), Int(unit=other) if unit == other:
             low, high = max(first.low, second.low), min(first.high, second.high)
             return Int(low, high, unit) if low <= high else None
-        case Real(unit=unit), Real(unit=other) if unit == other:
+        case Real(unit=unit), Real(unit=other) if unit == other and type(first) is type(second):
             least, greatest = max(first.low, second.low), min(first.high, second.high)
-            return Real(least, greatest, unit) if least <= greatest else None
+            return replace(first, low=least, high=greatest) if least <= greatest else None
         case Enum(), Enum():
             known = {members.whole: members.common for members in shared.values()}
             if first == second:

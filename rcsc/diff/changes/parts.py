@@ -85,7 +85,7 @@ def _narrower(first: Scalar, second: Scalar) -> Scalar:
         case Int(), Int():
             return Int(max(first.low, second.low), min(first.high, second.high), first.unit)
         case Real(), Real():
-            return Real(max(first.low, second.low), min(first.high, second.high), first.unit)
+            return replace(first, low=max(first.low, second.low), high=min(first.high, second.high))
         case _:
             return first
 

@@ -256,7 +256,7 @@ class Versions:
         return {**initial(program), **given}
 
 
-_HARD = {Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.TO_REAL}
+_HARD = {Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.TO_REAL, Op.TO_SINGLE}
 
 
 def is_hard(condition: Node) -> bool:

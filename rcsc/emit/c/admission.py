@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from rcsc.emit.c.cprogram import AT, NONE, CProgram, fault_name, first_of, on_state, run_on_state
-from rcsc.emit.c.ctext import c_type
+from rcsc.emit.c.ctext import CALLED, c_type
 from rcsc.emit.code_tree import (
     Body,
     Branch,
@@ -67,7 +67,7 @@ def refusal(c: CProgram, variable: Variable, place: Code) -> Code | None:
     if isinstance(kind, Real):
         if not clamped:
             return _beyond(c, kind, place)
-        name = "number_f64"
+        name = f"number_{CALLED[c_type(kind)]}"
         return Prefix("!", Invoke(f"{c.p}_{name}", (place,), "bool", helper=name))
     if isinstance(kind, Bool) or clamped:
         return None

@@ -45,8 +45,9 @@ def _view(c: CProgram) -> dict[str, object]:
     publics = (init_function(c), check_function(c), *tables, *step_functions(c), *levels)
     code = tuple(read((*procedures, settle, *inner, *publics, *c.classifiers)))
     kinds = {c_type(variable.type) for variable in c.program.variables}
-    reals = "double" in kinds.union(getattr(node, "type", "") for node in code)
-    admission = admit_function(c, reals)
+    types = kinds.union(getattr(node, "type", "") for node in code)
+    doubles, singles = ("double" in types, "float" in types)
+    admission = admit_function(c, doubles or singles)
     calls = (node for node in (*code, *read(admission)) if isinstance(node, Invoke))
     used = {call.helper for call in calls if call.helper}
     bits = {name for name in used if name.startswith("bit")}
@@ -65,7 +66,9 @@ def _view(c: CProgram) -> dict[str, object]:
         "failed": c.names.failed,
         "failed_type": failed_type(len(c.plan.monitored)),
         "faults": c.names.faults,
-        "reals": reals,
+        "reals": doubles or singles,
+        "doubles": doubles,
+        "singles": singles,
         "bits": bits,
         "externs": list(externs(c)),
         "helpers": [*(helper(c.p, name) for name in sorted(used - bits)), *c.classifiers],

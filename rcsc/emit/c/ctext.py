@@ -40,21 +40,26 @@ from rcsc.emit.translate import FAULT, Text, constant, local
 from rcsc.lang import model
 from rcsc.lang.expressions.words import bits_of, field_of, mask_of
 from rcsc.lang.leaves import everything
-from rcsc.lang.model import I64_MAX, Bool, Enum, Expr, Int, Op, Real, Scalar, Value
+from rcsc.lang.model import I64_MAX, Bool, Enum, Expr, Int, Op, Real, Scalar, Single, Value
 from rcsc.lang.operator_table import Arithmetic, Comparison, Operator, is_arithmetic, is_comparison
 
 _INFIX = {
     Op.AND: "&&", Op.OR: "||", Op.EQ: "==", Op.NE: "!=", Op.LT: "<", Op.LE: "<=", Op.GT: ">", Op.GE: ">=",
     Op.ADD: "+", Op.SUB: "-", Op.MUL: "*", Op.DIV: "/", Op.MOD: "%",
 }  # fmt: skip
-SHORT = {"f64": "double"} | {f"{s or 'i'}{n}": f"{s}int{n}_t" for s in ("", "u") for n in (8, 16, 32, 64)}
+SHORT = {"f64": "double", "f32": "float"} | {
+    f"{s or 'i'}{n}": f"{s}int{n}_t" for s in ("", "u") for n in (8, 16, 32, 64)
+}
 """How a type is called in the name of a helper."""
 WORD_TYPES = ("int32_t", "uint32_t", "int64_t", "uint64_t")
 """Types in which whole numbers are computed."""
+FLOATS = ("double", "float")
+"""Types of numbers with a fraction."""
 LOGIC = frozenset({"&&", "||", "==", "!=", "<", "<=", ">", ">="})
 """Operators whose result is a truth value."""
 LEAVES = (model.Read, model.ReadLocal, model.Select)
-_CALLED = {kind: short for short, kind in SHORT.items()}
+CALLED = {kind: short for short, kind in SHORT.items()}
+"""The reverse."""
 
 
 def c_type(kind: Scalar) -> str:
@@ -62,6 +67,8 @@ def c_type(kind: Scalar) -> str:
     match kind:
         case Bool():
             return "bool"
+        case Single():
+            return "float"
         case Real():
             return "double"
         case Enum(members=members):
@@ -131,7 +138,7 @@ def _bounds(exprs: Iterable[Expr]) -> tuple[int, int]:
 
 
 def _c_bounds(expr: Expr) -> tuple[Value, Value]:
-    """What the C type of an expression can hold: a constant only itself, a double anything.
+    """What the C type of an expression can hold: a constant only itself, a double or single anything.
 
     Of a division or a remainder by a constant compilers know more: they compute it in the type of what is divided.
     """
@@ -206,19 +213,22 @@ def _plain(code: Code) -> bool:
     """Whether it may be cast as it stands: a variable, or a constant that is one token."""
     match code:
         case Constant(value=value, type=kind):
-            return kind != "double" or value >= 0
+            return kind not in FLOATS or value >= 0
         case Place(steps=steps):
             return all(isinstance(step, str | Name) for step in steps)
         case Cast(type=kind, operand=operand):
-            return kind != "double" and isinstance(operand, Name | Place) and _plain(operand)
+            return kind not in FLOATS and isinstance(operand, Name | Place) and _plain(operand)
         case _:
             return isinstance(code, Name)
 
 
 def _narrower(source: str, target: str) -> bool:
-    """Whether `target` is an integer type of the same sign, and no wider: the result of an operation may be cast to it (MISRA C 10.8)."""
-    if "double" in (source, target) or "bool" in (source, target):
-        return False
+    """Whether the result of an operation may be cast to `target`, which is no wider (MISRA C 10.8).
+
+    It is an integer type of the same sign, or a single for a double.
+    """
+    if not {"bool", *FLOATS}.isdisjoint((source, target)):
+        return (source, target) == ("double", "float")
     return (
         source.startswith("u") == target.startswith("u") and type_bounds(target)[1] <= type_bounds(source)[1]
     )
@@ -362,7 +372,7 @@ class CText(Text):
             if known is None and sides[0] == sides[1] and not isinstance(args[0].type, Real):
                 known = op in (Op.EQ, Op.LE, Op.GE)  # two ways to write one variable
             return self._operation(op, sides, "") if known is None else constant(Bool(), known)
-        if op is Op.TO_INT or op is Op.TO_REAL:
+        if op is Op.TO_INT or op is Op.TO_REAL or op is Op.TO_SINGLE:
             given = self.expr(args[0])
             if isinstance(args[0].type, Bool):
                 return Choice(given, Constant(1, "uint32_t"), Constant(0, "uint32_t"))
@@ -401,7 +411,7 @@ class CText(Text):
             case Op.IMPLIES:
                 return _chain("||", (negated(args[0]), args[1]))
             case Op.ABS | Op.MIN | Op.MAX:
-                return self._helper(f"{op.value}_{_CALLED[shared]}", args, shared)
+                return self._helper(f"{op.value}_{CALLED[shared]}", args, shared)
             case Op.AND | Op.OR:
                 return _chain(_INFIX[op], args)
             case (
@@ -424,11 +434,11 @@ class CText(Text):
         """
         if source == target:
             return code
-        if isinstance(code, Constant) and target != "double":
+        if isinstance(code, Constant) and target not in FLOATS:
             return Constant(code.value, target)
         if _plain(code) or _narrower(source, target):
             return Cast(target, code)
-        return self._helper(f"{_CALLED[target]}_of_{_CALLED[source]}", (code,), target)
+        return self._helper(f"{CALLED[target]}_of_{CALLED[source]}", (code,), target)
 
     def stored(self, kind: Scalar, value: Expr, *, leaf: bool = False) -> Code:
         """A value for a leaf, or for a local, in the type that it is kept in."""

@@ -207,7 +207,7 @@ def range_text(kind: model.Type) -> str:
     match kind:
         case Int(low, high, unit) | Real(low, high, unit):
             units = unit_text(unit)
-            return f"{low} .. {high}" + (f" {units}" if units else "")
+            return f"{spell(kind, low)} .. {spell(kind, high)}" + (f" {units}" if units else "")
         case model.Array(element=element):
             return range_text(element)
         case _:

@@ -1,6 +1,7 @@
 """Functions of one operator or conversion, which expressions call."""
 
 from rcsc.emit.c.ctext import (
+    FLOATS,
     SHORT,
 )
 from rcsc.emit.code_tree import (
@@ -35,7 +36,7 @@ def helper(program: str, name: str) -> Function:
         return Function(doc, f"bool {program}_{name}({kind} a)", body)
     if op == "abs":
         zero, absolute = Constant(0, kind), None
-        if kind == "double":
+        if kind in FLOATS:
             absolute = Choice(infix("<=", a, zero), infix("-", zero, a), a)  # of -0.0 too
         elif not kind.startswith("u"):
             absolute = Choice(infix("<", a, zero), Prefix("-", a), a)

@@ -1,15 +1,15 @@
 """Interval arithmetic: bounds that enclose every value an operation can take.
 
 Integers exactly; doubles by the monotonicity of IEEE operations rounded to nearest: the extreme results are
-those of the extreme operands, computed in the same arithmetic.
+those of the extreme operands, computed in the same arithmetic. Singles alike, rounded once more.
 """
 
 import math
 from itertools import product
 from typing import TypeVar
 
-from rcsc.lang.model import Int, Real, Scalar, Unit
-from rcsc.lang.operator_table import Arithmetic, Op, divide
+from rcsc.lang.model import Int, Real, Scalar, Single, Unit
+from rcsc.lang.operator_table import Arithmetic, Op, divide, single
 
 WIDEST = 2**200
 """Integer bounds stop here: a result beyond 64 bits is refused by its own proof obligation."""
@@ -23,7 +23,10 @@ def apply(op: Arithmetic, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
         low, high = _integers(op, *((k.low, k.high) for k in kinds if isinstance(k, Int)))
         return Int(min(max(low, -WIDEST), WIDEST), min(max(high, -WIDEST), WIDEST), unit)
     bounds = _reals(op, *((k.low, k.high) for k in kinds if isinstance(k, Real)))
-    return Real(*bounds, unit) if bounds else Real(-math.inf, math.inf, unit)
+    least, greatest = bounds or (-math.inf, math.inf)
+    if isinstance(kinds[0], Single):
+        return Single(single(least), single(greatest), unit)
+    return Real(least, greatest, unit)
 
 
 def _integers(op: Arithmetic, a: tuple[int, int], b: tuple[int, int] = (0, 0)) -> tuple[int, int]:

@@ -8,7 +8,8 @@ from rcsc.diagnostics.diagnostic import Label
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.operators import Typed
 from rcsc.lang.expressions.scope import Scope
-from rcsc.lang.model import U64_MAX, Int, Literal, Real
+from rcsc.lang.model import U64_MAX, Int, Literal, Real, Scalar, Single
+from rcsc.lang.operator_table import single, spell_single
 from rcsc.lang.syntax import tree
 
 LONGEST = 1_000
@@ -55,6 +56,41 @@ def real(scope: Scope, written: tree.RealLiteral) -> Typed | None:
     return Typed(
         Literal(value, Real(value, value, scope.unit(written.unit)), written.span), written.unit is None
     )
+
+
+def as_single(scope: Scope, want: Scalar | None, given: Typed | None, written: tree.Expr) -> Typed | None:
+    """A constant double as the nearest single, where a single is wanted; anything else as it is; None where too large (reported).
+
+    Two different numbers of the text that are one single are reported, as those are that are one double.
+    """
+    if not isinstance(want, Single) or given is None or not isinstance(given.expr, Literal):
+        return given
+    kind = given.expr.type
+    if not isinstance(kind, Real) or isinstance(kind, Single):
+        return given
+    double = float(given.expr.value)
+    value = single(double) + 0.0
+    if not math.isfinite(value):
+        scope.report(Code.NOT_FINITE, f"`{double!r}` is larger than every single", written.span)
+        return None
+    while isinstance(written, tree.Unary):
+        written = written.operand
+    if isinstance(written, tree.RealLiteral):
+        _one_single(scope, abs(value), written)
+    return Typed(Literal(value, Single(value, value, kind.unit), given.expr.span), given.bare)
+
+
+def _one_single(scope: Scope, value: float, written: tree.RealLiteral) -> None:
+    """Reports two different numbers of the text that are the same single."""
+    text = written.text.replace("_", "")
+    first = scope.singles.setdefault(value, (text, scope.at(written.span)))
+    if Fraction(first[0]) != Fraction(text):
+        message = (
+            f"`{text}` and `{first[0]}` are different numbers but the same single, {spell_single(value)}"
+        )
+        label = Label(first[1], "the other")
+        help_text = f"write {spell_single(value)} for both"
+        scope.report(Code.SAME_DOUBLE, message, written.span, help_text, related=(label,))
 
 
 def _one_spelling(scope: Scope, value: float, text: str, span: Span) -> None:

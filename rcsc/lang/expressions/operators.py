@@ -1,7 +1,7 @@
 """What operators make of typed operands: kinds and units checked, bounds computed, constants folded."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -22,10 +22,11 @@ from rcsc.lang.model import (
     ReadLocal,
     Real,
     Scalar,
+    Single,
     Unit,
     spell,
 )
-from rcsc.lang.operator_table import Arithmetic, Comparison, Conversion, Op
+from rcsc.lang.operator_table import Arithmetic, Comparison, Conversion, Op, single
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +56,15 @@ def kind_word(kind: Scalar) -> str:
             return f"`{name}`"
         case Int():
             return "int"
+        case Single():
+            return "single"
         case Real():
             return "real"
+
+
+def width(kind: Scalar) -> str:
+    """What the numbers of a kind with a decimal point are called, for messages."""
+    return "single" if isinstance(kind, Single) else "double"
 
 
 def same_kind(left: Scalar, right: Scalar) -> bool:
@@ -78,16 +86,15 @@ def applied(
     if value is None:
         return Typed(operation, bare)
     if isinstance(operation.type, Real) and not math.isfinite(value):
-        scope.report(Code.NOT_FINITE, "this constant is larger than every double", span)
+        scope.report(Code.NOT_FINITE, f"this constant is larger than every {width(operation.type)}", span)
         return None
     if isinstance(operation.type, Int) and not I64_MIN <= value <= U64_MAX:
         scope.report(Code.TOO_WIDE, "no 64-bit integer holds this constant", span)
         return None
-    point = (
-        Int(int(value), int(value), unit)
-        if isinstance(operation.type, Int)
-        else Real(value + 0.0, value + 0.0, unit)
-    )
+    if isinstance(operation.type, Real):
+        point: Scalar = replace(operation.type, low=value + 0.0, high=value + 0.0)
+    else:
+        point = Int(int(value), int(value), unit)
     return Typed(Literal(value + 0.0 if isinstance(value, float) else value, point, span), bare)
 
 
@@ -121,10 +128,16 @@ def side(operand: Typed) -> str:
     return f"{shown}, which is {kind_word(operand.expr.type)}"
 
 
+_CONVERSIONS = {
+    frozenset({"int", "real"}): ("convert with `real(n)` or `int(x)`",),
+    frozenset({"int", "single"}): ("convert with `single(n)` or `int(x)`",),
+    frozenset({"real", "single"}): ("convert with `real(x)`, which is exact, or `single(x)`, which rounds",),
+}
+
+
 def conversion(one: Scalar, two: Scalar) -> tuple[str, ...]:
-    """What helps where a whole number meets a real one."""
-    both = {kind_word(one), kind_word(two)} == {"int", "real"}
-    return ("convert with `real(n)` or `int(x)`",) if both else ()
+    """What helps where numbers of two kinds meet."""
+    return _CONVERSIONS.get(frozenset({kind_word(one), kind_word(two)}), ())
 
 
 def one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
@@ -166,7 +179,7 @@ def compared(scope: Scope, op: Comparison, pair: tuple[Typed, Typed], span: Span
     return Typed(Apply(op, (left.expr, right.expr), Bool(), span))
 
 
-def _nearest(bound: int) -> float:
+def _nearest(bound: float) -> float:
     """The double nearest to a bound; infinite beyond all doubles, where a bound of a bound may lie."""
     try:
         return float(bound)
@@ -174,24 +187,35 @@ def _nearest(bound: int) -> float:
         return math.inf if bound > 0 else -math.inf
 
 
+_CONVERTED: dict[Conversion, str] = {
+    Op.TO_INT: "a real number, a single or a bool",
+    Op.TO_REAL: "a whole number or a single",
+    Op.TO_SINGLE: "a whole number or a real number",
+}
+
+
 def converted(scope: Scope, op: Conversion, operand: Typed, span: Span) -> Typed | None:
-    """`int(x)` toward zero, or `real(n)` to the nearest double; the unit stays."""
+    """`int(x)` toward zero, `real(n)` to the nearest double, or `single(n)` to the nearest single; the unit stays."""
     kind = operand.expr.type
+    if not isinstance(kind, Int | Real) or kind_word(kind) == op.value:
+        scope.report(Code.KIND, f"`{op.value}` converts {_CONVERTED[op]}", span)
+        return None
+    converted: Scalar
     if op is Op.TO_REAL:
-        if not isinstance(kind, Int):
-            scope.report(Code.KIND, "`real` converts a whole number", span)
-            return None
-        converted: Scalar = Real(_nearest(kind.low), _nearest(kind.high), kind.unit)
+        converted = Real(_nearest(kind.low), _nearest(kind.high), kind.unit)
+    elif op is Op.TO_SINGLE:
+        converted = Single(single(kind.low), single(kind.high), kind.unit)
     else:
-        if not isinstance(kind, Real):
-            scope.report(Code.KIND, "`int` converts a real number or a bool", span)
-            return None
+        assert isinstance(kind, Real)
         wide = not (math.isfinite(kind.low) and math.isfinite(kind.high))
         converted = Int(*((-(2**1024), 2**1024) if wide else (int(kind.low), int(kind.high))), kind.unit)
     conversion = Apply(op, (operand.expr,), converted, span)
     value = fold(conversion) if isinstance(operand.expr, Literal) else None
     if value is not None and op is Op.TO_INT and not I64_MIN <= value <= U64_MAX:
         scope.report(Code.TOO_WIDE, "no 64-bit integer holds this constant", span)
+        return None
+    if value is not None and op is Op.TO_SINGLE and not math.isfinite(value):
+        scope.report(Code.NOT_FINITE, "this constant is larger than every single", span)
         return None
     return Typed(conversion if value is None else Literal(value, converted, span), operand.bare)
 

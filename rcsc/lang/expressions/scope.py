@@ -56,6 +56,7 @@ class Scope:
         signatures: The types of each procedure's parameters.
         places_of: The place of each leaf in declared order; made when it is asked for.
         doubles: The first spelling of each double of the text, and where it stands.
+        singles: The same of each single.
         demand: Resolves a constant (`value`) or `type` asked for before its turn; False after an error.
         variables: Names of variables, declared or not yet.
         cell: The table cell that is being resolved.
@@ -90,6 +91,7 @@ class Scope:
     procedures: dict[str, tree.ProcedureDecl] = field(default_factory=dict)
     signatures: dict[str, tuple[Scalar, ...]] = field(default_factory=dict)
     doubles: dict[float, tuple[str, Span]] = field(default_factory=dict)
+    singles: dict[float, tuple[str, Span]] = field(default_factory=dict)
     records: list[Record] = field(default_factory=list)
     elements: dict[tuple[str, int], tuple[str, ...]] = field(default_factory=dict)
     demand: Callable[[str, tree.Name], bool] = lambda _space, _name: True

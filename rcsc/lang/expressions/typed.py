@@ -9,7 +9,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions import words
 from rcsc.lang.expressions.folding import fold
-from rcsc.lang.expressions.literals import integer, real
+from rcsc.lang.expressions.literals import as_single, integer, real
 from rcsc.lang.expressions.operators import (
     Typed,
     alike,
@@ -59,7 +59,7 @@ def typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None = No
         return None
     scope.depth += 1
     try:
-        return _typed(scope, body, written, want)
+        return as_single(scope, want, _typed(scope, body, written, want), written)
     finally:
         scope.depth -= 1
 
@@ -465,6 +465,7 @@ def _pair(scope: Scope, body: Body, left: tree.Expr, right: tree.Expr) -> tuple[
     else:
         first = typed(scope, body, left)
         second = typed(scope, body, right, first.expr.type if first else None)
+        first = as_single(scope, second.expr.type if second else None, first, left)
     return None if first is None or second is None else (first, second)
 
 
@@ -657,16 +658,19 @@ def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
             Code.WRONG_ARGUMENTS, f"`{op.value}` takes {want} argument{'s' * (want - 1)}", written.span
         )
         return None
-    args = [typed(scope, body, arg) for arg in written.args]
-    operands = tuple(arg for arg in args if arg is not None)
-    if len(operands) != want:
+    if len(written.args) == 2:
+        operands: tuple[Typed, ...] | None = _pair(scope, body, *written.args)
+    else:
+        operand = typed(scope, body, written.args[0])
+        operands = None if operand is None else (operand,)
+    if operands is None:
         return None
     if op is Op.TO_INT and isinstance(operands[0].expr.type, Bool):
         return counted(operands[0].expr, written.span)
     if not all(_number(scope, o, w) for o, w in zip(operands, written.args, strict=True)):
         return None
     match op:
-        case Op.TO_INT | Op.TO_REAL:
+        case Op.TO_INT | Op.TO_REAL | Op.TO_SINGLE:
             return converted(scope, op, operands[0], written.span)
         case Op.ABS | Op.MIN | Op.MAX:
             return alike(scope, op, operands, written.span)

@@ -1,11 +1,13 @@
 """Type expressions to types, and constants to values."""
 
 import math
+from dataclasses import replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
-from rcsc.lang.expressions.operators import Typed
+from rcsc.lang.expressions.literals import as_single
+from rcsc.lang.expressions.operators import Typed, conversion, kind_word, same_kind
 from rcsc.lang.expressions.scope import MOST_LEAVES, Body, Scope
 from rcsc.lang.expressions.typed import typed, without_before
 from rcsc.lang.model import (
@@ -20,6 +22,7 @@ from rcsc.lang.model import (
     Real,
     Record,
     Scalar,
+    Single,
     Type,
     Unit,
     Value,
@@ -46,7 +49,9 @@ def type_of(scope: Scope, written: tree.TypeExpr) -> Type:
         case tree.IntType():
             return _int(scope, written)
         case tree.RealType():
-            return _real(scope, written)
+            return _real(scope, written, Real(0.0, 0.0))
+        case tree.SingleType():
+            return _real(scope, written, Single(0.0, 0.0))
 
 
 def size(kind: Type) -> int:
@@ -92,7 +97,7 @@ def constant(scope: Scope, written: tree.Expr, want: Scalar | None = None) -> Ty
 def _point(kind: Scalar, value: Value) -> Scalar:
     if isinstance(kind, Int):
         return Int(int(value), int(value), kind.unit)
-    return Real(float(value), float(value), kind.unit) if isinstance(kind, Real) else kind
+    return replace(kind, low=float(value), high=float(value)) if isinstance(kind, Real) else kind
 
 
 def _length(scope: Scope, written: tree.Expr) -> int:
@@ -106,7 +111,9 @@ def _length(scope: Scope, written: tree.Expr) -> int:
     return int(length)
 
 
-def _bounds(scope: Scope, written: tree.IntType | tree.RealType) -> tuple[Typed, Typed, Unit] | None:
+def _bounds(
+    scope: Scope, written: tree.IntType | tree.RealType | tree.SingleType
+) -> tuple[Typed, Typed, Unit] | None:
     low, high = constant(scope, written.low), constant(scope, written.high)
     if low is None or high is None:
         return None
@@ -142,12 +149,15 @@ def _int(scope: Scope, written: tree.IntType) -> Int:
     return Int(least, most, unit)
 
 
-def _real(scope: Scope, written: tree.RealType) -> Real:
+def _real(scope: Scope, written: tree.RealType | tree.SingleType, kind: Real) -> Real:
+    """A type of numbers with a decimal point; `kind` is one of them."""
     bounds = _bounds(scope, written)
     if bounds is None:
-        return Real(0.0, 0.0)
+        return kind
     low, high, unit = bounds
-    least, most = _double(scope, low, written.low.span), _double(scope, high, written.high.span)
+    least, most = (
+        _end(scope, kind, bound, place) for bound, place in ((low, written.low), (high, written.high))
+    )
     if least > most:
         scope.report(
             Code.EMPTY_RANGE,
@@ -155,13 +165,22 @@ def _real(scope: Scope, written: tree.RealType) -> Real:
             written.span,
             "write the smaller bound first",
         )
-        return Real(most, most, unit)
-    return Real(least, most, unit)
+        return replace(kind, low=most, high=most, unit=unit)
+    return replace(kind, low=least, high=most, unit=unit)
 
 
-def _double(scope: Scope, bound: Typed, span: Span) -> float:
-    value = bound.literal().value
-    if not isinstance(bound.expr.type, Real):
-        scope.report(Code.KIND, "the bounds of a `real` have a decimal point", span, f"write `{value}.0`")
+def _end(scope: Scope, kind: Real, bound: Typed, written: tree.Expr) -> float:
+    fitting = as_single(scope, kind, bound, written)
+    if fitting is None:
+        return 0.0
+    value = fitting.literal().value
+    if not same_kind(fitting.expr.type, kind):
+        message = f"the bounds of a `{kind_word(kind)}` have a decimal point"
+        helps = (
+            (f"write `{value}.0`",)
+            if isinstance(bound.expr.type, Int)
+            else conversion(fitting.expr.type, kind)
+        )
+        scope.report(Code.KIND, message, written.span, *helps)
         return 0.0
     return float(value) + 0.0 if math.isfinite(value) else 0.0

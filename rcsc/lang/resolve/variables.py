@@ -28,6 +28,7 @@ from rcsc.lang.model import (
     VariableName,
     key_bounds,
     pending,
+    spell,
     value_of_key,
 )
 from rcsc.lang.syntax import tree
@@ -196,7 +197,11 @@ def fits(scope: Scope, kind: Scalar, value: Typed, span: Span) -> bool:
             return False
         literal = value.literal().value
         if not kind.low <= literal <= kind.high:
-            scope.report(Code.OUT_OF_RANGE_CONSTANT, f"{literal} is not in {kind.low} .. {kind.high}", span)
+            scope.report(
+                Code.OUT_OF_RANGE_CONSTANT,
+                f"{spell(kind, literal)} is not in {spell(kind, kind.low)} .. {spell(kind, kind.high)}",
+                span,
+            )
             return False
     return True
 

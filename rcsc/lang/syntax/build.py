@@ -9,6 +9,12 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.comments import Comments, split, words
 from rcsc.lang.syntax.lalr import ParseNode
 
+_NUMBER_TYPES: dict[str, type[tree.IntType | tree.RealType | tree.SingleType]] = {
+    "int_type": tree.IntType,
+    "real_type": tree.RealType,
+    "single_type": tree.SingleType,
+}
+
 
 class Rows(Protocol):
     """Parses the rows of a table."""
@@ -298,7 +304,7 @@ class Build:
                 return tree.ArrayType(self.expr(node.children[0]), self.type(node.children[1]), span)
             case rule:
                 low, high, *unit = node.children
-                built = tree.IntType if rule == "int_type" else tree.RealType
+                built = _NUMBER_TYPES[rule]
                 most, own = self.expr(high), self._unit(unit)
                 if (
                     own is None

@@ -47,6 +47,7 @@ _WORDS = {
     "MASK": "bits",
     "_INT": "`int`",
     "_REAL": "`real`",
+    "_SINGLE": "`single`",
     "_SET": "`set`",
     "_REQ": "`req`",
 }
@@ -55,9 +56,10 @@ _CLASSES = {
     "KIND": ("input", "state", "output"),
     "ADMIT": ("clamp", "reject"),
     "STANDING": ("assumed", "monitored", "proved"),
-    "FUNCTION": ("abs", "min", "max", "count"),
+    "FUNCTION": ("abs", "min", "max", "count", "single"),
     "_INT": ("int",),
     "_REAL": ("real",),
+    "_SINGLE": ("single",),
     "_SET": ("set",),
 }
 """The words of the terminals that are not called as their one word is."""
@@ -88,7 +90,7 @@ def expected(terminals: Iterable[str]) -> str:
             names -= group | ({"NAME", "INT", "MINUS", "_INT", "_REAL"} if word != "an operator" else set())
             parts.append(word)
     if {"BOOL", "ARRAY"} <= names:
-        names -= {"INT", "REAL", "ARRAY", "NAME", "_INT", "_REAL"}
+        names -= {"INT", "REAL", "ARRAY", "NAME", "_INT", "_REAL", "_SINGLE"}
     single = sorted(_WORDS.get(name, f"`{name.lower()}`") for name in names)
     words = (parts + single)[:_MOST]
     return " or ".join(words) if len(words) < 3 else ", ".join(words[:-1]) + " or " + words[-1]

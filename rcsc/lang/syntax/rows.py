@@ -23,7 +23,7 @@ STUB = re.compile(r"(?P<name>\w+)(\s+(above|same)\s+\w+(\s*,\s*\w+)*)*$", re.ASC
 """The first cell of a line: its name, the lines above which it stands, and those that do the same."""
 _MARK = re.compile(r"\s+(above|same)\s+(\w+(?:\s*,\s*\w+)*)", re.ASCII)
 MARKS = "after a line's name may stand `above LINE, LINE`, or `above all`, and `same LINE`"
-CALL = re.compile(r"(?!(?:abs|min|max|int|real|not)\b)[A-Za-z_][A-Za-z0-9_]*\s*\(|[^=]*:=")
+CALL = re.compile(r"(?!(?:abs|min|max|int|real|single|not)\b)[A-Za-z_][A-Za-z0-9_]*\s*\(|[^=]*:=")
 """What looks like a call or an assignment, and stands perhaps where a value should."""
 CALL_UNDER = "a call or an assignment stands under `procedures`, `command_out` or `status_out`"
 IN_QUOTES = (

@@ -157,8 +157,10 @@ def spell_type(kind: tree.TypeExpr) -> str:
             return "bool"
         case tree.NamedType(name):
             return name.text
-        case tree.IntType(low, high, unit) | tree.RealType(low, high, unit):
-            word = "int" if isinstance(kind, tree.IntType) else "real"
+        case (
+            tree.IntType(low, high, unit) | tree.RealType(low, high, unit) | tree.SingleType(low, high, unit)
+        ):
+            word = {tree.IntType: "int", tree.RealType: "real", tree.SingleType: "single"}[type(kind)]
             unit_text = f" {spell_unit(unit)}" if unit else ""
             return f"{word} {spell_expr(low, SUM)} .. {spell_expr(high, SUM)}{unit_text}"
         case tree.ArrayType(length, element):

@@ -314,6 +314,16 @@ class RealType:
 
 
 @dataclass(frozen=True, slots=True)
+class SingleType:
+    """`single LOW .. HIGH [unit]`: an IEEE single in a finite range."""
+
+    low: Expr
+    high: Expr
+    unit: Unit | None = None
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
 class ArrayType:
     """`array[LENGTH] of ELEMENT`."""
 
@@ -322,7 +332,7 @@ class ArrayType:
     span: Span = at()
 
 
-TypeExpr: TypeAlias = BoolType | NamedType | IntType | RealType | ArrayType
+TypeExpr: TypeAlias = BoolType | NamedType | IntType | RealType | SingleType | ArrayType
 
 
 # --- statements ----------------------------------------------------------------------

@@ -149,5 +149,5 @@ def write_parquet(log: Log, path: Path) -> None:
 
 _ARROW = {
     "bool": "bool_", "uint8_t": "uint8", "int8_t": "int8", "uint16_t": "uint16", "int16_t": "int16",
-    "uint32_t": "uint32", "int32_t": "int32", "uint64_t": "uint64", "int64_t": "int64", "double": "float64",
+    "uint32_t": "uint32", "int32_t": "int32", "uint64_t": "uint64", "int64_t": "int64", "double": "float64", "float": "float32",
 }  # fmt: skip

@@ -28,7 +28,7 @@ LEVELS, BUFFERS, RESTARTS = "/levels/", "/buffers/", "/restarts/"
 
 _ROS = {
     "bool": "bool", "uint8_t": "uint8", "int8_t": "int8", "uint16_t": "uint16", "int16_t": "int16",
-    "uint32_t": "uint32", "int32_t": "int32", "uint64_t": "uint64", "int64_t": "int64", "double": "float64",
+    "uint32_t": "uint32", "int32_t": "int32", "uint64_t": "uint64", "int64_t": "int64", "double": "float64", "float": "float32",
 }  # fmt: skip
 _TRACE_FIELDS = (
     "int32 line # place of the line in its table, from 0; -1 for none",

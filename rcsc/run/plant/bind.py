@@ -379,7 +379,7 @@ def _suggested(leaves: Sequence[Leaf]) -> str:
     [leaf] = leaves
     if leaf.members:
         return f"Literal[{', '.join(repr(member) for member in leaf.members)}]"
-    return {"bool": "bool", "double": "float"}.get(leaf.c_type, "int")
+    return {"bool": "bool", "double": "float", "float": "float"}.get(leaf.c_type, "int")
 
 
 def _kind(of: type, hints: Mapping[str, Any], field: FieldPath) -> fields.FieldType:

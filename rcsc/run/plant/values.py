@@ -17,7 +17,7 @@ from typing import Any, Protocol
 from rcsc.host.described import nearest
 from rcsc.run.plant import fields
 from rcsc.run.plant.units import Factor, factor
-from rcsc.run.signature import Leaf, Value
+from rcsc.run.signature import REALS, Leaf, Value, number_word
 
 C_BITS = {f"{sign}int{bits}_t": (bits, sign == "") for bits in (8, 16, 32, 64) for sign in ("", "u")}
 
@@ -137,14 +137,14 @@ class NumberLink:
             number = value if isinstance(value, int) and not isinstance(value, bool) else float(value)
         except (TypeError, ValueError, OverflowError):
             raise BadValue("", f"is {_shown(value)}, which is no number") from None
-        real = self.leaf.c_type == "double"
+        real = self.leaf.c_type in REALS
         if isinstance(number, float) and not math.isfinite(number):
             if real:
                 yield number
                 return
             raise BadValue("", f"is {number}, and `{self.leaf.name}` is a whole number")
         exact = number if self.factor.is_one else _times(self.factor, number)
-        yield float(exact) if real else self._held(round(exact))
+        yield self.leaf.held(float(exact)) if real else self._held(round(exact))
 
     def _held(self, number: int) -> int:
         """A whole number that the variable's C type holds."""
@@ -291,7 +291,7 @@ def _scalar(leaf: Leaf, of: fields.FieldType) -> Link:
 
 def _misfit(leaf: Leaf, of: fields.FieldType, *, gives: bool) -> tuple[str, tuple[str, ...]] | None:
     """What is wrong with a scalar, and what would help."""
-    wanted = "bool" if leaf.c_type == "bool" else "float" if leaf.c_type == "double" else "int"
+    wanted = "bool" if leaf.c_type == "bool" else "float" if leaf.c_type in REALS else "int"
     if leaf.members:
         return _members_misfit(leaf, of, gives=gives)
     if isinstance(of, fields.Flag) != (wanted == "bool") or not isinstance(of, fields.Flag | fields.Number):
@@ -366,9 +366,7 @@ def _shown(value: object) -> str:
 
 
 def _type(leaf: Leaf) -> str:
-    return (
-        "bool" if leaf.c_type == "bool" else f"{'real' if leaf.c_type == 'double' else 'int'} {_range(leaf)}"
-    )
+    return "bool" if leaf.c_type == "bool" else f"{number_word(leaf)} {_range(leaf)}"
 
 
 def _range(leaf: Leaf) -> str:
@@ -376,7 +374,7 @@ def _range(leaf: Leaf) -> str:
         return "any number"
     return (
         f"{leaf.low:g} .. {leaf.high:g}{_unit(leaf)}"
-        if leaf.c_type == "double"
+        if leaf.c_type in REALS
         else f"{int(leaf.low)} .. {int(leaf.high)}{_unit(leaf)}"
     )
 

@@ -24,7 +24,7 @@ from rcsc.run.description import BadDescription, Description, LevelSpec, places
 from rcsc.run.executors import NotBuilt
 from rcsc.run.levels import Query, RunningLevel, running_level
 from rcsc.run.log.schema import fingerprints
-from rcsc.run.signature import Leaf, Signature, generated_files, signature
+from rcsc.run.signature import Leaf, Signature, generated_files, number_word, signature
 from rcsc.run.system import Kind, executors
 from rcsc.shell.reload.gate import witness
 from rcsc.shell.reload.refusal import Refused
@@ -213,7 +213,7 @@ def _form(leaf: Leaf) -> str:
         return "an enumeration"
     if leaf.c_type == "bool":
         return "a bool"
-    return f"{'a real' if leaf.c_type == 'double' else 'an int'}{f' in {leaf.unit}' if leaf.unit else ''}"
+    return f"{'an' if number_word(leaf) == 'int' else 'a'} {number_word(leaf)}{f' in {leaf.unit}' if leaf.unit else ''}"
 
 
 def _in_proof(level: RunningLevel, program: Program) -> None:

@@ -31,6 +31,7 @@ from rcsc.lang.model import (
     Real,
     Scalar,
     Select,
+    Single,
     Statement,
     ToElement,
     ToLeaf,
@@ -65,8 +66,9 @@ WIDTHS = (("int64_t", 63), ("ref_wide", 127))
 
 def c_type(*kinds: Scalar) -> str:
     """The C type in which values of all these kinds are computed."""
-    if any(isinstance(kind, Real) for kind in kinds):
-        return "double"
+    reals = [kind for kind in kinds if isinstance(kind, Real)]
+    if reals:
+        return "float" if all(isinstance(kind, Single) for kind in reals) else "double"
     ints = [kind for kind in kinds if isinstance(kind, Int)]
     low = min((kind.low for kind in ints), default=0)
     high = max((kind.high for kind in ints), default=0)
@@ -77,7 +79,7 @@ def c_type(*kinds: Scalar) -> str:
 def constant(kind: Scalar, value: Value) -> str:
     """`value` as a C constant of `c_type(kind)`."""
     if isinstance(kind, Real):
-        return f"({float(value).hex()})"
+        return f"({float(value).hex()}{'f' if isinstance(kind, Single) else ''})"
     number = int(value)
     if abs(number) < 1 << 31:
         return f"({number})"
@@ -118,7 +120,12 @@ def settling(variable: Variable, place: str, leaf_type: str) -> Iterator[str]:
         yield f"if ({below}) {{ {place} = ({leaf_type}){low}; }}"
         yield f"else if ({above}) {{ {place} = ({leaf_type}){high}; }}"
     if isinstance(variable.type, Real):
-        yield f"{place} = ref_zero({place});"
+        yield f"{place} = {_without_sign(variable.type, place)};"
+
+
+def _without_sign(kind: Real, text: str) -> str:
+    """The value, without the sign of a zero."""
+    return f"ref_zero{'_f' if isinstance(kind, Single) else ''}({text})"
 
 
 def admission(variable: Variable, place: str, leaf_type: str, refused: str) -> Iterator[str]:
@@ -162,7 +169,7 @@ class Writer:
         """An operator and its operands."""
         if op in COMPARISONS:
             wide = c_type(*(arg.type for arg in args))
-        elif op in (Op.TO_INT, Op.TO_REAL):
+        elif op in (Op.TO_INT, Op.TO_REAL, Op.TO_SINGLE):
             return f"(({c_type(kind)}){self.expr(args[0])})"
         elif is_logic(op) or op is Op.NOT:
             wide = "int32_t"
@@ -235,7 +242,7 @@ class Writer:
 
     def settled(self, kind: Scalar, text: str) -> str:
         """A stored value: reals lose the sign of zero."""
-        return f"ref_zero({text})" if isinstance(kind, Real) else f"({c_type(kind)}){text}"
+        return _without_sign(kind, text) if isinstance(kind, Real) else f"({c_type(kind)}){text}"
 
     def assign(self, place: ToLeaf | ToElement | ToLocal, value: Expr) -> str:
         """One assignment."""

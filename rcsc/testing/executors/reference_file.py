@@ -39,6 +39,7 @@ static void ref_refused(ref_trace_t *r, int at) {
   if (at != 0) { r->fault = 4; r->fault_at = at - 1; }
 }
 static double ref_zero(double x) { return (x == 0.0) ? 0.0 : x; }
+static float ref_zero_f(float x) { return (x == 0.0f) ? 0.0f : x; }
 static int ref_sign(double x) {
   union { double d; uint64_t u; } bits; bits.d = x; return (int)(bits.u >> 63);
 }
@@ -269,7 +270,7 @@ def reference_c(program: Program, symbols: Symbols) -> str:
     prototypes = [f"{lines[0].removesuffix(' {')};" for lines in procedures]
     count = max(1, len(monitored(program)))
     head = [f"#define REF_ASSUMPTIONS {count}", PRELUDE]
-    head += [EXTREMES.format(T=name) for name in ("int32_t", "int64_t", "ref_wide", "double")]
+    head += [EXTREMES.format(T=name) for name in ("int32_t", "int64_t", "ref_wide", "double", "float")]
     bodies = [line for lines in procedures for line in lines]
     return "\n".join([*head, *prototypes, *writer.accessors(), *bodies, *rest]) + "\n"
 

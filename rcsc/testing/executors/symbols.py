@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rcsc.host.files.read import json_of
-from rcsc.lang.model import I64_MAX, Bool, Int, Program, Real, Scalar
+from rcsc.lang.model import I64_MAX, Bool, Int, Program, Real, Scalar, Single
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +96,8 @@ class Symbols:
 
     def value_type(self, kind: Scalar) -> str:
         """C type of a parameter of this kind."""
+        if isinstance(kind, Single):
+            return "float"
         if isinstance(kind, Bool | Real):
             return "bool" if isinstance(kind, Bool) else "double"
         wide = isinstance(kind, Int) and kind.low >= 0 and kind.high > I64_MAX

@@ -5,7 +5,7 @@ In: an expression. Out: text, with parentheses around every operand that is not 
 
 from rcsc.lang.model import Among, Apply, Expr, Literal, Op, Read, ReadLocal, Select, spell
 
-CALLED = frozenset({Op.ABS, Op.MIN, Op.MAX, Op.TO_INT, Op.TO_REAL})
+CALLED = frozenset({Op.ABS, Op.MIN, Op.MAX, Op.TO_INT, Op.TO_REAL, Op.TO_SINGLE})
 
 
 def words(expr: Expr) -> str:

@@ -29,7 +29,19 @@ from random import Random
 from rcsc.host.children import scratch
 from rcsc.host.tools import Absent, c_compiler, run_command, write_c
 from rcsc.lang.interval_sets import meet
-from rcsc.lang.model import Box, Program, Real, Table, Variable, key_bounds, real_key, value_of_key
+from rcsc.lang.model import (
+    Box,
+    Program,
+    Real,
+    Scalar,
+    Single,
+    Table,
+    Variable,
+    key_bounds,
+    key_of,
+    value_of_key,
+)
+from rcsc.lang.operator_table import single
 from rcsc.testing.executors.edges import companions, leaf_edges, may_be_matched, relational_tests
 from rcsc.testing.executors.externs import STAND_INS
 from rcsc.testing.executors.native import to_word
@@ -139,6 +151,13 @@ def agrees(
     return compared
 
 
+def _written_key(kind: Scalar, text: str) -> int:
+    """The key of a number as C spells it."""
+    if not isinstance(kind, Real):
+        return int(text)
+    return key_of(kind, single(float(text)) if isinstance(kind, Single) else float(text))
+
+
 @dataclass(frozen=True, slots=True)
 class _Way:
     """What one component may stand for: a leaf (test -1), or a test; and the lines that admit each class."""
@@ -213,7 +232,7 @@ class _Checker:
             return list(range(low, high + 1))
         named = {end for _, box in self.boxes(leaf) for ends in box for end in ends}
         for text in part.constants:
-            number = real_key(float(text)) if isinstance(leaf.type, Real) else int(text)
+            number = _written_key(leaf.type, text)
             named |= {number, -number}
         near = {key + step for key in named for step in (-1, 0, 1)} | {low, high}
         return sorted(key for key in near if low <= key <= high)

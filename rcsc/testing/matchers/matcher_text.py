@@ -18,7 +18,7 @@ TABLES = re.compile(
     re.DOTALL,
 )
 FIELD = re.compile(r"uint(\d+)_t t(\d+)\[(\d+)\](?:\[(\d+)\])?;")
-CONSTANT = r"(?:\(-INT64_C\(\d+\)(?: - INT64_C\(1\))?\)|U?INT64_C\(\d+\)|\(?-?\d+(?:\.\d+)?(?:e[+-]?\d+)?u?\)?|[A-Z]\w*)"
+CONSTANT = r"(?:\(-INT64_C\(\d+\)(?: - INT64_C\(1\))?\)|U?INT64_C\(\d+\)|\(?-?\d+(?:\.\d+)?(?:e[+-]?\d+)?[uf]?\)?|[A-Z]\w*)"
 PLACE = r"s->(?P<path>[A-Za-z_]\w*(?:\.\w+|\[\d+\])*)"
 AGAIN = r"s->[A-Za-z_]\w*(?:\.\w+|\[\d+\])*"
 ABOVE = rf"\(u?int(?:32|64)_t\){PLACE} [-+] {CONSTANT}"
@@ -42,7 +42,7 @@ TRUTH = re.compile(r"^(?P<condition>.*) \? 1u : 0u$", re.DOTALL)
 RADIX = re.compile(r"(?P<rest>.*) \* (?P<count>\d+)u", re.DOTALL)
 LOAD = re.compile(r"\bt\.t(\d+)\[")
 WHOLE = re.compile(r"\b(0[xX][0-9a-fA-F]+|\d+)[uUlL]*\b")
-NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?)u?(?![\w.])(?! : 0u)(?<! : 0u)")
+NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?)[uf]?(?![\w.])(?! : 0u)(?<! : 0u)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +181,9 @@ def _search_text(source: str, name: str) -> str:
 
     A function that looks the class up has none: it is made for leaves of few keys, and `matcher` tries each.
     """
-    head = re.search(rf"static inline uint32_t {name}\((?:u?int(?:8|16|32|64)_t|double) value\)", source)
+    head = re.search(
+        rf"static inline uint32_t {name}\((?:u?int(?:8|16|32|64)_t|double|float) value\)", source
+    )
     if head is None:
         raise ShapeError(f"no function `{name}`")
     body = function_body(source, head[0])
