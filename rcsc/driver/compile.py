@@ -15,7 +15,7 @@ from rcsc.emit.generated import stale, write
 from rcsc.emit.lower import lower
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import ProvedProgram
-from rcsc.lang.project import PROJECT_FILE, project_root
+from rcsc.lang.project import PROJECT_FILE, prefix, project_root
 from rcsc.link import Linked, emit_system, linked, outward
 from rcsc.run.description import BadDescription, description, places
 from rcsc.solvers.options import Options
@@ -178,7 +178,8 @@ class Generated:
 
 def planned(proved: ProvedProgram, *, defensive: bool = False) -> Plan:
     """How the executors of a proved program are laid out."""
-    return lower(proved, project_root(proved.program.file), defensive=defensive)
+    root = project_root(proved.program.file)
+    return lower(proved, root, defensive=defensive, prefix=prefix(root))
 
 
 def _same_file(path: str, root: str, other: str) -> Diagnostic:

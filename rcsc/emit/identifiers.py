@@ -149,7 +149,7 @@ def failed_words(monitored: int) -> tuple[str, ...]:
     return ("assumptions_failed", *(f"assumptions_failed_{number}" for number in more))
 
 
-def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({})) -> Names:
+def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}), prefix: str = "") -> Names:
     """All names, made unique in declared order.
 
     Those of types come first: they hang on the file that declares them alone, and not on the program that uses it.
@@ -157,11 +157,12 @@ def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}))
     Args:
         program: The program.
         places: `Plan.places`; a file that is not there is called by its own name.
+        prefix: `Plan.prefix`.
     """
-    file, p = _program_words(program)
+    file, p = _program_words(program, prefix)
     failed = failed_words(len(checked(program)))
     c, module = _file_scope(program, p), NameScope(set(_MODULE))
-    units = _units(program, p, places)
+    units = _units(program, p, places, prefix)
     types = _types(program, units, c)
     constants = _constants(program, units, c)
     stems = _Stems(p, c, module)
@@ -180,10 +181,10 @@ def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}))
     )  # fmt: skip
 
 
-def _program_words(program: Program) -> tuple[str, str]:
+def _program_words(program: Program, prefix: str) -> tuple[str, str]:
     """The program's own word, and the one that its C names and files bear."""
     own = plain_word(program.name)
-    return own, file_word(own)
+    return own, file_word(own, prefix)
 
 
 def plain_word(name: str) -> str:
@@ -196,9 +197,9 @@ LONGEST_PREFIX = 18
 """Characters of a program's word, or a file's, up to which it stands before other names as it is."""
 
 
-def file_word(word: str) -> str:
+def file_word(word: str, prefix: str = "") -> str:
     """A word that C names and files may bear: one that no library or tool keeps."""
-    word = abbreviated(word, LONGEST_PREFIX)
+    word = prefix + abbreviated(word, LONGEST_PREFIX - len(prefix))
     kept = word.lower() in _FILES | C_WORDS
     composed = any(f"{word}_{end}" in reserved.C_COMPOSED for end in OWN)
     return f"{word}_" if kept or composed else word
@@ -209,7 +210,7 @@ def types_header(unit: str) -> str:
     return f"{unit}_types.h"
 
 
-def _units(program: Program, p: str, places: Mapping[str, str]) -> dict[str, str]:
+def _units(program: Program, p: str, places: Mapping[str, str], prefix: str) -> dict[str, str]:
     """The word of each file that declares a type: the program's for its own, else one made of the file's place.
 
     Files whose types need each other have one word, that of the first: one header declares them.
@@ -225,16 +226,17 @@ def _units(program: Program, p: str, places: Mapping[str, str]) -> dict[str, str
     words: dict[str, str] = {}
     for file, others in needs.items():
         first = next(other for other in needs if other in others and file in needs[other])
-        words[file] = words.get(first) or _unit(program, p, file, places)
+        words[file] = words.get(first) or _unit(program, (p, prefix), file, places)
     return words
 
 
-def _unit(program: Program, p: str, file: str, places: Mapping[str, str]) -> str:
-    """The word of one file: `emove/common` is `emove_common`, `gripper/gripper` is `gripper`."""
+def _unit(program: Program, own: tuple[str, str], file: str, places: Mapping[str, str]) -> str:
+    """The word of one file: `emove/common` is `emove_common`, `gripper/gripper` is `gripper`; `own` is the program's, and the prefix."""
+    p, prefix = own
     if file in {"", program.file}:
         return p
     parts = places.get(file, file.rpartition("/")[2].removesuffix(".rcs")).split("/")
-    word = file_word(plain_word("_".join(part for part, _ in groupby(parts))))
+    word = file_word(plain_word("_".join(part for part, _ in groupby(parts))), prefix)
     return f"{word}_" if types_header(word) == f"{p}.h" else word
 
 

@@ -47,7 +47,7 @@ FEW_GROUPED = 24
 """The same where a mask is one word: as many rows as a person reads, and no more bytes than one table for each leaf."""
 
 
-def lower(proved: ProvedProgram, root: str = "", *, defensive: bool = False) -> Plan:
+def lower(proved: ProvedProgram, root: str = "", *, defensive: bool = False, prefix: str = "") -> Plan:
     """The plan of a proved program; there is no other way to one that is not marked.
 
     Args:
@@ -55,8 +55,9 @@ def lower(proved: ProvedProgram, root: str = "", *, defensive: bool = False) -> 
         root: The project's folder: files are named as seen from there, so that the same project gives the
             same bytes wherever it stands and from wherever it is compiled; "" leaves their names alone.
         defensive: Whether the executors check their state at the beginning of every cycle.
+        prefix: What names of files, and in C, begin with.
     """
-    return replace(_plan(proved.program, root, proved=True), defensive=defensive)
+    return replace(_plan(proved.program, root, proved=True), defensive=defensive, prefix=prefix)
 
 
 def lower_by_force(program: Program, root: str = "") -> Plan:

@@ -212,6 +212,7 @@ class Plan:
         monitored: Positions in `program.assumptions` of those that the executors check: monitored ones, and those that stop some table.
         places: For each file that declares a type, its place in the project, relative, with `/` and without its ending.
         files: For each file that declares a procedure or an assumption, its name, relative, with `/`.
+        prefix: What names of files, and in C, begin with.
         proved: Whether it is proved; otherwise every file is marked (`UNPROVED`).
         defensive: Whether every cycle begins with a check of the state.
     """
@@ -224,6 +225,7 @@ class Plan:
     defensive: bool = False
     places: Mapping[str, str] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
+    prefix: str = ""
 
     @property
     def checked(self) -> tuple[str, ...]:

@@ -83,7 +83,7 @@ class _Maker:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.program = plan.program
-        self.names = names_of(plan.program)
+        self.names = names_of(plan.program, prefix=plan.prefix)
         self.text = PyText(self.names)
         self.constants: list[tuple[str, tuple[str, ...]]] = []
         self.lines: list[tuple[str, tuple[str, ...]]] = []

@@ -22,6 +22,8 @@ if TYPE_CHECKING:  # who only looks for the folder of a project, as a running le
 
 PROJECT_FILE = "rcsc.toml"
 MOST_BYTES = 16 * 1024 * 1024
+PREFIX = re.compile(r"(?:[A-Za-z][A-Za-z0-9_]{0,7})?")
+"""What the C names of a project may begin with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +89,19 @@ def project_root(file: str) -> str:
             same = os.path.realpath(root) == str(above)
             return root if same else str(above)  # a linked folder's parents are not its name's
     return folder
+
+
+def prefix(root: str) -> str:
+    """What the C names of a project begin with, as its file says; empty where it says nothing, or nothing that is right.
+
+    Args:
+        root: The project's folder.
+    """
+    try:
+        said = toml_of(Path(root, PROJECT_FILE).read_text(encoding="utf-8")).get("prefix", "")
+    except (OSError, ValueError, Malformed):
+        return ""
+    return said if isinstance(said, str) and PREFIX.fullmatch(said) else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,14 +205,18 @@ class _Loader:
             self.report(Code.PROJECT_FILE, message, Span(path, where, where))
             return ()
         patterns = settings.get("exclude", [])
-        unknown = sorted(settings.keys() - {"name", "exclude"})
+        unknown = sorted(settings.keys() - {"name", "exclude", "prefix"})
         wrong = f"`{unknown[0]}` is not a setting" if unknown else ""
         if not isinstance(settings.get("name", ""), str):
             wrong = "`name` is a text"
         if not isinstance(patterns, list) or not all(isinstance(pattern, str) for pattern in patterns):
             wrong = "`exclude` is a list of patterns"
+        begins = settings.get("prefix", "")
+        if not isinstance(begins, str) or not PREFIX.fullmatch(begins):
+            wrong = "`prefix` is a letter, and at most seven letters, digits and `_` after it"
         if wrong:
-            self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), "the settings are `name` and `exclude`")
+            helps = "the settings are `name`, `exclude` and `prefix`"
+            self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), helps)
             return ()
         return tuple(patterns)
 

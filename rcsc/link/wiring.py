@@ -182,14 +182,15 @@ class Linked:
         return list(dict.fromkeys(buffer.party for buffer in self.buffers if buffer.side == side))
 
 
-def system_word(name: str, programs: Iterable[str]) -> str:
+def system_word(name: str, programs: Iterable[str], prefix: str = "") -> str:
     """The word of a system in C, which none of its programs bears.
 
     Args:
         name: The system's.
         programs: What the programs of its levels are called in C.
+        prefix: What names of files, and in C, begin with.
     """
-    word = file_word(plain_word(name))
+    word = file_word(plain_word(name), prefix)
     return f"{word}_system" if word.casefold() in {program.casefold() for program in programs} else word
 
 
@@ -206,11 +207,12 @@ def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linke
     """
     programs = {name: _program(plan) for name, plan in plans.items()}
     check_fit(system, {name: program.sign for name, program in programs.items()})
-    word = system_word(system.name, (program.names.program for program in programs.values()))
+    prefix = next((plan.prefix for plan in plans.values()), "")
+    word = system_word(system.name, (program.names.program for program in programs.values()), prefix)
     wiring = _Wiring(programs, word)
     buffers = tuple(wiring.buffer(wire) for wire in system.wires)
     members = c_scope({IN, OUT, BETWEEN, TICK}).all((spec.name, c_word(spec.name)) for spec in system.levels)
-    wiring.scope.names |= {f"{word}_{does}_{member}" for does in DOES for member in members.values()}
+    wiring.scope.reserve(f"{word}_{does}_{member}" for does in DOES for member in members.values())
     constants = c_scope({constant_word(word, "level", "none"), constant_word(word, "tick", "ms")})
     levels = tuple(
         _level(
@@ -226,7 +228,7 @@ def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linke
 
 
 def _program(plan: Plan) -> LevelProgram:
-    names = names_of(plan.program, plan.places)
+    names = names_of(plan.program, plan.places, plan.prefix)
     return LevelProgram(
         plan, names, signature_of(CheckedFields(json_of(symbols(plan, names, digest(plan.program, names)))))
     )

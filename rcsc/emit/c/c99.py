@@ -95,7 +95,7 @@ def _program(plan: Plan) -> CProgram:
     parameters = {
         str(procedure.name): tuple(p.type for p in procedure.params) for procedure in plan.program.procedures
     }
-    names = names_of(plan.program, plan.places)
+    names = names_of(plan.program, plan.places, plan.prefix)
     text = CText(names, parameters, failing(plan.program))
     return CProgram(plan, names, text, digest(plan.program, names))
 

@@ -201,7 +201,7 @@ def _masks(table: PlanTable) -> Iterator[Stmt]:
     words = "" if matcher.words <= 1 else f"[{matcher.words}]"
     masks = [joined(group) for group in matcher.groups]
     members = (Line(f"uint{bits}_t t{at}[{len(entries)}]{words};") for at, entries in enumerate(masks))
-    yield Frame(("static const struct {",), tuple(members))
+    yield Frame(("RCSC_CONST_SECTION static const struct {",), tuple(members))
     rows = (
         Frame(
             (f"{{ /* {comment(f'{table.source}: {_leaves(group)}')} */",),
@@ -296,7 +296,7 @@ def _wrapped(values: Iterable[Code], width: int = 88) -> Iterator[Line]:
 
 def _codes(index: Coded) -> Body:
     """The class of `value`, looked up."""
-    head = f"static const uint{8 if index.count <= 256 else 16}_t classes[{len(index.classes)}] = {{"
+    head = f"RCSC_CONST_SECTION static const uint{8 if index.count <= 256 else 16}_t classes[{len(index.classes)}] = {{"
     rows = tuple(_wrapped(Constant(number, "uint32_t") for number in index.classes))
     return Frame((head,), rows, "};"), Leave(Element(Name("classes"), Name("value")))
 
@@ -305,7 +305,7 @@ def _search(index: Cuts, wide: str) -> Iterator[Stmt]:
     """How many cuts are at most `value`, in a number of steps that depends on nothing."""
     count, cuts = Constant(len(index.cuts), "uint32_t"), Name("cuts")
     rows = tuple(_wrapped(Constant(cut, wide) for cut in index.cuts))
-    yield Frame((f"static const {wide} cuts[{len(index.cuts)}] = {{",), rows, "};")
+    yield Frame((f"RCSC_CONST_SECTION static const {wide} cuts[{len(index.cuts)}] = {{",), rows, "};")
     yield Let("uint32_t", "at", Constant(0, "uint32_t"))
     step = 1 << len(index.cuts).bit_length() - 1
     while step:
