@@ -26,12 +26,12 @@ from functools import cache
 from pathlib import Path
 
 from rcsc.emit import emitted
+from rcsc.evidence.harness import bounds, calls, stand_ins
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.host.children import scratch
 from rcsc.host.tools import run_command, write_c
-from rcsc.lang.model import I64_MAX, Bool, Enum, Int, Program, Real, Scalar, key_bounds
+from rcsc.lang.model import I64_MAX, Program, Real, Scalar
 from rcsc.lang.model import Kind as Role
-from rcsc.testing.executors.externs import externs
 from rcsc.testing.executors.symbols import Symbols, symbols_of
 
 PACKAGE = "frama-c-base"
@@ -39,7 +39,7 @@ STATES = 1000
 """How many states EVA keeps apart in a chain of comparisons: more than a program has variables."""
 TIMEOUT_S = 1800.0
 MEMORY_MB = 6000
-GREATEST = "0x1.fffffffffffffp+1023"
+GREATEST = {"double": "0x1.fffffffffffffp+1023", "float": "0x1.fffffep+127"}
 OPTIONS = (
     "-machdep", "gcc_x86_64", "-rte", "-warn-signed-downcast", "-warn-unsigned-downcast", "-warn-special-float",
 )  # fmt: skip
@@ -173,71 +173,35 @@ def _command(symbols: Symbols, place: Path, *, finite: bool, defensive: bool) ->
 def harness(program: Program, symbols: Symbols, *, defensive: bool, finite: bool) -> str:
     """The C that calls every function of the header on states of which nothing is known."""
     lines = ['#include "__fc_builtin.h"', f'#include "{symbols.header}"', f"static {symbols.struct} s;"]
-    lines += _stand_ins(program, symbols)
+    lines += stand_ins(program, symbols, _any)
     lines += ["static void any(void) {", "    Frama_C_make_unknown((char *)&s, sizeof s);"]
     if finite:
         reals = [v for v in program.variables if isinstance(v.type, Real)]
         lines += [
-            f"    s.{symbols.path(v.name)} = {_any(symbols.c_type(v.name), v.type, whole=True)};"
-            for v in reals
+            f"    s.{symbols.path(v.name)} = {_any(symbols.c_type(v.name), v.type, True)};" for v in reals
         ]
     inputs = [v for v in program.variables if v.kind is Role.INPUT]
     lines += ["}", "static void admitted(void) {", "    any();"]
-    lines += [f"    s.{symbols.path(v.name)} = {_any(symbols.c_type(v.name), v.type)};" for v in inputs]
+    lines += [
+        f"    s.{symbols.path(v.name)} = {_any(symbols.c_type(v.name), v.type, False)};" for v in inputs
+    ]
     lines += ["}", "int main(void) {", "    switch (Frama_C_interval(0, 9999)) {"]
-    for number, body in enumerate(_calls(symbols, defensive=defensive)):
+    for number, body in enumerate(calls(symbols, defensive=defensive)):
         lines += [f"    case {number}: {body} break;"]
     return "\n".join([*lines, "    default: break;", "    }", "    return 0;", "}", ""])
 
 
-def _calls(symbols: Symbols, *, defensive: bool) -> Iterator[str]:
-    """A call of every function, with what it asks of its caller."""
-    check = f"{symbols.program}_check(&s)"
-    yield f"any(); {symbols.init}(&s);"
-    yield f"any(); (void){check};"
-    for function in (*symbols.steps.values(), *symbols.cycles.values()):
-        call = f"(void){function}(&s);"
-        yield f"any(); {call}" if defensive else f"any(); if ({check} < 0) {{ {call} }}"
-    for name, function in symbols.lines.items():
-        many = f"int32_t at[1]; {symbols.batches[name]}(&s, at, 1u);"
-        yield f"admitted(); if ({check} < 0) {{ (void){function}(&s); {many} }}"
-
-
-def _stand_ins(program: Program, symbols: Symbols) -> Iterator[str]:
-    """Functions of the user's, that give anything of its type."""
-    for procedure in externs(program):
-        given = [symbols.c_type(name) for name in procedure.reads]
-        given += [symbols.value_type(p.type) for p in procedure.params]
-        params = [f"{c_type} a{at}" for at, c_type in enumerate(given)]
-        params += [f"{symbols.c_type(name)} *r{at}" for at, name in enumerate(procedure.writes)]
-        function = procedure.extern.c if procedure.extern else ""
-        written = " ".join(
-            f"*r{at} = {_any(symbols.c_type(name), program.variable(name).type, whole=True)};"
-            for at, name in enumerate(procedure.writes)
-        )
-        yield f"void {function}({', '.join(params) or 'void'}) {{ {written} }}"
-
-
-def _any(c_type: str, kind: Scalar, *, whole: bool = False) -> str:
+def _any(c_type: str, kind: Scalar, whole: bool) -> str:
     """Any value of a kind, or of its whole C type, as an expression of EVA's."""
     if isinstance(kind, Real):
-        low, high = (f"-{GREATEST}", GREATEST) if whole else (float(kind.low).hex(), float(kind.high).hex())
+        most = GREATEST[c_type]
+        low, high = (f"-{most}", most) if whole else (float(kind.low).hex(), float(kind.high).hex())
         return f"({c_type})Frama_C_double_interval({low}, {high})"
-    least, most = _bounds(c_type, kind, whole=whole)
-    if most > I64_MAX:
-        return f"({c_type})Frama_C_unsigned_long_long_interval({least}ULL, {most}ULL)"
+    least, greatest = bounds(c_type, kind, whole=whole)
+    if greatest > I64_MAX:
+        return f"({c_type})Frama_C_unsigned_long_long_interval({least}ULL, {greatest}ULL)"
     lowest = f"{least}LL" if least > -I64_MAX else f"(-{I64_MAX}LL - 1LL)"
-    return f"({c_type})Frama_C_long_long_interval({lowest}, {most}LL)"
-
-
-def _bounds(c_type: str, kind: Bool | Enum | Int, *, whole: bool) -> tuple[int, int]:
-    """The bounds of a kind, or of its C type."""
-    if isinstance(kind, Bool):
-        return 0, 1
-    if not whole:
-        return key_bounds(kind)
-    bits = int(re.sub(r"\D", "", c_type.removesuffix("_t")))
-    return (0, (1 << bits) - 1) if c_type.startswith("u") else (-(1 << bits - 1), (1 << bits - 1) - 1)
+    return f"({c_type})Frama_C_long_long_interval({lowest}, {greatest}LL)"
 
 
 def _properties(text: str) -> Iterator[Property]:
