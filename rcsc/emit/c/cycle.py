@@ -72,7 +72,7 @@ def action_functions(c: CProgram) -> Iterator[Function]:
     """One function a table: a match that runs the line's actions."""
     for table in c.plan.tables:
         name = c.names.tables[table.table.name]
-        told = [stmt for place in table.monitored for stmt in _told(c, place, stops=place in table.stops)]
+        told = [stmt for place in table.monitored for stmt in _told(c, place, table.stops)]
         matched = _matched(c, table, name)
         run = (when(c.text.faultless, *matched),) if table.stops else matched
         answers = comment(answering(table.table.requirements))
@@ -93,8 +93,8 @@ def assumption_functions(c: CProgram) -> Iterator[Function]:
         yield Function(doc, f"bool {name}(const {c.p}_t *s)", (*unread, *body))
 
 
-def _told(c: CProgram, place: int, *, stops: bool) -> Body:
-    """Marks an assumption that fails; one that stops ends the cycle."""
+def _told(c: CProgram, place: int, stops: tuple[int, ...]) -> Body:
+    """Marks an assumption that fails; the first that stops and fails ends the cycle."""
     word, bit = divmod(place, FAILED_BITS)
     failed = Place((c.names.failed[word],))
     shift = Constant(bit, "uint32_t") if word else Cast("uint32_t", Name(c.names.assumptions[place]))
@@ -102,7 +102,7 @@ def _told(c: CProgram, place: int, *, stops: bool) -> Body:
     mark = Set(failed, infix("|", failed, infix("<<", one, shift)))
     name = Name(c.names.assumptions[place])
     end = Set(FAULT, fault_name(c, Fault.ASSUMPTION)), Set(FAULT_AT, name)
-    ended = (when(c.text.faultless, *end),) if stops else ()
+    ended = () if place not in stops else end if place == stops[0] else (when(c.text.faultless, *end),)
     test = Prefix("!", Invoke(c.names.holding[place], (STATE,)))
     return (when(test, mark, *ended),)
 
