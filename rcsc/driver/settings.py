@@ -71,7 +71,8 @@ class TestEffort:
         esbmc_s: Time limit of the model checker for one function, in seconds; 0 leaves it out.
         cortex: Whether an emulated Cortex-M3 is asked.
         mutants: How many mutants of each table (and of the C, where `deep`); 0 for none, -1 for all.
-        vectors: Where to write MC/DC vectors.
+        vectors: Where to write vectors that cover the whole C.
+        sessions: Where to write the sessions that were drawn for them.
     """
 
     examples: int = 200
@@ -81,3 +82,4 @@ class TestEffort:
     cortex: bool = True
     mutants: int = 24
     vectors: Path | None = None
+    sessions: Path | None = None

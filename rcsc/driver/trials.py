@@ -24,7 +24,7 @@ from rcsc.episodes.search import KINDS, Searched, found_again, search
 from rcsc.episodes.stand import Stand, stand
 from rcsc.host import children
 from rcsc.host.files import write_atomically
-from rcsc.lang.model import Expr, Program, Snapshot, Table
+from rcsc.lang.model import Expr, Program, ProvedProgram, Snapshot, Table
 from rcsc.link import Linked, drawing, run_beside, script
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import BadDescription, description
@@ -36,9 +36,9 @@ from rcsc.symbolic.encode import declared, encode
 from rcsc.table.certificate import must_cover
 from rcsc.table.decide import prove_table
 from rcsc.table.verdict import Gap
-from rcsc.testing.inputs.export import vectors_csv, vectors_json
-from rcsc.testing.inputs.snapshot import Missing, search_in
-from rcsc.testing.inputs.vectors import vectors_of
+from rcsc.testing.coverage.document import VectorSet
+from rcsc.testing.coverage.vector_set import figure, vector_set, write_vectors
+from rcsc.testing.inputs.snapshot import Missing
 from rcsc.testing.mutants import Opinion
 from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
 
@@ -75,12 +75,10 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
             wrong, text = trial(path, generated, effort)
             diagnostics += wrong
             figures.append(text)
-    if effort.vectors is not None:
-        diagnostics += _write_vectors(
-            [proved_program.program for _, proved_program in project.executable],
-            settings.options,
-            effort.vectors,
-        )
+    if effort.vectors is not None or effort.sessions is not None:
+        sets = [_vectors(program, settings) for _, program in project.executable]
+        diagnostics += write_vectors(sets, effort.vectors, effort.sessions)
+        figures += map(figure, sets)
     settings.progress("")
     return Conclusion(project.report(tuple(diagnostics)), "\n".join(figures))
 
@@ -218,24 +216,10 @@ def _try_out(
     return result.diagnostics, result.text()
 
 
-def _write_vectors(programs: Sequence[Program], options: Options, file: Path) -> tuple[Diagnostic, ...]:
-    """Write the vectors of the programs' tables, as CSV where the name ends so, else as JSON."""
-    spell = vectors_csv if file.suffix == ".csv" else vectors_json
-    texts = []
-    for program in programs:
-        search = search_in(program, proofs(options).solver)
-        texts.append(spell(program, [vectors_of(search, table) for table in program.tables]))
-    if len(texts) != 1 and file.suffix == ".csv":
-        return (_unwritten(file, "a CSV file holds the vectors of one program"),)
-    try:
-        write_atomically(file, (texts[0] if len(texts) == 1 else f"[{','.join(texts)}]\n").encode())
-    except OSError as error:
-        return (_unwritten(file, f"cannot be written: {error.strerror}"),)
-    return ()
-
-
-def _unwritten(file: Path, why: str) -> Diagnostic:
-    return Diagnostic(Code.NOT_WRITTEN, f"`{file}`: {why}", Label(Span(str(file), 0, 0)))
+def _vectors(program: ProvedProgram, settings: Settings) -> VectorSet:
+    """Vectors of the whole C of a program."""
+    plan, options = planned(program), settings.options
+    return vector_set(plan, emitted(plan), options, proofs(options).solver, settings.progress)
 
 
 def proofs(options: Options) -> Proofs:

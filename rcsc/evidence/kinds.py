@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from rcsc.evidence import analysers, runtime
+from rcsc.evidence import analysers, coverage, runtime
 from rcsc.evidence.kind import Kind
 
-KINDS: Mapping[str, Kind] = MappingProxyType({"runtime": runtime.KIND, "analysers": analysers.KIND})
+KINDS: Mapping[str, Kind] = MappingProxyType(
+    {"coverage": coverage.KIND, "runtime": runtime.KIND, "analysers": analysers.KIND}
+)
 """In the order in which they are made and listed. A new one is a module and its line here."""

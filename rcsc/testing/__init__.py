@@ -20,12 +20,13 @@ with, its neighbours, and the ends of its range. So a few keys see every boundar
 
 *Mutants* show that the tests bite: a slip of the hand in a table must be noticed by the prover or the tests, a
 changed bit of the C by the matcher's check, the suite or ESBMC. Nothing here is imported by other commands, and no
-solver at all, but for ESBMC with `--deep`, in a process of its own.
+solver, but for Z3 in `coverage` and ESBMC with `--deep`, in a process of its own.
 
 Trusted: nothing for a verdict of `rcsc check`. What it costs: seconds a table by `--examples` and `--mutants`;
 minutes with `--deep`.
 
-Modules, in the order the data flows: `executors`, `inputs`, `matchers` (rooms); `agree` compares the executors,
+Modules, in the order the data flows: `executors`, `inputs`, `matchers`, `coverage` (rooms: the last one makes vectors that
+cover the whole C); `agree` compares the executors,
 `differential_search` looks for inputs on which they do not, `cortex` runs the C on an emulated Cortex-M3, `esbmc`
 proves it; `mutants` and `code_mutants` try the suite itself; `figures` counts, `suite` is all of it on one screen.
 """

@@ -1,8 +1,5 @@
 """MC/DC vectors: each pair shows that its condition decides its line; what has no vector says why."""
 
-import csv
-import io
-import json
 from pathlib import Path
 
 import pytest
@@ -10,7 +7,6 @@ import pytest
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.interval_sets import complement, meet
 from rcsc.lang.model import Program, key_bounds
-from rcsc.testing.inputs.export import vectors_csv, vectors_json
 from rcsc.testing.inputs.snapshot import Missing, box_of, search_in
 from rcsc.testing.inputs.vectors import Vectors, atoms, vectors_of
 from tests.support.programs.stages import program_of, shipped
@@ -122,19 +118,6 @@ def test_a_solver_is_asked_where_nothing_is_found() -> None:
     found = vectors_of(search_in(wide, solver), wide.tables[0])
     assert asked
     assert "3" in {v.line for v in found.vectors}
-
-
-def test_json_and_csv_say_the_same() -> None:
-    program = program_of(COUPLED)
-    found = vectors_of(search_in(program), program.tables[0])
-    tables = json.loads(vectors_json(program, [found]))["tables"]
-    rows = list(csv.DictReader(io.StringIO(vectors_csv(program, [found]))))
-    assert len(rows) == len(tables[0]["vectors"]) == len(found.vectors)
-    for row, vector in zip(rows, tables[0]["vectors"], strict=True):
-        assert row["expected"] == vector["expected"]
-        assert row["column"] == vector["column"]
-        assert row["mode_in"] == vector["inputs"]["mode_in"]
-        assert int(row["width"]) == vector["inputs"]["width"]
 
 
 def test_a_vector_names_the_column_of_its_condition() -> None:

@@ -18,7 +18,8 @@ Examples:
   rcsc test tables/task             interpreter = Python = C, every line reached
   rcsc test --deep acquire.rcs      also prove the C, and mutate it; minutes
   rcsc test robot/system.toml       a system: its levels, the C of the whole, and episodes in its plant
-  rcsc test --vectors v.json a.rcs  also write test vectors for each condition""",
+  rcsc test --vectors v.json a.rcs  also write test vectors that cover the whole C
+  rcsc test --vectors v.c a.rcs     the same as a C file that plays them, on a target too""",
 )
 @PATHS
 @click.option("--examples", type=click.IntRange(min=1), default=200, show_default=True, metavar="N",
@@ -33,12 +34,15 @@ Examples:
 @click.option("--cortex/--no-cortex", default=True, show_default=True,
               help="Run the C on an emulated Cortex-M3, too.")  # fmt: skip
 @click.option("--vectors", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
-              help="Write MC/DC vectors to FILE, as JSON or CSV by its ending.")  # fmt: skip
+              help="Write vectors that cover the whole C (statements, branches, MC/DC) to FILE: a C file that plays them, CSV, or else "
+              "JSON, by its ending.")  # fmt: skip
+@click.option("--sessions", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Write the sequences of cycles that were drawn for the vectors to FILE, as CSV or JSON.")  # fmt: skip
 @proving
 @showing
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     paths: tuple[str, ...], examples: int, mutants: int, deep: bool, esbmc: float | None, cortex: bool,
-    vectors: Path | None, options: Options, use_cache: bool, output: Output,
+    vectors: Path | None, sessions: Path | None, options: Options, use_cache: bool, output: Output,
 ) -> int:  # fmt: skip
     """Test what is generated: interpreter = Python = C on the same inputs and over cycles.
 
@@ -50,8 +54,18 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     Hypothesis draws: lost, late, doubled and stale buffers, restarts, readings at edges, faults of the plant. An episode that breaks a
     property is made small and saved in campaign/ for `rcsc campaign --again`. The plant is imported and run; else extern
     procedures are stand-ins, and nothing of the user's is imported or linked. Needs a C compiler.
+    Vectors are complete states with their inputs: each can be played on its own. What no vector reaches stands in the JSON, with the
+    proof that nothing can, or that none was found.
     """
     esbmc_s = (60.0 if deep else 0.0) if esbmc is None else esbmc
-    effort = TestEffort(examples, deep=deep, esbmc_s=esbmc_s, cortex=cortex, mutants=mutants, vectors=vectors)
+    effort = TestEffort(
+        examples,
+        deep=deep,
+        esbmc_s=esbmc_s,
+        cortex=cortex,
+        mutants=mutants,
+        vectors=vectors,
+        sessions=sessions,
+    )
     conclusion = test(settings_of(options, use_cache, output, paths), effort)
     return finish(conclusion.report, "test", output, conclusion.closing)

@@ -64,6 +64,7 @@ class Symbols:
         cycles: By level: function of one cycle.
         positions: Of each leaf; what `fault_at` says when it is refused.
         module: File name of the Python executor.
+        check: Function that says whether a state may be gone on from.
         state_class: Its class.
     """
 
@@ -81,6 +82,7 @@ class Symbols:
     trace: TracePlaces = TracePlaces()
     module: str = ""
     state_class: str = ""
+    check: str = ""
 
     def path(self, name: str) -> str:
         """Place of a leaf in the struct."""
@@ -143,5 +145,6 @@ def _symbols(document: Mapping[str, Any]) -> Symbols:
         positions={name: at for at, name in enumerate(leaves)},
         module=document["python"]["module"],
         state_class=document["python"]["class"],
+        check=document["check"],
         trace=TracePlaces(failed_paths=tuple(document.get("failed", TracePlaces().failed_paths))),
     )

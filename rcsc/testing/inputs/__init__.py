@@ -5,9 +5,7 @@ the outcome of one condition of a line and in whether the line matches, which sh
 search takes the condition's sides apart and finds an input for each by the same region trees that decide a table,
 without a solver.
 
-    rcsc test --vectors vectors.json tables/task/acquire.rcs
-
-writes them for other test benches, each with the line, the condition in words, and the two inputs.
+`coverage` adds what the rest of the C needs, and writes all of it for other test benches.
 
 >>> from rcsc.testing.inputs import vectors
 >>> "MC/DC" in vectors.__doc__
@@ -16,6 +14,6 @@ True
 Nothing here is trusted: an input that leads nowhere costs a test, and the report counts what has no vector.
 
 Modules, in the order the data flows: `snapshot` finds an input in which conditions hold or fail, `vectors` makes
-MC/DC vectors of them (`condition_text` words their conditions, `export` writes them for users), `sampling` draws inputs by
+MC/DC vectors of them (`condition_text` words their conditions), `sampling` draws inputs by
 seed.
 """

@@ -1,0 +1,273 @@
+"""Why what was not measured cannot be: from a place in the C back to what was shown of the language.
+
+In: what llvm-cov measured, and what the vectors' search showed out of reach. Out: for every branch, condition and
+statement that is not covered a reason that rests on a proof, or none, which is a shortfall. A function of the C has
+the conditions of its procedure in the same order; where their numbers differ, nothing is explained.
+"""
+
+import re
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rcsc.emit.c.ctext import SHORT
+from rcsc.emit.identifiers import Names
+from rcsc.emit.plan import Cuts, Direct, Plan, Truth
+from rcsc.evidence.llvm import Decision, Measured, Point, Region
+from rcsc.lang.model import Bool, Level, Table
+from rcsc.testing.agree import NONE, SEVERAL
+from rcsc.testing.coverage.directed import Unreached
+from rcsc.testing.coverage.marks import Decision as Marked
+from rcsc.testing.coverage.marks import Place
+
+LOOP = re.compile(r"v_\w+ <=? |more_\w+$|[ik] <=? ")
+GUARD = re.compile(r"s->fault [!=]= \w+$")
+NO_LINE = re.compile(r"\(?(m|seen) == 0|case \(-1\)")
+SEVERAL_LINES = re.compile(r"several$|several != 0|default$")
+MACHINE = "the machine computes reals as was proved; only one that does not takes this"
+COMPLETE = "every value of the selector has a table, and no other is admitted"
+FAULTLESS = (
+    "no table of this cycle can leave a fault: that none of its lines matches, or several, is out of reach"
+)
+NO_WAY = "no branch leads here: see those of this function"
+OTHER_LINE = "the table has no other line, and no other outcome is within reach"
+
+
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """Something that was not covered.
+
+    Attributes:
+        what: The condition, and what was not seen of it.
+        reason: Why it cannot be; empty where that is not known.
+    """
+
+    function: str
+    line: int
+    what: str
+    reason: str
+
+
+@dataclass(slots=True)
+class Reasons:
+    """Explains one program.
+
+    Attributes:
+        decisions: Of the language, in order.
+        shown: Reasons by key (see `Unreached`), of what was shown to be out of reach.
+    """
+
+    plan: Plan
+    names: Names
+    decisions: Sequence[Marked]
+    unreached: Sequence[Unreached]
+    shown: Mapping[Hashable, str] = field(init=False)
+    places: Mapping[str, list[Place]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.shown = {each.key: each.reason for each in self.unreached if each.shown}
+        self.places = dict(self._places())
+
+    def _places(self) -> Iterator[tuple[str, list[Place]]]:
+        """The places of the decisions of each function."""
+        p, names, program = self.names.program, self.names, self.plan.program
+        for procedure in program.procedures:
+            yield f"{p}_do_{names.procedures[procedure.name]}", [Place("procedure", procedure.name)]
+        for at, number in enumerate(self.plan.monitored):
+            yield names.holding[at], [Place("assumption", program.assumptions[number].name)]
+        deferred = [Place("deferred", v.name) for v in program.variables if v.deferred_until is not None]
+        yield f"{p}_settle", deferred
+        yield f"{p}_admit", deferred
+        yield f"{p}_check", [Place("invariant", invariant.name) for invariant in program.invariants]
+        for table in self.plan.tables:
+            lines = [Place("line", table.table.name, line.name) for line in table.lines]
+            yield f"{p}_run_{names.tables[table.table.name]}", lines
+        for name, kind in SHORT.items():
+            for op in ("abs", "min", "max"):
+                yield f"{p}_{op}_{name}", [Place("operator", f"{op} of {kind}")]
+
+    # --- what was missed ---
+
+    def missed(self, measured: Measured) -> Iterator[Missed]:
+        """Everything that was not covered, each with its reason."""
+        by_function: dict[str, list[Point]] = {}
+        for point in measured.branches:
+            by_function.setdefault(point.function, []).append(point)
+        explained: dict[str, list[str]] = {}
+        for function, points in by_function.items():
+            for point, truth in _not_seen(points):
+                reason = self.branch(point, truth, points)
+                explained.setdefault(function, []).append(reason)
+                yield Missed(function, point.line, f"`{point.text}` {str(truth).lower()}", reason)
+        for decision in measured.decisions:
+            inside = [other for other in measured.decisions if other.function == decision.function]
+            for number, shown in enumerate(decision.shown):
+                if not shown:
+                    what = f"condition {number + 1} of {len(decision.shown)} decides on its own"
+                    reason = self.condition(decision, number, inside)
+                    yield Missed(decision.function, decision.line, what, reason)
+        for region in measured.regions:
+            if region.count == 0:
+                reasons = explained.get(region.function, [])
+                reason = NO_WAY if reasons and all(reasons) else self._of_constant(region)
+                yield Missed(region.function, region.line, "statement", reason)
+
+    def _of_constant(self, region: Region) -> str:
+        """Why the value of a choice is not taken that a compiler decides, and counts as no branch."""
+        table = self._table(region.function)
+        which = {"(-1)": NONE, "(-2)": SEVERAL}.get(region.text[:4])
+        return "" if table is None else self.shown.get(("matched", table.name, which), "")
+
+    def branch(self, point: Point, truth: bool, points: Sequence[Point]) -> str:
+        """Why a condition cannot have this truth; empty where that is not known."""
+        function = point.function
+        if function == f"{self.names.program}_exact" or point.text.startswith(
+            f"!{self.names.program}_exact()"
+        ):
+            return MACHINE
+        table = self._table(function)
+        if table is not None and (reason := self._of_table(table, point, truth)):
+            return reason
+        level = self._level(function)
+        if level is not None:
+            return self._of_level(level, point, truth, points)
+        keys = self._line_keys(table) if function.endswith("_line") and table else self._keys(function)
+        own = [other for other in points if not _generic(other.text)]
+        place = own.index(point) - (len(own) - len(keys)) if point in own else -1
+        if function.endswith(("_check", "_admit")) and 0 <= place < len(keys):
+            return self._reason(keys[place], truth)
+        return self._reason(keys[place], truth) if len(own) == len(keys) and place >= 0 else ""
+
+    def _reason(self, key: Hashable, truth: bool) -> str:
+        match key:
+            case ("classes", name, leaf, false, true):
+                classes = true if truth else false
+                reasons = [self.shown.get(("class", name, leaf, at), "") for at in classes]  # type: ignore[attr-defined]
+                return reasons[0] if reasons and all(reasons) else ""
+            case (int(decision), int(number)):
+                wanted = truth is not (number in self.decisions[decision].negated)
+                return self.shown.get(("decision", decision, number, wanted), "")
+        return ""
+
+    def _keys(self, function: str) -> list[Hashable]:
+        """Decision and number of each condition of a function, in order."""
+        places = self.places.get(function, [])
+        inside = [(at, d) for place in places for at, d in enumerate(self.decisions) if d.place == place]
+        return [
+            (at, number)
+            for at, decision in inside
+            for number in range(len(decision.conditions))
+            if number not in decision.constant
+        ]
+
+    def _line_keys(self, table: Table) -> list[Hashable]:
+        """What each comparison of a matcher is: of classes of a leaf, or a condition of a test."""
+        planned = next(each for each in self.plan.tables if each.table.name == table.name)
+        keys = list[Hashable]()
+        for probe in (probe for group in planned.matcher.groups for probe in group):
+            match probe.index:
+                case Direct(leaf=leaf, type=Bool()):
+                    keys.append(("classes", table.name, leaf, (0,), (1,)))
+                case Cuts(leaf=leaf, cuts=cuts):
+                    whole = range(len(cuts) + 1)
+                    keys += [
+                        ("classes", table.name, leaf, tuple(whole[: at + 1]), tuple(whole[at + 1 :]))
+                        for at, _ in enumerate(cuts)
+                    ]
+                case Truth(condition=condition):
+                    at = next(
+                        at
+                        for at, d in enumerate(self.decisions)
+                        if d.form == condition and d.place.kind == "test" and d.place.name == table.name
+                    )
+                    numbers = range(len(self.decisions[at].conditions))
+                    keys += [(at, n) for n in numbers if n not in self.decisions[at].constant]
+        return keys
+
+    def condition(self, decision: Decision, number: int, inside: Sequence[Decision]) -> str:
+        """Why a condition cannot be shown to decide on its own; empty where that is not known."""
+        function, table = decision.function, self._table(decision.function)
+        if function == f"{self.names.program}_exact":
+            return MACHINE
+        keys = self._line_keys(table) if function.endswith("_line") and table else self._keys(function)
+        joint: dict[int, list[int]] = {}
+        for key in keys:
+            match key:
+                case (int(at), int(which)):
+                    joint.setdefault(at, []).append(which)
+        several = [(at, numbers) for at, numbers in joint.items() if len(numbers) > 1]
+        skipped = len(inside) - len(several) if function.endswith(("_check", "_admit")) else 0
+        place = inside.index(decision) - skipped
+        if len(several) + skipped != len(inside) or not 0 <= place < len(several):
+            return ""
+        at, numbers = several[place]
+        if len(numbers) != len(decision.shown):
+            return ""
+        keyed = (("decision", at, numbers[number], truth) for truth in (None, True, False))
+        return next((self.shown[key] for key in keyed if key in self.shown), "")
+
+    # --- tables and levels ---
+
+    def _table(self, function: str) -> Table | None:
+        p, names = self.names.program, self.names.tables
+        for table in self.plan.program.tables:
+            if function in (f"{p}_{names[table.name]}_line", f"{p}_run_{names[table.name]}"):
+                return table
+        return None
+
+    def _of_table(self, table: Table, point: Point, truth: bool) -> str:
+        """Why no line matches, or several, or a line does not run, is out of reach."""
+        if not truth:  # a switch on one line alone
+            alone = len(table.lines) + (table.default is not None) == 1 and point.text.startswith("case ")
+            return OTHER_LINE if alone and self._matched_once(table) else ""
+        if NO_LINE.match(point.text):
+            return self.shown.get(("matched", table.name, NONE), "")
+        if SEVERAL_LINES.match(point.text):
+            return self.shown.get(("matched", table.name, SEVERAL), "")
+        if point.text.startswith("case "):
+            constants = self.names.lines[table.name]
+            at = next((at for at, name in enumerate(constants) if point.text == f"case {name}"), -1)
+            return self.shown.get(("ran", table.name, at), "")
+        return ""
+
+    def _matched_once(self, table: Table, level: Level | None = None) -> bool:
+        """Whether both no line and several lines are out of reach: anywhere, or in the cycle of a level."""
+        name = str(table.name)
+
+        def excluded(which: int) -> bool:
+            in_cycle = level is not None and ("ended", level.name, name, which) in self.shown
+            return in_cycle or ("matched", name, which) in self.shown
+
+        return (table.default is not None or excluded(NONE)) and excluded(SEVERAL)
+
+    def _level(self, function: str) -> Level | None:
+        p, names = self.names.program, self.names.levels
+        levels = (level for level in self.plan.program.levels if function == f"{p}_{names[level.name]}_cycle")
+        return next(levels, None)
+
+    def _of_level(self, level: Level, point: Point, truth: bool, points: Sequence[Point]) -> str:
+        program = self.plan.program
+        tables = [table for table in program.tables if table.name in level.table_names]
+        sound = all(self._matched_once(table, level) and not table.stops for table in tables)
+        sound = sound and not any(procedure.extern for procedure in program.procedures)
+        if GUARD.match(point.text):
+            passing = truth is ("!=" in point.text)
+            return FAULTLESS if sound and passing else ""
+        choices = [other for other in points if other.text.startswith("chosen")]
+        last = point in choices and not truth
+        if last and all(other.false for other in choices if other.line < point.line):
+            return COMPLETE
+        return ""
+
+
+def _generic(text: str) -> bool:
+    """Whether it is a condition that no expression of the language is: of a loop, a fault, a switch, a match."""
+    patterns = (LOOP, GUARD, NO_LINE, SEVERAL_LINES)
+    return any(pattern.match(text) for pattern in patterns) or text.startswith("case ") or "_holds_" in text
+
+
+def _not_seen(points: Sequence[Point]) -> Iterator[tuple[Point, bool]]:
+    for point in points:
+        if not point.true:
+            yield point, True
+        if not point.false:
+            yield point, False

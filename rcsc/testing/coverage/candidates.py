@@ -1,0 +1,190 @@
+"""Cases that are tried first, without a solver: what every program has, what tables say, and what is drawn.
+
+In: a program, the plan and the symbols of its C, and MC/DC vectors of its tables. Out: cases, the cheapest kind
+first; most lead nowhere new and are dropped (`choose`).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from random import Random
+
+from rcsc.emit.plan import Cuts, Direct, Group, Plan
+from rcsc.lang.interpret import initial
+from rcsc.lang.model import (
+    Apply,
+    Bool,
+    Expr,
+    Kind,
+    Literal,
+    Op,
+    Procedure,
+    Program,
+    Read,
+    Snapshot,
+    Table,
+    Value,
+    Variable,
+    key_bounds,
+    value_of_key,
+)
+from rcsc.testing.coverage.case import Answer, Case, Entry, Expected, entries, outside_of, ran, refused_at
+from rcsc.testing.executors.externs import results
+from rcsc.testing.executors.sessions import Stimuli
+from rcsc.testing.executors.symbols import Symbols
+from rcsc.testing.inputs.sampling import declarations, session
+from rcsc.testing.inputs.snapshot import InputSearch, Missing
+from rcsc.testing.inputs.vectors import Vectors
+
+TRIES = 10
+"""Sessions that are drawn for each that starts where `check` accepts the state."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Session:
+    """Cycles of one step or level, one after the other.
+
+    Attributes:
+        cases: One a cycle; the state of each is what the one before left, with new inputs.
+        expected: What each must give.
+    """
+
+    entry: Entry
+    cases: tuple[Case, ...]
+    expected: tuple[Expected, ...]
+
+
+@dataclass(slots=True)
+class Drawn:
+    """Answers extern procedures by chance, and keeps what it answered."""
+
+    program: Program
+    random: Random
+    given: list[Answer]
+
+    def answer(self, procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
+        """An edge of each leaf that is written, or a reading outside its range."""
+        leaves = [self.program.variable(name) for name in procedure.writes]
+        values = tuple(self.random.choice(results(self.program, leaf)) for leaf in leaves)
+        self.given.append(Answer(str(procedure.name), values))
+        return values
+
+
+def always(program: Program, symbols: Symbols) -> Iterator[Case]:
+    """What every program has: `init`, `check` on each bad state, and each input refused beyond each end of its range."""
+    start = initial(program)
+    yield Case(Entry("init"), start, origin="initial state")
+    yield Case(Entry("check"), start, origin="initial state")
+    yield Case(Entry("check"), start, origin="a state of other tables", foreign=True)
+    for variable in program.variables:
+        for end, value in outside_of(variable, symbols.c_type(variable.name)).items():
+            if variable.kind is not Kind.INPUT or isinstance(variable.type, Bool):
+                words = f"{variable.name} {end} its range"
+                yield Case(Entry("check"), {**start, variable.name: value}, origin=words)
+    cycles = [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
+    for variable in (v for v in program.variables if v.kind is Kind.INPUT and not isinstance(v.type, Bool)):
+        for end, value in outside_of(variable, symbols.c_type(variable.name)).items():
+            for entry in cycles:
+                yield Case(entry, {**start, variable.name: value}, origin=f"{variable.name} {end} its range")
+
+
+def of_tables(search: InputSearch, plan: Plan, tables: Sequence[Vectors]) -> Iterator[Case]:
+    """The tables' own vectors, and each class of each leaf."""
+    for planned, vectors in zip(plan.tables, tables, strict=True):
+        table = planned.table
+        for kind in ("line", "lines", "step"):
+            for vector in vectors.vectors:
+                words = f"line {vector.line}: {vector.condition} {vector.purpose}" if vector.condition else ""
+                origin = words or f"line {vector.line} reached"
+                yield Case(Entry(kind, str(table.name)), vector.snapshot, origin=origin)
+        for leaf, classes in _classes(planned.matcher.groups):
+            for value in classes:
+                given = search.find(
+                    [(_equals(search.program.variable(leaf), value), True), *_given(search.program, table)]
+                )
+                if not isinstance(given, Missing):
+                    yield Case(Entry("line", str(table.name)), given, origin=f"{leaf} looked up")
+
+
+def _classes(groups: Sequence[Group]) -> Iterator[tuple[str, tuple[Value, ...]]]:
+    """A value of each class of each leaf that the C finds by comparing."""
+    for probe in (probe for group in groups for probe in group):
+        match probe.index:
+            case Direct(leaf=leaf, type=Bool()):
+                yield leaf, (False, True)
+            case Cuts(leaf=leaf, type=kind, cuts=cuts):
+                low, _ = key_bounds(kind)
+                yield leaf, (value_of_key(kind, low), *cuts)
+
+
+def _given(program: Program, table: Table) -> list[tuple[Expr, bool]]:
+    """What must hold that a table may be matched."""
+    stops = [a.condition for a in program.assumptions if a.name in table.stops]
+    return [(condition, True) for condition in (*stops, *(i.condition for i in program.invariants))]
+
+
+def _equals(variable: Variable, value: Value) -> Expr:
+    read = Read(variable.name, variable.type)
+    if isinstance(variable.type, Bool):
+        return read if value else Apply(Op.NOT, (read,), Bool())
+    return Apply(Op.EQ, (read, Literal(value, variable.type)), Bool())
+
+
+def refusals(program: Program, symbols: Symbols, case: Case) -> Iterator[Case]:
+    """The same case, but each result of an extern procedure beyond each end of its range, and in it as far as it goes."""
+    procedures = {str(procedure.name): procedure for procedure in program.procedures}
+    for number, answer in enumerate(case.answers):
+        names = procedures[answer.procedure].writes
+        admitted = [program.variable(name).initial for name in names]
+        for at, name in enumerate(names):
+            for end, value in outside_of(program.variable(name), symbols.c_type(name)).items():
+                if isinstance(program.variable(name).type, Bool):
+                    continue
+                changed = Answer(answer.procedure, (*admitted[:at], value, *admitted[at + 1 :]))
+                origin = f"{name} from {answer.procedure} {end} its range"
+                yield replace(
+                    case,
+                    answers=(*case.answers[:number], changed, *case.answers[number + 1 :]),
+                    origin=origin,
+                )
+
+
+def drawn(program: Program, entry: Entry, examples: int, most: int) -> Iterator[Session]:
+    """Sessions of a step or a cycle that are drawn by a seed, leaning on edges.
+
+    Args:
+        program: A program.
+        entry: A step or a cycle.
+        examples: How many.
+        most: Cycles of the longest.
+    """
+    known, random = declarations(program), Random(f"{entry.kind} {entry.name}")  # noqa: S311  # repeatable
+    tables = {str(table.name): table for table in program.tables}
+    levels = {level.name: level for level in program.levels}
+    aimed = tables[entry.name] if entry.kind == "step" else None
+    left = examples
+    for _ in range(TRIES * examples):
+        table = aimed or tables[str(random.choice(levels[entry.name].table_names))]
+        stimuli = session(known, table, most, random)
+        if refused_at(program, stimuli.start) >= 0:
+            continue
+        yield played(program, entry, stimuli, random)
+        left -= 1
+        if not left:
+            return
+
+
+def played(program: Program, entry: Entry, stimuli: Stimuli, random: Random) -> Session:
+    """A session as cases, up to a cycle that is undefined."""
+    cases, shown = list[Case](), list[Expected]()
+    state: Snapshot = stimuli.start
+    for number, readings in enumerate(stimuli.readings, 1):
+        before = {**state, **readings}
+        answers = Drawn(program, random, [])
+        with_answers = Case(entry, before, origin=f"drawn, cycle {number}")
+        right = ran(program, with_answers, answers.answer)
+        if right is None or right.after is None:
+            break
+        cases.append(Case(entry, before, tuple(answers.given), with_answers.origin))
+        shown.append(right)
+        state = right.after
+    return Session(entry, tuple(cases), tuple(shown))

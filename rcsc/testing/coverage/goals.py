@@ -1,0 +1,229 @@
+"""What vectors reach of the C, as the language knows it, and what is still open.
+
+In: a marked program, the plan of its C, and cases. Out: for each case what it *hits*: how each decision went, which
+line ran, which fault ended it, what was refused and on which side, which class of a leaf was looked up. Every branch of
+the C belongs to one of these, so that a set that hits all of them covers the C; a compiler then measures it.
+"""
+
+import math
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import TypeAlias
+
+from rcsc.emit.plan import Cuts, Direct, Plan
+from rcsc.lang.interpret import Fault, evaluate, holds
+from rcsc.lang.model import (
+    Admit,
+    Bool,
+    Int,
+    Kind,
+    Level,
+    OneTable,
+    Program,
+    Real,
+    Snapshot,
+    Table,
+    Value,
+    Variable,
+    key_bounds,
+)
+from rcsc.testing.coverage.case import Case, Expected, ran, table_of
+from rcsc.testing.coverage.marks import Decision, Marked, Outcomes
+
+Hit: TypeAlias = tuple[Hashable, ...]
+
+
+@dataclass(slots=True)
+class Reached:
+    """What cases reach of one program.
+
+    Attributes:
+        ways: Of each decision, how it went, in all cases that were kept.
+    """
+
+    program: Program
+    plan: Plan
+    marked: Marked
+    hits: set[Hit] = field(default_factory=set)
+    ways: dict[int, dict[tuple[Outcomes, bool], None]] = field(default_factory=dict)
+
+    def of(self, case: Case, right: Expected) -> set[Hit]:
+        """What a case hits."""
+        self.marked.forget()
+        entry = case.entry
+        hits: set[Hit] = {("entry", entry)}
+        match entry.kind:
+            case "check":
+                hits.update(self._checked(case.before, right.result))
+            case "line" | "lines":
+                hits.update(self._matched(case, right))
+            case "step" | "cycle":
+                hits.update(self._run(case, right))
+        for at, decision in enumerate(self.marked.decisions):
+            hits |= {("decision", at, outcomes, truth) for outcomes, truth in decision.seen}
+        return hits
+
+    def keep(self, hits: Iterable[Hit]) -> None:
+        """Count what a case hits."""
+        for hit in hits:
+            self.hits.add(hit)
+            match hit:
+                case ("decision", int(at), outcomes, bool(truth)):
+                    self.ways.setdefault(at, {})[(outcomes, truth)] = None  # type: ignore[index]  # as `of` makes it
+
+    def _checked(self, before: Snapshot, result: int) -> Iterator[Hit]:
+        variables = self.program.variables
+        if 0 <= result < len(variables):
+            variable = variables[result]
+            yield ("unfit", variable.name, side(variable, before[variable.name]))
+            return
+        yield ("checked", result)
+        for at, invariant in enumerate(self.marked.program.invariants, len(variables)):
+            if result in range(at):
+                return
+            holds(invariant.condition, before)
+
+    def _matched(self, case: Case, right: Expected) -> Iterator[Hit]:
+        table = table_of(self.marked.program, case.entry)
+        if case.entry.kind == "lines":
+            return
+        yield ("matched", table.name, min(right.result, 0))
+        for test in {id(t): t for line in table.lines for t in line.tests if t is not None}.values():
+            if test.box is None:
+                holds(test.condition, case.before)
+        yield from self._classes(table, case.before)
+
+    def _classes(self, table: Table, before: Snapshot) -> Iterator[Hit]:
+        """The class of each leaf that the C finds by comparing."""
+        planned = next(one for one in self.plan.tables if one.table.name == table.name)
+        for probe in (probe for group in planned.matcher.groups for probe in group):
+            match probe.index:
+                case Direct(leaf=leaf, type=Bool()):
+                    yield ("class", table.name, leaf, int(before[leaf]))
+                case Cuts(leaf=leaf, cuts=cuts):
+                    yield ("class", table.name, leaf, sum(before[leaf] >= cut for cut in cuts))
+
+    def _run(self, case: Case, right: Expected) -> Iterator[Hit]:
+        entry, after = case.entry, right.after
+        assert after is not None
+        yield ("fault", entry, right.result, right.fault_at if right.result != Fault.ADMIT else "")
+        if right.result == Fault.ADMIT:
+            variable = self.program.variable(right.fault_at)
+            yield ("refused", variable.name, side(variable, case.before[variable.name]))
+            return
+        yield from self._answered(case, right)
+        for variable in self.program.variables:
+            if variable.kind is Kind.INPUT and variable.admit is Admit.CLAMP:
+                yield ("clamped", variable.name, side(variable, case.before[variable.name]))
+        ran(self.marked.program, case)
+        for decision in self.marked.decisions:
+            if decision.place.kind == "test":  # the interpreter looks at fewer tests than the C
+                decision.seen = {}
+        yield from self._told(entry.name, right.failed) if entry.kind == "step" else ()
+        if entry.kind == "step" and right.line >= 0:
+            yield ("ran", entry.name, right.line)
+        if entry.kind == "cycle":
+            yield from self._chosen(next(x for x in self.program.levels if x.name == entry.name), after)
+
+    def _answered(self, case: Case, right: Expected) -> Iterator[Hit]:
+        """What extern procedures gave: each leaf on each side of its range, and where a refusal ended the cycle."""
+        procedures = {str(procedure.name): procedure for procedure in self.program.procedures}
+        for number, answer in enumerate(case.answers, 1):
+            for name, value in zip(procedures[answer.procedure].writes, answer.values, strict=True):
+                beyond = side(self.program.variable(name), value)
+                yield ("given", answer.procedure, name, beyond)
+                if right.result == Fault.EXTERN and number == len(case.answers):
+                    yield ("ended by", case.entry, number, name, beyond)
+
+    def _told(self, name: str, failed: tuple[str, ...]) -> Iterator[Hit]:
+        """How each assumption that the table checks went, and whether one before it had ended the cycle."""
+        table = next(table for table in self.program.tables if table.name == name)
+        ended = False
+        for at in self.plan.monitored:
+            assumption = self.program.assumptions[at].name
+            if assumption in table.assumptions:
+                fails = assumption in failed
+                yield ("told", name, assumption, fails, fails and ended)
+                ended = ended or (fails and assumption in table.stops)
+
+    def _chosen(self, level: Level, after: Snapshot) -> Iterator[Hit]:
+        """Which table of each choice ran, by what selects it."""
+        for at, choice in enumerate(level.choices):
+            if not isinstance(choice, OneTable):
+                yield ("chosen", level.name, at, evaluate(choice.selector, after))
+
+    # --- what is open ---
+
+    def number_of(self, decision: Decision) -> int:
+        """The position of a decision in the program."""
+        return self.marked.decisions.index(decision)
+
+    def open_goals(self) -> Iterator["Goal"]:
+        """Conditions that no case kept so far shows to have both truths, or to decide on their own."""
+        for at, decision in enumerate(self.marked.decisions):
+            ways = self.ways.get(at, {})
+            for number in sorted(set(range(len(decision.conditions))) - decision.constant):
+                for truth in (True, False):
+                    if not any(outcomes[number] is truth for outcomes, _ in ways):
+                        yield Goal(decision, number, truth)
+                if len(decision.conditions) > 1 and not decides(ways, number):
+                    yield Goal(decision, number, None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Goal:
+    """A condition to be shown.
+
+    Attributes:
+        number: Of the condition in its decision.
+        truth: The truth that it is to have; None where it is to decide on its own.
+    """
+
+    decision: Decision
+    number: int
+    truth: bool | None
+
+    @property
+    def condition(self) -> str:
+        """The condition in words."""
+        return self.decision.conditions[self.number]
+
+    @property
+    def wanted(self) -> str:
+        """What is to be shown, in words."""
+        return "decides on its own" if self.truth is None else str(self.truth).lower()
+
+
+def decides(ways: Mapping[tuple[Outcomes, bool], None], number: int) -> bool:
+    """Whether two of these ways show that the condition decides: it and the truth differ, others only where one is not looked at.
+
+    Source: unique-cause MC/DC with short-circuit operators, as `llvm-cov` counts it.
+    """
+    return any(pairs(one, other, number) for one, other in combinations(ways, 2))
+
+
+def pairs(one: tuple[Outcomes, bool], other: tuple[Outcomes, bool], number: int) -> bool:
+    """Whether two ways show together that a condition decides."""
+    (first, truth), (second, other_truth) = one, other
+    if (
+        truth is other_truth
+        or first[number] is None
+        or second[number] is None
+        or first[number] is second[number]
+    ):
+        return False
+    return all(
+        a is b or a is None or b is None
+        for at, (a, b) in enumerate(zip(first, second, strict=True))
+        if at != number
+    )
+
+
+def side(variable: Variable, value: Value) -> str:
+    """The end of its range that a value is beyond: `below`, `above`, or `nan`; empty where it lies inside."""
+    kind = variable.type
+    if isinstance(kind, Real) and math.isnan(value):
+        return "nan"
+    low, high = (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
+    return "below" if value < low else "above" if value > high else ""

@@ -1,0 +1,275 @@
+"""Vectors of the whole C: they pass on the C, notice what is planted in it, and say truly what nothing reaches."""
+
+import csv
+import io
+import json
+import subprocess
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.emit import emitted as emitted_of
+from rcsc.emit.lower import lower
+from rcsc.emit.plan import Plan
+from rcsc.host.tools import c_compiler
+from rcsc.lang.model import Program, ProvedProgram, Value, seal_of_proof
+from rcsc.solvers.options import Options
+from rcsc.testing.coverage.case import Case, Entry, entries, expected
+from rcsc.testing.coverage.choose import Choice, chosen
+from rcsc.testing.coverage.document import (
+    VectorSet,
+    as_json,
+    sessions_csv,
+    sessions_document,
+    vectors_csv,
+    vectors_document,
+)
+from rcsc.testing.coverage.goals import Reached, decides
+from rcsc.testing.coverage.harness import vectors_c
+from rcsc.testing.coverage.marks import marked, ways_of
+from rcsc.testing.coverage.vector_set import vector_set
+from rcsc.testing.executors.symbols import symbols_of
+from rcsc.testing.inputs.snapshot import search_in
+from rcsc.testing.inputs.vectors import vectors_of
+from tests.support.programs.examples import EXTERN, LASTING, STOPS
+from tests.support.programs.stages import emitted, program_of, proved_of
+from tests.support.programs.texts import edited
+
+SMALL = """
+enum mode { idle, run, stop }
+input wanted : mode
+input go : bool
+input parts : int 0 .. 3
+state held : int 0 .. 2
+state warm : bool
+output lamp : bool
+invariant cold : held = 0 implies not warm
+
+assume quiet monitored : go or parts < 3
+
+procedure count {
+  if held < 2 and (go or parts = 3) { held := held + 1; warm := true }
+}
+procedure glow { if warm and held = 0 { lamp := true } else { lamp := wanted in {run, stop} and go } }
+
+table t assuming quiet {
+  | line | wanted  || procedures  |
+  | on   | = run   || count; glow |
+  | off  | DEFAULT || glow        |
+}
+level l {
+  period 10 [ms]
+  table t
+}
+"""
+"""Small enough that every state with every input is tried; `glow` has a condition that the invariant excludes."""
+
+
+def plan_of(text: str) -> Plan:
+    return lower(ProvedProgram(proved_of(text), seal_of_proof()))
+
+
+def set_of(text: str, sessions: int = 30) -> VectorSet:
+    plan = plan_of(text)
+    return vector_set(plan, emitted_of(plan), Options(), None, lambda _: None, sessions)
+
+
+def played(folder: Path, document: VectorSet, *edits: tuple[str, str]) -> tuple[int, str]:
+    """Status and words of the program that plays the vectors on the C, which is edited first."""
+    compiler = c_compiler()
+    assert isinstance(compiler, str)
+    for path, text in emitted(document.program).items():
+        if path.endswith((".c", ".h")):
+            own = Path(path).name == document.symbols.source
+            (folder / Path(path).name).write_text(edited(text, *edits) if own else text, "utf-8")
+    (folder / "vectors.c").write_text(vectors_c(document.program, document.symbols, document.kept), "utf-8")
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O1"]
+    files = ["vectors.c", document.symbols.source]
+    subprocess.run([compiler, *strict, "-o", "play", *files], cwd=folder, check=True)
+    ran = subprocess.run(["./play"], cwd=folder, capture_output=True, text=True, check=False)
+    return ran.returncode, ran.stdout
+
+
+@pytest.mark.parametrize("text", [SMALL, STOPS, LASTING, EXTERN])
+def test_the_c_gives_what_every_vector_says(text: str, tmp_path: Path) -> None:
+    document = set_of(text)
+    status, told = played(tmp_path, document)
+    assert (status, told) == (0, f"{len(document.kept)} vectors, 0 wrong\n")
+    assert {kept.case.entry for kept in document.kept} == set(entries(document.program))
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("s->held < 2u", "s->held < 1u"),
+        ("s->go || (s->parts == 3u)", "s->go || (s->parts != 9u)"),
+        ("(s->parts > 3u)", "(s->parts > 9u)"),
+        ("return s->go || (s->parts < 3u)", "return s->go || (s->parts < 4u)"),
+        ("(s->held > 2u)", "(s->held > 3u)"),
+        ("_COLD;", "_COLD - 1;"),
+        ("s->held = 0u;", "s->held = 1u;"),
+    ],
+)
+def test_a_slip_in_the_c_fails_a_vector(right: str, wrong: str, tmp_path: Path) -> None:
+    status, told = played(tmp_path, set_of(SMALL), (right, wrong))
+    assert status == 1
+    assert "wrong" in told
+
+
+WHOLE = (Entry("check"), Entry("step", "t"), Entry("cycle", "l"))
+
+
+def every_case(program: Program) -> list[Case]:
+    """Every state within its ranges with every admitted input, for `check` and each step and cycle."""
+    kinds = {"wanted": range(3), "go": (False, True), "parts": range(4), "held": range(3)}
+    kinds |= {"warm": (False, True), "lamp": (False, True)}
+    states: list[dict[str, Value]] = [
+        dict(zip(kinds, values, strict=True)) for values in product(*kinds.values())
+    ]
+    assert list(kinds) == [str(v.name) for v in program.variables]
+    return [Case(entry, state) for entry in WHOLE for state in states]
+
+
+def test_what_is_said_to_be_out_of_reach_is_and_all_else_is_reached() -> None:
+    """Against all 432 cases: no decision can go a way that the vectors leave out, but for ways that show nothing more."""
+    document = set_of(SMALL)
+    program, plan = document.program, plan_of(SMALL)
+    whole, kept = (Reached(program, plan, marked(program)) for _ in range(2))
+    for case in every_case(program):
+        right = expected(program, case)
+        if right is not None:
+            whole.keep(whole.of(case, right))
+    for each in document.kept:
+        kept.keep(each.hits)
+    for at, decision in enumerate(whole.marked.decisions):
+        for number, _ in enumerate(decision.conditions):
+            able, done = whole.ways.get(at, {}), kept.ways.get(at, {})
+            for truth in (True, False):
+                possible = any(outcomes[number] is truth for outcomes, _ in able)
+                assert possible is any(outcomes[number] is truth for outcomes, _ in done)
+                assert possible is not any(
+                    u.key == ("decision", at, number, truth) for u in document.unreached
+                )
+            if len(decision.conditions) > 1:
+                possible = decides(able, number)
+                assert possible is decides(done, number)
+                assert possible is not any(
+                    u.key == ("decision", at, number, None) for u in document.unreached
+                )
+    places = {(u.where, u.what) for u in document.unreached if u.key[0] == "decision"}
+    assert places == {("procedure glow", "warm"), ("procedure glow", "held = 0")}  # neither decides
+    assert all(unreached.shown for unreached in document.unreached)
+
+
+def test_no_vector_can_be_spared() -> None:
+    document = set_of(SMALL)
+    for left_out in document.kept:
+        rest = {hit for kept in document.kept if kept is not left_out for hit in kept.hits}
+        assert not left_out.hits <= rest
+
+
+def test_a_line_that_only_a_failing_assumption_leaves_without_an_answer_is_run() -> None:
+    """Without DEFAULT the table rests on an assumption that only tells: where it fails, no line matches."""
+    text = edited(SMALL, ("  | off  | DEFAULT || glow        |", "  | off  | = idle  || glow        |"))
+    text = edited(text, ("go or parts < 3", "wanted /= stop"))
+    document = set_of(text)
+    ended = [kept for kept in document.kept if kept.expected.result == 2]
+    assert {kept.case.entry.kind for kept in ended} == {"step", "cycle"}
+    assert all(kept.case.before["wanted"] == 2 for kept in ended)
+    keys = {unreached.key for unreached in document.unreached}
+    assert ("matched", "t", -2) in keys
+    assert ("matched", "t", -1) not in keys
+
+
+def test_where_the_solver_may_do_nothing_it_is_said() -> None:
+    plan = plan_of(SMALL)
+    files = emitted_of(plan)
+    document = vector_set(plan, files, Options(steps=1), None, lambda _: None, 1)
+    assert any(not unreached.shown and "no answer" in unreached.reason for unreached in document.unreached)
+
+
+def test_the_ways_of_a_decision_are_those_of_short_circuits() -> None:
+    whole = marked(program_of(SMALL))
+    joint = next(d for d in whole.decisions if d.place.name == "count" and len(d.conditions) == 3)
+    assert joint.conditions == ("held < 2", "go", "parts = 3")
+    assert joint.form is not None
+    assert set(ways_of(joint.form)) == {
+        ((False, None, None), False),
+        ((True, True, None), True),
+        ((True, False, True), True),
+        ((True, False, False), False),
+    }
+    implied = next(d for d in whole.decisions if d.place.kind == "invariant")
+    assert implied.form is not None
+    assert set(ways_of(implied.form)) == {
+        ((False, None), True),
+        ((True, False), True),
+        ((True, True), False),
+    }
+    assert implied.negated == {0, 1}
+
+
+def test_json_and_csv_say_the_same() -> None:
+    document = set_of(SMALL)
+    parsed = json.loads(as_json([vectors_document(document)]))
+    rows = list(csv.DictReader(io.StringIO(vectors_csv(document))))
+    assert len(rows) == len(parsed["vectors"]) == len(document.kept)
+    for row, vector in zip(rows, parsed["vectors"], strict=True):
+        assert row["function"] == vector["function"]
+        assert int(row["result"]) == vector["expected"]["result"]
+        before = vector["inputs"] | vector["state"]
+        after = before | vector["expected"].get("changes", {})
+        for name, value in before.items():
+            assert row[name] == (str(value).lower() if isinstance(value, bool) else str(value))
+        for name, value in after.items():
+            assert row[f"after {name}"] == (str(value).lower() if isinstance(value, bool) else str(value))
+    assert parsed["tables"][0]["vectors"]
+    assert [each["what"] for each in parsed["unreached"]].count("held = 0") == 2
+
+
+def test_sessions_carry_their_state_from_cycle_to_cycle() -> None:
+    document = set_of(LASTING)
+    parsed = json.loads(as_json([sessions_document(document)]))
+    rows = list(csv.DictReader(io.StringIO(sessions_csv(document))))
+    assert len(rows) == sum(len(session["cycles"]) for session in parsed["sessions"]) > len(document.sessions)
+    number = 0
+    for session in parsed["sessions"]:
+        state = session["start"]
+        for cycle in session["cycles"]:
+            state |= cycle["inputs"]
+            assert {name: rows[number][name] for name in state} == {
+                name: str(value).lower() if isinstance(value, bool) else str(value)
+                for name, value in state.items()
+            }
+            state |= cycle["expected"]["changes"]
+            number += 1
+
+
+def test_drawing_is_the_same_every_time() -> None:
+    program = program_of(SMALL)
+    plan = plan_of(SMALL)
+
+    def once() -> Choice:
+        tables = [vectors_of(search_in(program), table) for table in program.tables]
+        symbols = symbols_of(program, emitted(program))
+        return chosen(search_in(program), plan, symbols, tables, 5, lambda _: None)
+
+    first, second = once(), once()
+    assert [kept.case.before for kept in first.kept] == [kept.case.before for kept in second.kept]
+
+
+def test_the_command_writes_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.rcs").write_text(SMALL, encoding="utf-8")
+    quick = ["test", "--examples", "5", "--mutants", "0", "--no-cortex", "a.rcs"]
+    assert run([*quick, "--vectors", "v.c", "--sessions", "s.csv"]) == 0
+    assert "vectors of the whole C" in capsys.readouterr().out
+    assert "vectors_play" in Path("v.c").read_text(encoding="utf-8")
+    assert Path("s.csv").read_text(encoding="utf-8").startswith("session,cycle,function,")
+    Path("b.rcs").write_text(SMALL, encoding="utf-8")
+    assert run([*quick, "b.rcs", "--vectors", "v.c"]) == 1
+    assert "a C file holds what is of one program" in capsys.readouterr().out

@@ -1,0 +1,68 @@
+"""What clang measures while the vectors are played, and the reasons for what it does not see covered."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from rcsc.evidence import coverage, llvm
+from rcsc.evidence.kind import Subject
+from rcsc.host.tools import Absent
+from rcsc.testing.coverage.directed import Director
+from tests.evidence.subjects import EVERYTHING, subject_of
+from tests.support.programs.examples import EXTERN, LASTING, STOPS
+
+pytestmark = [pytest.mark.needs("clang-19", "llvm-cov-19"), pytest.mark.slow]
+
+
+def edited_c(subject: Subject, right: str, wrong: str) -> Subject:
+    files = {path: text.replace(right, wrong) for path, text in subject.files.items()}
+    assert files != subject.files
+    return replace(subject, files=files)
+
+
+@pytest.mark.parametrize("text", [EVERYTHING, EXTERN, LASTING, STOPS])
+def test_all_is_covered_or_out_of_reach(text: str) -> None:
+    evidence = coverage.collect(subject_of(text))
+    assert not evidence.missing
+    assert evidence.shortfalls == ()
+    assert " 0 wrong" in evidence.figures[-1]
+    assert "open" not in "".join(evidence.figures)
+    missed = json.loads(evidence.files["missed.json"])
+    assert all(each["reason"] for each in missed)
+    assert "MC/DC Coverage for Decision: 100.00%" in evidence.files["coverage.txt"]
+
+
+def test_a_branch_that_no_vector_takes_is_a_shortfall() -> None:
+    """A test that the language does not have is planted in the C: nothing explains it."""
+    planted = "if (s->at > 3u) { s->at = 0u; }\n    s->both.right = s->go;"
+    evidence = coverage.collect(edited_c(subject_of(EVERYTHING), "s->both.right = s->go;", planted))
+    told = [each.what for each in evidence.shortfalls]
+    assert any("`s->at > 3u` true" in what for what in told)
+
+
+def test_a_wrong_result_is_a_shortfall() -> None:
+    evidence = coverage.collect(edited_c(subject_of(EVERYTHING), "% 4u", "% 2u"))
+    assert any(each.what.startswith("vector ") for each in evidence.shortfalls)
+
+
+def test_without_a_proof_nothing_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Director, "all", lambda _: iter(()))
+    evidence = coverage.collect(subject_of(EVERYTHING))
+    assert any("several" in each.what for each in evidence.shortfalls)
+
+
+def test_c_that_does_not_compile_is_a_shortfall() -> None:
+    evidence = coverage.collect(
+        edited_c(subject_of(EVERYTHING), "int32_t probe_check(", "int32_t probe_chuck(")
+    )
+    assert len(evidence.shortfalls) == 1
+    assert "error" in evidence.shortfalls[0].what
+
+
+def test_tools_that_are_not_there_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    absent = llvm.tools()
+    assert isinstance(absent, Absent)
+    assert coverage.collect(subject_of(EVERYTHING)).missing == absent.reason
+    assert "apt install clang-19 llvm-19" in absent.reason
