@@ -124,3 +124,42 @@ def test_a_system_with_a_prefix_runs(dock: Path) -> None:
         subprocess.run(["cc", "-std=c99", *STRICT, "-c", source.name], cwd=generated / "c", check=True)
     for executor in ("c", "python"):
         assert run(["run", str(dock / "system.toml"), "--executor", executor]) == 0
+
+
+PAGE = "tables/integration.md"
+
+
+def shown(repo: Path) -> list[tuple[str, str]]:
+    """What the page has one run, and what it prints then."""
+    text = (repo / PAGE).read_text(encoding="utf-8")
+    return re.findall(r"^```sh\n(.*?)^```\n\n```text\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+def played(repo: Path, folder: Path, *, cross: bool) -> list[str]:
+    """The commands of the page that need a cross compiler, or those that do not, each in the repository's tables and C."""
+    (folder / "build").mkdir()
+    for name in ("tables", "generated"):
+        (folder / name).symlink_to(repo / name)
+    ran = []
+    for commands, printed in shown(repo):
+        if ("arm-none-eabi" in commands) is cross:
+            made = subprocess.run(
+                ["bash", "-e", "-c", commands], cwd=folder, capture_output=True, text=True, check=False
+            )
+            assert (made.returncode, made.stdout) == (0, printed), made.stderr
+            ran.append(commands)
+    return ran
+
+
+def test_what_the_page_shows_is_so(repo: Path, tmp_path: Path) -> None:
+    text = (repo / PAGE).read_text(encoding="utf-8")
+    assert text.count("```sh\n") == len(shown(repo))
+    assert len(played(repo, tmp_path, cross=False)) == 3
+    for link in re.findall(r"\]\((?!#)([^)]+)\)", text):
+        assert (repo / "tables" / link).exists(), link
+
+
+@pytest.mark.needs("arm-none-eabi-gcc")
+@pytest.mark.needs("qemu-system-arm")
+def test_the_bare_metal_example_runs(repo: Path, tmp_path: Path) -> None:
+    assert len(played(repo, tmp_path, cross=True)) == 1
