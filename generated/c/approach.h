@@ -56,7 +56,7 @@ enum {
 
 /* Digests of what the tables mean, 373eb74c1d0b3dff, and of how the state is laid out, 1fa9c56db3e288dc:
    comments, and names of files, change neither. The number is made of both. */
-#define APPROACH_DIGEST UINT32_C(0xb51c33ec)
+#define APPROACH_DIGEST 0xb51c33ecu
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.

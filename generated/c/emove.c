@@ -644,7 +644,8 @@ static bool emove_holds_release_part_in_step(const emove_t *s)
 static int32_t emove_run_locate(emove_t *s)
 {
     if (!emove_holds_locate_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)EMOVE_ASSUMPTION_LOCATE_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_LOCATE_IN_STEP);
     }
     s->line = emove_locate_line(s);
     switch (s->line) {
@@ -768,7 +769,8 @@ static int32_t emove_run_locate(emove_t *s)
 static int32_t emove_run_move_to(emove_t *s)
 {
     if (!emove_holds_move_to_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_IN_STEP);
     }
     s->line = emove_move_to_line(s);
     switch (s->line) {
@@ -874,7 +876,7 @@ static int32_t emove_run_move_to_obj(emove_t *s)
 {
     if (!emove_holds_move_to_obj_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (1u << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_OBJ_IN_STEP);
+                ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_OBJ_IN_STEP);
     }
     s->line = emove_move_to_obj_line(s);
     switch (s->line) {
@@ -1007,7 +1009,8 @@ static int32_t emove_run_pause_emove(emove_t *s)
 static int32_t emove_run_pickup(emove_t *s)
 {
     if (!emove_holds_pickup_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)EMOVE_ASSUMPTION_PICKUP_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_PICKUP_IN_STEP);
     }
     s->line = emove_pickup_line(s);
     switch (s->line) {
@@ -1067,7 +1070,7 @@ static int32_t emove_run_release_part(emove_t *s)
 {
     if (!emove_holds_release_part_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (1u << (uint32_t)EMOVE_ASSUMPTION_RELEASE_PART_IN_STEP);
+                ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_RELEASE_PART_IN_STEP);
     }
     s->line = emove_release_part_line(s);
     switch (s->line) {

@@ -248,7 +248,7 @@ enum {
 
 /* Digests of what the tables mean, 9b385fe4bc08e20d, and of how the state is laid out, 2077c843488f4c8d:
    comments, and names of files, change neither. The number is made of both. */
-#define EMOVE_DIGEST UINT32_C(0xe48f9953)
+#define EMOVE_DIGEST 0xe48f9953u
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.

@@ -91,7 +91,7 @@ enum {
 
 /* Digests of what the tables mean, 0458c475cfdbeb84, and of how the state is laid out, 796ad2d866a867d5:
    comments, and names of files, change neither. The number is made of both. */
-#define GRIPPER_DIGEST UINT32_C(0xa1ee4292)
+#define GRIPPER_DIGEST 0xa1ee4292u
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.

@@ -377,9 +377,7 @@ nbs_robot_level_t nbs_robot_step(nbs_robot_t *s)
     nbs_robot_take_primitive(s);
     nbs_robot_take_gripper(s);
     if (task_task_cycle(&s->task) != 0) {
-        if (faulted == NBS_ROBOT_LEVEL_NONE) {
-            faulted = NBS_ROBOT_LEVEL_TASK;
-        }
+        faulted = NBS_ROBOT_LEVEL_TASK;
     }
     if (emove_emove_cycle(&s->emove) != 0) {
         if (faulted == NBS_ROBOT_LEVEL_NONE) {

@@ -578,7 +578,7 @@ static int32_t primitive_run_aprc_pstn_fngrs(primitive_t *s)
 {
     if (!primitive_holds_approach_position_fingers_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (1u << (uint32_t)PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP);
+                ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP);
     }
     s->line = primitive_aprc_pstn_fngrs_line(s);
     switch (s->line) {
@@ -643,7 +643,7 @@ static int32_t primitive_run_dprt_pstn_fngrs(primitive_t *s)
 {
     if (!primitive_holds_departure_position_fingers_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (1u << (uint32_t)PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP);
+                ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP);
     }
     s->line = primitive_dprt_pstn_fngrs_line(s);
     switch (s->line) {
@@ -707,7 +707,8 @@ static int32_t primitive_run_dprt_pstn_fngrs(primitive_t *s)
 static int32_t primitive_run_goto_(primitive_t *s)
 {
     if (!primitive_holds_goto_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)PRIMITIVE_ASSUMPTION_GOTO_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_GOTO_IN_STEP);
     }
     s->line = primitive_goto__line(s);
     switch (s->line) {
@@ -797,7 +798,8 @@ static int32_t primitive_run_goto_(primitive_t *s)
 static int32_t primitive_run_gothru(primitive_t *s)
 {
     if (!primitive_holds_gothru_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)PRIMITIVE_ASSUMPTION_GOTHRU_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_GOTHRU_IN_STEP);
     }
     s->line = primitive_gothru_line(s);
     switch (s->line) {
@@ -859,7 +861,7 @@ static int32_t primitive_run_immed_grasp(primitive_t *s)
 {
     if (!primitive_holds_immed_grasp_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (1u << (uint32_t)PRIMITIVE_ASSUMPTION_IMMED_GRASP_IN_STEP);
+                ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_IMMED_GRASP_IN_STEP);
     }
     s->line = primitive_immed_grasp_line(s);
     switch (s->line) {

@@ -241,7 +241,7 @@ enum {
 
 /* Digests of what the tables mean, 5821c84033322e76, and of how the state is laid out, de17d736f850af0d:
    comments, and names of files, change neither. The number is made of both. */
-#define PRIMITIVE_DIGEST UINT32_C(0xdf111493)
+#define PRIMITIVE_DIGEST 0xdf111493u
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.

@@ -627,10 +627,12 @@ static bool task_holds_transfer_resting(const task_t *s)
 static int32_t task_run_acquire(task_t *s)
 {
     if (!task_holds_acquire_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_ACQUIRE_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_ACQUIRE_IN_STEP);
     }
     if (!task_holds_acquire_resting(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_ACQUIRE_RESTING);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_ACQUIRE_RESTING);
     }
     s->line = task_acquire_line(s);
     switch (s->line) {
@@ -761,10 +763,12 @@ static int32_t task_run_acquire(task_t *s)
 static int32_t task_run_clear(task_t *s)
 {
     if (!task_holds_clear_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_CLEAR_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_CLEAR_IN_STEP);
     }
     if (!task_holds_clear_resting(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_CLEAR_RESTING);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_CLEAR_RESTING);
     }
     s->line = task_clear_line(s);
     switch (s->line) {
@@ -875,10 +879,12 @@ static int32_t task_run_clear(task_t *s)
 static int32_t task_run_move(task_t *s)
 {
     if (!task_holds_move_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_MOVE_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_MOVE_IN_STEP);
     }
     if (!task_holds_move_resting(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_MOVE_RESTING);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_MOVE_RESTING);
     }
     s->line = task_move_line(s);
     switch (s->line) {
@@ -1066,11 +1072,11 @@ static int32_t task_run_release_part(task_t *s)
 {
     if (!task_holds_release_part_in_step(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (1u << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_IN_STEP);
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_IN_STEP);
     }
     if (!task_holds_release_part_resting(s)) {
         s->assumptions_failed = s->assumptions_failed |
-                (1u << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_RESTING);
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_RESTING);
     }
     s->line = task_release_part_line(s);
     switch (s->line) {
@@ -1164,10 +1170,12 @@ static int32_t task_run_release_part(task_t *s)
 static int32_t task_run_transfer(task_t *s)
 {
     if (!task_holds_transfer_in_step(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_TRANSFER_IN_STEP);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_TRANSFER_IN_STEP);
     }
     if (!task_holds_transfer_resting(s)) {
-        s->assumptions_failed = s->assumptions_failed | (1u << (uint32_t)TASK_ASSUMPTION_TRANSFER_RESTING);
+        s->assumptions_failed = s->assumptions_failed |
+                ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_TRANSFER_RESTING);
     }
     s->line = task_transfer_line(s);
     switch (s->line) {

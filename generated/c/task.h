@@ -247,7 +247,7 @@ enum {
 
 /* Digests of what the tables mean, 3694b2b7e7d1eacd, and of how the state is laid out, 9722c05fd422a41b:
    comments, and names of files, change neither. The number is made of both. */
-#define TASK_DIGEST UINT32_C(0x7c2a9834)
+#define TASK_DIGEST 0x7c2a9834u
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.

@@ -106,7 +106,7 @@ enum {
 
 /* Digests of what the tables mean, 523a56f6445ac47e, and of how the state is laid out, 4bb0dda7f7999e26:
    comments, and names of files, change neither. The number is made of both. */
-#define VISION_DIGEST UINT32_C(0xcb40c93f)
+#define VISION_DIGEST 0xcb40c93fu
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.

@@ -293,7 +293,8 @@ class _Maker:
                 body += _due(level, self._own("take", level))
         for level in levels:
             cycle = Invoke(level.level.cycle, (Name(f"&s->{level.member}"),))
-            first = when(infix("==", faulted, none), Set(faulted, Name(level.constant)))
+            told = Set(faulted, Name(level.constant))
+            first = told if level is levels[0] else when(infix("==", faulted, none), told)
             body += _due(level, when(infix("!=", cycle, Constant(0)), first))
         for level in levels:
             if level.gives:

@@ -98,7 +98,8 @@ def _told(c: CProgram, place: int, stops: tuple[int, ...]) -> Body:
     word, bit = divmod(place, FAILED_BITS)
     failed = Place((c.names.failed[word],))
     shift = Constant(bit, "uint32_t") if word else Cast("uint32_t", Name(c.names.assumptions[place]))
-    one = Constant(1, failed_type(len(c.plan.monitored)))
+    kind = failed_type(len(c.plan.monitored))
+    one = Cast(kind, Constant(1, kind))  # the essential type of a bare 1 has eight bits
     mark = Set(failed, infix("|", failed, infix("<<", one, shift)))
     name = Name(c.names.assumptions[place])
     end = Set(FAULT, fault_name(c, Fault.ASSUMPTION)), Set(FAULT_AT, name)
