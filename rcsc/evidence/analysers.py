@@ -223,7 +223,8 @@ def drawn(program: Program, symbols: Symbols, *, defensive: bool) -> str:
     ]
     lines += stand_ins(program, symbols, _drawn)
     for name, strange in (("any", True), ("admitted", False)):
-        lines += [f"static void {name}(void) {{", *_state(program, symbols, strange=strange), "}"]
+        state = [*_state(program, symbols, strange=strange), *(_bytes() if strange and defensive else ())]
+        lines += [f"static void {name}(void) {{", *state, "}"]
     lines += ["int main(void) {", f"    for (uint32_t n = 0u; n < {CALLS}u; n = n + 1u) {{"]
     bodies = [*calls(symbols, defensive=defensive)]
     lines += [f"        switch (next() % {len(bodies)}u) {{"]
@@ -247,6 +248,14 @@ def _state(program: Program, symbols: Symbols, *, strange: bool) -> Iterator[str
             yield f"    s.{place} = {_drawn(c_type, variable.type, False)};"
             if strange:
                 yield f"    if (next() % 256u == 0u) {{ s.{place} = {_drawn(c_type, variable.type, True)}; }}"
+
+
+def _bytes() -> Iterator[str]:
+    """Now and then some bytes are any, where the C trusts no state."""
+    yield "    if (next() % 16u == 0u) {"
+    yield "        unsigned char *byte = (unsigned char *)&s;"
+    yield "        byte[sizeof s.digest + (next() % (sizeof s - sizeof s.digest))] = (unsigned char)(next() & 255u);"
+    yield "    }"
 
 
 def _drawn(c_type: str, kind: Scalar, whole: bool) -> str:

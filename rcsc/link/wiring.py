@@ -73,7 +73,7 @@ class End:
 
     def declared(self, name: str) -> str:
         """The declaration of a variable of its type."""
-        return declared(self.program.names, name, self.kind)
+        return declared(self.program.names, name, self.kind, defensive=self.program.plan.defensive)
 
     def part(self, at: int) -> str:
         """What a leaf's path has after that of the end."""

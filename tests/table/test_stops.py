@@ -408,6 +408,23 @@ def test_a_bool_that_is_neither_is_refused_in_c(tmp_path: Path) -> None:
     assert executor.check() == -1
 
 
+def test_a_bool_that_is_neither_is_a_byte_that_a_defensive_cycle_refuses(tmp_path: Path) -> None:
+    program = verdict_of(CHECKED).program
+    executor = made(tmp_path, defensive=True)[1]
+    assert isinstance(executor, CExecutor)
+    assert " bool " not in (tmp_path / "c/case_.h").read_text("utf-8")
+    at_fault = len(program.variables) + 2
+    for at, variable in enumerate(program.variables):
+        if isinstance(variable.type, Bool):
+            for byte in (b"\x02", b"\xff"):
+                executor.put(0, [v.initial for v in program.variables])
+                executor._memory[executor._places[at]] = (
+                    byte  # any byte is a value here, and none is undefined
+                )
+                refused = Fault.ADMIT if variable.kind is Kind.INPUT else Fault.STATE
+                assert (executor.cycle(), executor.values()[at_fault]) == (refused, at)
+
+
 def test_defensive_executors_refuse_a_state_in_every_cycle(tmp_path: Path) -> None:
     program = verdict_of(CHECKED).program
     names, shown = [str(v.name) for v in program.variables], {"shown": 1, "hold": True}

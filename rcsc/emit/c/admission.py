@@ -41,7 +41,7 @@ def trace(c: CProgram, fault: Code, at: Code) -> Body:
 def admit_function(c: CProgram, reals: bool) -> Function:
     """Refuses first, then admits: a refused cycle changes nothing but its trace."""
     inputs = [v for v in c.program.variables if v.kind is model.Kind.INPUT]
-    tests = [(Name(c.names.leaves[v.name]), refusal(c, v, c.text.place(v.name))) for v in inputs]
+    tests = [(Name(c.names.leaves[v.name]), _refused(c, v)) for v in inputs]
     asked = [(leaf, test) for leaf, test in tests if test is not None]
     taken = (*_all_admitted(c, inputs), run_on_state(c, "settle"))
     told = Set(FAULT, fault_name(c, Fault.ADMIT)), Set(FAULT_AT, AT)
@@ -59,6 +59,14 @@ def admit_function(c: CProgram, reals: bool) -> Function:
         *trace(c, fault_name(c, Fault.OK), NONE),
         *body,
     )
+
+
+def _refused(c: CProgram, variable: Variable) -> Code | None:
+    """A condition that an input is refused: a truth value too, where it is a byte."""
+    place = c.text.place(variable.name)
+    if c.plan.defensive and isinstance(variable.type, Bool):
+        return infix(">", place, Constant(1, "uint32_t"))
+    return refusal(c, variable, place)
 
 
 def refusal(c: CProgram, variable: Variable, place: Code) -> Code | None:
@@ -147,7 +155,10 @@ def check_function(c: CProgram) -> Function:
 def _unfit(c: CProgram, variable: Variable) -> Code | None:
     """A condition that the place holds no value of its type; None where its C type or admission rules that out."""
     kind, place = variable.type, c.text.place(variable.name)
-    if isinstance(kind, Bool):  # read as a byte: as a bool, another than 0 and 1 means nothing
+    if isinstance(kind, Bool):
+        if c.plan.defensive:
+            return None if variable.kind is model.Kind.INPUT else infix(">", place, Constant(1, "uint32_t"))
+        # read as a byte: as a bool, another than 0 and 1 means nothing
         byte = Prefix("*", Cast("const uint8_t *", Prefix("&", place)))
         return infix(">", byte, Constant(1, "uint32_t"))
     if variable.kind is model.Kind.INPUT:

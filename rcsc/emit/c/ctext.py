@@ -82,14 +82,20 @@ def c_type(kind: Scalar) -> str:
     raise ValueError(kind)  # resolve keeps ranges within 64 bits
 
 
-def declared(names: Names, name: str, kind: model.Type) -> str:
-    """A declaration: the type of the innermost elements, the name, the lengths from the outermost in."""
+def stored_type(kind: Scalar, *, defensive: bool) -> str:
+    """The type of a leaf in the state: of a truth value a byte where any bytes may come, as a bool of them means nothing."""
+    return "uint8_t" if defensive and isinstance(kind, Bool) else c_type(kind)
+
+
+def declared(names: Names, name: str, kind: model.Type, *, defensive: bool) -> str:
+    """A member's declaration: the type of the innermost elements, the name, the lengths from the outermost in."""
     lengths = ""
     while isinstance(kind, model.Array):
         lengths += f"[{kind.length}]"
         kind = kind.element
-    base = names.types[kind.name] if isinstance(kind, model.Record | Enum) else c_type(kind)
-    return f"{base} {name}{lengths}"
+    if isinstance(kind, model.Record | Enum):
+        return f"{names.types[kind.name]} {name}{lengths}"
+    return f"{stored_type(kind, defensive=defensive)} {name}{lengths}"
 
 
 def wide_type(kind: Scalar) -> str:

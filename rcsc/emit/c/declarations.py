@@ -93,7 +93,8 @@ def _record(c: CProgram, record: model.Record) -> tuple[str, str, Fields]:
     names = c.names.members[record.name]
     docs = ("; ".join(word for word in (range_text(f.type), comment(f.doc)) if word) for f in record.fields)
     fields = tuple(
-        (declared(c.names, names[f.name], f.type), doc) for f, doc in zip(record.fields, docs, strict=True)
+        (declared(c.names, names[f.name], f.type, defensive=c.plan.defensive), doc)
+        for f, doc in zip(record.fields, docs, strict=True)
     )
     size = record_size(record)
     return (
@@ -149,11 +150,19 @@ def fields(c: CProgram) -> Iterator[tuple[str, str]]:
             _safe_text(variables[variable.leaves[0]]),
             comment(variable.doc),
         ]
-        yield declared(c.names, root, variable.type), "; ".join(word for word in words if word)
+        yield (
+            declared(c.names, root, variable.type, defensive=c.plan.defensive),
+            "; ".join(word for word in words if word),
+        )
         later = pending(variable.name)
         if later in variables:
             doc = f"{position[later]}: state; the deferred next value of {root}"
-            yield declared(c.names, "".join(c.names.paths[later]), variables[later].type), doc
+            yield (
+                declared(
+                    c.names, "".join(c.names.paths[later]), variables[later].type, defensive=c.plan.defensive
+                ),
+                doc,
+            )
 
 
 def size_text(c: CProgram) -> str:
