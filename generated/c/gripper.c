@@ -235,45 +235,47 @@ static int32_t gripper_run_position(gripper_t *s)
 {
     s->line = gripper_position_line(s);
     switch (s->line) {
-    case GRIPPER_LINE_POSITION_1: /* gripper/gripper.rcs line 1: new_command true */
+    case GRIPPER_LINE_POSITION_1: /* gripper/gripper.rcs line 1 of position: new_command true */
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_MOVING);
         gripper_do_drive(s);
         gripper_do_executing(s);
         break;
-    /* gripper/gripper.rcs line 2: new_command false; cur_state moving; at_opening true */
+    /* gripper/gripper.rcs line 2 of position: new_command false; cur_state moving; at_opening true */
     case GRIPPER_LINE_POSITION_2:
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_D_STATE);
         gripper_do_hold(s);
         gripper_do_done(s);
         break;
-    /* gripper/gripper.rcs line 3: new_command false; cur_state moving; at_opening false; closing and
-       forced */
+    /* gripper/gripper.rcs line 3 of position: new_command false; cur_state moving; at_opening false;
+       closing and forced */
     case GRIPPER_LINE_POSITION_3:
         gripper_do_grip_failure(s);
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_F_STATE);
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
-    /* gripper/gripper.rcs line 4: new_command false; cur_state moving; at_opening false; not (closing and
-       forced); waited < most_waited */
+    /* gripper/gripper.rcs line 4 of position: new_command false; cur_state moving; at_opening false; not
+       (closing and forced); waited < most_waited */
     case GRIPPER_LINE_POSITION_4:
         gripper_do_wait(s);
         gripper_do_drive(s);
         gripper_do_executing(s);
         break;
-    /* gripper/gripper.rcs line 5: new_command false; cur_state moving; at_opening false; not (closing and
-       forced); waited most_waited */
+    /* gripper/gripper.rcs line 5 of position: new_command false; cur_state moving; at_opening false; not
+       (closing and forced); waited most_waited */
     case GRIPPER_LINE_POSITION_5:
         gripper_do_grip_failure(s);
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_F_STATE);
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
-    case GRIPPER_LINE_POSITION_6: /* gripper/gripper.rcs line 6: new_command false; cur_state d_state */
+    /* gripper/gripper.rcs line 6 of position: new_command false; cur_state d_state */
+    case GRIPPER_LINE_POSITION_6:
         gripper_do_hold(s);
         gripper_do_done(s);
         break;
-    case GRIPPER_LINE_POSITION_7: /* gripper/gripper.rcs line 7: new_command false; cur_state f_state */
+    /* gripper/gripper.rcs line 7 of position: new_command false; cur_state f_state */
+    case GRIPPER_LINE_POSITION_7:
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
@@ -293,35 +295,37 @@ static int32_t gripper_run_grasp(gripper_t *s)
 {
     s->line = gripper_grasp_line(s);
     switch (s->line) {
-    case GRIPPER_LINE_GRASP_1: /* gripper/gripper.rcs line 1: new_command true */
+    case GRIPPER_LINE_GRASP_1: /* gripper/gripper.rcs line 1 of grasp: new_command true */
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_MOVING);
         gripper_do_drive(s);
         gripper_do_executing(s);
         break;
-    /* gripper/gripper.rcs line 2: new_command false; cur_state moving; forced true */
+    /* gripper/gripper.rcs line 2 of grasp: new_command false; cur_state moving; forced true */
     case GRIPPER_LINE_GRASP_2:
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_D_STATE);
         gripper_do_drive(s);
         gripper_do_done(s);
         break;
-    /* gripper/gripper.rcs line 3: new_command false; cur_state moving; forced false; waited < most_waited */
+    /* gripper/gripper.rcs line 3 of grasp: new_command false; cur_state moving; forced false; waited <
+       most_waited */
     case GRIPPER_LINE_GRASP_3:
         gripper_do_wait(s);
         gripper_do_drive(s);
         gripper_do_executing(s);
         break;
-    /* gripper/gripper.rcs line 4: new_command false; cur_state moving; forced false; waited most_waited */
+    /* gripper/gripper.rcs line 4 of grasp: new_command false; cur_state moving; forced false; waited
+       most_waited */
     case GRIPPER_LINE_GRASP_4:
         gripper_do_grip_failure(s);
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_F_STATE);
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
-    case GRIPPER_LINE_GRASP_5: /* gripper/gripper.rcs line 5: new_command false; cur_state d_state */
+    case GRIPPER_LINE_GRASP_5: /* gripper/gripper.rcs line 5 of grasp: new_command false; cur_state d_state */
         gripper_do_drive(s);
         gripper_do_done(s);
         break;
-    case GRIPPER_LINE_GRASP_6: /* gripper/gripper.rcs line 6: new_command false; cur_state f_state */
+    case GRIPPER_LINE_GRASP_6: /* gripper/gripper.rcs line 6 of grasp: new_command false; cur_state f_state */
         gripper_do_hold(s);
         gripper_do_failed(s);
         break;
@@ -341,7 +345,7 @@ static int32_t gripper_run_pause_gripper(gripper_t *s)
 {
     s->line = gripper_pause_gripper_line(s);
     switch (s->line) {
-    case GRIPPER_LINE_PAUSE_GRIPPER_1: /* gripper/gripper.rcs line 1 */
+    case GRIPPER_LINE_PAUSE_GRIPPER_1: /* gripper/gripper.rcs line 1 of pause_gripper */
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_D_STATE);
         gripper_do_hold(s);
         gripper_do_done(s);
@@ -441,14 +445,14 @@ int32_t gripper_check(const gripper_t *s)
 /* The line of table position that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t gripper_position_line(const gripper_t *s)
 {
-    /* Masks of gripper/gripper.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each set where its
-       line does not exclude that class. */
+    /* Masks of gripper/gripper.rcs table position: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each
+       set where its line does not exclude that class. */
     RCSC_CONST_SECTION static const struct {
         uint8_t t0[151];
         uint8_t t1[24];
         uint8_t t2[2];
     } t = {
-        { /* gripper/gripper.rcs: waited */
+        { /* gripper/gripper.rcs table position: waited */
             /* 0 .. 149: all lines but 5 */
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
@@ -465,7 +469,7 @@ int32_t gripper_position_line(const gripper_t *s)
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x77u /* 150: all lines but 4 */
         },
-        { /* gripper/gripper.rcs: cur_state, new_command, at_opening, closing and forced */
+        { /* gripper/gripper.rcs table position: cur_state, new_command, at_opening, closing and forced */
             0x20u, /* d_state, false, false, false: line 6 */
             0x20u, /* d_state, false, false, true: line 6 */
             0x20u, /* d_state, false, true, false: line 6 */
@@ -491,7 +495,7 @@ int32_t gripper_position_line(const gripper_t *s)
             0x1u, /* moving, true, true, false: line 1 */
             0x1u /* moving, true, true, true: line 1 */
         },
-        { /* gripper/gripper.rcs: not (closing and forced) */
+        { /* gripper/gripper.rcs table position: not (closing and forced) */
             0x67u, /* false: all lines but 4, 5 */
             0x7fu /* true: every line */
         },
@@ -520,13 +524,13 @@ void gripper_position_lines(const gripper_t *in, int32_t *out, uint32_t n)
 /* The line of table grasp that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t gripper_grasp_line(const gripper_t *s)
 {
-    /* Masks of gripper/gripper.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6; each set where its line
-       does not exclude that class. */
+    /* Masks of gripper/gripper.rcs table grasp: from the lowest bit, lines 1, 2, 3, 4, 5, 6; each set
+       where its line does not exclude that class. */
     RCSC_CONST_SECTION static const struct {
         uint8_t t0[151];
         uint8_t t1[12];
     } t = {
-        { /* gripper/gripper.rcs: waited */
+        { /* gripper/gripper.rcs table grasp: waited */
             /* 0 .. 149: all lines but 4 */
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
@@ -543,7 +547,7 @@ int32_t gripper_grasp_line(const gripper_t *s)
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x3bu /* 150: all lines but 3 */
         },
-        { /* gripper/gripper.rcs: cur_state, new_command, forced */
+        { /* gripper/gripper.rcs table grasp: cur_state, new_command, forced */
             0x10u, /* d_state, false, false: line 5 */
             0x10u, /* d_state, false, true: line 5 */
             0x1u, /* d_state, true, false: line 1 */

@@ -268,42 +268,48 @@ static int32_t vision_run_flood_flash(vision_t *s)
 {
     s->line = vision_flood_flash_line(s);
     switch (s->line) {
-    case VISION_LINE_FLOOD_FLASH_1: /* vision/vision.rcs line 1: new_command true */
+    case VISION_LINE_FLOOD_FLASH_1: /* vision/vision.rcs line 1 of flood_flash: new_command true */
         vision_do_state(s, VISION_VISION_STATE_LOOKING);
         vision_do_shoot(s, VISION_FLASH_FLOOD);
         vision_do_executing(s);
         break;
-    /* vision/vision.rcs line 2: new_command false; cur_state looking; arrived false; waited < most_waited */
+    /* vision/vision.rcs line 2 of flood_flash: new_command false; cur_state looking; arrived false; waited
+       < most_waited */
     case VISION_LINE_FLOOD_FLASH_2:
         vision_do_wait(s);
         vision_do_executing(s);
         break;
-    /* vision/vision.rcs line 3: new_command false; cur_state looking; arrived false; waited most_waited */
+    /* vision/vision.rcs line 3 of flood_flash: new_command false; cur_state looking; arrived false; waited
+       most_waited */
     case VISION_LINE_FLOOD_FLASH_3:
         vision_do_no_picture(s);
         vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    /* vision/vision.rcs line 4: new_command false; cur_state looking; arrived true; camera.matched true */
+    /* vision/vision.rcs line 4 of flood_flash: new_command false; cur_state looking; arrived true;
+       camera.matched true */
     case VISION_LINE_FLOOD_FLASH_4:
         vision_do_found(s);
         vision_do_state(s, VISION_VISION_STATE_D_STATE);
         vision_do_rest(s);
         vision_do_done(s);
         break;
-    /* vision/vision.rcs line 5: new_command false; cur_state looking; arrived true; camera.matched false */
+    /* vision/vision.rcs line 5 of flood_flash: new_command false; cur_state looking; arrived true;
+       camera.matched false */
     case VISION_LINE_FLOOD_FLASH_5:
         vision_do_no_match(s);
         vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    case VISION_LINE_FLOOD_FLASH_6: /* vision/vision.rcs line 6: new_command false; cur_state d_state */
+    /* vision/vision.rcs line 6 of flood_flash: new_command false; cur_state d_state */
+    case VISION_LINE_FLOOD_FLASH_6:
         vision_do_rest(s);
         vision_do_done(s);
         break;
-    case VISION_LINE_FLOOD_FLASH_7: /* vision/vision.rcs line 7: new_command false; cur_state f_state */
+    /* vision/vision.rcs line 7 of flood_flash: new_command false; cur_state f_state */
+    case VISION_LINE_FLOOD_FLASH_7:
         vision_do_rest(s);
         vision_do_failed(s);
         break;
@@ -323,50 +329,56 @@ static int32_t vision_run_line_flash(vision_t *s)
 {
     s->line = vision_line_flash_line(s);
     switch (s->line) {
-    case VISION_LINE_LINE_FLASH_1: /* vision/vision.rcs line 1: new_command true */
+    case VISION_LINE_LINE_FLASH_1: /* vision/vision.rcs line 1 of line_flash: new_command true */
         vision_do_state(s, VISION_VISION_STATE_LOOKING);
         vision_do_shoot(s, VISION_FLASH_LINE);
         vision_do_executing(s);
         break;
-    /* vision/vision.rcs line 2: new_command false; cur_state looking; arrived false; waited < most_waited */
+    /* vision/vision.rcs line 2 of line_flash: new_command false; cur_state looking; arrived false; waited
+       < most_waited */
     case VISION_LINE_LINE_FLASH_2:
         vision_do_wait(s);
         vision_do_executing(s);
         break;
-    /* vision/vision.rcs line 3: new_command false; cur_state looking; arrived false; waited most_waited */
+    /* vision/vision.rcs line 3 of line_flash: new_command false; cur_state looking; arrived false; waited
+       most_waited */
     case VISION_LINE_LINE_FLASH_3:
         vision_do_no_picture(s);
         vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    /* vision/vision.rcs line 4: new_command false; cur_state looking; arrived true; fits true; faces true */
+    /* vision/vision.rcs line 4 of line_flash: new_command false; cur_state looking; arrived true; fits
+       true; faces true */
     case VISION_LINE_LINE_FLASH_4:
         vision_do_measured(s);
         vision_do_state(s, VISION_VISION_STATE_D_STATE);
         vision_do_rest(s);
         vision_do_done(s);
         break;
-    /* vision/vision.rcs line 5a: new_command false; cur_state looking; arrived true; fits false */
+    /* vision/vision.rcs line 5a of line_flash: new_command false; cur_state looking; arrived true; fits
+       false */
     case VISION_LINE_LINE_FLASH_5A:
         vision_do_range_failure(s);
         vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    /* vision/vision.rcs line 5b: new_command false; cur_state looking; arrived true; fits true; faces
-       false */
+    /* vision/vision.rcs line 5b of line_flash: new_command false; cur_state looking; arrived true; fits
+       true; faces false */
     case VISION_LINE_LINE_FLASH_5B:
         vision_do_surface_failure(s);
         vision_do_state(s, VISION_VISION_STATE_F_STATE);
         vision_do_rest(s);
         vision_do_failed(s);
         break;
-    case VISION_LINE_LINE_FLASH_6: /* vision/vision.rcs line 6: new_command false; cur_state d_state */
+    /* vision/vision.rcs line 6 of line_flash: new_command false; cur_state d_state */
+    case VISION_LINE_LINE_FLASH_6:
         vision_do_rest(s);
         vision_do_done(s);
         break;
-    case VISION_LINE_LINE_FLASH_7: /* vision/vision.rcs line 7: new_command false; cur_state f_state */
+    /* vision/vision.rcs line 7 of line_flash: new_command false; cur_state f_state */
+    case VISION_LINE_LINE_FLASH_7:
         vision_do_rest(s);
         vision_do_failed(s);
         break;
@@ -386,7 +398,7 @@ static int32_t vision_run_pause_vision(vision_t *s)
 {
     s->line = vision_pause_vision_line(s);
     switch (s->line) {
-    case VISION_LINE_PAUSE_VISION_1: /* vision/vision.rcs line 1 */
+    case VISION_LINE_PAUSE_VISION_1: /* vision/vision.rcs line 1 of pause_vision */
         vision_do_state(s, VISION_VISION_STATE_D_STATE);
         vision_do_rest(s);
         vision_do_done(s);
@@ -505,13 +517,13 @@ int32_t vision_check(const vision_t *s)
 /* The line of table flood_flash that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t vision_flood_flash_line(const vision_t *s)
 {
-    /* Masks of vision/vision.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each set where its line
-       does not exclude that class. */
+    /* Masks of vision/vision.rcs table flood_flash: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each
+       set where its line does not exclude that class. */
     RCSC_CONST_SECTION static const struct {
         uint8_t t0[101];
         uint8_t t1[24];
     } t = {
-        { /* vision/vision.rcs: waited */
+        { /* vision/vision.rcs table flood_flash: waited */
             /* 0 .. 99: all lines but 3 */
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
@@ -524,7 +536,7 @@ int32_t vision_flood_flash_line(const vision_t *s)
             0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7du /* 100: all lines but 2 */
         },
-        { /* vision/vision.rcs: cur_state, new_command, camera.matched, arrived */
+        { /* vision/vision.rcs table flood_flash: cur_state, new_command, camera.matched, arrived */
             0x20u, /* d_state, false, false, false: line 6 */
             0x20u, /* d_state, false, false, true: line 6 */
             0x20u, /* d_state, false, true, false: line 6 */
@@ -574,14 +586,14 @@ void vision_flood_flash_lines(const vision_t *in, int32_t *out, uint32_t n)
 /* The line of table line_flash that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t vision_line_flash_line(const vision_t *s)
 {
-    /* Masks of vision/vision.rcs: from the lowest bit, lines 1, 2, 3, 4, 5a, 5b, 6, 7; each set where its
-       line does not exclude that class. */
+    /* Masks of vision/vision.rcs table line_flash: from the lowest bit, lines 1, 2, 3, 4, 5a, 5b, 6, 7;
+       each set where its line does not exclude that class. */
     RCSC_CONST_SECTION static const struct {
         uint8_t t0[101];
         uint8_t t1[24];
         uint8_t t2[2];
     } t = {
-        { /* vision/vision.rcs: waited */
+        { /* vision/vision.rcs table line_flash: waited */
             /* 0 .. 99: all lines but 3 */
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
@@ -594,7 +606,7 @@ int32_t vision_line_flash_line(const vision_t *s)
             0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfdu /* 100: all lines but 2 */
         },
-        { /* vision/vision.rcs: cur_state, new_command, arrived, fits */
+        { /* vision/vision.rcs table line_flash: cur_state, new_command, arrived, fits */
             0x40u, /* d_state, false, false, false: line 6 */
             0x40u, /* d_state, false, false, true: line 6 */
             0x40u, /* d_state, false, true, false: line 6 */
@@ -620,7 +632,7 @@ int32_t vision_line_flash_line(const vision_t *s)
             0x1u, /* looking, true, true, false: line 1 */
             0x1u /* looking, true, true, true: line 1 */
         },
-        { /* vision/vision.rcs: faces */
+        { /* vision/vision.rcs table line_flash: faces */
             0xf7u, /* false: all lines but 4 */
             0xdfu /* true: all lines but 5b */
         },

@@ -820,21 +820,21 @@ def _run_position(s):
 
 
 def _position_0(s):
-    """gripper/gripper.rcs line 1"""
+    """gripper/gripper.rcs line 1 of position"""
     _do_state(s, 2)
     _do_drive(s)
     _do_executing(s)
 
 
 def _position_1(s):
-    """gripper/gripper.rcs line 2"""
+    """gripper/gripper.rcs line 2 of position"""
     _do_state(s, 0)
     _do_hold(s)
     _do_done(s)
 
 
 def _position_2(s):
-    """gripper/gripper.rcs line 3"""
+    """gripper/gripper.rcs line 3 of position"""
     _do_grip_failure(s)
     _do_state(s, 1)
     _do_hold(s)
@@ -842,14 +842,14 @@ def _position_2(s):
 
 
 def _position_3(s):
-    """gripper/gripper.rcs line 4"""
+    """gripper/gripper.rcs line 4 of position"""
     _do_wait(s)
     _do_drive(s)
     _do_executing(s)
 
 
 def _position_4(s):
-    """gripper/gripper.rcs line 5"""
+    """gripper/gripper.rcs line 5 of position"""
     _do_grip_failure(s)
     _do_state(s, 1)
     _do_hold(s)
@@ -857,13 +857,13 @@ def _position_4(s):
 
 
 def _position_5(s):
-    """gripper/gripper.rcs line 6"""
+    """gripper/gripper.rcs line 6 of position"""
     _do_hold(s)
     _do_done(s)
 
 
 def _position_6(s):
-    """gripper/gripper.rcs line 7"""
+    """gripper/gripper.rcs line 7 of position"""
     _do_hold(s)
     _do_failed(s)
 
@@ -901,28 +901,28 @@ def _run_grasp(s):
 
 
 def _grasp_0(s):
-    """gripper/gripper.rcs line 1"""
+    """gripper/gripper.rcs line 1 of grasp"""
     _do_state(s, 2)
     _do_drive(s)
     _do_executing(s)
 
 
 def _grasp_1(s):
-    """gripper/gripper.rcs line 2"""
+    """gripper/gripper.rcs line 2 of grasp"""
     _do_state(s, 0)
     _do_drive(s)
     _do_done(s)
 
 
 def _grasp_2(s):
-    """gripper/gripper.rcs line 3"""
+    """gripper/gripper.rcs line 3 of grasp"""
     _do_wait(s)
     _do_drive(s)
     _do_executing(s)
 
 
 def _grasp_3(s):
-    """gripper/gripper.rcs line 4"""
+    """gripper/gripper.rcs line 4 of grasp"""
     _do_grip_failure(s)
     _do_state(s, 1)
     _do_hold(s)
@@ -930,13 +930,13 @@ def _grasp_3(s):
 
 
 def _grasp_4(s):
-    """gripper/gripper.rcs line 5"""
+    """gripper/gripper.rcs line 5 of grasp"""
     _do_drive(s)
     _do_done(s)
 
 
 def _grasp_5(s):
-    """gripper/gripper.rcs line 6"""
+    """gripper/gripper.rcs line 6 of grasp"""
     _do_hold(s)
     _do_failed(s)
 
@@ -977,7 +977,7 @@ def _run_pause_gripper(s):
 
 
 def _pause_gripper_0(s):
-    """gripper/gripper.rcs line 1"""
+    """gripper/gripper.rcs line 1 of pause_gripper"""
     _do_state(s, 0)
     _do_hold(s)
     _do_done(s)

@@ -828,20 +828,20 @@ def _run_flood_flash(s):
 
 
 def _flood_flash_0(s):
-    """vision/vision.rcs line 1"""
+    """vision/vision.rcs line 1 of flood_flash"""
     _do_state(s, 2)
     _do_shoot(s, 1)
     _do_executing(s)
 
 
 def _flood_flash_1(s):
-    """vision/vision.rcs line 2"""
+    """vision/vision.rcs line 2 of flood_flash"""
     _do_wait(s)
     _do_executing(s)
 
 
 def _flood_flash_2(s):
-    """vision/vision.rcs line 3"""
+    """vision/vision.rcs line 3 of flood_flash"""
     _do_no_picture(s)
     _do_state(s, 1)
     _do_rest(s)
@@ -849,7 +849,7 @@ def _flood_flash_2(s):
 
 
 def _flood_flash_3(s):
-    """vision/vision.rcs line 4"""
+    """vision/vision.rcs line 4 of flood_flash"""
     _do_found(s)
     _do_state(s, 0)
     _do_rest(s)
@@ -857,7 +857,7 @@ def _flood_flash_3(s):
 
 
 def _flood_flash_4(s):
-    """vision/vision.rcs line 5"""
+    """vision/vision.rcs line 5 of flood_flash"""
     _do_no_match(s)
     _do_state(s, 1)
     _do_rest(s)
@@ -865,13 +865,13 @@ def _flood_flash_4(s):
 
 
 def _flood_flash_5(s):
-    """vision/vision.rcs line 6"""
+    """vision/vision.rcs line 6 of flood_flash"""
     _do_rest(s)
     _do_done(s)
 
 
 def _flood_flash_6(s):
-    """vision/vision.rcs line 7"""
+    """vision/vision.rcs line 7 of flood_flash"""
     _do_rest(s)
     _do_failed(s)
 
@@ -909,20 +909,20 @@ def _run_line_flash(s):
 
 
 def _line_flash_0(s):
-    """vision/vision.rcs line 1"""
+    """vision/vision.rcs line 1 of line_flash"""
     _do_state(s, 2)
     _do_shoot(s, 2)
     _do_executing(s)
 
 
 def _line_flash_1(s):
-    """vision/vision.rcs line 2"""
+    """vision/vision.rcs line 2 of line_flash"""
     _do_wait(s)
     _do_executing(s)
 
 
 def _line_flash_2(s):
-    """vision/vision.rcs line 3"""
+    """vision/vision.rcs line 3 of line_flash"""
     _do_no_picture(s)
     _do_state(s, 1)
     _do_rest(s)
@@ -930,7 +930,7 @@ def _line_flash_2(s):
 
 
 def _line_flash_3(s):
-    """vision/vision.rcs line 4"""
+    """vision/vision.rcs line 4 of line_flash"""
     _do_measured(s)
     _do_state(s, 0)
     _do_rest(s)
@@ -938,7 +938,7 @@ def _line_flash_3(s):
 
 
 def _line_flash_4(s):
-    """vision/vision.rcs line 5a"""
+    """vision/vision.rcs line 5a of line_flash"""
     _do_range_failure(s)
     _do_state(s, 1)
     _do_rest(s)
@@ -946,7 +946,7 @@ def _line_flash_4(s):
 
 
 def _line_flash_5(s):
-    """vision/vision.rcs line 5b"""
+    """vision/vision.rcs line 5b of line_flash"""
     _do_surface_failure(s)
     _do_state(s, 1)
     _do_rest(s)
@@ -954,13 +954,13 @@ def _line_flash_5(s):
 
 
 def _line_flash_6(s):
-    """vision/vision.rcs line 6"""
+    """vision/vision.rcs line 6 of line_flash"""
     _do_rest(s)
     _do_done(s)
 
 
 def _line_flash_7(s):
-    """vision/vision.rcs line 7"""
+    """vision/vision.rcs line 7 of line_flash"""
     _do_rest(s)
     _do_failed(s)
 
@@ -1001,7 +1001,7 @@ def _run_pause_vision(s):
 
 
 def _pause_vision_0(s):
-    """vision/vision.rcs line 1"""
+    """vision/vision.rcs line 1 of pause_vision"""
     _do_state(s, 0)
     _do_rest(s)
     _do_done(s)

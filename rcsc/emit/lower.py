@@ -89,11 +89,13 @@ def _place(file: str, root: str) -> str:
 
 
 def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str) -> PlanTable:
+    alone = sum(other.file == table.file for other in program.tables) == 1
+    of, source = ("", file) if alone else (f" of {table.name}", f"{file} table {table.name}")
     lines = [
         PlanLine(
             line.name,
             line.actions,
-            f"{file} line {line.name}",
+            f"{file} line {line.name}{of}",
             _conditions(table, line),
             line.requirements,
         )
@@ -102,7 +104,7 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
     if table.default is not None:
         name, last = table.default.name, table.default
         when = ("no other line matches",)
-        lines.append(PlanLine(name, last.actions, f"{file} line {name}", when, last.requirements))
+        lines.append(PlanLine(name, last.actions, f"{file} line {name}{of}", when, last.requirements))
     named = [(place, program.assumptions[at]) for place, at in enumerate(monitored)]
     stops = tuple(place for place, assumption in named if assumption.name in table.stops)
     relied = tuple(
@@ -110,7 +112,7 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
         for place, assumption in named
         if place in stops or (assumption.standing.checked and assumption.name in table.assumptions)
     )
-    return PlanTable(table, file, _matcher(program, table), tuple(lines), relied, stops)
+    return PlanTable(table, source, _matcher(program, table), tuple(lines), relied, stops)
 
 
 def _conditions(table: Table, line: Line) -> tuple[str, ...]:

@@ -140,7 +140,7 @@ class PlanLine:
     """A line and what it does, for DEFAULT too.
 
     Attributes:
-        source: The file, and the line's name.
+        source: The file, and the line's name; its table's, too, where the file has several.
         conditions: What it states, heading by heading.
         requirements: Names of those that it answers.
     """
@@ -184,7 +184,7 @@ class PlanTable:
     """A table to be emitted.
 
     Attributes:
-        source: Its file, relative.
+        source: Its file, relative, and its name where the file has several.
         monitored: Positions in `Plan.monitored` of the assumptions that it checks.
         stops: Those of them that end the cycle where they fail.
     """

@@ -207,3 +207,12 @@ def test_a_file_with_a_long_name_is_still_known_as_its_programs(tmp_path: Path) 
     short = verdict.proved.program
     for program in (short, replace(short, file=f"/{'a_long_folder/' * 12}case.rcs")):
         assert write(emitted(lower_by_force(program)), str(tmp_path)) == ()
+
+
+def test_a_line_names_its_table_where_the_file_has_several() -> None:
+    gripper, task = ((GENERATED / f"{name}.c").read_text(encoding="utf-8") for name in ("gripper", "task"))
+    assert "/* gripper/gripper.rcs line 1 of grasp: new_command true */" in gripper
+    assert (
+        "/* Masks of gripper/gripper.rcs table grasp: from the lowest bit, lines 1, 2, 3, 4, 5, 6;" in gripper
+    )
+    assert re.search(r"/\* task/acquire\.rcs line 0: ", task)
