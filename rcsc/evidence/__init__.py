@@ -14,5 +14,6 @@ anything here. What it costs: seconds to minutes a program, by kind.
 
 Modules: `kind` (what a kind takes and gives), `kinds` (their names), `collect` (all that was asked for, on one screen).
 Kinds: `coverage` (vectors of the whole C, measured in `llvm`; why the rest is `out_of_reach`), `runtime` (Frama-C's EVA),
-`analysers` (compilers, analysers, sanitizers); `harness` is the C that the last two give their tools.
+`analysers` (compilers, analysers, sanitizers); `harness` is the C that the last two give their tools. `resources` (what each
+function needs) has a room of its own, `processors`.
 """

@@ -3,10 +3,15 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from rcsc.evidence import analysers, coverage, runtime
+from rcsc.evidence import analysers, coverage, resources, runtime
 from rcsc.evidence.kind import Kind
 
 KINDS: Mapping[str, Kind] = MappingProxyType(
-    {"coverage": coverage.KIND, "runtime": runtime.KIND, "analysers": analysers.KIND}
+    {
+        "coverage": coverage.KIND,
+        "runtime": runtime.KIND,
+        "analysers": analysers.KIND,
+        "resources": resources.KIND,
+    }
 )
 """In the order in which they are made and listed. A new one is a module and its line here."""

@@ -103,21 +103,22 @@ def choices(
     return [(variable, every[variable.name]) for variable in used], complete
 
 
-def _leaf_values(program: Program, symbols: Symbols) -> Iterator[str]:
-    """Sets every leaf to one of its edges, by a simple generator."""
+def leaf_values(program: Program, symbols: Symbols) -> Iterator[str]:
+    """C of `scatter(s)`, which sets every leaf to one of its edges, by the simple generator `any(n)`."""
     edges = leaf_edges(program)
     yield "static uint32_t seed = 1u; static uint32_t any(uint32_t n) {"
     yield "seed = seed * 1664525u + 1013904223u; return (seed >> 8) % n; }"
     yield f"static void scatter({symbols.struct} *s) {{"
     for variable in program.variables:
-        values = ", ".join(_constant(variable, key) for key in edges[variable.name])
+        values = ", ".join(constant_in_c(variable, key) for key in edges[variable.name])
         c_type = symbols.c_type(variable.name)
         yield f"{{ static const {c_type} v[] = {{{values}}}; s->{symbols.path(variable.name)} ="
         yield "v[any(sizeof v / sizeof v[0])]; }"
     yield "}"
 
 
-def _constant(variable: Variable, key: int) -> str:
+def constant_in_c(variable: Variable, key: int) -> str:
+    """The value of a key, as C spells it."""
     text = constant(variable.type, value_of_key(variable.type, key))
     return text.replace("ref_wide", "uint64_t") if not isinstance(variable.type, Real) else text
 
@@ -148,13 +149,13 @@ def image_c(program: Program, symbols: Symbols, number: int, most: int) -> str:
         reference_c(program, symbols),
         STARTUP,
         "extern uint32_t rcsc_script;",
-        *_leaf_values(program, symbols),
+        *leaf_values(program, symbols),
         *_same(program, symbols),
     ]
     parts += [f"int main(void) {{ static {struct} a, b; {symbols.init}(&a);"]
     parts += ["unsigned long inputs = 0, lines = 0, steps = 0, differ = 0;"]
     for at, (variable, keys) in enumerate(used):
-        values = ", ".join(_constant(variable, key) for key in keys)
+        values = ", ".join(constant_in_c(variable, key) for key in keys)
         parts.append(f"static const {symbols.c_type(variable.name)} v{at}[] = {{{values}}};")
         parts.append(f"for (unsigned i{at} = 0; i{at} < {len(keys)}u; i{at}++) {{")
     parts.append("scatter(&a);" + (f" rcsc_script = any({SCRIPTS}u);" if externs(program) else ""))
