@@ -9,21 +9,26 @@ import re
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rcsc.emit.c.ctext import SHORT
+from rcsc.emit.c.ctext import SHORT, c_type
 from rcsc.emit.identifiers import Names
 from rcsc.emit.plan import Cuts, Direct, Plan, Truth
 from rcsc.evidence.llvm import Decision, Measured, Point, Region
-from rcsc.lang.model import Bool, Level, Table
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import Admit, Bool, Kind, Level, Real, Table
 from rcsc.testing.agree import NONE, SEVERAL
+from rcsc.testing.coverage.case import outside_of
 from rcsc.testing.coverage.directed import Unreached
 from rcsc.testing.coverage.marks import Decision as Marked
 from rcsc.testing.coverage.marks import Place
 
 LOOP = re.compile(r"v_\w+ <=? |more_\w+$|[ik] <=? ")
-GUARD = re.compile(r"s->fault [!=]= \w+$")
+GUARD = re.compile(r"\(?s->fault [!=]= \w+\)?$")
 NO_LINE = re.compile(r"\(?(m|seen) == 0|case \(-1\)")
-SEVERAL_LINES = re.compile(r"several$|several != 0|default$")
+SEVERAL_LINES = re.compile(r"several$|\(?several != 0|default$")
 MACHINE = "the machine computes reals as was proved; only one that does not takes this"
+ADMITTED = "no input of this program can be refused"
+UNENDED = "no table before the last can be without its one line"
+ENDS = {Fault.NO_LINE: NONE, Fault.SEVERAL_LINES: SEVERAL}
 COMPLETE = "every value of the selector has a table, and no other is admitted"
 FAULTLESS = (
     "no table of this cycle can leave a fault: that none of its lines matches, or several, is out of reach"
@@ -105,11 +110,19 @@ class Reasons:
                     what = f"condition {number + 1} of {len(decision.shown)} decides on its own"
                     reason = self.condition(decision, number, inside)
                     yield Missed(decision.function, decision.line, what, reason)
+        told = [reason for points in by_function.values() for reason in self._safe(points)]
+        explained[f"{self.names.program}_safe"] = told
         for region in measured.regions:
             if region.count == 0:
                 reasons = explained.get(region.function, [])
                 reason = NO_WAY if reasons and all(reasons) else self._of_constant(region)
                 yield Missed(region.function, region.line, "statement", reason)
+
+    def _safe(self, points: Sequence[Point]) -> Iterator[str]:
+        """Why safe values are not shown, for each place that would."""
+        for point in points:
+            if GUARD.match(point.text) and "!=" in point.text:
+                yield "" if point.true else self.branch(point, True, points)
 
     def _of_constant(self, region: Region) -> str:
         """Why the value of a choice is not taken that a compiler decides, and counts as no branch."""
@@ -127,8 +140,9 @@ class Reasons:
         table = self._table(function)
         if table is not None and (reason := self._of_table(table, point, truth)):
             return reason
-        level = self._level(function)
-        if level is not None:
+        if (step := self._step(function)) is not None:
+            return self._of_step(step, point, truth)
+        if (level := self._level(function)) is not None:
             return self._of_level(level, point, truth, points)
         keys = self._line_keys(table) if function.endswith("_line") and table else self._keys(function)
         own = [other for other in points if not _generic(other.text)]
@@ -188,6 +202,14 @@ class Reasons:
         function, table = decision.function, self._table(decision.function)
         if function == f"{self.names.program}_exact":
             return MACHINE
+        if (
+            level := self._level(function)
+        ) is not None:  # it decides by the two ends of a table before its last
+            return (
+                self._excluded(level, tuple(ENDS.values())[number])
+                if len(decision.shown) == len(ENDS)
+                else ""
+            )
         keys = self._line_keys(table) if function.endswith("_line") and table else self._keys(function)
         joint: dict[int, list[int]] = {}
         for key in keys:
@@ -231,32 +253,68 @@ class Reasons:
 
     def _matched_once(self, table: Table, level: Level | None = None) -> bool:
         """Whether both no line and several lines are out of reach: anywhere, or in the cycle of a level."""
+        return self._never(table, NONE, level) and self._never(table, SEVERAL, level)
+
+    def _never(self, table: Table, which: int, level: Level | None) -> bool:
+        """Whether it is out of reach that no line of a table matches, or several."""
+        if which == NONE and table.default is not None:
+            return True
         name = str(table.name)
-
-        def excluded(which: int) -> bool:
-            in_cycle = level is not None and ("ended", level.name, name, which) in self.shown
-            return in_cycle or ("matched", name, which) in self.shown
-
-        return (table.default is not None or excluded(NONE)) and excluded(SEVERAL)
+        in_cycle = level is not None and ("ended", level.name, name, which) in self.shown
+        return in_cycle or ("matched", name, which) in self.shown
 
     def _level(self, function: str) -> Level | None:
         p, names = self.names.program, self.names.levels
         levels = (level for level in self.plan.program.levels if function == f"{p}_{names[level.name]}_cycle")
         return next(levels, None)
 
+    def _step(self, function: str) -> Table | None:
+        p, names = self.names.program, self.names.tables
+        tables = self.plan.program.tables
+        return next((table for table in tables if function == f"{p}_{names[table.name]}_step"), None)
+
+    def _of_step(self, table: Table, point: Point, truth: bool) -> str:
+        """Why a step is not refused, or ends in no fault."""
+        if not GUARD.match(point.text) or truth is not ("!=" in point.text) or self._refuses():
+            return ""
+        return ADMITTED if "==" in point.text else FAULTLESS if self._sound([table]) else ""
+
     def _of_level(self, level: Level, point: Point, truth: bool, points: Sequence[Point]) -> str:
-        program = self.plan.program
-        tables = [table for table in program.tables if table.name in level.table_names]
-        sound = all(self._matched_once(table, level) and not table.stops for table in tables)
-        sound = sound and not any(procedure.extern for procedure in program.procedures)
-        if GUARD.match(point.text):
-            passing = truth is ("!=" in point.text)
-            return FAULTLESS if sound and passing else ""
+        """Why a cycle is not refused, ends in no fault, or runs no table for want of one."""
+        tables = [table for table in self.plan.program.tables if table.name in level.table_names]
+        guards = [other for other in points if GUARD.match(other.text)]
+        if point in guards:
+            for fault, which in ENDS.items():
+                if point.text.strip("()").endswith(self.names.faults[fault]):
+                    return self._excluded(level, which) if truth else ""
+            if truth is not ("!=" in point.text) or ((point is guards[0] or truth) and self._refuses()):
+                return ""
+            return ADMITTED if point is guards[0] else FAULTLESS if self._sound(tables, level) else ""
         choices = [other for other in points if other.text.startswith("chosen")]
         last = point in choices and not truth
         if last and all(other.false for other in choices if other.line < point.line):
             return COMPLETE
         return ""
+
+    def _excluded(self, level: Level, which: int) -> str:
+        """Why no table of a cycle before its last has no line, or several."""
+        tables = [table for table in self.plan.program.tables if table.name in level.staged]
+        return UNENDED if all(self._never(table, which, level) for table in tables) else ""
+
+    def _sound(self, tables: Sequence[Table], level: Level | None = None) -> bool:
+        """Whether these tables leave no fault."""
+        extern = any(procedure.extern for procedure in self.plan.program.procedures)
+        return not extern and all(self._matched_once(table, level) and not table.stops for table in tables)
+
+    def _refuses(self) -> bool:
+        """Whether some input can be refused."""
+        return any(
+            variable.kind is Kind.INPUT
+            and not isinstance(variable.type, Bool)
+            and (variable.admit is Admit.REJECT or isinstance(variable.type, Real))
+            and bool(outside_of(variable, c_type(variable.type)))
+            for variable in self.plan.program.variables
+        )
 
 
 def _generic(text: str) -> bool:

@@ -55,7 +55,7 @@ class Reached:
         hits: set[Hit] = {("entry", entry)}
         match entry.kind:
             case "check":
-                hits.update(self._checked(case.before, right.result))
+                hits.update(self._checked(case, right.result))
             case "line" | "lines":
                 hits.update(self._matched(case, right))
             case "step" | "cycle":
@@ -72,8 +72,11 @@ class Reached:
                 case ("decision", int(at), outcomes, bool(truth)):
                     self.ways.setdefault(at, {})[(outcomes, truth)] = None  # type: ignore[index]  # as `of` makes it
 
-    def _checked(self, before: Snapshot, result: int) -> Iterator[Hit]:
-        variables = self.program.variables
+    def _checked(self, case: Case, result: int) -> Iterator[Hit]:
+        variables, before = self.program.variables, case.before
+        if case.foreign:  # nothing else of it is looked at
+            yield ("foreign",)
+            return
         if 0 <= result < len(variables):
             variable = variables[result]
             yield ("unfit", variable.name, side(variable, before[variable.name]))
