@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from types import MappingProxyType
 
+from rcsc.emit.plan import Plan
 from rcsc.emit.scope import NameScope, abbreviated, c_scope, short
 from rcsc.lang import reserved
 from rcsc.lang.interpret import Fault
@@ -179,6 +180,11 @@ def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}),
         file, p, _attributes(program, failed), paths, roots, members, tables, levels, procedures, units, types,
         constants, classes, _class_members(program), failed, *_positions(program, p, c), *_state(p, c), c, module,
     )  # fmt: skip
+
+
+def names_in(plan: Plan) -> Names:
+    """All names of what is emitted of a plan."""
+    return names_of(plan.program, plan.places, plan.prefix)
 
 
 def _program_words(program: Program, prefix: str) -> tuple[str, str]:

@@ -32,7 +32,7 @@ from rcsc.emit.code_tree import (
     read,
     when,
 )
-from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment, names_of
+from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment, names_in
 from rcsc.emit.plan import (
     WORD,
     Coded,
@@ -83,7 +83,7 @@ class _Maker:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.program = plan.program
-        self.names = names_of(plan.program, prefix=plan.prefix)
+        self.names = names_in(plan)
         self.text = PyText(self.names)
         self.constants: list[tuple[str, tuple[str, ...]]] = []
         self.lines: list[tuple[str, tuple[str, ...]]] = []

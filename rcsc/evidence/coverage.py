@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 
 from rcsc.driver.trials import proofs
-from rcsc.emit.identifiers import names_of
+from rcsc.emit.identifiers import names_in
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.evidence.llvm import Measured, Tools, measured, tools
 from rcsc.evidence.out_of_reach import Missed, Reasons
@@ -27,7 +27,7 @@ def collect(subject: Subject) -> Evidence:
     seen = measured(llvm, subject.files, document.symbols.source, vectors)
     if isinstance(seen, BuildFailed):
         return Evidence((), {"vectors.c": vectors}, (Shortfall(document.symbols.source, seen.text),))
-    names = names_of(plan.program, plan.places)
+    names = names_in(plan)
     reasons = Reasons(plan, names, marked(plan.program).decisions, document.unreached)
     missed = list(reasons.missed(seen))
     files = {

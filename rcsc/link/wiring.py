@@ -16,7 +16,7 @@ from rcsc.emit.identifiers import (
     c_word,
     constant_word,
     file_word,
-    names_of,
+    names_in,
     parameter_word,
     plain_word,
 )
@@ -228,7 +228,7 @@ def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linke
 
 
 def _program(plan: Plan) -> LevelProgram:
-    names = names_of(plan.program, plan.places, plan.prefix)
+    names = names_in(plan)
     return LevelProgram(
         plan, names, signature_of(CheckedFields(json_of(symbols(plan, names, digest(plan.program, names)))))
     )

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from rcsc.emit.identifiers import Names, names_of
+from rcsc.emit.identifiers import Names, names_in
 from rcsc.emit.plan import Plan
 from rcsc.trace.chunks import Chunk, chunks
 from rcsc.trace.origin import Origin, Piece, Sort, infrastructure
@@ -47,7 +47,7 @@ class CNames:
 
 def c_names(plan: Plan) -> CNames:
     """Collect the names of a plan in C, with what they stand for."""
-    names, program = names_of(plan.program, plan.places), plan.program
+    names, program = names_in(plan), plan.program
     whole = Origin(Sort.PROGRAM, program.name)
     externs = {
         one.extern.c: Origin(Sort.PROCEDURE, one.name) for one in program.procedures if one.extern is not None

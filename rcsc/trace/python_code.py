@@ -7,7 +7,7 @@ import ast
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from rcsc.emit.identifiers import comment, names_of
+from rcsc.emit.identifiers import comment, names_in
 from rcsc.emit.plan import Plan
 from rcsc.trace.origin import Origin, Piece, Sort, infrastructure
 
@@ -45,7 +45,7 @@ class _Names:
 
 
 def _names(plan: Plan) -> _Names:
-    names, program = names_of(plan.program, plan.places), plan.program
+    names, program = names_in(plan), plan.program
     whole = Origin(Sort.PROGRAM, program.name)
     named = {"State": whole, **dict.fromkeys(("check", "_admit", "_settle", "_safe", "_begin"), whole)}
     named |= {f"_do_{stem}": Origin(Sort.PROCEDURE, name) for name, stem in names.procedures.items()}

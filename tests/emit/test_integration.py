@@ -112,7 +112,7 @@ def test_a_prefix_that_is_none_is_told(
     assert not (tmp_path / "generated").exists()
 
 
-def test_a_system_with_a_prefix_runs(dock: Path) -> None:
+def test_a_system_with_a_prefix_runs(dock: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (dock / "rcsc.toml").write_text('prefix = "acme_"\n', encoding="utf-8")
     generated = dock / "generated"
     shutil.rmtree(generated)
@@ -122,6 +122,8 @@ def test_a_system_with_a_prefix_runs(dock: Path) -> None:
     assert all(name.startswith("acme_") for name in names)
     for source in generated.glob("c/*.c"):
         subprocess.run(["cc", "-std=c99", *STRICT, "-c", source.name], cwd=generated / "c", check=True)
+    monkeypatch.chdir(dock)
+    assert run(["trace", "-q", "drive.rcs"]) == 0  # each line of the C comes from something in the tables
     for executor in ("c", "python"):
         assert run(["run", str(dock / "system.toml"), "--executor", executor]) == 0
 

@@ -30,7 +30,7 @@ from rcsc.emit.c.matching import match_functions
 from rcsc.emit.c.procedures import callees_first, failing, procedure_function
 from rcsc.emit.c.symbols import symbols
 from rcsc.emit.code_tree import Invoke, read
-from rcsc.emit.identifiers import comment, failed_type, guard, names_of, types_header
+from rcsc.emit.identifiers import comment, failed_type, guard, names_in, types_header
 from rcsc.emit.plan import Plan
 from rcsc.emit.rendering import render
 
@@ -95,7 +95,7 @@ def _program(plan: Plan) -> CProgram:
     parameters = {
         str(procedure.name): tuple(p.type for p in procedure.params) for procedure in plan.program.procedures
     }
-    names = names_of(plan.program, plan.places, plan.prefix)
+    names = names_in(plan)
     text = CText(names, parameters, failing(plan.program))
     return CProgram(plan, names, text, digest(plan.program, names))
 
