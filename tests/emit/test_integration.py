@@ -165,3 +165,27 @@ def test_what_the_page_shows_is_so(repo: Path, tmp_path: Path) -> None:
 @pytest.mark.needs("qemu-system-arm")
 def test_the_bare_metal_example_runs(repo: Path, tmp_path: Path) -> None:
     assert len(played(repo, tmp_path, cross=True)) == 1
+
+
+@pytest.mark.needs("arm-none-eabi-gcc")
+def test_an_image_carries_the_tables_that_it_steps(repo: Path, tmp_path: Path) -> None:
+    main = '#include "task.h"\ntask_t s;\nint main(void) { task_init(&s); for (;;) { (void)task_acquire_step(&s); } }\n'
+    (tmp_path / "main.c").write_text(main)
+    bytes_ = []
+    for flags in ((), ("-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")):
+        words = [
+            "arm-none-eabi-gcc",
+            "-std=c99",
+            "-Os",
+            "-mcpu=cortex-m3",
+            "-mthumb",
+            "-ffreestanding",
+            *flags,
+        ]
+        words += [f"-I{repo / 'generated/c'}", "main.c", str(repo / "generated/c/task.c")]
+        subprocess.run([*words, "-nostdlib", "-lgcc", "-Wl,-e,main", "-o", "image"], cwd=tmp_path, check=True)
+        size = subprocess.run(
+            ["arm-none-eabi-size", "image"], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        bytes_.append(int(size.stdout.splitlines()[1].split()[0]))
+    assert 3 * bytes_[1] < bytes_[0], bytes_
