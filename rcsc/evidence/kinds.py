@@ -5,6 +5,7 @@ from types import MappingProxyType
 
 from rcsc.evidence import analysers, coverage, resources, runtime
 from rcsc.evidence.kind import Kind
+from rcsc.evidence.misra import compliance
 
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
@@ -12,6 +13,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "runtime": runtime.KIND,
         "analysers": analysers.KIND,
         "resources": resources.KIND,
+        "misra": compliance.KIND,
     }
 )
 """In the order in which they are made and listed. A new one is a module and its line here."""

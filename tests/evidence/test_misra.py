@@ -1,0 +1,105 @@
+"""The compliance table of MISRA C:2012: every guideline has its row, and a reason holds at its place alone."""
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+
+from rcsc.evidence.misra.compliance import Compliance, Summary, collect, main, summary
+from rcsc.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, Checked, Finding, check
+from rcsc.evidence.misra.deviations import explained, own_findings
+from rcsc.evidence.misra.guidelines import Category, guidelines
+from tests.evidence.subjects import EVERYTHING, subject_of
+
+REPO = Path(__file__).parents[2]
+PLANTED = """
+int32_t planted(int32_t a)
+{
+    int32_t b;
+    if (a = 1) {
+        goto end;
+    }
+end:
+    return b;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def files() -> dict[str, str]:
+    """The emitted files of the program."""
+    return dict(subject_of(EVERYTHING).files)
+
+
+def test_every_guideline_has_a_row_and_each_deviation_its_place() -> None:
+    evidence = collect(subject_of(EVERYTHING))
+    assert not evidence.missing
+    assert evidence.shortfalls == ()
+    rows = list(csv.DictReader(io.StringIO(evidence.files["compliance.csv"])))
+    assert [row["guideline"] for row in rows] == [one.number for one in guidelines()]
+    kept = {row["guideline"]: row["compliance"] for row in rows}
+    assert kept["1.2"] == kept["8.7"] == kept["Dir 4.6"] == "deviation"
+    assert kept["17.3"] == kept["5.1"] == kept["14.4"] == kept["Dir 4.10"] == "compliant"
+    assert kept["Dir 4.1"] == kept["Dir 1.1"] == "not checked"
+    assert kept["22.1"] == "not applicable"
+    assert all(row["reasons"] for row in rows if row["compliance"] == "deviation")
+    assert all(row["checked by"] for row in rows)
+    assert not any(row["compliance"] == "deviation" for row in rows if row["category"] == "mandatory")
+    places = list(csv.DictReader(io.StringIO(evidence.files["places.csv"])))
+    assert sum(int(row["places"] or 0) for row in rows) == len(places)
+    assert "misra-c2012-17.3:probe.c:" in evidence.files["suppressions.txt"]
+    assert "\nmisra-c2012-17.3\n" not in evidence.files["suppressions.txt"]
+
+
+def test_what_is_planted_is_a_violation_although_its_rule_may_deviate_elsewhere(
+    files: dict[str, str],
+) -> None:
+    made = summary({**files, "c/probe.c": files["c/probe.c"] + PLANTED})
+    first = files["c/probe.c"].count("\n")
+    found = {place.guideline for place in made.unexplained}
+    assert all(place.finding.line > first for place in made.unexplained)
+    assert {"13.4", "14.4", "15.1", "8.4"} <= found
+    by_number = {one.number: one for one in guidelines()}
+    assert made.of(by_number["13.4"])[0] is Compliance.VIOLATION
+
+
+def test_a_reason_holds_where_the_line_says_what_it_needs(files: dict[str, str]) -> None:
+    lines = files["c/probe.c"].splitlines()
+    builtin = next(at for at, line in enumerate(lines, 1) if "__builtin_ctz" in line)
+    step = next(at for at, line in enumerate(lines, 1) if line.startswith("int32_t probe_t_step("))
+    assert explained(Finding("probe.c", builtin, "misra-c2012-17.3", ""), files) is not None
+    assert explained(Finding("probe.c", builtin + 1, "misra-c2012-17.3", ""), files) is None
+    assert explained(Finding("probe.c", step, "misra-c2012-8.7", ""), files) is not None
+    hidden = {
+        **files,
+        "c/probe.c": files["c/probe.c"].replace("int32_t probe_t_step(", "int32_t probe_t_stop("),
+    }
+    assert explained(Finding("probe.c", step, "misra-c2012-8.7", ""), hidden) is None
+    assert explained(Finding("probe.c", 10_000, "misra-c2012-8.7", ""), files) is None
+
+
+def test_no_reason_is_good_enough_for_a_mandatory_guideline(files: dict[str, str]) -> None:
+    builtin = 1 + next(
+        at for at, line in enumerate(files["c/probe.c"].splitlines()) if "__builtin_ctz" in line
+    )
+    place = Finding("probe.c", builtin, "misra-c2012-17.3", "")
+    known = explained(place, files)
+    assert known is not None
+    assert known.guideline == "1.2"
+    mandatory = [one.number for one in guidelines() if one.category is Category.MANDATORY]
+    assert "17.3" in mandatory
+    assert known.guideline not in mandatory
+
+
+def test_basic_types_and_compared_enumerators_are_searched_for_in_code_alone() -> None:
+    text = "enum {\n    A_ONE = 1\n};\n/* int == A_ONE */\nint x;\nbool f(void) { return y == A_ONE; }\nuint8_t z = B_TWO;\n"
+    found = [(one.line, one.check) for one in own_findings({"c/a.c": text})]
+    assert found == [(5, BASIC_TYPE), (6, ENUMERATOR)]
+
+
+def test_a_failure_of_the_checker_is_no_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = Summary(Checked("cppcheck", {}, (), "it crashed"), (), plain=True)
+    monkeypatch.setattr("rcsc.evidence.misra.compliance.summary", lambda _: broken)
+    assert main(str(REPO / "generated" / "c")) == 1
+    assert check({}).rules["17.3"]
