@@ -126,6 +126,7 @@ static void approach_admit(approach_t *s)
         s->fault = APPROACH_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
+        /* Not tested, as no value of their types is refused: distance_mm. */
         if (s->braking_mm > 500u) {
             at = APPROACH_LEAF_BRAKING_MM;
         } else if ((s->tolerance_mm < 1u) || (s->tolerance_mm > 20u)) {
@@ -244,30 +245,30 @@ int32_t approach_approach_line(const approach_t *s)
         /* examples/approach.rcs: force_n > limit_n, force_n <= limit_n, distance_mm - tolerance_mm <= 0,
            distance_mm - tolerance_mm > 0 */
         {
-            0x0u, /* false, false, false, false: no line */
-            0x0u, /* false, false, false, true: no line */
-            0x0u, /* false, false, true, false: no line */
-            0x0u, /* false, false, true, true: no line */
-            0x0u, /* false, true, false, false: no line */
-            0xcu, /* false, true, false, true: lines brake, cruise */
-            0x2u, /* false, true, true, false: line arrived */
-            0xeu, /* false, true, true, true: all lines but blocked */
-            0x1u, /* true, false, false, false: line blocked */
-            0x1u, /* true, false, false, true: line blocked */
-            0x1u, /* true, false, true, false: line blocked */
-            0x1u, /* true, false, true, true: line blocked */
-            0x1u, /* true, true, false, false: line blocked */
-            0xdu, /* true, true, false, true: all lines but arrived */
-            0x3u, /* true, true, true, false: lines blocked, arrived */
-            0xfu /* true, true, true, true: every line */
+            0x00u, /* false, false, false, false: no line */
+            0x00u, /* false, false, false, true: no line */
+            0x00u, /* false, false, true, false: no line */
+            0x00u, /* false, false, true, true: no line */
+            0x00u, /* false, true, false, false: no line */
+            0x0cu, /* false, true, false, true: lines brake, cruise */
+            0x02u, /* false, true, true, false: line arrived */
+            0x0eu, /* false, true, true, true: lines arrived, brake, cruise */
+            0x01u, /* true, false, false, false: line blocked */
+            0x01u, /* true, false, false, true: line blocked */
+            0x01u, /* true, false, true, false: line blocked */
+            0x01u, /* true, false, true, true: line blocked */
+            0x01u, /* true, true, false, false: line blocked */
+            0x0du, /* true, true, false, true: lines blocked, brake, cruise */
+            0x03u, /* true, true, true, false: lines blocked, arrived */
+            0x0fu /* true, true, true, true: every line */
         },
         /* examples/approach.rcs: distance_mm <= tolerance_mm + braking_mm, distance_mm > tolerance_mm +
            braking_mm */
         {
-            0x3u, /* false, false: lines blocked, arrived */
-            0xbu, /* false, true: all lines but brake */
-            0x7u, /* true, false: all lines but cruise */
-            0xfu /* true, true: every line */
+            0x03u, /* false, false: lines blocked, arrived */
+            0x0bu, /* false, true: lines blocked, arrived, cruise */
+            0x07u, /* true, false: lines blocked, arrived, brake */
+            0x0fu /* true, true: every line */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(((((((s->force_n > s->limit_n) ? 1u : 0u) * 2u) +

@@ -338,7 +338,10 @@ static void emove_do_located(emove_t *s)
     s->displaced_here.y = s->to_primitive.displaced.y + 0.0;
 }
 
-/* emove/common.rcs procedure take_orders */
+/* emove/common.rcs procedure take_orders: Made of the declared roles (manual, Protocol). An order is new
+   if its number differs from the last, until it is answered and the answer's own orders are echoed. A
+   report counts once it echoes the number of the last order. A subordinate rests where it has reported
+   *done* to the order to rest, and the new order is answered or every order echoed. */
 static void emove_do_take_orders(emove_t *s)
 {
     s->echoed = ((s->from_primitive.inc_command_echo == s->to_primitive.inc_command) &&
@@ -369,7 +372,9 @@ static void emove_do_take_orders(emove_t *s)
             (s->vision.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
-/* emove/common.rcs procedure give_orders */
+/* emove/common.rcs procedure give_orders: Made of the declared roles (manual, Protocol). A new order is
+   answered by the first cycle that is not settling; its number and name are echoed. An order gets a new
+   number where its command or a field differs from the last; fields of a stream do not count. */
 static void emove_do_give_orders(emove_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -460,6 +465,9 @@ static void emove_admit(emove_t *s)
         s->fault = EMOVE_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
+        /* Not tested, as no value of their types is refused: task.inc_command, task.locpt_ptr,
+           task.apoint_pos_flag, from_primitive.inc_command_echo, from_primitive.holds,
+           from_vision.inc_command_echo, path.known, target.known, object_data.known, held_data.known. */
         if (s->task.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE) {
             at = EMOVE_LEAF_TASK_INPUT_COMMAND;
         } else if (s->task.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
@@ -560,7 +568,8 @@ static void emove_admit(emove_t *s)
     }
 }
 
-/* emove/locate.rcs assumption locate_in_step: A state goes with the orders that it waits for (section 9). */
+/* emove/locate.rcs assumption locate_in_step: Found from what the lines order, and proved: a state goes
+   with the orders that it waits for (section 9). */
 static bool emove_holds_locate_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -587,8 +596,8 @@ static bool emove_holds_locate_in_step(const emove_t *s)
                 (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE));
 }
 
-/* emove/move_to.rcs assumption move_to_in_step: A state goes with the orders that it waits for (section
-   9). */
+/* emove/move_to.rcs assumption move_to_in_step: Found from what the lines order, and proved: a state goes
+   with the orders that it waits for (section 9). */
 static bool emove_holds_move_to_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -601,8 +610,8 @@ static bool emove_holds_move_to_in_step(const emove_t *s)
                 (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTO));
 }
 
-/* emove/move_to_obj.rcs assumption move_to_obj_in_step: A state goes with the orders that it waits for
-   (section 9). */
+/* emove/move_to_obj.rcs assumption move_to_obj_in_step: Found from what the lines order, and proved: a
+   state goes with the orders that it waits for (section 9). */
 static bool emove_holds_move_to_obj_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -617,7 +626,8 @@ static bool emove_holds_move_to_obj_in_step(const emove_t *s)
                 (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS));
 }
 
-/* emove/pickup.rcs assumption pickup_in_step: A state goes with the orders that it waits for (section 9). */
+/* emove/pickup.rcs assumption pickup_in_step: Found from what the lines order, and proved: a state goes
+   with the orders that it waits for (section 9). */
 static bool emove_holds_pickup_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -628,8 +638,8 @@ static bool emove_holds_pickup_in_step(const emove_t *s)
                 (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP));
 }
 
-/* emove/release.rcs assumption release_part_in_step: A state goes with the orders that it waits for
-   (section 9). */
+/* emove/release.rcs assumption release_part_in_step: Found from what the lines order, and proved: a state
+   goes with the orders that it waits for (section 9). */
 static bool emove_holds_release_part_in_step(const emove_t *s)
 {
     return s->new_command ||
@@ -1258,6 +1268,8 @@ void emove_init(emove_t *s)
 int32_t emove_check(const emove_t *s)
 {
     int32_t at = EMOVE_CHECK_OK;
+    /* Not tested, as no value of their types is refused: to_task.inc_command_echo, inc_command_seen,
+       to_primitive.inc_command, to_vision.inc_command, here, here.next, here_asked. */
     if (s->digest != EMOVE_DIGEST) {
         at = EMOVE_CHECK_FOREIGN;
     } else if ((*(const uint8_t *)&s->task.apoint_pos_flag) > 1u) {
@@ -1414,64 +1426,64 @@ int32_t emove_locate_line(const emove_t *s)
         uint16_t t4[3];
     } t = {
         { /* emove/locate.rcs: cur_state */
-            0x407u, /* d_state: lines 0, 1, 2, 9 */
+            0x0407u, /* d_state: lines 0, 1, 2, 9 */
             0x2007u, /* f_state: lines 0, 1, 2, 12 */
-            0x7u, /* through: lines 0, 1, 2 */
-            0x7u, /* last: lines 0, 1, 2 */
-            0x7u, /* opening: lines 0, 1, 2 */
-            0x480fu, /* looking: lines 0, 1, 2, 3, 10, 13 */
+            0x0007u, /* through: lines 0, 1, 2 */
+            0x0007u, /* last: lines 0, 1, 2 */
+            0x0007u, /* opening: lines 0, 1, 2 */
+            0x480fu, /* looking: lines 0 to 3, 10, 13 */
             0x9817u, /* flooding: lines 0, 1, 2, 4, 10, 11, 14 */
             0x4827u, /* centering: lines 0, 1, 2, 4a, 10, 13 */
             0x9847u, /* lining: lines 0, 1, 2, 5, 10, 11, 14 */
             0x4887u, /* closing: lines 0, 1, 2, 6, 10, 13 */
             0x4907u, /* hovering: lines 0, 1, 2, 7, 10, 13 */
             0x4a07u, /* lowering: lines 0, 1, 2, 8, 10, 13 */
-            0x7u, /* grasping: lines 0, 1, 2 */
-            0x7u /* releasing: lines 0, 1, 2 */
+            0x0007u, /* grasping: lines 0, 1, 2 */
+            0x0007u /* releasing: lines 0, 1, 2 */
         },
         { /* emove/locate.rcs: primitive.command, new_command, target.known */
-            0xfc50u, /* pause, false, false: lines 4, 5, 9, 10, 11, 12, 13, 14 */
-            0xfc50u, /* pause, false, true: lines 4, 5, 9, 10, 11, 12, 13, 14 */
-            0x3u, /* pause, true, false: lines 0, 1 */
-            0x5u, /* pause, true, true: lines 0, 2 */
-            0xff70u, /* goto, false, false: all lines but 0, 1, 2, 3, 6 */
-            0xff70u, /* goto, false, true: all lines but 0, 1, 2, 3, 6 */
-            0x3u, /* goto, true, false: lines 0, 1 */
-            0x5u, /* goto, true, true: lines 0, 2 */
-            0xfc50u, /* gothru, false, false: lines 4, 5, 9, 10, 11, 12, 13, 14 */
-            0xfc50u, /* gothru, false, true: lines 4, 5, 9, 10, 11, 12, 13, 14 */
-            0x3u, /* gothru, true, false: lines 0, 1 */
-            0x5u, /* gothru, true, true: lines 0, 2 */
-            0xfcd0u, /* approach_position_fingers, false, false: all lines but 0, 1, 2, 3, 4a, 7, 8 */
-            0xfcd0u, /* approach_position_fingers, false, true: all lines but 0, 1, 2, 3, 4a, 7, 8 */
-            0x3u, /* approach_position_fingers, true, false: lines 0, 1 */
-            0x5u, /* approach_position_fingers, true, true: lines 0, 2 */
-            0xfc58u, /* departure_position_fingers, false, false: all lines but 0, 1, 2, 4a, 6, 7, 8 */
-            0xfc58u, /* departure_position_fingers, false, true: all lines but 0, 1, 2, 4a, 6, 7, 8 */
-            0x3u, /* departure_position_fingers, true, false: lines 0, 1 */
-            0x5u, /* departure_position_fingers, true, true: lines 0, 2 */
-            0xfc50u, /* immed_grasp, false, false: lines 4, 5, 9, 10, 11, 12, 13, 14 */
-            0xfc50u, /* immed_grasp, false, true: lines 4, 5, 9, 10, 11, 12, 13, 14 */
-            0x3u, /* immed_grasp, true, false: lines 0, 1 */
-            0x5u /* immed_grasp, true, true: lines 0, 2 */
+            0xfc50u, /* pause, false, false: lines 4, 5, 9 to 14 */
+            0xfc50u, /* pause, false, true: lines 4, 5, 9 to 14 */
+            0x0003u, /* pause, true, false: lines 0, 1 */
+            0x0005u, /* pause, true, true: lines 0, 2 */
+            0xff70u, /* goto, false, false: lines 4, 4a, 5, 7 to 14 */
+            0xff70u, /* goto, false, true: lines 4, 4a, 5, 7 to 14 */
+            0x0003u, /* goto, true, false: lines 0, 1 */
+            0x0005u, /* goto, true, true: lines 0, 2 */
+            0xfc50u, /* gothru, false, false: lines 4, 5, 9 to 14 */
+            0xfc50u, /* gothru, false, true: lines 4, 5, 9 to 14 */
+            0x0003u, /* gothru, true, false: lines 0, 1 */
+            0x0005u, /* gothru, true, true: lines 0, 2 */
+            0xfcd0u, /* approach_position_fingers, false, false: lines 4, 5, 6, 9 to 14 */
+            0xfcd0u, /* approach_position_fingers, false, true: lines 4, 5, 6, 9 to 14 */
+            0x0003u, /* approach_position_fingers, true, false: lines 0, 1 */
+            0x0005u, /* approach_position_fingers, true, true: lines 0, 2 */
+            0xfc58u, /* departure_position_fingers, false, false: lines 3, 4, 5, 9 to 14 */
+            0xfc58u, /* departure_position_fingers, false, true: lines 3, 4, 5, 9 to 14 */
+            0x0003u, /* departure_position_fingers, true, false: lines 0, 1 */
+            0x0005u, /* departure_position_fingers, true, true: lines 0, 2 */
+            0xfc50u, /* immed_grasp, false, false: lines 4, 5, 9 to 14 */
+            0xfc50u, /* immed_grasp, false, true: lines 4, 5, 9 to 14 */
+            0x0003u, /* immed_grasp, true, false: lines 0, 1 */
+            0x0005u /* immed_grasp, true, true: lines 0, 2 */
         },
         { /* emove/locate.rcs: primitive.status, idle */
-            0xb7f9u, /* done, false: all lines but 1, 2, 10, 13 */
-            0xb7feu, /* done, true: all lines but 0, 10, 13 */
-            0xf451u, /* executing, false: lines 0, 4, 5, 9, 11, 12, 13, 14 */
-            0xf456u, /* executing, true: all lines but 0, 3, 4a, 6, 7, 8, 10 */
+            0xb7f9u, /* done, false: lines 0, 3 to 9, 11, 12, 14 */
+            0xb7feu, /* done, true: lines 1 to 9, 11, 12, 14 */
+            0xf451u, /* executing, false: lines 0, 4, 5, 9, 11 to 14 */
+            0xf456u, /* executing, true: lines 1, 2, 4, 5, 9, 11 to 14 */
             0x2c01u, /* failed, false: lines 0, 9, 10, 12 */
             0x2c06u /* failed, true: lines 1, 2, 9, 10, 12 */
         },
         { /* emove/locate.rcs: vision.command */
-            0xffafu, /* pause: all lines but 4, 5 */
-            0xffbfu, /* flood_flash: all lines but 5 */
-            0xffefu /* line_flash: all lines but 4 */
+            0xffafu, /* pause: lines 0 to 3, 4a, 6 to 14 */
+            0xffbfu, /* flood_flash: lines 0 to 4a, 6 to 14 */
+            0xffefu /* line_flash: lines 0 to 3, 4a to 14 */
         },
         { /* emove/locate.rcs: vision.status */
-            0x6fffu, /* done: all lines but 11, 14 */
-            0xefafu, /* executing: all lines but 4, 5, 11 */
-            0x7fafu /* failed: all lines but 4, 5, 14 */
+            0x6fffu, /* done: lines 0 to 10, 12, 13 */
+            0xefafu, /* executing: lines 0 to 3, 4a, 6 to 10, 12, 13, 14 */
+            0x7fafu /* failed: lines 0 to 3, 4a, 6 to 13 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->cur_state] &
@@ -1507,9 +1519,9 @@ int32_t emove_move_to_line(const emove_t *s)
         uint16_t t4[2];
     } t = {
         { /* emove/move_to.rcs: path_length */
-            0x1fe7u, /* 0: all lines but 3, 4 */
-            0x1febu, /* 1: all lines but 2, 4 */
-            /* 2 .. 62: all lines but 2, 3 */
+            0x1fe7u, /* 0: lines 0, 1, 2, 5 to 11 */
+            0x1febu, /* 1: lines 0, 1, 3, 5 to 11 */
+            /* 2 .. 62: lines 0, 1, 4 to 11 */
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
@@ -1519,75 +1531,75 @@ int32_t emove_move_to_line(const emove_t *s)
             0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u
         },
         { /* emove/move_to.rcs: cur_state */
-            0x61fu, /* d_state: all lines but 5, 6, 7, 7a, 10, 11 */
-            0x81fu, /* f_state: lines 0, 1, 2, 3, 4, 10 */
-            0x147fu, /* through: all lines but 7, 7a, 8, 10 */
-            0x159fu, /* last: all lines but 5, 6, 8, 10 */
-            0x41fu, /* opening: lines 0, 1, 2, 3, 4, 9 */
-            0x41fu, /* looking: lines 0, 1, 2, 3, 4, 9 */
-            0x41fu, /* flooding: lines 0, 1, 2, 3, 4, 9 */
-            0x41fu, /* centering: lines 0, 1, 2, 3, 4, 9 */
-            0x41fu, /* lining: lines 0, 1, 2, 3, 4, 9 */
-            0x41fu, /* closing: lines 0, 1, 2, 3, 4, 9 */
-            0x41fu, /* hovering: lines 0, 1, 2, 3, 4, 9 */
-            0x41fu, /* lowering: lines 0, 1, 2, 3, 4, 9 */
-            0x41fu, /* grasping: lines 0, 1, 2, 3, 4, 9 */
-            0x41fu /* releasing: lines 0, 1, 2, 3, 4, 9 */
+            0x061fu, /* d_state: lines 0 to 4, 8, 9 */
+            0x081fu, /* f_state: lines 0 to 4, 10 */
+            0x147fu, /* through: lines 0 to 6, 9, 11 */
+            0x159fu, /* last: lines 0 to 4, 7, 7a, 9, 11 */
+            0x041fu, /* opening: lines 0 to 4, 9 */
+            0x041fu, /* looking: lines 0 to 4, 9 */
+            0x041fu, /* flooding: lines 0 to 4, 9 */
+            0x041fu, /* centering: lines 0 to 4, 9 */
+            0x041fu, /* lining: lines 0 to 4, 9 */
+            0x041fu, /* closing: lines 0 to 4, 9 */
+            0x041fu, /* hovering: lines 0 to 4, 9 */
+            0x041fu, /* lowering: lines 0 to 4, 9 */
+            0x041fu, /* grasping: lines 0 to 4, 9 */
+            0x041fu /* releasing: lines 0 to 4, 9 */
         },
         { /* emove/move_to.rcs: primitive.command, new_command, target.known */
             0x1a00u, /* pause, false, false: lines 8, 10, 11 */
             0x1a00u, /* pause, false, true: lines 8, 10, 11 */
-            0x3u, /* pause, true, false: lines 0, 1 */
-            0x1du, /* pause, true, true: lines 0, 2, 3, 4 */
-            0x1f80u, /* goto, false, false: lines 7, 7a, 8, 9, 10, 11 */
-            0x1f80u, /* goto, false, true: lines 7, 7a, 8, 9, 10, 11 */
-            0x3u, /* goto, true, false: lines 0, 1 */
-            0x1du, /* goto, true, true: lines 0, 2, 3, 4 */
-            0x1e60u, /* gothru, false, false: lines 5, 6, 8, 9, 10, 11 */
-            0x1e60u, /* gothru, false, true: lines 5, 6, 8, 9, 10, 11 */
-            0x3u, /* gothru, true, false: lines 0, 1 */
-            0x1du, /* gothru, true, true: lines 0, 2, 3, 4 */
+            0x0003u, /* pause, true, false: lines 0, 1 */
+            0x001du, /* pause, true, true: lines 0, 2, 3, 4 */
+            0x1f80u, /* goto, false, false: lines 7 to 11 */
+            0x1f80u, /* goto, false, true: lines 7 to 11 */
+            0x0003u, /* goto, true, false: lines 0, 1 */
+            0x001du, /* goto, true, true: lines 0, 2, 3, 4 */
+            0x1e60u, /* gothru, false, false: lines 5, 6, 8 to 11 */
+            0x1e60u, /* gothru, false, true: lines 5, 6, 8 to 11 */
+            0x0003u, /* gothru, true, false: lines 0, 1 */
+            0x001du, /* gothru, true, true: lines 0, 2, 3, 4 */
             0x1a00u, /* approach_position_fingers, false, false: lines 8, 10, 11 */
             0x1a00u, /* approach_position_fingers, false, true: lines 8, 10, 11 */
-            0x3u, /* approach_position_fingers, true, false: lines 0, 1 */
-            0x1du, /* approach_position_fingers, true, true: lines 0, 2, 3, 4 */
+            0x0003u, /* approach_position_fingers, true, false: lines 0, 1 */
+            0x001du, /* approach_position_fingers, true, true: lines 0, 2, 3, 4 */
             0x1a00u, /* departure_position_fingers, false, false: lines 8, 10, 11 */
             0x1a00u, /* departure_position_fingers, false, true: lines 8, 10, 11 */
-            0x3u, /* departure_position_fingers, true, false: lines 0, 1 */
-            0x1du, /* departure_position_fingers, true, true: lines 0, 2, 3, 4 */
+            0x0003u, /* departure_position_fingers, true, false: lines 0, 1 */
+            0x001du, /* departure_position_fingers, true, true: lines 0, 2, 3, 4 */
             0x1a00u, /* immed_grasp, false, false: lines 8, 10, 11 */
             0x1a00u, /* immed_grasp, false, true: lines 8, 10, 11 */
-            0x3u, /* immed_grasp, true, false: lines 0, 1 */
-            0x1du /* immed_grasp, true, true: lines 0, 2, 3, 4 */
+            0x0003u, /* immed_grasp, true, false: lines 0, 1 */
+            0x001du /* immed_grasp, true, true: lines 0, 2, 3, 4 */
         },
         { /* emove/move_to.rcs: primitive.status, idle, lost, path_length - path_at > 2 */
-            0xac1u, /* done, false, false, false: lines 0, 6, 7, 8, 10 */
-            0xae1u, /* done, false, false, true: lines 0, 5, 6, 7, 8, 10 */
-            0xb41u, /* done, false, true, false: lines 0, 6, 7a, 8, 10 */
-            0xb61u, /* done, false, true, true: lines 0, 5, 6, 7a, 8, 10 */
-            0xadeu, /* done, true, false, false: all lines but 0, 5, 7a, 9, 11 */
-            0xafeu, /* done, true, false, true: all lines but 0, 7a, 9, 11 */
-            0xb5eu, /* done, true, true, false: all lines but 0, 5, 7, 9, 11 */
-            0xb7eu, /* done, true, true, true: all lines but 0, 7, 9, 11 */
+            0x0ac1u, /* done, false, false, false: lines 0, 6, 7, 8, 10 */
+            0x0ae1u, /* done, false, false, true: lines 0, 5, 6, 7, 8, 10 */
+            0x0b41u, /* done, false, true, false: lines 0, 6, 7a, 8, 10 */
+            0x0b61u, /* done, false, true, true: lines 0, 5, 6, 7a, 8, 10 */
+            0x0adeu, /* done, true, false, false: lines 1 to 4, 6, 7, 8, 10 */
+            0x0afeu, /* done, true, false, true: lines 1 to 7, 8, 10 */
+            0x0b5eu, /* done, true, true, false: lines 1 to 4, 6, 7a, 8, 10 */
+            0x0b7eu, /* done, true, true, true: lines 1 to 6, 7a, 8, 10 */
             0x1a01u, /* executing, false, false, false: lines 0, 8, 10, 11 */
             0x1a01u, /* executing, false, false, true: lines 0, 8, 10, 11 */
             0x1a01u, /* executing, false, true, false: lines 0, 8, 10, 11 */
             0x1a01u, /* executing, false, true, true: lines 0, 8, 10, 11 */
-            0x1a1eu, /* executing, true, false, false: all lines but 0, 5, 6, 7, 7a, 9 */
-            0x1a1eu, /* executing, true, false, true: all lines but 0, 5, 6, 7, 7a, 9 */
-            0x1a1eu, /* executing, true, true, false: all lines but 0, 5, 6, 7, 7a, 9 */
-            0x1a1eu, /* executing, true, true, true: all lines but 0, 5, 6, 7, 7a, 9 */
-            0xe01u, /* failed, false, false, false: lines 0, 8, 9, 10 */
-            0xe01u, /* failed, false, false, true: lines 0, 8, 9, 10 */
-            0xe01u, /* failed, false, true, false: lines 0, 8, 9, 10 */
-            0xe01u, /* failed, false, true, true: lines 0, 8, 9, 10 */
-            0xe1eu, /* failed, true, false, false: all lines but 0, 5, 6, 7, 7a, 11 */
-            0xe1eu, /* failed, true, false, true: all lines but 0, 5, 6, 7, 7a, 11 */
-            0xe1eu, /* failed, true, true, false: all lines but 0, 5, 6, 7, 7a, 11 */
-            0xe1eu /* failed, true, true, true: all lines but 0, 5, 6, 7, 7a, 11 */
+            0x1a1eu, /* executing, true, false, false: lines 1 to 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, false, true: lines 1 to 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, true, false: lines 1 to 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, true, true: lines 1 to 4, 8, 10, 11 */
+            0x0e01u, /* failed, false, false, false: lines 0, 8, 9, 10 */
+            0x0e01u, /* failed, false, false, true: lines 0, 8, 9, 10 */
+            0x0e01u, /* failed, false, true, false: lines 0, 8, 9, 10 */
+            0x0e01u, /* failed, false, true, true: lines 0, 8, 9, 10 */
+            0x0e1eu, /* failed, true, false, false: lines 1 to 4, 8, 9, 10 */
+            0x0e1eu, /* failed, true, false, true: lines 1 to 4, 8, 9, 10 */
+            0x0e1eu, /* failed, true, true, false: lines 1 to 4, 8, 9, 10 */
+            0x0e1eu /* failed, true, true, true: lines 1 to 4, 8, 9, 10 */
         },
         { /* emove/move_to.rcs: path_length - path_at <= 2 */
-            0x1fbfu, /* false: all lines but 6 */
+            0x1fbfu, /* false: lines 0 to 5, 7 to 11 */
             0x1fffu /* true: every line */
         },
     };
@@ -1624,9 +1636,9 @@ int32_t emove_move_to_obj_line(const emove_t *s)
         uint16_t t3[24];
     } t = {
         { /* emove/move_to_obj.rcs: path_length */
-            0x1fd7u, /* 0: all lines but 3, 5 */
-            0x1fdbu, /* 1: all lines but 2, 5 */
-            /* 2 .. 62: all lines but 2, 4 */
+            0x1fd7u, /* 0: lines 0, 1, 2, 4, 6 to 12 */
+            0x1fdbu, /* 1: lines 0, 1, 3, 4, 6 to 12 */
+            /* 2 .. 62: lines 0, 1, 3, 5 to 12 */
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
@@ -1636,58 +1648,58 @@ int32_t emove_move_to_obj_line(const emove_t *s)
             0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu
         },
         { /* emove/move_to_obj.rcs: cur_state */
-            0x60fu, /* d_state: lines 0, 1, 2, 3, 9, 10 */
-            0x80fu, /* f_state: lines 0, 1, 2, 3, 11 */
-            0x14cfu, /* through: all lines but 4, 5, 8, 9, 11 */
-            0x150fu, /* last: all lines but 4, 5, 6, 7, 9, 11 */
-            0x143fu, /* opening: all lines but 6, 7, 8, 9, 11 */
-            0x40fu, /* looking: lines 0, 1, 2, 3, 10 */
-            0x40fu, /* flooding: lines 0, 1, 2, 3, 10 */
-            0x40fu, /* centering: lines 0, 1, 2, 3, 10 */
-            0x40fu, /* lining: lines 0, 1, 2, 3, 10 */
-            0x40fu, /* closing: lines 0, 1, 2, 3, 10 */
-            0x40fu, /* hovering: lines 0, 1, 2, 3, 10 */
-            0x40fu, /* lowering: lines 0, 1, 2, 3, 10 */
-            0x40fu, /* grasping: lines 0, 1, 2, 3, 10 */
-            0x40fu /* releasing: lines 0, 1, 2, 3, 10 */
+            0x060fu, /* d_state: lines 0 to 3, 9, 10 */
+            0x080fu, /* f_state: lines 0 to 3, 11 */
+            0x14cfu, /* through: lines 0 to 3, 6, 7, 10, 12 */
+            0x150fu, /* last: lines 0 to 3, 8, 10, 12 */
+            0x143fu, /* opening: lines 0 to 5, 10, 12 */
+            0x040fu, /* looking: lines 0 to 3, 10 */
+            0x040fu, /* flooding: lines 0 to 3, 10 */
+            0x040fu, /* centering: lines 0 to 3, 10 */
+            0x040fu, /* lining: lines 0 to 3, 10 */
+            0x040fu, /* closing: lines 0 to 3, 10 */
+            0x040fu, /* hovering: lines 0 to 3, 10 */
+            0x040fu, /* lowering: lines 0 to 3, 10 */
+            0x040fu, /* grasping: lines 0 to 3, 10 */
+            0x040fu /* releasing: lines 0 to 3, 10 */
         },
         { /* emove/move_to_obj.rcs: primitive.command, new_command, target.known */
             0x1a00u, /* pause, false, false: lines 9, 11, 12 */
             0x1a00u, /* pause, false, true: lines 9, 11, 12 */
-            0x3u, /* pause, true, false: lines 0, 1 */
-            0xdu, /* pause, true, true: lines 0, 2, 3 */
-            0x1f00u, /* goto, false, false: lines 8, 9, 10, 11, 12 */
-            0x1f00u, /* goto, false, true: lines 8, 9, 10, 11, 12 */
-            0x3u, /* goto, true, false: lines 0, 1 */
-            0xdu, /* goto, true, true: lines 0, 2, 3 */
-            0x1ec0u, /* gothru, false, false: lines 6, 7, 9, 10, 11, 12 */
-            0x1ec0u, /* gothru, false, true: lines 6, 7, 9, 10, 11, 12 */
-            0x3u, /* gothru, true, false: lines 0, 1 */
-            0xdu, /* gothru, true, true: lines 0, 2, 3 */
-            0x1e30u, /* approach_position_fingers, false, false: lines 4, 5, 9, 10, 11, 12 */
-            0x1e30u, /* approach_position_fingers, false, true: lines 4, 5, 9, 10, 11, 12 */
-            0x3u, /* approach_position_fingers, true, false: lines 0, 1 */
-            0xdu, /* approach_position_fingers, true, true: lines 0, 2, 3 */
+            0x0003u, /* pause, true, false: lines 0, 1 */
+            0x000du, /* pause, true, true: lines 0, 2, 3 */
+            0x1f00u, /* goto, false, false: lines 8 to 12 */
+            0x1f00u, /* goto, false, true: lines 8 to 12 */
+            0x0003u, /* goto, true, false: lines 0, 1 */
+            0x000du, /* goto, true, true: lines 0, 2, 3 */
+            0x1ec0u, /* gothru, false, false: lines 6, 7, 9 to 12 */
+            0x1ec0u, /* gothru, false, true: lines 6, 7, 9 to 12 */
+            0x0003u, /* gothru, true, false: lines 0, 1 */
+            0x000du, /* gothru, true, true: lines 0, 2, 3 */
+            0x1e30u, /* approach_position_fingers, false, false: lines 4, 5, 9 to 12 */
+            0x1e30u, /* approach_position_fingers, false, true: lines 4, 5, 9 to 12 */
+            0x0003u, /* approach_position_fingers, true, false: lines 0, 1 */
+            0x000du, /* approach_position_fingers, true, true: lines 0, 2, 3 */
             0x1a00u, /* departure_position_fingers, false, false: lines 9, 11, 12 */
             0x1a00u, /* departure_position_fingers, false, true: lines 9, 11, 12 */
-            0x3u, /* departure_position_fingers, true, false: lines 0, 1 */
-            0xdu, /* departure_position_fingers, true, true: lines 0, 2, 3 */
+            0x0003u, /* departure_position_fingers, true, false: lines 0, 1 */
+            0x000du, /* departure_position_fingers, true, true: lines 0, 2, 3 */
             0x1a00u, /* immed_grasp, false, false: lines 9, 11, 12 */
             0x1a00u, /* immed_grasp, false, true: lines 9, 11, 12 */
-            0x3u, /* immed_grasp, true, false: lines 0, 1 */
-            0xdu /* immed_grasp, true, true: lines 0, 2, 3 */
+            0x0003u, /* immed_grasp, true, false: lines 0, 1 */
+            0x000du /* immed_grasp, true, true: lines 0, 2, 3 */
         },
         /* emove/move_to_obj.rcs: primitive.status, idle, path_length - path_at > 2, path_length - path_at
            <= 2 */
         {
-            0xb31u, /* done, false, false, false: lines 0, 4, 5, 8, 9, 11 */
-            0xbb1u, /* done, false, false, true: all lines but 1, 2, 3, 6, 10, 12 */
-            0xb71u, /* done, false, true, false: all lines but 1, 2, 3, 7, 10, 12 */
-            0xbf1u, /* done, false, true, true: all lines but 1, 2, 3, 10, 12 */
-            0xb3eu, /* done, true, false, false: all lines but 0, 6, 7, 10, 12 */
-            0xbbeu, /* done, true, false, true: all lines but 0, 6, 10, 12 */
-            0xb7eu, /* done, true, true, false: all lines but 0, 7, 10, 12 */
-            0xbfeu, /* done, true, true, true: all lines but 0, 10, 12 */
+            0x0b31u, /* done, false, false, false: lines 0, 4, 5, 8, 9, 11 */
+            0x0bb1u, /* done, false, false, true: lines 0, 4, 5, 7, 8, 9, 11 */
+            0x0b71u, /* done, false, true, false: lines 0, 4, 5, 6, 8, 9, 11 */
+            0x0bf1u, /* done, false, true, true: lines 0, 4 to 9, 11 */
+            0x0b3eu, /* done, true, false, false: lines 1 to 5, 8, 9, 11 */
+            0x0bbeu, /* done, true, false, true: lines 1 to 5, 7, 8, 9, 11 */
+            0x0b7eu, /* done, true, true, false: lines 1 to 6, 8, 9, 11 */
+            0x0bfeu, /* done, true, true, true: lines 1 to 9, 11 */
             0x1a01u, /* executing, false, false, false: lines 0, 9, 11, 12 */
             0x1a01u, /* executing, false, false, true: lines 0, 9, 11, 12 */
             0x1a01u, /* executing, false, true, false: lines 0, 9, 11, 12 */
@@ -1696,14 +1708,14 @@ int32_t emove_move_to_obj_line(const emove_t *s)
             0x1a0eu, /* executing, true, false, true: lines 1, 2, 3, 9, 11, 12 */
             0x1a0eu, /* executing, true, true, false: lines 1, 2, 3, 9, 11, 12 */
             0x1a0eu, /* executing, true, true, true: lines 1, 2, 3, 9, 11, 12 */
-            0xe01u, /* failed, false, false, false: lines 0, 9, 10, 11 */
-            0xe01u, /* failed, false, false, true: lines 0, 9, 10, 11 */
-            0xe01u, /* failed, false, true, false: lines 0, 9, 10, 11 */
-            0xe01u, /* failed, false, true, true: lines 0, 9, 10, 11 */
-            0xe0eu, /* failed, true, false, false: lines 1, 2, 3, 9, 10, 11 */
-            0xe0eu, /* failed, true, false, true: lines 1, 2, 3, 9, 10, 11 */
-            0xe0eu, /* failed, true, true, false: lines 1, 2, 3, 9, 10, 11 */
-            0xe0eu /* failed, true, true, true: lines 1, 2, 3, 9, 10, 11 */
+            0x0e01u, /* failed, false, false, false: lines 0, 9, 10, 11 */
+            0x0e01u, /* failed, false, false, true: lines 0, 9, 10, 11 */
+            0x0e01u, /* failed, false, true, false: lines 0, 9, 10, 11 */
+            0x0e01u, /* failed, false, true, true: lines 0, 9, 10, 11 */
+            0x0e0eu, /* failed, true, false, false: lines 1, 2, 3, 9, 10, 11 */
+            0x0e0eu, /* failed, true, false, true: lines 1, 2, 3, 9, 10, 11 */
+            0x0e0eu, /* failed, true, true, false: lines 1, 2, 3, 9, 10, 11 */
+            0x0e0eu /* failed, true, true, true: lines 1, 2, 3, 9, 10, 11 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->path_length] & (uint32_t)t.t1[s->cur_state] &
@@ -1736,8 +1748,8 @@ int32_t emove_pause_emove_line(const emove_t *s)
         uint8_t t0[2];
     } t = {
         { /* emove/pause.rcs: idle */
-            0x2u, /* false: line 2 */
-            0x1u /* true: line 1 */
+            0x02u, /* false: line 2 */
+            0x01u /* true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];
@@ -1767,51 +1779,51 @@ int32_t emove_pickup_line(const emove_t *s)
         uint8_t t2[3];
     } t = {
         { /* emove/pickup.rcs: cur_state */
-            0xbu, /* d_state: lines 0, 1, 3 */
+            0x0bu, /* d_state: lines 0, 1, 3 */
             0x23u, /* f_state: lines 0, 1, 5 */
-            0x3u, /* through: lines 0, 1 */
-            0x3u, /* last: lines 0, 1 */
-            0x3u, /* opening: lines 0, 1 */
-            0x3u, /* looking: lines 0, 1 */
-            0x3u, /* flooding: lines 0, 1 */
-            0x3u, /* centering: lines 0, 1 */
-            0x3u, /* lining: lines 0, 1 */
-            0x3u, /* closing: lines 0, 1 */
-            0x3u, /* hovering: lines 0, 1 */
-            0x3u, /* lowering: lines 0, 1 */
-            0x57u, /* grasping: all lines but 3, 5 */
-            0x3u /* releasing: lines 0, 1 */
+            0x03u, /* through: lines 0, 1 */
+            0x03u, /* last: lines 0, 1 */
+            0x03u, /* opening: lines 0, 1 */
+            0x03u, /* looking: lines 0, 1 */
+            0x03u, /* flooding: lines 0, 1 */
+            0x03u, /* centering: lines 0, 1 */
+            0x03u, /* lining: lines 0, 1 */
+            0x03u, /* closing: lines 0, 1 */
+            0x03u, /* hovering: lines 0, 1 */
+            0x03u, /* lowering: lines 0, 1 */
+            0x57u, /* grasping: lines 0, 1, 2, 4, 6 */
+            0x03u /* releasing: lines 0, 1 */
         },
         { /* emove/pickup.rcs: primitive.command, new_command, idle */
             0x68u, /* pause, false, false: lines 3, 5, 6 */
             0x68u, /* pause, false, true: lines 3, 5, 6 */
-            0x1u, /* pause, true, false: line 0 */
-            0x2u, /* pause, true, true: line 1 */
+            0x01u, /* pause, true, false: line 0 */
+            0x02u, /* pause, true, true: line 1 */
             0x68u, /* goto, false, false: lines 3, 5, 6 */
             0x68u, /* goto, false, true: lines 3, 5, 6 */
-            0x1u, /* goto, true, false: line 0 */
-            0x2u, /* goto, true, true: line 1 */
+            0x01u, /* goto, true, false: line 0 */
+            0x02u, /* goto, true, true: line 1 */
             0x68u, /* gothru, false, false: lines 3, 5, 6 */
             0x68u, /* gothru, false, true: lines 3, 5, 6 */
-            0x1u, /* gothru, true, false: line 0 */
-            0x2u, /* gothru, true, true: line 1 */
+            0x01u, /* gothru, true, false: line 0 */
+            0x02u, /* gothru, true, true: line 1 */
             0x68u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
             0x68u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
-            0x1u, /* approach_position_fingers, true, false: line 0 */
-            0x2u, /* approach_position_fingers, true, true: line 1 */
+            0x01u, /* approach_position_fingers, true, false: line 0 */
+            0x02u, /* approach_position_fingers, true, true: line 1 */
             0x68u, /* departure_position_fingers, false, false: lines 3, 5, 6 */
             0x68u, /* departure_position_fingers, false, true: lines 3, 5, 6 */
-            0x1u, /* departure_position_fingers, true, false: line 0 */
-            0x2u, /* departure_position_fingers, true, true: line 1 */
-            0x7cu, /* immed_grasp, false, false: all lines but 0, 1 */
-            0x7cu, /* immed_grasp, false, true: all lines but 0, 1 */
-            0x1u, /* immed_grasp, true, false: line 0 */
-            0x2u /* immed_grasp, true, true: line 1 */
+            0x01u, /* departure_position_fingers, true, false: line 0 */
+            0x02u, /* departure_position_fingers, true, true: line 1 */
+            0x7cu, /* immed_grasp, false, false: lines 2 to 6 */
+            0x7cu, /* immed_grasp, false, true: lines 2 to 6 */
+            0x01u, /* immed_grasp, true, false: line 0 */
+            0x02u /* immed_grasp, true, true: line 1 */
         },
         { /* emove/pickup.rcs: primitive.status */
-            0x2fu, /* done: all lines but 4, 6 */
-            0x6bu, /* executing: all lines but 2, 4 */
-            0x3bu /* failed: all lines but 2, 6 */
+            0x2fu, /* done: lines 0 to 3, 5 */
+            0x6bu, /* executing: lines 0, 1, 3, 5, 6 */
+            0x3bu /* failed: lines 0, 1, 3, 4, 5 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->cur_state] &
@@ -1846,52 +1858,52 @@ int32_t emove_release_part_line(const emove_t *s)
         { /* emove/release.rcs: cur_state */
             0x17u, /* d_state: lines 0, 1, 1a, 3 */
             0x47u, /* f_state: lines 0, 1, 1a, 5 */
-            0x7u, /* through: lines 0, 1, 1a */
-            0x7u, /* last: lines 0, 1, 1a */
-            0x7u, /* opening: lines 0, 1, 1a */
-            0x7u, /* looking: lines 0, 1, 1a */
-            0x7u, /* flooding: lines 0, 1, 1a */
-            0x7u, /* centering: lines 0, 1, 1a */
-            0x7u, /* lining: lines 0, 1, 1a */
-            0x7u, /* closing: lines 0, 1, 1a */
-            0x7u, /* hovering: lines 0, 1, 1a */
-            0x7u, /* lowering: lines 0, 1, 1a */
-            0x7u, /* grasping: lines 0, 1, 1a */
-            0xafu /* releasing: all lines but 3, 5 */
+            0x07u, /* through: lines 0, 1, 1a */
+            0x07u, /* last: lines 0, 1, 1a */
+            0x07u, /* opening: lines 0, 1, 1a */
+            0x07u, /* looking: lines 0, 1, 1a */
+            0x07u, /* flooding: lines 0, 1, 1a */
+            0x07u, /* centering: lines 0, 1, 1a */
+            0x07u, /* lining: lines 0, 1, 1a */
+            0x07u, /* closing: lines 0, 1, 1a */
+            0x07u, /* hovering: lines 0, 1, 1a */
+            0x07u, /* lowering: lines 0, 1, 1a */
+            0x07u, /* grasping: lines 0, 1, 1a */
+            0xafu /* releasing: lines 0 to 2, 4, 6 */
         },
         { /* emove/release.rcs: primitive.command, new_command, idle */
             0xd0u, /* pause, false, false: lines 3, 5, 6 */
             0xd0u, /* pause, false, true: lines 3, 5, 6 */
-            0x1u, /* pause, true, false: line 0 */
-            0x6u, /* pause, true, true: lines 1, 1a */
+            0x01u, /* pause, true, false: line 0 */
+            0x06u, /* pause, true, true: lines 1, 1a */
             0xd0u, /* goto, false, false: lines 3, 5, 6 */
             0xd0u, /* goto, false, true: lines 3, 5, 6 */
-            0x1u, /* goto, true, false: line 0 */
-            0x6u, /* goto, true, true: lines 1, 1a */
+            0x01u, /* goto, true, false: line 0 */
+            0x06u, /* goto, true, true: lines 1, 1a */
             0xd0u, /* gothru, false, false: lines 3, 5, 6 */
             0xd0u, /* gothru, false, true: lines 3, 5, 6 */
-            0x1u, /* gothru, true, false: line 0 */
-            0x6u, /* gothru, true, true: lines 1, 1a */
+            0x01u, /* gothru, true, false: line 0 */
+            0x06u, /* gothru, true, true: lines 1, 1a */
             0xd0u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
             0xd0u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
-            0x1u, /* approach_position_fingers, true, false: line 0 */
-            0x6u, /* approach_position_fingers, true, true: lines 1, 1a */
-            0xf8u, /* departure_position_fingers, false, false: all lines but 0, 1, 1a */
-            0xf8u, /* departure_position_fingers, false, true: all lines but 0, 1, 1a */
-            0x1u, /* departure_position_fingers, true, false: line 0 */
-            0x6u, /* departure_position_fingers, true, true: lines 1, 1a */
+            0x01u, /* approach_position_fingers, true, false: line 0 */
+            0x06u, /* approach_position_fingers, true, true: lines 1, 1a */
+            0xf8u, /* departure_position_fingers, false, false: lines 2 to 6 */
+            0xf8u, /* departure_position_fingers, false, true: lines 2 to 6 */
+            0x01u, /* departure_position_fingers, true, false: line 0 */
+            0x06u, /* departure_position_fingers, true, true: lines 1, 1a */
             0xd0u, /* immed_grasp, false, false: lines 3, 5, 6 */
             0xd0u, /* immed_grasp, false, true: lines 3, 5, 6 */
-            0x1u, /* immed_grasp, true, false: line 0 */
-            0x6u /* immed_grasp, true, true: lines 1, 1a */
+            0x01u, /* immed_grasp, true, false: line 0 */
+            0x06u /* immed_grasp, true, true: lines 1, 1a */
         },
         { /* emove/release.rcs: primitive.status, lost */
-            0x5bu, /* done, false: all lines but 1a, 4, 6 */
-            0x5du, /* done, true: all lines but 1, 4, 6 */
-            0xd3u, /* executing, false: all lines but 1a, 2, 4 */
-            0xd5u, /* executing, true: all lines but 1, 2, 4 */
-            0x73u, /* failed, false: all lines but 1a, 2, 6 */
-            0x75u /* failed, true: all lines but 1, 2, 6 */
+            0x5bu, /* done, false: lines 0, 1, 2, 3, 5 */
+            0x5du, /* done, true: lines 0, 1a, 2, 3, 5 */
+            0xd3u, /* executing, false: lines 0, 1, 3, 5, 6 */
+            0xd5u, /* executing, true: lines 0, 1a, 3, 5, 6 */
+            0x73u, /* failed, false: lines 0, 1, 3, 4, 5 */
+            0x75u /* failed, true: lines 0, 1a, 3, 4, 5 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->cur_state] &

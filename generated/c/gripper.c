@@ -127,7 +127,8 @@ static void gripper_do_wait(gripper_t *s)
     }
 }
 
-/* gripper/gripper.rcs procedure take_orders */
+/* gripper/gripper.rcs procedure take_orders: Made of the declared roles (manual, Protocol). An order is
+   new if its number differs from the last, until it is answered and the answer's own orders are echoed. */
 static void gripper_do_take_orders(gripper_t *s)
 {
     if (s->primitive.inc_command != s->inc_command_seen) {
@@ -144,7 +145,8 @@ static void gripper_do_take_orders(gripper_t *s)
     s->settling = false;
 }
 
-/* gripper/gripper.rcs procedure give_orders */
+/* gripper/gripper.rcs procedure give_orders: Made of the declared roles (manual, Protocol). A new order is
+   answered by the first cycle that is not settling; its number and name are echoed. */
 static void gripper_do_give_orders(gripper_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -189,6 +191,7 @@ static void gripper_admit(gripper_t *s)
         s->fault = GRIPPER_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
+        /* Not tested, as no value of their types is refused: primitive.inc_command. */
         if (s->primitive.input_command > VOCABULARY_GRIPPER_COMMAND_GRASP) {
             at = GRIPPER_LEAF_PRIMITIVE_INPUT_COMMAND;
         } else if (!((s->primitive.opening_mm >= 0.0) && (s->primitive.opening_mm <= 200.0))) {
@@ -402,6 +405,7 @@ void gripper_init(gripper_t *s)
 int32_t gripper_check(const gripper_t *s)
 {
     int32_t at = GRIPPER_CHECK_OK;
+    /* Not tested, as no value of their types is refused: to_primitive.inc_command_echo, inc_command_seen. */
     if (s->digest != GRIPPER_DIGEST) {
         at = GRIPPER_CHECK_FOREIGN;
     } else if (s->to_primitive.ref_command_echo > VOCABULARY_GRIPPER_COMMAND_GRASP) {
@@ -453,7 +457,7 @@ int32_t gripper_position_line(const gripper_t *s)
         uint8_t t2[2];
     } t = {
         { /* gripper/gripper.rcs table position: waited */
-            /* 0 .. 149: all lines but 5 */
+            /* 0 .. 149: lines 1 to 4, 6, 7 */
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
@@ -467,36 +471,36 @@ int32_t gripper_position_line(const gripper_t *s)
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
             0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x77u /* 150: all lines but 4 */
+            0x77u /* 150: lines 1, 2, 3, 5, 6, 7 */
         },
         { /* gripper/gripper.rcs table position: cur_state, new_command, at_opening, closing and forced */
             0x20u, /* d_state, false, false, false: line 6 */
             0x20u, /* d_state, false, false, true: line 6 */
             0x20u, /* d_state, false, true, false: line 6 */
             0x20u, /* d_state, false, true, true: line 6 */
-            0x1u, /* d_state, true, false, false: line 1 */
-            0x1u, /* d_state, true, false, true: line 1 */
-            0x1u, /* d_state, true, true, false: line 1 */
-            0x1u, /* d_state, true, true, true: line 1 */
+            0x01u, /* d_state, true, false, false: line 1 */
+            0x01u, /* d_state, true, false, true: line 1 */
+            0x01u, /* d_state, true, true, false: line 1 */
+            0x01u, /* d_state, true, true, true: line 1 */
             0x40u, /* f_state, false, false, false: line 7 */
             0x40u, /* f_state, false, false, true: line 7 */
             0x40u, /* f_state, false, true, false: line 7 */
             0x40u, /* f_state, false, true, true: line 7 */
-            0x1u, /* f_state, true, false, false: line 1 */
-            0x1u, /* f_state, true, false, true: line 1 */
-            0x1u, /* f_state, true, true, false: line 1 */
-            0x1u, /* f_state, true, true, true: line 1 */
+            0x01u, /* f_state, true, false, false: line 1 */
+            0x01u, /* f_state, true, false, true: line 1 */
+            0x01u, /* f_state, true, true, false: line 1 */
+            0x01u, /* f_state, true, true, true: line 1 */
             0x18u, /* moving, false, false, false: lines 4, 5 */
             0x1cu, /* moving, false, false, true: lines 3, 4, 5 */
-            0x2u, /* moving, false, true, false: line 2 */
-            0x2u, /* moving, false, true, true: line 2 */
-            0x1u, /* moving, true, false, false: line 1 */
-            0x1u, /* moving, true, false, true: line 1 */
-            0x1u, /* moving, true, true, false: line 1 */
-            0x1u /* moving, true, true, true: line 1 */
+            0x02u, /* moving, false, true, false: line 2 */
+            0x02u, /* moving, false, true, true: line 2 */
+            0x01u, /* moving, true, false, false: line 1 */
+            0x01u, /* moving, true, false, true: line 1 */
+            0x01u, /* moving, true, true, false: line 1 */
+            0x01u /* moving, true, true, true: line 1 */
         },
         { /* gripper/gripper.rcs table position: not (closing and forced) */
-            0x67u, /* false: all lines but 4, 5 */
+            0x67u, /* false: lines 1, 2, 3, 6, 7 */
             0x7fu /* true: every line */
         },
     };
@@ -531,7 +535,7 @@ int32_t gripper_grasp_line(const gripper_t *s)
         uint8_t t1[12];
     } t = {
         { /* gripper/gripper.rcs table grasp: waited */
-            /* 0 .. 149: all lines but 4 */
+            /* 0 .. 149: lines 1, 2, 3, 5, 6 */
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
@@ -545,21 +549,21 @@ int32_t gripper_grasp_line(const gripper_t *s)
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
             0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x3bu /* 150: all lines but 3 */
+            0x3bu /* 150: lines 1, 2, 4, 5, 6 */
         },
         { /* gripper/gripper.rcs table grasp: cur_state, new_command, forced */
             0x10u, /* d_state, false, false: line 5 */
             0x10u, /* d_state, false, true: line 5 */
-            0x1u, /* d_state, true, false: line 1 */
-            0x1u, /* d_state, true, true: line 1 */
+            0x01u, /* d_state, true, false: line 1 */
+            0x01u, /* d_state, true, true: line 1 */
             0x20u, /* f_state, false, false: line 6 */
             0x20u, /* f_state, false, true: line 6 */
-            0x1u, /* f_state, true, false: line 1 */
-            0x1u, /* f_state, true, true: line 1 */
-            0xcu, /* moving, false, false: lines 3, 4 */
-            0x2u, /* moving, false, true: line 2 */
-            0x1u, /* moving, true, false: line 1 */
-            0x1u /* moving, true, true: line 1 */
+            0x01u, /* f_state, true, false: line 1 */
+            0x01u, /* f_state, true, true: line 1 */
+            0x0cu, /* moving, false, false: lines 3, 4 */
+            0x02u, /* moving, false, true: line 2 */
+            0x01u, /* moving, true, false: line 1 */
+            0x01u /* moving, true, true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->waited] &

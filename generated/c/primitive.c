@@ -310,7 +310,10 @@ static void primitive_do_stop(primitive_t *s)
     s->speed_mm_s = 0.0 + 0.0;
 }
 
-/* primitive/common.rcs procedure take_orders */
+/* primitive/common.rcs procedure take_orders: Made of the declared roles (manual, Protocol). An order is
+   new if its number differs from the last, until it is answered and the answer's own orders are echoed. A
+   report counts once it echoes the number of the last order. A subordinate rests where it has reported
+   *done* to the order to rest, and the new order is answered or every order echoed. */
 static void primitive_do_take_orders(primitive_t *s)
 {
     s->echoed = ((s->from_robot.inc_command_echo == s->to_robot.inc_command) &&
@@ -341,7 +344,9 @@ static void primitive_do_take_orders(primitive_t *s)
             (s->gripper.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
-/* primitive/common.rcs procedure give_orders */
+/* primitive/common.rcs procedure give_orders: Made of the declared roles (manual, Protocol). A new order
+   is answered by the first cycle that is not settling; its number and name are echoed. An order gets a new
+   number where its command or a field differs from the last; fields of a stream do not count. */
 static void primitive_do_give_orders(primitive_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -412,6 +417,8 @@ static void primitive_admit(primitive_t *s)
         s->fault = PRIMITIVE_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
+        /* Not tested, as no value of their types is refused: emove.inc_command,
+           from_robot.inc_command_echo, from_gripper.inc_command_echo, goal.known, fingers.known. */
         if (s->emove.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
             at = PRIMITIVE_LEAF_EMOVE_INPUT_COMMAND;
         } else if (s->emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
@@ -531,8 +538,8 @@ static void primitive_admit(primitive_t *s)
     }
 }
 
-/* primitive/approach_position_fingers.rcs assumption approach_position_fingers_in_step: A state goes with
-   the orders that it waits for (section 9). */
+/* primitive/approach_position_fingers.rcs assumption approach_position_fingers_in_step: Found from what
+   the lines order, and proved: a state goes with the orders that it waits for (section 9). */
 static bool primitive_holds_approach_position_fingers_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
@@ -540,8 +547,8 @@ static bool primitive_holds_approach_position_fingers_in_step(const primitive_t 
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_FINGERING);
 }
 
-/* primitive/departure_position_fingers.rcs assumption departure_position_fingers_in_step: A state goes
-   with the orders that it waits for (section 9). */
+/* primitive/departure_position_fingers.rcs assumption departure_position_fingers_in_step: Found from what
+   the lines order, and proved: a state goes with the orders that it waits for (section 9). */
 static bool primitive_holds_departure_position_fingers_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
@@ -549,23 +556,24 @@ static bool primitive_holds_departure_position_fingers_in_step(const primitive_t
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_FINGERING);
 }
 
-/* primitive/goto.rcs assumption goto_in_step: A state goes with the orders that it waits for (section 9). */
+/* primitive/goto.rcs assumption goto_in_step: Found from what the lines order, and proved: a state goes
+   with the orders that it waits for (section 9). */
 static bool primitive_holds_goto_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) || (s->cur_state == PRMTV_CMN_PRMTV_STATE_MOVING);
 }
 
-/* primitive/gothru.rcs assumption gothru_in_step: A state goes with the orders that it waits for (section
-   9). */
+/* primitive/gothru.rcs assumption gothru_in_step: Found from what the lines order, and proved: a state
+   goes with the orders that it waits for (section 9). */
 static bool primitive_holds_gothru_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) || (s->cur_state == PRMTV_CMN_PRMTV_STATE_MOVING);
 }
 
-/* primitive/immed_grasp.rcs assumption immed_grasp_in_step: A state goes with the orders that it waits for
-   (section 9). */
+/* primitive/immed_grasp.rcs assumption immed_grasp_in_step: Found from what the lines order, and proved: a
+   state goes with the orders that it waits for (section 9). */
 static bool primitive_holds_immed_grasp_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
@@ -1088,6 +1096,8 @@ void primitive_init(primitive_t *s)
 int32_t primitive_check(const primitive_t *s)
 {
     int32_t at = PRIMITIVE_CHECK_OK;
+    /* Not tested, as no value of their types is refused: to_emove.inc_command_echo, inc_command_seen,
+       to_robot.inc_command, to_gripper.inc_command. */
     if (s->digest != PRIMITIVE_DIGEST) {
         at = PRIMITIVE_CHECK_FOREIGN;
     } else if (s->to_emove.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
@@ -1250,25 +1260,25 @@ int32_t primitive_aprc_pstn_fngrs_line(const primitive_t *s)
         { /* primitive/approach_position_fingers.rcs: cur_state, new_command, fingers.known */
             0x20u, /* d_state, false, false: line 6 */
             0x20u, /* d_state, false, true: line 6 */
-            0x2u, /* d_state, true, false: line 2 */
-            0x1u, /* d_state, true, true: line 1 */
+            0x02u, /* d_state, true, false: line 2 */
+            0x01u, /* d_state, true, true: line 1 */
             0x40u, /* f_state, false, false: line 7 */
             0x40u, /* f_state, false, true: line 7 */
-            0x2u, /* f_state, true, false: line 2 */
-            0x1u, /* f_state, true, true: line 1 */
-            0x0u, /* moving, false, false: no line */
-            0x0u, /* moving, false, true: no line */
-            0x2u, /* moving, true, false: line 2 */
-            0x1u, /* moving, true, true: line 1 */
+            0x02u, /* f_state, true, false: line 2 */
+            0x01u, /* f_state, true, true: line 1 */
+            0x00u, /* moving, false, false: no line */
+            0x00u, /* moving, false, true: no line */
+            0x02u, /* moving, true, false: line 2 */
+            0x01u, /* moving, true, true: line 1 */
             0x1cu, /* fingering, false, false: lines 3, 4, 5 */
             0x1cu, /* fingering, false, true: lines 3, 4, 5 */
-            0x2u, /* fingering, true, false: line 2 */
-            0x1u /* fingering, true, true: line 1 */
+            0x02u, /* fingering, true, false: line 2 */
+            0x01u /* fingering, true, true: line 1 */
         },
         { /* primitive/approach_position_fingers.rcs: gripper.status */
-            0x6bu, /* done: all lines but 3, 5 */
-            0x67u, /* executing: all lines but 4, 5 */
-            0x73u /* failed: all lines but 3, 4 */
+            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
+            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
+            0x73u /* failed: lines 1, 2, 5, 6, 7 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
@@ -1302,25 +1312,25 @@ int32_t primitive_dprt_pstn_fngrs_line(const primitive_t *s)
         { /* primitive/departure_position_fingers.rcs: cur_state, new_command, fingers.known */
             0x20u, /* d_state, false, false: line 6 */
             0x20u, /* d_state, false, true: line 6 */
-            0x2u, /* d_state, true, false: line 2 */
-            0x1u, /* d_state, true, true: line 1 */
+            0x02u, /* d_state, true, false: line 2 */
+            0x01u, /* d_state, true, true: line 1 */
             0x40u, /* f_state, false, false: line 7 */
             0x40u, /* f_state, false, true: line 7 */
-            0x2u, /* f_state, true, false: line 2 */
-            0x1u, /* f_state, true, true: line 1 */
-            0x0u, /* moving, false, false: no line */
-            0x0u, /* moving, false, true: no line */
-            0x2u, /* moving, true, false: line 2 */
-            0x1u, /* moving, true, true: line 1 */
+            0x02u, /* f_state, true, false: line 2 */
+            0x01u, /* f_state, true, true: line 1 */
+            0x00u, /* moving, false, false: no line */
+            0x00u, /* moving, false, true: no line */
+            0x02u, /* moving, true, false: line 2 */
+            0x01u, /* moving, true, true: line 1 */
             0x1cu, /* fingering, false, false: lines 3, 4, 5 */
             0x1cu, /* fingering, false, true: lines 3, 4, 5 */
-            0x2u, /* fingering, true, false: line 2 */
-            0x1u /* fingering, true, true: line 1 */
+            0x02u, /* fingering, true, false: line 2 */
+            0x01u /* fingering, true, true: line 1 */
         },
         { /* primitive/departure_position_fingers.rcs: gripper.status */
-            0x6bu, /* done: all lines but 3, 5 */
-            0x67u, /* executing: all lines but 4, 5 */
-            0x73u /* failed: all lines but 3, 4 */
+            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
+            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
+            0x73u /* failed: lines 1, 2, 5, 6, 7 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
@@ -1352,65 +1362,68 @@ int32_t primitive_goto__line(const primitive_t *s)
         uint16_t t2[12];
     } t = {
         { /* primitive/goto.rcs: waited */
-            /* 0 .. 249: all lines but 5, 6b */
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
-            0x7b7u /* 250: all lines but 4, 6a */
+            /* 0 .. 249: lines 1 to 4, 6, 6a, 7, 8, 9 */
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x07b7u /* 250: lines 1, 2, 3, 5, 6, 6b to 9 */
         },
         { /* primitive/goto.rcs: cur_state, new_command, goal.known */
-            0x200u, /* d_state, false, false: line 8 */
-            0x200u, /* d_state, false, true: line 8 */
-            0x2u, /* d_state, true, false: line 2 */
-            0x1u, /* d_state, true, true: line 1 */
-            0x400u, /* f_state, false, false: line 9 */
-            0x400u, /* f_state, false, true: line 9 */
-            0x2u, /* f_state, true, false: line 2 */
-            0x1u, /* f_state, true, true: line 1 */
-            0x1fcu, /* moving, false, false: all lines but 1, 2, 8, 9 */
-            0x1fcu, /* moving, false, true: all lines but 1, 2, 8, 9 */
-            0x2u, /* moving, true, false: line 2 */
-            0x1u, /* moving, true, true: line 1 */
-            0x0u, /* fingering, false, false: no line */
-            0x0u, /* fingering, false, true: no line */
-            0x2u, /* fingering, true, false: line 2 */
-            0x1u /* fingering, true, true: line 1 */
+            0x0200u, /* d_state, false, false: line 8 */
+            0x0200u, /* d_state, false, true: line 8 */
+            0x0002u, /* d_state, true, false: line 2 */
+            0x0001u, /* d_state, true, true: line 1 */
+            0x0400u, /* f_state, false, false: line 9 */
+            0x0400u, /* f_state, false, true: line 9 */
+            0x0002u, /* f_state, true, false: line 2 */
+            0x0001u, /* f_state, true, true: line 1 */
+            0x01fcu, /* moving, false, false: lines 3 to 7 */
+            0x01fcu, /* moving, false, true: lines 3 to 7 */
+            0x0002u, /* moving, true, false: line 2 */
+            0x0001u, /* moving, true, true: line 1 */
+            0x0000u, /* fingering, false, false: no line */
+            0x0000u, /* fingering, false, true: no line */
+            0x0002u, /* fingering, true, false: line 2 */
+            0x0001u /* fingering, true, true: line 1 */
         },
         { /* primitive/goto.rcs: robot.status, there, settled */
-            0x607u, /* done, false, false: lines 1, 2, 3, 8, 9 */
-            0x607u, /* done, false, true: lines 1, 2, 3, 8, 9 */
-            0x6c3u, /* done, true, false: all lines but 3, 4, 5, 6, 7 */
-            0x623u, /* done, true, true: lines 1, 2, 6, 8, 9 */
-            0x607u, /* executing, false, false: lines 1, 2, 3, 8, 9 */
-            0x607u, /* executing, false, true: lines 1, 2, 3, 8, 9 */
-            0x61bu, /* executing, true, false: all lines but 3, 6, 6a, 6b, 7 */
-            0x61bu, /* executing, true, true: all lines but 3, 6, 6a, 6b, 7 */
-            0x703u, /* failed, false, false: lines 1, 2, 7, 8, 9 */
-            0x703u, /* failed, false, true: lines 1, 2, 7, 8, 9 */
-            0x703u, /* failed, true, false: lines 1, 2, 7, 8, 9 */
-            0x703u /* failed, true, true: lines 1, 2, 7, 8, 9 */
+            0x0607u, /* done, false, false: lines 1, 2, 3, 8, 9 */
+            0x0607u, /* done, false, true: lines 1, 2, 3, 8, 9 */
+            0x06c3u, /* done, true, false: lines 1, 2, 6a, 6b, 8, 9 */
+            0x0623u, /* done, true, true: lines 1, 2, 6, 8, 9 */
+            0x0607u, /* executing, false, false: lines 1, 2, 3, 8, 9 */
+            0x0607u, /* executing, false, true: lines 1, 2, 3, 8, 9 */
+            0x061bu, /* executing, true, false: lines 1, 2, 4, 5, 8, 9 */
+            0x061bu, /* executing, true, true: lines 1, 2, 4, 5, 8, 9 */
+            0x0703u, /* failed, false, false: lines 1, 2, 7, 8, 9 */
+            0x0703u, /* failed, false, true: lines 1, 2, 7, 8, 9 */
+            0x0703u, /* failed, true, false: lines 1, 2, 7, 8, 9 */
+            0x0703u /* failed, true, true: lines 1, 2, 7, 8, 9 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->waited] &
@@ -1444,28 +1457,28 @@ int32_t primitive_gothru_line(const primitive_t *s)
         { /* primitive/gothru.rcs: cur_state, new_command, goal.known */
             0x30u, /* d_state, false, false: lines 5, 6 */
             0x30u, /* d_state, false, true: lines 5, 6 */
-            0x2u, /* d_state, true, false: line 2 */
-            0x1u, /* d_state, true, true: line 1 */
+            0x02u, /* d_state, true, false: line 2 */
+            0x01u, /* d_state, true, true: line 1 */
             0x40u, /* f_state, false, false: line 7 */
             0x40u, /* f_state, false, true: line 7 */
-            0x2u, /* f_state, true, false: line 2 */
-            0x1u, /* f_state, true, true: line 1 */
+            0x02u, /* f_state, true, false: line 2 */
+            0x01u, /* f_state, true, true: line 1 */
             0x2cu, /* moving, false, false: lines 3, 4, 6 */
             0x2cu, /* moving, false, true: lines 3, 4, 6 */
-            0x2u, /* moving, true, false: line 2 */
-            0x1u, /* moving, true, true: line 1 */
-            0x0u, /* fingering, false, false: no line */
-            0x0u, /* fingering, false, true: no line */
-            0x2u, /* fingering, true, false: line 2 */
-            0x1u /* fingering, true, true: line 1 */
+            0x02u, /* moving, true, false: line 2 */
+            0x01u, /* moving, true, true: line 1 */
+            0x00u, /* fingering, false, false: no line */
+            0x00u, /* fingering, false, true: no line */
+            0x02u, /* fingering, true, false: line 2 */
+            0x01u /* fingering, true, true: line 1 */
         },
         { /* primitive/gothru.rcs: robot.status, near */
-            0x57u, /* done, false: all lines but 4, 6 */
-            0x5bu, /* done, true: all lines but 3, 6 */
-            0x57u, /* executing, false: all lines but 4, 6 */
-            0x5bu, /* executing, true: all lines but 3, 6 */
-            0x63u, /* failed, false: all lines but 3, 4, 5 */
-            0x63u /* failed, true: all lines but 3, 4, 5 */
+            0x57u, /* done, false: lines 1, 2, 3, 5, 7 */
+            0x5bu, /* done, true: lines 1, 2, 4, 5, 7 */
+            0x57u, /* executing, false: lines 1, 2, 3, 5, 7 */
+            0x5bu, /* executing, true: lines 1, 2, 4, 5, 7 */
+            0x63u, /* failed, false: lines 1, 2, 6, 7 */
+            0x63u /* failed, true: lines 1, 2, 6, 7 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
@@ -1498,28 +1511,28 @@ int32_t primitive_immed_grasp_line(const primitive_t *s)
         { /* primitive/immed_grasp.rcs: cur_state, new_command, fingers.known */
             0x40u, /* d_state, false, false: line 7 */
             0x40u, /* d_state, false, true: line 7 */
-            0x2u, /* d_state, true, false: line 2 */
-            0x1u, /* d_state, true, true: line 1 */
+            0x02u, /* d_state, true, false: line 2 */
+            0x01u, /* d_state, true, true: line 1 */
             0x80u, /* f_state, false, false: line 8 */
             0x80u, /* f_state, false, true: line 8 */
-            0x2u, /* f_state, true, false: line 2 */
-            0x1u, /* f_state, true, true: line 1 */
-            0x0u, /* moving, false, false: no line */
-            0x0u, /* moving, false, true: no line */
-            0x2u, /* moving, true, false: line 2 */
-            0x1u, /* moving, true, true: line 1 */
-            0x3cu, /* fingering, false, false: lines 3, 4, 5, 6 */
-            0x3cu, /* fingering, false, true: lines 3, 4, 5, 6 */
-            0x2u, /* fingering, true, false: line 2 */
-            0x1u /* fingering, true, true: line 1 */
+            0x02u, /* f_state, true, false: line 2 */
+            0x01u, /* f_state, true, true: line 1 */
+            0x00u, /* moving, false, false: no line */
+            0x00u, /* moving, false, true: no line */
+            0x02u, /* moving, true, false: line 2 */
+            0x01u, /* moving, true, true: line 1 */
+            0x3cu, /* fingering, false, false: lines 3 to 6 */
+            0x3cu, /* fingering, false, true: lines 3 to 6 */
+            0x02u, /* fingering, true, false: line 2 */
+            0x01u /* fingering, true, true: line 1 */
         },
         { /* primitive/immed_grasp.rcs: gripper.status, fits */
-            0xd3u, /* done, false: all lines but 3, 4, 6 */
-            0xcbu, /* done, true: all lines but 3, 5, 6 */
-            0xc7u, /* executing, false: all lines but 4, 5, 6 */
-            0xc7u, /* executing, true: all lines but 4, 5, 6 */
-            0xe3u, /* failed, false: all lines but 3, 4, 5 */
-            0xe3u /* failed, true: all lines but 3, 4, 5 */
+            0xd3u, /* done, false: lines 1, 2, 5, 7, 8 */
+            0xcbu, /* done, true: lines 1, 2, 4, 7, 8 */
+            0xc7u, /* executing, false: lines 1, 2, 3, 7, 8 */
+            0xc7u, /* executing, true: lines 1, 2, 3, 7, 8 */
+            0xe3u, /* failed, false: lines 1, 2, 6, 7, 8 */
+            0xe3u /* failed, true: lines 1, 2, 6, 7, 8 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
@@ -1549,8 +1562,8 @@ int32_t primitive_pause_primitive_line(const primitive_t *s)
         uint8_t t0[2];
     } t = {
         { /* primitive/pause.rcs: idle */
-            0x2u, /* false: line 2 */
-            0x1u /* true: line 1 */
+            0x02u, /* false: line 2 */
+            0x01u /* true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];

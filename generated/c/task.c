@@ -377,7 +377,10 @@ static void task_do_release_failure(task_t *s)
     task_do_lost_on_the_way(s);
 }
 
-/* task/common.rcs procedure take_orders */
+/* task/common.rcs procedure take_orders: Made of the declared roles (manual, Protocol). An order is new if
+   its number differs from the last, until it is answered and the answer's own orders are echoed. A report
+   counts once it echoes the number of the last order. A subordinate rests where it has reported *done* to
+   the order to rest, and the new order is answered or every order echoed. */
 static void task_do_take_orders(task_t *s)
 {
     s->echoed = (s->from_emove.inc_command_echo == s->to_emove.inc_command);
@@ -402,7 +405,9 @@ static void task_do_take_orders(task_t *s)
             (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
-/* task/common.rcs procedure give_orders */
+/* task/common.rcs procedure give_orders: Made of the declared roles (manual, Protocol). A new order is
+   answered by the first cycle that is not settling; its number and name are echoed. An order gets a new
+   number where its command or a field differs from the last; fields of a stream do not count. */
 static void task_do_give_orders(task_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -471,6 +476,12 @@ static void task_admit(task_t *s)
     s->fault_at = -1;
     s->assumptions_failed = 0;
     int32_t at = -1;
+    /* Not tested, as no value of their types is refused: workstation.inc_command,
+       workstation.source_locpt, workstation.dest_locpt, workstation.end_at_locpt,
+       from_emove.inc_command_echo, source.known, source.vision, source.buffer, source.vupos, source.safe,
+       dest.known, dest.vision, dest.buffer, dest.vupos, dest.safe, end_at.known, end_at.vision,
+       end_at.buffer, end_at.vupos, end_at.safe, here.known, here.vision, here.buffer, here.vupos,
+       here.safe. */
     if (s->workstation.input_command > VOCABULARY_TASK_COMMAND_CLEAR) {
         at = TASK_LEAF_WORKSTATION_INPUT_COMMAND;
     } else if (s->workstation.obj > VOCABULARY_OBJECT_OPEN_GRIP) {
@@ -496,7 +507,8 @@ static void task_admit(task_t *s)
     }
 }
 
-/* task/acquire.rcs assumption acquire_in_step: A state goes with the orders that it waits for (section 9). */
+/* task/acquire.rcs assumption acquire_in_step: Found from what the lines order, and proved: a state goes
+   with the orders that it waits for (section 9). */
 static bool task_holds_acquire_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -521,7 +533,8 @@ static bool task_holds_acquire_resting(const task_t *s)
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
-/* task/clear.rcs assumption clear_in_step: A state goes with the orders that it waits for (section 9). */
+/* task/clear.rcs assumption clear_in_step: Found from what the lines order, and proved: a state goes with
+   the orders that it waits for (section 9). */
 static bool task_holds_clear_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -543,7 +556,8 @@ static bool task_holds_clear_resting(const task_t *s)
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
-/* task/move.rcs assumption move_in_step: A state goes with the orders that it waits for (section 9). */
+/* task/move.rcs assumption move_in_step: Found from what the lines order, and proved: a state goes with
+   the orders that it waits for (section 9). */
 static bool task_holds_move_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -571,8 +585,8 @@ static bool task_holds_move_resting(const task_t *s)
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
-/* task/release.rcs assumption release_part_in_step: A state goes with the orders that it waits for
-   (section 9). */
+/* task/release.rcs assumption release_part_in_step: Found from what the lines order, and proved: a state
+   goes with the orders that it waits for (section 9). */
 static bool task_holds_release_part_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -593,8 +607,8 @@ static bool task_holds_release_part_resting(const task_t *s)
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
-/* task/transfer.rcs assumption transfer_in_step: A state goes with the orders that it waits for (section
-   9). */
+/* task/transfer.rcs assumption transfer_in_step: Found from what the lines order, and proved: a state goes
+   with the orders that it waits for (section 9). */
 static bool task_holds_transfer_in_step(const task_t *s)
 {
     return s->new_command ||
@@ -1446,6 +1460,9 @@ void task_init(task_t *s)
 int32_t task_check(const task_t *s)
 {
     int32_t at = TASK_CHECK_OK;
+    /* Not tested, as no value of their types is refused: to_workstation.inc_command_echo,
+       inc_command_seen, to_emove.inc_command, to_emove.locpt_ptr, last_emove.locpt_ptr, source_loc,
+       source_vupos, remember_current_loc, current_loc. */
     if (s->digest != TASK_DIGEST) {
         at = TASK_CHECK_FOREIGN;
     } else if (s->to_workstation.ref_command_echo > VOCABULARY_TASK_COMMAND_CLEAR) {
@@ -1566,24 +1583,24 @@ int32_t task_acquire_line(const task_t *s)
         uint16_t t2[12];
     } t = {
         { /* task/acquire.rcs: cur_state, new_command */
-            0x3e00u, /* d_state, false: lines 9, 10, 11, 12, 13 */
-            0x1fu, /* d_state, true: lines 0, 1, 2, 3, 4 */
+            0x3e00u, /* d_state, false: lines 9 to 13 */
+            0x001fu, /* d_state, true: lines 0 to 4 */
             0x4000u, /* f_state, false: line 14 */
-            0x1fu, /* f_state, true: lines 0, 1, 2, 3, 4 */
-            0xbc40u, /* state_2, false: lines 6, 10, 11, 12, 13, 15 */
-            0x1fu, /* state_2, true: lines 0, 1, 2, 3, 4 */
-            0xbc80u, /* state_3, false: lines 7, 10, 11, 12, 13, 15 */
-            0x1fu, /* state_3, true: lines 0, 1, 2, 3, 4 */
-            0xbc20u, /* state_4, false: lines 5, 10, 11, 12, 13, 15 */
-            0x1fu, /* state_4, true: lines 0, 1, 2, 3, 4 */
-            0xbd00u, /* state_5, false: lines 8, 10, 11, 12, 13, 15 */
-            0x1fu, /* state_5, true: lines 0, 1, 2, 3, 4 */
-            0x3c00u, /* state_6, false: lines 10, 11, 12, 13 */
-            0x1fu, /* state_6, true: lines 0, 1, 2, 3, 4 */
-            0x3c00u, /* state_7, false: lines 10, 11, 12, 13 */
-            0x1fu, /* state_7, true: lines 0, 1, 2, 3, 4 */
-            0x3c00u, /* state_8, false: lines 10, 11, 12, 13 */
-            0x1fu /* state_8, true: lines 0, 1, 2, 3, 4 */
+            0x001fu, /* f_state, true: lines 0 to 4 */
+            0xbc40u, /* state_2, false: lines 6, 10 to 13, 15 */
+            0x001fu, /* state_2, true: lines 0 to 4 */
+            0xbc80u, /* state_3, false: lines 7, 10 to 13, 15 */
+            0x001fu, /* state_3, true: lines 0 to 4 */
+            0xbc20u, /* state_4, false: lines 5, 10 to 13, 15 */
+            0x001fu, /* state_4, true: lines 0 to 4 */
+            0xbd00u, /* state_5, false: lines 8, 10 to 13, 15 */
+            0x001fu, /* state_5, true: lines 0 to 4 */
+            0x3c00u, /* state_6, false: lines 10 to 13 */
+            0x001fu, /* state_6, true: lines 0 to 4 */
+            0x3c00u, /* state_7, false: lines 10 to 13 */
+            0x001fu, /* state_7, true: lines 0 to 4 */
+            0x3c00u, /* state_8, false: lines 10 to 13 */
+            0x001fu /* state_8, true: lines 0 to 4 */
         },
         { /* task/acquire.rcs: emove.command, emove.resting, loc_of_obj */
             0xc201u, /* pause, false, vis_reqd: lines 0, 9, 14, 15 */
@@ -1612,18 +1629,18 @@ int32_t task_acquire_line(const task_t *s)
             0xc000u /* release, true, known: lines 14, 15 */
         },
         { /* task/acquire.rcs: emove.status, source_spec, obj_acquired */
-            0x43e9u, /* done, false, false: lines 0, 3, 5, 6, 7, 8, 9, 14 */
-            0x43e5u, /* done, false, true: lines 0, 2, 5, 6, 7, 8, 9, 14 */
-            0x43f3u, /* done, true, false: all lines but 2, 3, 10, 11, 12, 13, 15 */
-            0x43e5u, /* done, true, true: lines 0, 2, 5, 6, 7, 8, 9, 14 */
+            0x43e9u, /* done, false, false: lines 0, 3, 5 to 9, 14 */
+            0x43e5u, /* done, false, true: lines 0, 2, 5 to 9, 14 */
+            0x43f3u, /* done, true, false: lines 0, 1, 4 to 9, 14 */
+            0x43e5u, /* done, true, true: lines 0, 2, 5 to 9, 14 */
             0xc201u, /* executing, false, false: lines 0, 9, 14, 15 */
             0xc201u, /* executing, false, true: lines 0, 9, 14, 15 */
             0xc201u, /* executing, true, false: lines 0, 9, 14, 15 */
             0xc201u, /* executing, true, true: lines 0, 9, 14, 15 */
-            0x7e01u, /* failed, false, false: lines 0, 9, 10, 11, 12, 13, 14 */
-            0x7e01u, /* failed, false, true: lines 0, 9, 10, 11, 12, 13, 14 */
-            0x7e01u, /* failed, true, false: lines 0, 9, 10, 11, 12, 13, 14 */
-            0x7e01u /* failed, true, true: lines 0, 9, 10, 11, 12, 13, 14 */
+            0x7e01u, /* failed, false, false: lines 0, 9 to 14 */
+            0x7e01u, /* failed, false, true: lines 0, 9 to 14 */
+            0x7e01u, /* failed, true, false: lines 0, 9 to 14 */
+            0x7e01u /* failed, true, true: lines 0, 9 to 14 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
@@ -1655,24 +1672,24 @@ int32_t task_clear_line(const task_t *s)
         uint16_t t2[12];
     } t = {
         { /* task/clear.rcs: cur_state, new_command */
-            0x700u, /* d_state, false: lines 8, 9, 10 */
-            0x1fu, /* d_state, true: lines 0, 1, 2, 3, 4 */
-            0x800u, /* f_state, false: line 11 */
-            0x1fu, /* f_state, true: lines 0, 1, 2, 3, 4 */
-            0x600u, /* state_2, false: lines 9, 10 */
-            0x1fu, /* state_2, true: lines 0, 1, 2, 3, 4 */
-            0x600u, /* state_3, false: lines 9, 10 */
-            0x1fu, /* state_3, true: lines 0, 1, 2, 3, 4 */
-            0x600u, /* state_4, false: lines 9, 10 */
-            0x1fu, /* state_4, true: lines 0, 1, 2, 3, 4 */
-            0x600u, /* state_5, false: lines 9, 10 */
-            0x1fu, /* state_5, true: lines 0, 1, 2, 3, 4 */
+            0x0700u, /* d_state, false: lines 8, 9, 10 */
+            0x001fu, /* d_state, true: lines 0 to 4 */
+            0x0800u, /* f_state, false: line 11 */
+            0x001fu, /* f_state, true: lines 0 to 4 */
+            0x0600u, /* state_2, false: lines 9, 10 */
+            0x001fu, /* state_2, true: lines 0 to 4 */
+            0x0600u, /* state_3, false: lines 9, 10 */
+            0x001fu, /* state_3, true: lines 0 to 4 */
+            0x0600u, /* state_4, false: lines 9, 10 */
+            0x001fu, /* state_4, true: lines 0 to 4 */
+            0x0600u, /* state_5, false: lines 9, 10 */
+            0x001fu, /* state_5, true: lines 0 to 4 */
             0x1620u, /* state_6, false: lines 5, 9, 10, 12 */
-            0x1fu, /* state_6, true: lines 0, 1, 2, 3, 4 */
+            0x001fu, /* state_6, true: lines 0 to 4 */
             0x1640u, /* state_7, false: lines 6, 9, 10, 12 */
-            0x1fu, /* state_7, true: lines 0, 1, 2, 3, 4 */
+            0x001fu, /* state_7, true: lines 0 to 4 */
             0x1680u, /* state_8, false: lines 7, 9, 10, 12 */
-            0x1fu /* state_8, true: lines 0, 1, 2, 3, 4 */
+            0x001fu /* state_8, true: lines 0 to 4 */
         },
         { /* task/clear.rcs: emove.command, emove.resting, dest_spec */
             0x1901u, /* pause, false, false: lines 0, 8, 11, 12 */
@@ -1701,18 +1718,18 @@ int32_t task_clear_line(const task_t *s)
             0x1c40u /* release, true, true: lines 6, 10, 11, 12 */
         },
         { /* task/clear.rcs: emove.status, names_known, obj_acquired */
-            0x9e3u, /* done, false, false: all lines but 2, 3, 4, 9, 10, 12 */
-            0x9e3u, /* done, false, true: all lines but 2, 3, 4, 9, 10, 12 */
-            0x9edu, /* done, true, false: all lines but 1, 4, 9, 10, 12 */
-            0x9f5u, /* done, true, true: all lines but 1, 3, 9, 10, 12 */
+            0x09e3u, /* done, false, false: lines 0, 1, 5 to 8, 11 */
+            0x09e3u, /* done, false, true: lines 0, 1, 5 to 8, 11 */
+            0x09edu, /* done, true, false: lines 0, 2, 3, 5 to 8, 11 */
+            0x09f5u, /* done, true, true: lines 0, 2, 4 to 8, 11 */
             0x1901u, /* executing, false, false: lines 0, 8, 11, 12 */
             0x1901u, /* executing, false, true: lines 0, 8, 11, 12 */
             0x1901u, /* executing, true, false: lines 0, 8, 11, 12 */
             0x1901u, /* executing, true, true: lines 0, 8, 11, 12 */
-            0xf01u, /* failed, false, false: lines 0, 8, 9, 10, 11 */
-            0xf01u, /* failed, false, true: lines 0, 8, 9, 10, 11 */
-            0xf01u, /* failed, true, false: lines 0, 8, 9, 10, 11 */
-            0xf01u /* failed, true, true: lines 0, 8, 9, 10, 11 */
+            0x0f01u, /* failed, false, false: lines 0, 8 to 11 */
+            0x0f01u, /* failed, false, true: lines 0, 8 to 11 */
+            0x0f01u, /* failed, true, false: lines 0, 8 to 11 */
+            0x0f01u /* failed, true, true: lines 0, 8 to 11 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
@@ -1746,94 +1763,94 @@ int32_t task_move_line(const task_t *s)
         uint32_t t3[24];
     } t = {
         { /* task/move.rcs: cur_state, new_command */
-            0x3c000u, /* d_state, false: lines 14, 15, 16, 17 */
-            0x1ffu, /* d_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
-            0x40000u, /* f_state, false: line 18 */
-            0x1ffu, /* f_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xb8200u, /* state_2, false: lines 9, 15, 16, 17, 19 */
-            0x1ffu, /* state_2, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xb8400u, /* state_3, false: lines 10, 15, 16, 17, 19 */
-            0x1ffu, /* state_3, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xb8800u, /* state_4, false: lines 11, 15, 16, 17, 19 */
-            0x1ffu, /* state_4, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xb9000u, /* state_5, false: lines 12, 15, 16, 17, 19 */
-            0x1ffu, /* state_5, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xba000u, /* state_6, false: lines 13, 15, 16, 17, 19 */
-            0x1ffu, /* state_6, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
-            0x38000u, /* state_7, false: lines 15, 16, 17 */
-            0x1ffu, /* state_7, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
-            0x38000u, /* state_8, false: lines 15, 16, 17 */
-            0x1ffu /* state_8, true: lines 0, 1, 2, 3, 4, 5, 6, 7, 8 */
+            0x0003c000u, /* d_state, false: lines 14 to 17 */
+            0x000001ffu, /* d_state, true: lines 0 to 8 */
+            0x00040000u, /* f_state, false: line 18 */
+            0x000001ffu, /* f_state, true: lines 0 to 8 */
+            0x000b8200u, /* state_2, false: lines 9, 15, 16, 17, 19 */
+            0x000001ffu, /* state_2, true: lines 0 to 8 */
+            0x000b8400u, /* state_3, false: lines 10, 15, 16, 17, 19 */
+            0x000001ffu, /* state_3, true: lines 0 to 8 */
+            0x000b8800u, /* state_4, false: lines 11, 15, 16, 17, 19 */
+            0x000001ffu, /* state_4, true: lines 0 to 8 */
+            0x000b9000u, /* state_5, false: lines 12, 15, 16, 17, 19 */
+            0x000001ffu, /* state_5, true: lines 0 to 8 */
+            0x000ba000u, /* state_6, false: lines 13, 15, 16, 17, 19 */
+            0x000001ffu, /* state_6, true: lines 0 to 8 */
+            0x00038000u, /* state_7, false: lines 15, 16, 17 */
+            0x000001ffu, /* state_7, true: lines 0 to 8 */
+            0x00038000u, /* state_8, false: lines 15, 16, 17 */
+            0x000001ffu /* state_8, true: lines 0 to 8 */
         },
         { /* task/move.rcs: workstation.obj, emove.resting */
-            0xffe01u, /* null_obj, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xffe7eu, /* null_obj, true: all lines but 0, 7, 8 */
-            0xffe01u, /* tbox, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xffe7eu, /* tbox, true: all lines but 0, 7, 8 */
-            0xffe01u, /* bbox, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xffe7eu, /* bbox, true: all lines but 0, 7, 8 */
-            0xffe01u, /* flag, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xffe7eu, /* flag, true: all lines but 0, 7, 8 */
-            0xffe01u, /* hous, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xffe7eu, /* hous, true: all lines but 0, 7, 8 */
-            0xffe01u, /* close_grip, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xfffbeu, /* close_grip, true: all lines but 0, 6 */
-            0xffe01u, /* unknown_object, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xffe7eu, /* unknown_object, true: all lines but 0, 7, 8 */
-            0xffe01u, /* open_grip, false: all lines but 1, 2, 3, 4, 5, 6, 7, 8 */
-            0xffe7eu /* open_grip, true: all lines but 0, 7, 8 */
+            0x000ffe01u, /* null_obj, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* null_obj, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* tbox, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* tbox, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* bbox, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* bbox, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* flag, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* flag, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* hous, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* hous, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* close_grip, false: lines 0, 9 to 19 */
+            0x000fffbeu, /* close_grip, true: lines 1 to 5, 7 to 19 */
+            0x000ffe01u, /* unknown_object, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* unknown_object, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* open_grip, false: lines 0, 9 to 19 */
+            0x000ffe7eu /* open_grip, true: lines 1 to 6, 9 to 19 */
         },
         { /* task/move.rcs: emove.command, loc_of_obj, source_spec */
-            0xc41c7u, /* pause, vis_reqd, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
-            0xc402fu, /* pause, vis_reqd, true: lines 0, 1, 2, 3, 5, 14, 18, 19 */
-            0xc41c7u, /* pause, known, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
-            0xc401fu, /* pause, known, true: lines 0, 1, 2, 3, 4, 14, 18, 19 */
-            0xca201u, /* move_to, vis_reqd, false: lines 0, 9, 13, 15, 18, 19 */
-            0xca201u, /* move_to, vis_reqd, true: lines 0, 9, 13, 15, 18, 19 */
-            0xca201u, /* move_to, known, false: lines 0, 9, 13, 15, 18, 19 */
-            0xca201u, /* move_to, known, true: lines 0, 9, 13, 15, 18, 19 */
-            0xca801u, /* move_to_obj, vis_reqd, false: lines 0, 11, 13, 15, 18, 19 */
-            0xca801u, /* move_to_obj, vis_reqd, true: lines 0, 11, 13, 15, 18, 19 */
-            0xca801u, /* move_to_obj, known, false: lines 0, 11, 13, 15, 18, 19 */
-            0xca801u, /* move_to_obj, known, true: lines 0, 11, 13, 15, 18, 19 */
-            0xd0401u, /* locate, vis_reqd, false: lines 0, 10, 16, 18, 19 */
-            0xd0401u, /* locate, vis_reqd, true: lines 0, 10, 16, 18, 19 */
-            0xd0401u, /* locate, known, false: lines 0, 10, 16, 18, 19 */
-            0xd0401u, /* locate, known, true: lines 0, 10, 16, 18, 19 */
-            0xe1001u, /* pickup, vis_reqd, false: lines 0, 12, 17, 18, 19 */
-            0xe1001u, /* pickup, vis_reqd, true: lines 0, 12, 17, 18, 19 */
-            0xe1001u, /* pickup, known, false: lines 0, 12, 17, 18, 19 */
-            0xe1001u, /* pickup, known, true: lines 0, 12, 17, 18, 19 */
-            0xc0001u, /* release, vis_reqd, false: lines 0, 18, 19 */
-            0xc0001u, /* release, vis_reqd, true: lines 0, 18, 19 */
-            0xc0001u, /* release, known, false: lines 0, 18, 19 */
-            0xc0001u /* release, known, true: lines 0, 18, 19 */
+            0x000c41c7u, /* pause, vis_reqd, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
+            0x000c402fu, /* pause, vis_reqd, true: lines 0 to 3, 5, 14, 18, 19 */
+            0x000c41c7u, /* pause, known, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
+            0x000c401fu, /* pause, known, true: lines 0 to 4, 14, 18, 19 */
+            0x000ca201u, /* move_to, vis_reqd, false: lines 0, 9, 13, 15, 18, 19 */
+            0x000ca201u, /* move_to, vis_reqd, true: lines 0, 9, 13, 15, 18, 19 */
+            0x000ca201u, /* move_to, known, false: lines 0, 9, 13, 15, 18, 19 */
+            0x000ca201u, /* move_to, known, true: lines 0, 9, 13, 15, 18, 19 */
+            0x000ca801u, /* move_to_obj, vis_reqd, false: lines 0, 11, 13, 15, 18, 19 */
+            0x000ca801u, /* move_to_obj, vis_reqd, true: lines 0, 11, 13, 15, 18, 19 */
+            0x000ca801u, /* move_to_obj, known, false: lines 0, 11, 13, 15, 18, 19 */
+            0x000ca801u, /* move_to_obj, known, true: lines 0, 11, 13, 15, 18, 19 */
+            0x000d0401u, /* locate, vis_reqd, false: lines 0, 10, 16, 18, 19 */
+            0x000d0401u, /* locate, vis_reqd, true: lines 0, 10, 16, 18, 19 */
+            0x000d0401u, /* locate, known, false: lines 0, 10, 16, 18, 19 */
+            0x000d0401u, /* locate, known, true: lines 0, 10, 16, 18, 19 */
+            0x000e1001u, /* pickup, vis_reqd, false: lines 0, 12, 17, 18, 19 */
+            0x000e1001u, /* pickup, vis_reqd, true: lines 0, 12, 17, 18, 19 */
+            0x000e1001u, /* pickup, known, false: lines 0, 12, 17, 18, 19 */
+            0x000e1001u, /* pickup, known, true: lines 0, 12, 17, 18, 19 */
+            0x000c0001u, /* release, vis_reqd, false: lines 0, 18, 19 */
+            0x000c0001u, /* release, vis_reqd, true: lines 0, 18, 19 */
+            0x000c0001u, /* release, known, false: lines 0, 18, 19 */
+            0x000c0001u /* release, known, true: lines 0, 18, 19 */
         },
         { /* task/move.rcs: emove.status, dest_spec, names_known, obj_acquired */
-            0x47e03u, /* done, false, false, false: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
-            0x47e03u, /* done, false, false, true: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
-            0x47e05u, /* done, false, true, false: lines 0, 2, 9, 10, 11, 12, 13, 14, 18 */
-            0x47e05u, /* done, false, true, true: lines 0, 2, 9, 10, 11, 12, 13, 14, 18 */
-            0x47e03u, /* done, true, false, false: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
-            0x47e03u, /* done, true, false, true: lines 0, 1, 9, 10, 11, 12, 13, 14, 18 */
-            0x47ef1u, /* done, true, true, false: all lines but 1, 2, 3, 8, 15, 16, 17, 19 */
-            0x47f49u, /* done, true, true, true: all lines but 1, 2, 4, 5, 7, 15, 16, 17, 19 */
-            0xc4001u, /* executing, false, false, false: lines 0, 14, 18, 19 */
-            0xc4001u, /* executing, false, false, true: lines 0, 14, 18, 19 */
-            0xc4001u, /* executing, false, true, false: lines 0, 14, 18, 19 */
-            0xc4001u, /* executing, false, true, true: lines 0, 14, 18, 19 */
-            0xc4001u, /* executing, true, false, false: lines 0, 14, 18, 19 */
-            0xc4001u, /* executing, true, false, true: lines 0, 14, 18, 19 */
-            0xc4001u, /* executing, true, true, false: lines 0, 14, 18, 19 */
-            0xc4001u, /* executing, true, true, true: lines 0, 14, 18, 19 */
-            0x7c001u, /* failed, false, false, false: lines 0, 14, 15, 16, 17, 18 */
-            0x7c001u, /* failed, false, false, true: lines 0, 14, 15, 16, 17, 18 */
-            0x7c001u, /* failed, false, true, false: lines 0, 14, 15, 16, 17, 18 */
-            0x7c001u, /* failed, false, true, true: lines 0, 14, 15, 16, 17, 18 */
-            0x7c001u, /* failed, true, false, false: lines 0, 14, 15, 16, 17, 18 */
-            0x7c001u, /* failed, true, false, true: lines 0, 14, 15, 16, 17, 18 */
-            0x7c001u, /* failed, true, true, false: lines 0, 14, 15, 16, 17, 18 */
-            0x7c001u /* failed, true, true, true: lines 0, 14, 15, 16, 17, 18 */
+            0x00047e03u, /* done, false, false, false: lines 0, 1, 9 to 14, 18 */
+            0x00047e03u, /* done, false, false, true: lines 0, 1, 9 to 14, 18 */
+            0x00047e05u, /* done, false, true, false: lines 0, 2, 9 to 14, 18 */
+            0x00047e05u, /* done, false, true, true: lines 0, 2, 9 to 14, 18 */
+            0x00047e03u, /* done, true, false, false: lines 0, 1, 9 to 14, 18 */
+            0x00047e03u, /* done, true, false, true: lines 0, 1, 9 to 14, 18 */
+            0x00047ef1u, /* done, true, true, false: lines 0, 4 to 7, 9 to 14, 18 */
+            0x00047f49u, /* done, true, true, true: lines 0, 3, 6, 8 to 14, 18 */
+            0x000c4001u, /* executing, false, false, false: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, false, false, true: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, false, true, false: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, false, true, true: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, true, false, false: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, true, false, true: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, true, true, false: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, true, true, true: lines 0, 14, 18, 19 */
+            0x0007c001u, /* failed, false, false, false: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, false, false, true: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, false, true, false: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, false, true, true: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, true, false, false: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, true, false, true: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, true, true, false: lines 0, 14 to 18 */
+            0x0007c001u /* failed, true, true, true: lines 0, 14 to 18 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
@@ -1866,8 +1883,8 @@ int32_t task_pause_task_line(const task_t *s)
         uint8_t t0[2];
     } t = {
         { /* task/pause.rcs: emove.resting */
-            0x2u, /* false: line 2 */
-            0x1u /* true: line 1 */
+            0x02u, /* false: line 2 */
+            0x01u /* true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->emove.resting ? 1u : 0u];
@@ -1897,58 +1914,58 @@ int32_t task_release_part_line(const task_t *s)
         uint16_t t2[6];
     } t = {
         { /* task/release.rcs: cur_state, new_command */
-            0x1c0u, /* d_state, false: lines 6, 7, 8 */
-            0xfu, /* d_state, true: lines 0, 1, 2, 3 */
-            0x200u, /* f_state, false: line 9 */
-            0xfu, /* f_state, true: lines 0, 1, 2, 3 */
-            0x180u, /* state_2, false: lines 7, 8 */
-            0xfu, /* state_2, true: lines 0, 1, 2, 3 */
-            0x180u, /* state_3, false: lines 7, 8 */
-            0xfu, /* state_3, true: lines 0, 1, 2, 3 */
-            0x180u, /* state_4, false: lines 7, 8 */
-            0xfu, /* state_4, true: lines 0, 1, 2, 3 */
-            0x180u, /* state_5, false: lines 7, 8 */
-            0xfu, /* state_5, true: lines 0, 1, 2, 3 */
-            0x180u, /* state_6, false: lines 7, 8 */
-            0xfu, /* state_6, true: lines 0, 1, 2, 3 */
-            0x590u, /* state_7, false: lines 4, 7, 8, 10 */
-            0xfu, /* state_7, true: lines 0, 1, 2, 3 */
-            0x5a0u, /* state_8, false: lines 5, 7, 8, 10 */
-            0xfu /* state_8, true: lines 0, 1, 2, 3 */
+            0x01c0u, /* d_state, false: lines 6, 7, 8 */
+            0x000fu, /* d_state, true: lines 0 to 3 */
+            0x0200u, /* f_state, false: line 9 */
+            0x000fu, /* f_state, true: lines 0 to 3 */
+            0x0180u, /* state_2, false: lines 7, 8 */
+            0x000fu, /* state_2, true: lines 0 to 3 */
+            0x0180u, /* state_3, false: lines 7, 8 */
+            0x000fu, /* state_3, true: lines 0 to 3 */
+            0x0180u, /* state_4, false: lines 7, 8 */
+            0x000fu, /* state_4, true: lines 0 to 3 */
+            0x0180u, /* state_5, false: lines 7, 8 */
+            0x000fu, /* state_5, true: lines 0 to 3 */
+            0x0180u, /* state_6, false: lines 7, 8 */
+            0x000fu, /* state_6, true: lines 0 to 3 */
+            0x0590u, /* state_7, false: lines 4, 7, 8, 10 */
+            0x000fu, /* state_7, true: lines 0 to 3 */
+            0x05a0u, /* state_8, false: lines 5, 7, 8, 10 */
+            0x000fu /* state_8, true: lines 0 to 3 */
         },
         { /* task/release.rcs: emove.command, emove.resting, names_known */
-            0x641u, /* pause, false, false: lines 0, 6, 9, 10 */
-            0x641u, /* pause, false, true: lines 0, 6, 9, 10 */
-            0x642u, /* pause, true, false: lines 1, 6, 9, 10 */
-            0x64cu, /* pause, true, true: lines 2, 3, 6, 9, 10 */
-            0x721u, /* move_to, false, false: lines 0, 5, 8, 9, 10 */
-            0x721u, /* move_to, false, true: lines 0, 5, 8, 9, 10 */
-            0x720u, /* move_to, true, false: lines 5, 8, 9, 10 */
-            0x720u, /* move_to, true, true: lines 5, 8, 9, 10 */
-            0x601u, /* move_to_obj, false, false: lines 0, 9, 10 */
-            0x601u, /* move_to_obj, false, true: lines 0, 9, 10 */
-            0x600u, /* move_to_obj, true, false: lines 9, 10 */
-            0x600u, /* move_to_obj, true, true: lines 9, 10 */
-            0x601u, /* locate, false, false: lines 0, 9, 10 */
-            0x601u, /* locate, false, true: lines 0, 9, 10 */
-            0x600u, /* locate, true, false: lines 9, 10 */
-            0x600u, /* locate, true, true: lines 9, 10 */
-            0x601u, /* pickup, false, false: lines 0, 9, 10 */
-            0x601u, /* pickup, false, true: lines 0, 9, 10 */
-            0x600u, /* pickup, true, false: lines 9, 10 */
-            0x600u, /* pickup, true, true: lines 9, 10 */
-            0x691u, /* release, false, false: lines 0, 4, 7, 9, 10 */
-            0x691u, /* release, false, true: lines 0, 4, 7, 9, 10 */
-            0x690u, /* release, true, false: lines 4, 7, 9, 10 */
-            0x690u /* release, true, true: lines 4, 7, 9, 10 */
+            0x0641u, /* pause, false, false: lines 0, 6, 9, 10 */
+            0x0641u, /* pause, false, true: lines 0, 6, 9, 10 */
+            0x0642u, /* pause, true, false: lines 1, 6, 9, 10 */
+            0x064cu, /* pause, true, true: lines 2, 3, 6, 9, 10 */
+            0x0721u, /* move_to, false, false: lines 0, 5, 8, 9, 10 */
+            0x0721u, /* move_to, false, true: lines 0, 5, 8, 9, 10 */
+            0x0720u, /* move_to, true, false: lines 5, 8, 9, 10 */
+            0x0720u, /* move_to, true, true: lines 5, 8, 9, 10 */
+            0x0601u, /* move_to_obj, false, false: lines 0, 9, 10 */
+            0x0601u, /* move_to_obj, false, true: lines 0, 9, 10 */
+            0x0600u, /* move_to_obj, true, false: lines 9, 10 */
+            0x0600u, /* move_to_obj, true, true: lines 9, 10 */
+            0x0601u, /* locate, false, false: lines 0, 9, 10 */
+            0x0601u, /* locate, false, true: lines 0, 9, 10 */
+            0x0600u, /* locate, true, false: lines 9, 10 */
+            0x0600u, /* locate, true, true: lines 9, 10 */
+            0x0601u, /* pickup, false, false: lines 0, 9, 10 */
+            0x0601u, /* pickup, false, true: lines 0, 9, 10 */
+            0x0600u, /* pickup, true, false: lines 9, 10 */
+            0x0600u, /* pickup, true, true: lines 9, 10 */
+            0x0691u, /* release, false, false: lines 0, 4, 7, 9, 10 */
+            0x0691u, /* release, false, true: lines 0, 4, 7, 9, 10 */
+            0x0690u, /* release, true, false: lines 4, 7, 9, 10 */
+            0x0690u /* release, true, true: lines 4, 7, 9, 10 */
         },
         { /* task/release.rcs: emove.status, obj_acquired */
-            0x277u, /* done, false: all lines but 3, 7, 8, 10 */
-            0x27bu, /* done, true: all lines but 2, 7, 8, 10 */
-            0x641u, /* executing, false: lines 0, 6, 9, 10 */
-            0x641u, /* executing, true: lines 0, 6, 9, 10 */
-            0x3c1u, /* failed, false: lines 0, 6, 7, 8, 9 */
-            0x3c1u /* failed, true: lines 0, 6, 7, 8, 9 */
+            0x0277u, /* done, false: lines 0, 1, 2, 4, 5, 6, 9 */
+            0x027bu, /* done, true: lines 0, 1, 3 to 6, 9 */
+            0x0641u, /* executing, false: lines 0, 6, 9, 10 */
+            0x0641u, /* executing, true: lines 0, 6, 9, 10 */
+            0x03c1u, /* failed, false: lines 0, 6 to 9 */
+            0x03c1u /* failed, true: lines 0, 6 to 9 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
@@ -1981,80 +1998,80 @@ int32_t task_transfer_line(const task_t *s)
         uint32_t t3[2];
     } t = {
         { /* task/transfer.rcs: cur_state, new_command */
-            0xf8000u, /* d_state, false: lines 15, 16, 17, 18, 19 */
-            0xffu, /* d_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
-            0x100000u, /* f_state, false: line 20 */
-            0xffu, /* f_state, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
-            0x2f0100u, /* state_2, false: lines 8, 16, 17, 18, 19, 21 */
-            0xffu, /* state_2, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
-            0x2f0200u, /* state_3, false: lines 9, 16, 17, 18, 19, 21 */
-            0xffu, /* state_3, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
-            0x2f0400u, /* state_4, false: lines 10, 16, 17, 18, 19, 21 */
-            0xffu, /* state_4, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
-            0x2f0800u, /* state_5, false: lines 11, 16, 17, 18, 19, 21 */
-            0xffu, /* state_5, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
-            0x2f1000u, /* state_6, false: lines 12, 16, 17, 18, 19, 21 */
-            0xffu, /* state_6, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
-            0x2f2000u, /* state_7, false: lines 13, 16, 17, 18, 19, 21 */
-            0xffu, /* state_7, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
-            0x2f4000u, /* state_8, false: lines 14, 16, 17, 18, 19, 21 */
-            0xffu /* state_8, true: lines 0, 1, 2, 3, 4, 5, 6, 7 */
+            0x000f8000u, /* d_state, false: lines 15 to 19 */
+            0x000000ffu, /* d_state, true: lines 0 to 7 */
+            0x00100000u, /* f_state, false: line 20 */
+            0x000000ffu, /* f_state, true: lines 0 to 7 */
+            0x002f0100u, /* state_2, false: lines 8, 16 to 19, 21 */
+            0x000000ffu, /* state_2, true: lines 0 to 7 */
+            0x002f0200u, /* state_3, false: lines 9, 16 to 19, 21 */
+            0x000000ffu, /* state_3, true: lines 0 to 7 */
+            0x002f0400u, /* state_4, false: lines 10, 16 to 19, 21 */
+            0x000000ffu, /* state_4, true: lines 0 to 7 */
+            0x002f0800u, /* state_5, false: lines 11, 16 to 19, 21 */
+            0x000000ffu, /* state_5, true: lines 0 to 7 */
+            0x002f1000u, /* state_6, false: lines 12, 16 to 19, 21 */
+            0x000000ffu, /* state_6, true: lines 0 to 7 */
+            0x002f2000u, /* state_7, false: lines 13, 16 to 19, 21 */
+            0x000000ffu, /* state_7, true: lines 0 to 7 */
+            0x002f4000u, /* state_8, false: lines 14, 16 to 19, 21 */
+            0x000000ffu /* state_8, true: lines 0 to 7 */
         },
         { /* task/transfer.rcs: emove.command, emove.resting, loc_of_obj */
-            0x308001u, /* pause, false, vis_reqd: lines 0, 15, 20, 21 */
-            0x308001u, /* pause, false, known: lines 0, 15, 20, 21 */
-            0x3080eeu, /* pause, true, vis_reqd: lines 1, 2, 3, 5, 6, 7, 15, 20, 21 */
-            0x3080deu, /* pause, true, known: lines 1, 2, 3, 4, 6, 7, 15, 20, 21 */
-            0x315101u, /* move_to, false, vis_reqd: lines 0, 8, 12, 14, 16, 20, 21 */
-            0x315101u, /* move_to, false, known: lines 0, 8, 12, 14, 16, 20, 21 */
-            0x315100u, /* move_to, true, vis_reqd: lines 8, 12, 14, 16, 20, 21 */
-            0x315100u, /* move_to, true, known: lines 8, 12, 14, 16, 20, 21 */
-            0x311401u, /* move_to_obj, false, vis_reqd: lines 0, 10, 12, 16, 20, 21 */
-            0x311401u, /* move_to_obj, false, known: lines 0, 10, 12, 16, 20, 21 */
-            0x311400u, /* move_to_obj, true, vis_reqd: lines 10, 12, 16, 20, 21 */
-            0x311400u, /* move_to_obj, true, known: lines 10, 12, 16, 20, 21 */
-            0x320201u, /* locate, false, vis_reqd: lines 0, 9, 17, 20, 21 */
-            0x320201u, /* locate, false, known: lines 0, 9, 17, 20, 21 */
-            0x320200u, /* locate, true, vis_reqd: lines 9, 17, 20, 21 */
-            0x320200u, /* locate, true, known: lines 9, 17, 20, 21 */
-            0x340801u, /* pickup, false, vis_reqd: lines 0, 11, 18, 20, 21 */
-            0x340801u, /* pickup, false, known: lines 0, 11, 18, 20, 21 */
-            0x340800u, /* pickup, true, vis_reqd: lines 11, 18, 20, 21 */
-            0x340800u, /* pickup, true, known: lines 11, 18, 20, 21 */
-            0x382001u, /* release, false, vis_reqd: lines 0, 13, 19, 20, 21 */
-            0x382001u, /* release, false, known: lines 0, 13, 19, 20, 21 */
-            0x382000u, /* release, true, vis_reqd: lines 13, 19, 20, 21 */
-            0x382000u /* release, true, known: lines 13, 19, 20, 21 */
+            0x00308001u, /* pause, false, vis_reqd: lines 0, 15, 20, 21 */
+            0x00308001u, /* pause, false, known: lines 0, 15, 20, 21 */
+            0x003080eeu, /* pause, true, vis_reqd: lines 1, 2, 3, 5, 6, 7, 15, 20, 21 */
+            0x003080deu, /* pause, true, known: lines 1 to 4, 6, 7, 15, 20, 21 */
+            0x00315101u, /* move_to, false, vis_reqd: lines 0, 8, 12, 14, 16, 20, 21 */
+            0x00315101u, /* move_to, false, known: lines 0, 8, 12, 14, 16, 20, 21 */
+            0x00315100u, /* move_to, true, vis_reqd: lines 8, 12, 14, 16, 20, 21 */
+            0x00315100u, /* move_to, true, known: lines 8, 12, 14, 16, 20, 21 */
+            0x00311401u, /* move_to_obj, false, vis_reqd: lines 0, 10, 12, 16, 20, 21 */
+            0x00311401u, /* move_to_obj, false, known: lines 0, 10, 12, 16, 20, 21 */
+            0x00311400u, /* move_to_obj, true, vis_reqd: lines 10, 12, 16, 20, 21 */
+            0x00311400u, /* move_to_obj, true, known: lines 10, 12, 16, 20, 21 */
+            0x00320201u, /* locate, false, vis_reqd: lines 0, 9, 17, 20, 21 */
+            0x00320201u, /* locate, false, known: lines 0, 9, 17, 20, 21 */
+            0x00320200u, /* locate, true, vis_reqd: lines 9, 17, 20, 21 */
+            0x00320200u, /* locate, true, known: lines 9, 17, 20, 21 */
+            0x00340801u, /* pickup, false, vis_reqd: lines 0, 11, 18, 20, 21 */
+            0x00340801u, /* pickup, false, known: lines 0, 11, 18, 20, 21 */
+            0x00340800u, /* pickup, true, vis_reqd: lines 11, 18, 20, 21 */
+            0x00340800u, /* pickup, true, known: lines 11, 18, 20, 21 */
+            0x00382001u, /* release, false, vis_reqd: lines 0, 13, 19, 20, 21 */
+            0x00382001u, /* release, false, known: lines 0, 13, 19, 20, 21 */
+            0x00382000u, /* release, true, vis_reqd: lines 13, 19, 20, 21 */
+            0x00382000u /* release, true, known: lines 13, 19, 20, 21 */
         },
         { /* task/transfer.rcs: emove.status, source_spec, dest_spec, names_known */
-            0x10ff03u, /* done, false, false, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
-            0x10ff05u, /* done, false, false, true: lines 0, 2, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
-            0x10ff03u, /* done, false, true, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
-            0x10ffc1u, /* done, false, true, true: all lines but 1, 2, 3, 4, 5, 16, 17, 18, 19, 21 */
-            0x10ff03u, /* done, true, false, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
-            0x10ff05u, /* done, true, false, true: lines 0, 2, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
-            0x10ff03u, /* done, true, true, false: lines 0, 1, 8, 9, 10, 11, 12, 13, 14, 15, 20 */
-            0x10ff39u, /* done, true, true, true: all lines but 1, 2, 6, 7, 16, 17, 18, 19, 21 */
-            0x308001u, /* executing, false, false, false: lines 0, 15, 20, 21 */
-            0x308001u, /* executing, false, false, true: lines 0, 15, 20, 21 */
-            0x308001u, /* executing, false, true, false: lines 0, 15, 20, 21 */
-            0x308001u, /* executing, false, true, true: lines 0, 15, 20, 21 */
-            0x308001u, /* executing, true, false, false: lines 0, 15, 20, 21 */
-            0x308001u, /* executing, true, false, true: lines 0, 15, 20, 21 */
-            0x308001u, /* executing, true, true, false: lines 0, 15, 20, 21 */
-            0x308001u, /* executing, true, true, true: lines 0, 15, 20, 21 */
-            0x1f8001u, /* failed, false, false, false: lines 0, 15, 16, 17, 18, 19, 20 */
-            0x1f8001u, /* failed, false, false, true: lines 0, 15, 16, 17, 18, 19, 20 */
-            0x1f8001u, /* failed, false, true, false: lines 0, 15, 16, 17, 18, 19, 20 */
-            0x1f8001u, /* failed, false, true, true: lines 0, 15, 16, 17, 18, 19, 20 */
-            0x1f8001u, /* failed, true, false, false: lines 0, 15, 16, 17, 18, 19, 20 */
-            0x1f8001u, /* failed, true, false, true: lines 0, 15, 16, 17, 18, 19, 20 */
-            0x1f8001u, /* failed, true, true, false: lines 0, 15, 16, 17, 18, 19, 20 */
-            0x1f8001u /* failed, true, true, true: lines 0, 15, 16, 17, 18, 19, 20 */
+            0x0010ff03u, /* done, false, false, false: lines 0, 1, 8 to 15, 20 */
+            0x0010ff05u, /* done, false, false, true: lines 0, 2, 8 to 15, 20 */
+            0x0010ff03u, /* done, false, true, false: lines 0, 1, 8 to 15, 20 */
+            0x0010ffc1u, /* done, false, true, true: lines 0, 6 to 15, 20 */
+            0x0010ff03u, /* done, true, false, false: lines 0, 1, 8 to 15, 20 */
+            0x0010ff05u, /* done, true, false, true: lines 0, 2, 8 to 15, 20 */
+            0x0010ff03u, /* done, true, true, false: lines 0, 1, 8 to 15, 20 */
+            0x0010ff39u, /* done, true, true, true: lines 0, 3, 4, 5, 8 to 15, 20 */
+            0x00308001u, /* executing, false, false, false: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, false, false, true: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, false, true, false: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, false, true, true: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, true, false, false: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, true, false, true: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, true, true, false: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, true, true, true: lines 0, 15, 20, 21 */
+            0x001f8001u, /* failed, false, false, false: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, false, false, true: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, false, true, false: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, false, true, true: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, true, false, false: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, true, false, true: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, true, true, false: lines 0, 15 to 20 */
+            0x001f8001u /* failed, true, true, true: lines 0, 15 to 20 */
         },
         { /* task/transfer.rcs: obj_acquired */
-            0x3fffb7u, /* false: all lines but 3, 6 */
-            0x3fff4fu /* true: all lines but 4, 5, 7 */
+            0x003fffb7u, /* false: lines 0, 1, 2, 4, 5, 7 to 21 */
+            0x003fff4fu /* true: lines 0 to 3, 6, 8 to 21 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &

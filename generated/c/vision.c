@@ -149,7 +149,8 @@ static void vision_do_wait(vision_t *s)
     }
 }
 
-/* vision/vision.rcs procedure take_orders */
+/* vision/vision.rcs procedure take_orders: Made of the declared roles (manual, Protocol). An order is new
+   if its number differs from the last, until it is answered and the answer's own orders are echoed. */
 static void vision_do_take_orders(vision_t *s)
 {
     if (s->emove.inc_command != s->inc_command_seen) {
@@ -166,7 +167,8 @@ static void vision_do_take_orders(vision_t *s)
     s->settling = false;
 }
 
-/* vision/vision.rcs procedure give_orders */
+/* vision/vision.rcs procedure give_orders: Made of the declared roles (manual, Protocol). A new order is
+   answered by the first cycle that is not settling; its number and name are echoed. */
 static void vision_do_give_orders(vision_t *s)
 {
     if (s->new_command && (!s->settling)) {
@@ -211,6 +213,8 @@ static void vision_admit(vision_t *s)
         s->fault = VISION_FAULT_ARITHMETIC;
     } else {
         int32_t at = -1;
+        /* Not tested, as no value of their types is refused: emove.inc_command, camera.number,
+           camera.matched. */
         if (s->emove.input_command > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
             at = VISION_LEAF_EMOVE_INPUT_COMMAND;
         } else if (s->emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
@@ -468,6 +472,8 @@ void vision_init(vision_t *s)
 int32_t vision_check(const vision_t *s)
 {
     int32_t at = VISION_CHECK_OK;
+    /* Not tested, as no value of their types is refused: to_emove.inc_command_echo, inc_command_seen,
+       to_camera.number. */
     if (s->digest != VISION_DIGEST) {
         at = VISION_CHECK_FOREIGN;
     } else if (s->to_emove.ref_command_echo > VOCABULARY_VISION_COMMAND_LINE_FLASH) {
@@ -524,7 +530,7 @@ int32_t vision_flood_flash_line(const vision_t *s)
         uint8_t t1[24];
     } t = {
         { /* vision/vision.rcs table flood_flash: waited */
-            /* 0 .. 99: all lines but 3 */
+            /* 0 .. 99: lines 1, 2, 4 to 7 */
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
@@ -534,33 +540,33 @@ int32_t vision_flood_flash_line(const vision_t *s)
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
             0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7du /* 100: all lines but 2 */
+            0x7du /* 100: lines 1, 3 to 7 */
         },
         { /* vision/vision.rcs table flood_flash: cur_state, new_command, camera.matched, arrived */
             0x20u, /* d_state, false, false, false: line 6 */
             0x20u, /* d_state, false, false, true: line 6 */
             0x20u, /* d_state, false, true, false: line 6 */
             0x20u, /* d_state, false, true, true: line 6 */
-            0x1u, /* d_state, true, false, false: line 1 */
-            0x1u, /* d_state, true, false, true: line 1 */
-            0x1u, /* d_state, true, true, false: line 1 */
-            0x1u, /* d_state, true, true, true: line 1 */
+            0x01u, /* d_state, true, false, false: line 1 */
+            0x01u, /* d_state, true, false, true: line 1 */
+            0x01u, /* d_state, true, true, false: line 1 */
+            0x01u, /* d_state, true, true, true: line 1 */
             0x40u, /* f_state, false, false, false: line 7 */
             0x40u, /* f_state, false, false, true: line 7 */
             0x40u, /* f_state, false, true, false: line 7 */
             0x40u, /* f_state, false, true, true: line 7 */
-            0x1u, /* f_state, true, false, false: line 1 */
-            0x1u, /* f_state, true, false, true: line 1 */
-            0x1u, /* f_state, true, true, false: line 1 */
-            0x1u, /* f_state, true, true, true: line 1 */
-            0x6u, /* looking, false, false, false: lines 2, 3 */
+            0x01u, /* f_state, true, false, false: line 1 */
+            0x01u, /* f_state, true, false, true: line 1 */
+            0x01u, /* f_state, true, true, false: line 1 */
+            0x01u, /* f_state, true, true, true: line 1 */
+            0x06u, /* looking, false, false, false: lines 2, 3 */
             0x10u, /* looking, false, false, true: line 5 */
-            0x6u, /* looking, false, true, false: lines 2, 3 */
-            0x8u, /* looking, false, true, true: line 4 */
-            0x1u, /* looking, true, false, false: line 1 */
-            0x1u, /* looking, true, false, true: line 1 */
-            0x1u, /* looking, true, true, false: line 1 */
-            0x1u /* looking, true, true, true: line 1 */
+            0x06u, /* looking, false, true, false: lines 2, 3 */
+            0x08u, /* looking, false, true, true: line 4 */
+            0x01u, /* looking, true, false, false: line 1 */
+            0x01u, /* looking, true, false, true: line 1 */
+            0x01u, /* looking, true, true, false: line 1 */
+            0x01u /* looking, true, true, true: line 1 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->waited] &
@@ -594,7 +600,7 @@ int32_t vision_line_flash_line(const vision_t *s)
         uint8_t t2[2];
     } t = {
         { /* vision/vision.rcs table line_flash: waited */
-            /* 0 .. 99: all lines but 3 */
+            /* 0 .. 99: lines 1, 2, 4 to 7 */
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
@@ -604,37 +610,37 @@ int32_t vision_line_flash_line(const vision_t *s)
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
             0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfdu /* 100: all lines but 2 */
+            0xfdu /* 100: lines 1, 3 to 7 */
         },
         { /* vision/vision.rcs table line_flash: cur_state, new_command, arrived, fits */
             0x40u, /* d_state, false, false, false: line 6 */
             0x40u, /* d_state, false, false, true: line 6 */
             0x40u, /* d_state, false, true, false: line 6 */
             0x40u, /* d_state, false, true, true: line 6 */
-            0x1u, /* d_state, true, false, false: line 1 */
-            0x1u, /* d_state, true, false, true: line 1 */
-            0x1u, /* d_state, true, true, false: line 1 */
-            0x1u, /* d_state, true, true, true: line 1 */
+            0x01u, /* d_state, true, false, false: line 1 */
+            0x01u, /* d_state, true, false, true: line 1 */
+            0x01u, /* d_state, true, true, false: line 1 */
+            0x01u, /* d_state, true, true, true: line 1 */
             0x80u, /* f_state, false, false, false: line 7 */
             0x80u, /* f_state, false, false, true: line 7 */
             0x80u, /* f_state, false, true, false: line 7 */
             0x80u, /* f_state, false, true, true: line 7 */
-            0x1u, /* f_state, true, false, false: line 1 */
-            0x1u, /* f_state, true, false, true: line 1 */
-            0x1u, /* f_state, true, true, false: line 1 */
-            0x1u, /* f_state, true, true, true: line 1 */
-            0x6u, /* looking, false, false, false: lines 2, 3 */
-            0x6u, /* looking, false, false, true: lines 2, 3 */
+            0x01u, /* f_state, true, false, false: line 1 */
+            0x01u, /* f_state, true, false, true: line 1 */
+            0x01u, /* f_state, true, true, false: line 1 */
+            0x01u, /* f_state, true, true, true: line 1 */
+            0x06u, /* looking, false, false, false: lines 2, 3 */
+            0x06u, /* looking, false, false, true: lines 2, 3 */
             0x10u, /* looking, false, true, false: line 5a */
             0x28u, /* looking, false, true, true: lines 4, 5b */
-            0x1u, /* looking, true, false, false: line 1 */
-            0x1u, /* looking, true, false, true: line 1 */
-            0x1u, /* looking, true, true, false: line 1 */
-            0x1u /* looking, true, true, true: line 1 */
+            0x01u, /* looking, true, false, false: line 1 */
+            0x01u, /* looking, true, false, true: line 1 */
+            0x01u, /* looking, true, true, false: line 1 */
+            0x01u /* looking, true, true, true: line 1 */
         },
         { /* vision/vision.rcs table line_flash: faces */
-            0xf7u, /* false: all lines but 4 */
-            0xdfu /* true: all lines but 5b */
+            0xf7u, /* false: lines 1, 2, 3, 5a to 7 */
+            0xdfu /* true: lines 1 to 5a, 6, 7 */
         },
     };
     const uint32_t m = (uint32_t)t.t0[s->waited] &

@@ -1031,7 +1031,7 @@ def _do_stop(s):
 
 
 def _do_take_orders(s):
-    """primitive/common.rcs procedure take_orders"""
+    """primitive/common.rcs procedure take_orders: Made of the declared roles (manual, Protocol). An order is new if its number differs from the last, until it is answered and the answer's own orders are echoed. A report counts once it echoes the number of the last order. A subordinate rests where it has reported *done* to the order to rest, and the new order is answered or every order echoed."""
     s.echoed = ((s.from_robot_inc_command_echo == s.to_robot_inc_command) and (s.from_gripper_inc_command_echo == s.to_gripper_inc_command))
     if (s.emove_inc_command != s.inc_command_seen):
         s.inc_command_seen = s.emove_inc_command
@@ -1055,7 +1055,7 @@ def _do_take_orders(s):
 
 
 def _do_give_orders(s):
-    """primitive/common.rcs procedure give_orders"""
+    """primitive/common.rcs procedure give_orders: Made of the declared roles (manual, Protocol). A new order is answered by the first cycle that is not settling; its number and name are echoed. An order gets a new number where its command or a field differs from the last; fields of a stream do not count."""
     if (s.new_command and (not s.settling)):
         s.answered = True
     s.to_emove_inc_command_echo = s.inc_command_seen

@@ -627,7 +627,7 @@ def _do_wait(s):
 
 
 def _do_take_orders(s):
-    """vision/vision.rcs procedure take_orders"""
+    """vision/vision.rcs procedure take_orders: Made of the declared roles (manual, Protocol). An order is new if its number differs from the last, until it is answered and the answer's own orders are echoed."""
     if (s.emove_inc_command != s.inc_command_seen):
         s.inc_command_seen = s.emove_inc_command
         s.new_command = True
@@ -641,7 +641,7 @@ def _do_take_orders(s):
 
 
 def _do_give_orders(s):
-    """vision/vision.rcs procedure give_orders"""
+    """vision/vision.rcs procedure give_orders: Made of the declared roles (manual, Protocol). A new order is answered by the first cycle that is not settling; its number and name are echoed."""
     if (s.new_command and (not s.settling)):
         s.answered = True
     s.to_emove_inc_command_echo = s.inc_command_seen

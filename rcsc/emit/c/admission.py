@@ -1,5 +1,6 @@
 """Admission of inputs and of results, and the check of a state that comes from outside."""
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
@@ -15,6 +16,7 @@ from rcsc.emit.code_tree import (
     Invoke,
     Leave,
     Let,
+    Line,
     Loop,
     Name,
     Place,
@@ -25,7 +27,7 @@ from rcsc.emit.code_tree import (
     type_bounds,
     when,
 )
-from rcsc.emit.identifiers import DIGEST
+from rcsc.emit.identifiers import DIGEST, comment
 from rcsc.emit.translate import FAULT, FAULT_AT, STATE, constant
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
@@ -48,7 +50,8 @@ def admit_function(c: CProgram, reals: bool) -> Function:
     body: Body = taken
     if asked:
         branch = Branch(((infix(">=", AT, Constant(0)), told),), taken)
-        body = (Let("int32_t", "at", NONE), *first_of(asked), branch)
+        free = [v.name for v, (_, test) in zip(inputs, tests, strict=True) if test is None]
+        body = (Let("int32_t", "at", NONE), *_untested(free), *first_of(asked), branch)
     if reals:
         inexact = Prefix("!", Invoke(f"{c.p}_exact"))
         body = (Branch(((inexact, (Set(FAULT, fault_name(c, Fault.ARITHMETIC)),)),), body),)
@@ -67,6 +70,13 @@ def _refused(c: CProgram, variable: Variable) -> Code | None:
     if c.plan.defensive and isinstance(variable.type, Bool):
         return infix(">", place, Constant(1, "uint32_t"))
     return refusal(c, variable, place)
+
+
+def _untested(names: Sequence[str]) -> Iterator[Line]:
+    """Which variables have no test, so that one that is lost can be told from one that nothing needs."""
+    words = dict.fromkeys(comment(re.sub(r"\[\d+\]", "[..]", name)) for name in names)
+    if words:
+        yield Line(f"/* Not tested, as no value of their types is refused: {', '.join(words)}. */")
 
 
 def refusal(c: CProgram, variable: Variable, place: Code) -> Code | None:
@@ -137,6 +147,11 @@ def check_function(c: CProgram) -> Function:
         (Name(name), Prefix("!", c.text.expr(invariant.condition)))
         for name, invariant in zip(c.names.invariants, c.program.invariants, strict=True)
     ]
+    own = [
+        (v, test)
+        for v, test in zip(c.program.variables, tests, strict=False)
+        if v.kind is not model.Kind.INPUT
+    ]
     foreign = infix("!=", Place((DIGEST,)), Name(c.names.digest))
     asked = [(Name(c.names.checks[1]), foreign), *((at, test) for at, test in tests if test is not None)]
     doc = (
@@ -146,6 +161,7 @@ def check_function(c: CProgram) -> Function:
     )
     body = (
         Let("int32_t", "at", Name(c.names.checks[0])),
+        *_untested([v.name for v, (_, test) in own if test is None]),
         *first_of(asked),
         Leave(AT),
     )

@@ -175,9 +175,9 @@ def _bit(condition: Code) -> Code:
     return Choice(condition, Constant(1, "uint32_t"), Constant(0, "uint32_t"))
 
 
-def _word(value: int, bits: int) -> Name:
-    """A mask, as wide as 32 bits or 64."""
-    return Name(f"{value:#x}{'ull' if bits == 64 else 'u'}")
+def _word(value: int, bits: int, digits: int = 1) -> Name:
+    """A mask, as wide as 32 bits or 64; `digits` of it are written at least."""
+    return Name(f"0x{value:0{digits}x}{'ull' if bits == 64 else 'u'}")
 
 
 def _width(lines: int) -> int:
@@ -232,7 +232,7 @@ def _rows(
         yield from (Line(f"{_mask_code(mask, words, bits)},") for mask in entries)
         return
     elif len(runs) > MOST_TOLD:
-        yield from _wrapped([_word(mask, bits) for mask in entries], 84)
+        yield from _wrapped([_word(mask, bits, bits // 4) for mask in entries], 84)
         return
     for run in runs:
         of = " .. ".join(dict.fromkeys((classes[run[0]], classes[run[-1]])))
@@ -246,19 +246,23 @@ def _rows(
 
 
 def _mask_code(mask: int, words: int, bits: int) -> str:
-    parts = Items(tuple(_word(mask >> (WORD * w) & (2**WORD - 1), WORD) for w in range(words)))
-    return IN_C.code(parts if words > 1 else _word(mask, bits))
+    digits = bits // 4
+    parts = Items(tuple(_word(mask >> (WORD * w) & (2**WORD - 1), WORD, digits) for w in range(words)))
+    return IN_C.code(parts if words > 1 else _word(mask, bits, digits))
 
 
 def _left(mask: int, lines: Sequence[str]) -> str:
-    """The lines that a mask leaves, by name, or those that it does not: whichever are fewer."""
-    left = [line for at, line in enumerate(lines) if mask >> at & 1]
-    out = [line for at, line in enumerate(lines) if not mask >> at & 1]
-    if not left or not out:
+    """The lines that a mask leaves, by name, four or more in a row by the first and the last."""
+    left = [at for at in range(len(lines)) if mask >> at & 1]
+    if not left or len(left) == len(lines):
         return "every line" if left else "no line"
-    if len(left) > len(out):
-        return f"all lines but {', '.join(out)}"
-    return f"line{'s' if len(left) > 1 else ''} {', '.join(left)}"
+    runs = [[at for _, at in run] for _, run in groupby(enumerate(left), key=lambda pair: pair[1] - pair[0])]
+    told = [
+        piece
+        for run in runs
+        for piece in ([f"{lines[run[0]]} to {lines[run[-1]]}"] if len(run) > 3 else [lines[at] for at in run])
+    ]
+    return f"line{'s' if len(left) > 1 else ''} {', '.join(told)}"
 
 
 def _classes(group: Group) -> list[str]:

@@ -131,6 +131,7 @@ def taken(parties: Parties) -> Iterator[str]:
         writes += [*own, "settling", f"{above.told}.status_report"]
         writes += [f"{above.told}.{above.reason}"] if above.reason is not None else []
     reads += ["echoed"] if below else []
+    yield from (f"## {line}" for line in _told_taken(parties))
     yield f"module {BEFORE} reads {', '.join([*reads, *timed])} writes {', '.join([*writes, *timed])} {{"
     for party in below:
         yield from _too_late(party)
@@ -145,6 +146,16 @@ def taken(parties: Parties) -> Iterator[str]:
         yield "  }"
         yield from (_resting(party, above is not None) for party in below)
     yield "}"
+
+
+def _told_taken(parties: Parties) -> Iterator[str]:
+    """What the module before is for, in the words of who reads the code."""
+    yield "Made of the declared roles (manual, Protocol)."
+    if parties.superior is not None:
+        yield "An order is new if its number differs from the last, until it is answered and the answer's own orders are echoed."
+    if parties.subordinates:
+        yield "A report counts once it echoes the number of the last order. A subordinate rests where it has reported *done* to"
+        yield "the order to rest, and the new order is answered or every order echoed."
 
 
 def _too_late(party: Party) -> Iterator[str]:
@@ -249,6 +260,11 @@ def given(parties: Parties) -> Iterator[str]:
     if above is not None:
         reads += ["new_command", "settling", "inc_command_seen", f"{above.name}.input_command"]
         writes += ["answered", f"{above.told}.inc_command_echo", f"{above.told}.ref_command_echo"]
+    yield "## Made of the declared roles (manual, Protocol)."
+    if above is not None:
+        yield "## A new order is answered by the first cycle that is not settling; its number and name are echoed."
+    if below:
+        yield "## An order gets a new number where its command or a field differs from the last; fields of a stream do not count."
     yield f"module {AFTER} reads {', '.join(reads)} writes {', '.join(writes)} {{"
     if above is not None:
         yield "  if new_command and not settling {\n    answered := true\n  }"

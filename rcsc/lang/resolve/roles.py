@@ -168,7 +168,7 @@ def offered(
 
 
 _SAID = {
-    "in_step": "A state goes with the orders that it waits for (section 9).",
+    "in_step": "Found from what the lines order, and proved: a state goes with the orders that it waits for (section 9).",
     "resting": "What rests says so.",
 }
 
