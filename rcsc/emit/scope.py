@@ -86,10 +86,6 @@ class NameScope:
         """Keeps of each name what is significant."""
         self.names = set(map(self.key, self.names))
 
-    def reserve(self, names: Iterable[str]) -> None:
-        """Take names as they are."""
-        self.names.update(map(self.key, names))
-
     def fresh(self, name: str) -> str:
         """`name`, made short where that tells it apart, or the first of `name_2`, `name_3` that is free; it is then taken."""
         free = next(variant for variant in self._variants(name) if self.free(variant))

@@ -211,8 +211,10 @@ def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linke
     word = system_word(system.name, (program.names.program for program in programs.values()), prefix)
     wiring = _Wiring(programs, word)
     buffers = tuple(wiring.buffer(wire) for wire in system.wires)
-    members = c_scope({IN, OUT, BETWEEN, TICK}).all((spec.name, c_word(spec.name)) for spec in system.levels)
-    wiring.scope.reserve(f"{word}_{does}_{member}" for does in DOES for member in members.values())
+    members = c_scope({IN, OUT, BETWEEN, TICK}).all(
+        ((spec.name, c_word(spec.name)) for spec in system.levels),
+        lambda member: ((wiring.scope, f"{word}_{does}_{member}") for does in DOES),
+    )
     constants = c_scope({constant_word(word, "level", "none"), constant_word(word, "tick", "ms")})
     levels = tuple(
         _level(

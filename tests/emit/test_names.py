@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcsc.commands import run
 from rcsc.emit.c.c99 import emit_c
 from rcsc.emit.lower import lower_by_force
 from rcsc.emit.scope import SIGNIFICANT, abbreviated, c_scope
@@ -23,7 +24,7 @@ COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 
 def machine_code(files: Mapping[str, str], folder: Path) -> bytes:
     """The code that the C files are compiled to."""
-    folder.mkdir()
+    folder.mkdir(parents=True)
     for name, text in files.items():
         (folder / name).write_text(text)
     (source,) = (name for name in files if name.endswith(".c"))
@@ -64,6 +65,12 @@ def test_shipped_programs_and_the_gallery(root: str, repo: Path, tmp_path: Path)
     program = resolve(loaded.roots[0], loaded)
     assert isinstance(program, Program), program
     differ_in_time(emit_c(lower_by_force(program, str(repo / "tables"))), tmp_path)
+
+
+def test_the_shipped_system(repo: Path, tmp_path: Path) -> None:
+    generated = repo / "generated/c"
+    files = {path.name: path.read_text(encoding="utf-8") for path in generated.glob("*.h")}
+    differ_in_time(files | {"nbs_robot.c": (generated / "nbs_robot.c").read_text(encoding="utf-8")}, tmp_path)
 
 
 LONG = "which_is_a_very_long_name_that_only_its_end_tells_apart"
@@ -108,6 +115,23 @@ def test_names_that_only_their_ends_tell_apart(file: str, tmp_path: Path) -> Non
     text = re.sub(r"\b([A-Z]+)(?=_[ab]\b|_[ab]_|\b)", lambda word: f"{word[1].lower()}_{LONG}", PROGRAM)
     files = emit_c(lower_by_force(program_of(text, file)))
     differ_in_time(files, tmp_path)
+
+
+def test_levels_that_only_their_ends_tell_apart(dock: Path, tmp_path: Path) -> None:
+    system = dock / "system.toml"
+    text = system.read_text(encoding="utf-8")
+    for level in ("supervisor", "drive"):
+        text = text.replace(f'name = "{level}"', f'name = "{LONG}_{level}"\nprogram = "{level}"')
+        text = text.replace(f'"{level}.', f'"{LONG}_{level}.')
+        rcs = dock / f"{level}.rcs"
+        rcs.write_text(
+            rcs.read_text("utf-8").replace(f"level {level}", f"level {LONG}_{level}"), encoding="utf-8"
+        )
+    system.write_text(text, encoding="utf-8")
+    assert run(["compile", "-q", str(system), "--out", str(dock / "generated")]) == 0
+    generated = dock / "generated/c"
+    files = {path.name: path.read_text(encoding="utf-8") for path in generated.glob("*.h")}
+    differ_in_time(files | {"dock.c": (generated / "dock.c").read_text(encoding="utf-8")}, tmp_path / "seen")
 
 
 WORDS = st.lists(
