@@ -25,7 +25,7 @@ LOOP = re.compile(r"v_\w+ <=? |more_\w+$|[ik] <=? ")
 GUARD = re.compile(r"\(?s->fault [!=]= \w+\)?$")
 NO_LINE = re.compile(r"\(?(m|seen) == 0|case \(-1\)")
 SEVERAL_LINES = re.compile(r"several$|\(?several != 0|default$")
-MACHINE = "the machine computes reals as was proved; only one that does not takes this"
+MACHINE = "no way in which a machine can be told to round makes it so: four were played"
 ADMITTED = "no input of this program can be refused"
 UNENDED = "no table before the last can be without its one line"
 ENDS = {Fault.NO_LINE: NONE, Fault.SEVERAL_LINES: SEVERAL}

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import platform
 import subprocess
 from itertools import product
 from pathlib import Path
@@ -16,7 +17,7 @@ from rcsc.emit.plan import Plan
 from rcsc.host.tools import c_compiler
 from rcsc.lang.model import Program, ProvedProgram, Value, seal_of_proof
 from rcsc.solvers.options import Options
-from rcsc.testing.coverage.case import Case, Entry, entries, expected
+from rcsc.testing.coverage.case import MODES, Case, Entry, entries, expected
 from rcsc.testing.coverage.choose import Choice, chosen
 from rcsc.testing.coverage.document import (
     VectorSet,
@@ -188,6 +189,17 @@ def test_where_the_solver_may_do_nothing_it_is_said() -> None:
     files = emitted_of(plan)
     document = vector_set(plan, files, Options(steps=1), None, lambda _: None, 1)
     assert any(not unreached.shown and "no answer" in unreached.reason for unreached in document.unreached)
+
+
+def test_a_machine_that_rounds_otherwise_is_refused(tmp_path: Path) -> None:
+    document = set_of(STOPS)
+    odd = [kept for kept in document.kept if kept.case.mode]
+    assert [kept.case.mode for kept in odd] == list(MODES)
+    assert {kept.expected.result for kept in odd} == {7}
+    if platform.machine() in ("x86_64", "aarch64"):  # others play these as passed
+        status, told = played(tmp_path, document, ("return exact;", "return true;"))
+        assert (status, told.count("wrong result")) == (1, len(MODES))
+    assert not any(kept.case.mode for kept in set_of(SMALL).kept)
 
 
 def test_the_ways_of_a_decision_are_those_of_short_circuits() -> None:

@@ -27,7 +27,17 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
-from rcsc.testing.coverage.case import Answer, Case, Entry, Expected, entries, outside_of, ran, refused_at
+from rcsc.testing.coverage.case import (
+    MODES,
+    Answer,
+    Case,
+    Entry,
+    Expected,
+    entries,
+    outside_of,
+    ran,
+    refused_at,
+)
 from rcsc.testing.executors.externs import results
 from rcsc.testing.executors.sessions import Stimuli
 from rcsc.testing.executors.symbols import Symbols
@@ -69,8 +79,14 @@ class Drawn:
         return values
 
 
-def always(program: Program, symbols: Symbols) -> Iterator[Case]:
-    """What every program has: `init`, `check` on each bad state, and each input refused beyond each end of its range."""
+def always(program: Program, symbols: Symbols, *, reals: bool) -> Iterator[Case]:
+    """What every program has: `init`, `check` on each bad state, and each input refused beyond each end of its range.
+
+    Args:
+        program: The program.
+        symbols: Of its C.
+        reals: Whether the C looks how the machine computes reals.
+    """
     start = initial(program)
     yield Case(Entry("init"), start, origin="initial state")
     yield Case(Entry("check"), start, origin="initial state")
@@ -81,6 +97,8 @@ def always(program: Program, symbols: Symbols) -> Iterator[Case]:
                 words = f"{variable.name} {end} its range"
                 yield Case(Entry("check"), {**start, variable.name: value}, origin=words)
     cycles = [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
+    for mode in MODES if reals else ():
+        yield Case(cycles[-1], start, origin=f"a machine that rounds {mode}", mode=mode)
     for variable in (v for v in program.variables if v.kind is Kind.INPUT and not isinstance(v.type, Bool)):
         for end, value in outside_of(variable, symbols.c_type(variable.name)).items():
             for entry in cycles:

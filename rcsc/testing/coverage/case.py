@@ -38,6 +38,8 @@ from rcsc.testing.agree import line_number
 from rcsc.testing.executors.edges import may_be_matched
 
 NONE = -1
+MODES = ("upward", "downward", "toward zero", "subnormals to zero")
+"""Ways of rounding that are not the language's: a step finds out, and refuses to compute."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +72,7 @@ class Case:
         answers: Of the extern procedures, in the order of their calls.
         origin: How it was come by, in words.
         foreign: Whether the state has the digest of other tables.
+        mode: How the machine rounds, one of `MODES`; empty for as it should.
     """
 
     entry: Entry
@@ -77,6 +80,7 @@ class Case:
     answers: tuple[Answer, ...] = ()
     origin: str = ""
     foreign: bool = False
+    mode: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +122,14 @@ def expected(program: Program, case: Case) -> Expected | None:
             if not may_be_matched(program, table, case.before):
                 return None
             return Expected(line_number(table, matching_lines(table, case.before)))
+    if case.mode:
+        return Expected(Fault.ARITHMETIC, after=shown_safe(program, case.before))
     return ran(program, case) if refused_at(program, case.before) == NONE else None
+
+
+def shown_safe(program: Program, state: Snapshot) -> Snapshot:
+    """The state, its outputs as they are after a fault."""
+    return {**state, **{str(v.name): v.safe for v in program.variables if v.safe is not None}}
 
 
 def ran(program: Program, case: Case, answers: Answers | None = None) -> Expected | None:

@@ -92,6 +92,8 @@ def chosen(
     tables: Sequence[Vectors],
     sessions: int,
     progress: Callable[[str], None],
+    *,
+    reals: bool = False,
 ) -> Choice:
     """Vectors of a program, as far as no solver is needed for its procedures.
 
@@ -102,10 +104,11 @@ def chosen(
         tables: MC/DC vectors of each table.
         sessions: How many are drawn of each step and cycle, at most.
         progress: Told what is being done.
+        reals: Whether the C looks how the machine computes reals.
     """
     program = search.program
     choice = Choice(program, Reached(program, plan, marked(program)))
-    for case in (*always(program, symbols), *of_tables(search, plan, tables)):
+    for case in (*always(program, symbols, reals=reals), *of_tables(search, plan, tables)):
         choice.offer(case)
     for entry in entries(program):
         if entry.kind in ("step", "cycle"):

@@ -117,6 +117,7 @@ def _case(document: VectorSet, case: Case, right: Expected) -> dict[str, object]
         "of": case.entry.name,
         "origin": case.origin,
         **({"foreign": True} if case.foreign else {}),
+        **({"mode": case.mode} if case.mode else {}),
         "inputs": {name: value for name, value in values.items() if name in inputs},
         "state": {name: value for name, value in values.items() if name not in inputs},
         **({"answers": answers} if answers else {}),
@@ -221,7 +222,7 @@ def _csv(
     program = document.program
     names = [str(v.name) for v in program.variables]
     lines: list[list[object]] = [
-        [*numbers, *CSV_COLUMNS, "foreign", "answers", *names, *(f"after {name}" for name in names)]
+        [*numbers, *CSV_COLUMNS, "foreign", "mode", "answers", *names, *(f"after {name}" for name in names)]
     ]
     for number, case, right in rows:
         told = expected_of(program, case, right)
@@ -237,6 +238,7 @@ def _csv(
                 right.line,
                 " ".join(right.failed),
                 int(case.foreign),
+                case.mode,
                 answers,
                 *map(_word, _values(program, case.before).values()),
                 *map(_word, _values(program, right.after or case.before).values()),

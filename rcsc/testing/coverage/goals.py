@@ -110,6 +110,9 @@ class Reached:
     def _run(self, case: Case, right: Expected) -> Iterator[Hit]:
         entry, after = case.entry, right.after
         assert after is not None
+        if case.mode:
+            yield ("mode", case.mode)
+            return
         yield ("fault", entry, right.result, right.fault_at if right.result != Fault.ADMIT else "")
         if right.result == Fault.ADMIT:
             variable = self.program.variable(right.fault_at)

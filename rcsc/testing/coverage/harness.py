@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Procedure, Program, Real, Scalar, Snapshot, Value
-from rcsc.testing.coverage.case import Entry, Expected, entries
+from rcsc.testing.coverage.case import MODES, Entry, Expected, entries
 from rcsc.testing.coverage.choose import Kept
 from rcsc.testing.executors.externs import externs
 from rcsc.testing.executors.reference_file import monitored
@@ -42,6 +42,7 @@ typedef struct {{
     uint16_t sets; /* changes of the initial state, from `first` on */
     uint16_t changed; /* changes of the state by the function, after those */
     uint16_t answers; /* words that the extern functions give, after those */
+    uint16_t mode; /* how the machine rounds: 0 as it should, else a way of `rounding` */
     uint32_t first;
     int32_t result;
     int32_t line;
@@ -54,7 +55,24 @@ int32_t vectors_play(uint32_t number);
 """
 
 PLAY = """
-/* Plays one vector: 0 where all is as it must be; 1 a wrong result, 2 a wrong trace, else 3 and the position of a wrong leaf. */
+/* Lets the machine round to nearest (0), upward, downward, toward zero, or subnormals to zero; false where it cannot be told to. */
+static bool rounding(uint16_t mode)
+{{
+#if defined(__SSE2_MATH__)
+    static const uint32_t modes[5] = {{0x1f80u, 0x5f80u, 0x3f80u, 0x7f80u, 0x9fc0u}};
+    __builtin_ia32_ldmxcsr(modes[mode]);
+    return true;
+#elif defined(__aarch64__)
+    static const uint64_t modes[5] = {{0u, 0x400000u, 0x800000u, 0xc00000u, 0x1000000u}};
+    __asm__ volatile("msr fpcr, %0" : : "r"(modes[mode]));
+    return true;
+#else
+    return mode == 0u;
+#endif
+}}
+
+/* Plays one vector: 0 where all is as it must be, or this machine cannot be made to round as the vector wants; 1 a wrong result,
+   2 a wrong trace, else 3 and the position of a wrong leaf. */
 int32_t vectors_play(uint32_t number)
 {{
     static {struct} s, right;
@@ -72,7 +90,11 @@ int32_t vectors_play(uint32_t number)
         put(&right, change[at].leaf, change[at].word);
     }}
     answer = &change[v->changed];
+    if (!rounding(v->mode)) {{
+        return 0;
+    }}
     result = call(&s, v->function);
+    (void)rounding(0u);
     if (result != v->result) {{
         return 1;
     }}
@@ -273,12 +295,11 @@ def _data(program: Program, kept: Sequence[Kept]) -> tuple[list[str], list[str]]
             for kind, value in zip(kinds[answer.procedure], answer.values, strict=True)
         ]
         changes += [*sets, *after, *answers]
+        mode = ("", *MODES).index(each.case.mode)
         words = max(1, -(-len(numbers.assumptions) // WORD_BITS))
         bits = sum(1 << numbers.assumptions.index(name) for name in right.failed)
         failed = ", ".join(_hex(bits >> WORD_BITS * at & (2**WORD_BITS - 1)) for at in range(words))
-        counts = (
-            f"{numbers.entries[each.case.entry]}u, {len(sets)}u, {len(after)}u, {len(answers)}u, {first}u"
-        )
+        counts = f"{numbers.entries[each.case.entry]}u, {len(sets)}u, {len(after)}u, {len(answers)}u, {mode}u, {first}u"
         rows.append(
             f"    {{{counts}, {right.result}, {right.line}, {numbers.fault_at(right)}, {{{failed}}}}}, "
             f"/* {each.case.entry.kind} {each.case.entry.name}: {_plain(each.case.origin)} */"
