@@ -10,7 +10,7 @@ assumptions contradict each other is reported as unknown (`--check-vacuity`), ne
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -18,9 +18,9 @@ from time import perf_counter
 
 from rcsc.host.children import Ran, scratch
 from rcsc.host.tools import Absent, esbmc, run_command, write_c
-from rcsc.lang.model import Program, Real
+from rcsc.lang.model import Program, Read, Real, TableByCommand, Value, VariableName, spell
 from rcsc.testing.executors.externs import STAND_INS, externs
-from rcsc.testing.executors.reference_file import monitored, reference_c
+from rcsc.testing.executors.reference_file import all_lines, monitored, reference_c
 from rcsc.testing.executors.symbols import Symbols
 from rcsc.testing.executors.targets import ComparedFunction, call_of, is_matcher, reference_of
 from rcsc.testing.matchers.matcher_text import ShapeError, function_body
@@ -42,6 +42,7 @@ RECORD = "the calls of an extern fit their record"
 COUNT = re.compile(r"\*\* (\d+) of (\d+) properties failed, (\d+) passed")
 AGAIN = "rcsc_again = 1;"
 
+KNOWN = "__ESBMC_assume(ref_ranges(&a, 0)); __ESBMC_assume(ref_invariants(&a));"
 SAME = """static int ref_same(double a, double b) {
   return (a == b && ref_sign(a) == ref_sign(b)) || (a != a && b != b);
 }"""
@@ -55,6 +56,9 @@ class EsbmcAnswer(StrEnum):
     TOO_LARGE = "too large for ESBMC"  # out of time or memory
     ABSENT = "not installed"
     FAILED = "failed"  # ESBMC itself: not understood, crashed, vacuous
+
+
+WORST = (EsbmcAnswer.REFUTED, EsbmcAnswer.ABSENT, EsbmcAnswer.FAILED, EsbmcAnswer.TOO_LARGE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +150,10 @@ def _trace_claims(program: Program, symbols: Symbols) -> Iterator[str]:
         yield f'__ESBMC_assert({failed}, "assumption {number}");'
 
 
-def harness(program: Program, symbols: Symbols, target: ComparedFunction) -> str:
-    """The C text that states what is to be proved of one function."""
+def harness(
+    program: Program, symbols: Symbols, target: ComparedFunction, confined: Sequence[str] = ()
+) -> str:
+    """The C text that states what is to be proved of one function, where `confined` says more of its inputs."""
     struct, name = symbols.struct, reference_of(target)
     top = [f'#include "{symbols.header}"', reference_c(program, symbols), SAME, *_arbitrary(program, symbols)]
     top += ["int main(void) {", f"{struct} a; arbitrary(&a);"]
@@ -158,46 +164,92 @@ def harness(program: Program, symbols: Symbols, target: ComparedFunction) -> str
     elif target.kind == "init":
         body = [f"{struct} b = a; (void){name}(&b);", *call, *_claims(program, symbols)]
     else:
-        body = ["__ESBMC_assume(ref_ranges(&a, 0)); __ESBMC_assume(ref_invariants(&a));"]
+        body = [KNOWN, *confined]
         body += [f"{struct} b = a; const ref_trace_t r = {name}(&b);"]
         body += [AGAIN, *call, "rcsc_calls();", *_claims(program, symbols), *_trace_claims(program, symbols)]
     return "\n".join([*top, *body, "return 0; }"]) + "\n"
 
 
-STEP = re.compile(
-    r"\s*(?P<admit>\w+)\(s\);\s*if \(s->fault == 0\) \{"
-    r"\s*(?P<settle>\w+)\(s\);\s*(?P<run>\w+)\(s\);\s*\}\s*return s->fault;\s*"
+STEPS = (
+    re.compile(
+        r"\s*(?P<admit>\w+)\(s\);\s*return \(s->fault == \w+_FAULT_NONE\) \? (?P<run>\w+)\(s\) : s->fault;\s*"
+    ),
+    re.compile(
+        r"\s*(?P<admit>\w+)\(s\);\s*if \(s->fault == \w+_FAULT_NONE\) \{\s*(?:\(void\))?(?P<run>\w+)\(s\);\s*\}"
+        r"\s*if \(s->fault != \w+_FAULT_NONE\) \{\s*(?P<safe>\w+)\(s\);\s*\}\s*return s->fault;\s*"
+    ),
 )
-KNOWN = "__ESBMC_assume(ref_ranges(&a, 0)); __ESBMC_assume(ref_invariants(&a));"
+"""The two forms of a step: without outputs that have safe values, and with."""
 
 
 def part_harness(
-    program: Program, symbols: Symbols, target: ComparedFunction, part: str, function: str
+    program: Program,
+    symbols: Symbols,
+    target: ComparedFunction,
+    part: str,
+    function: str,
+    line: int | None = None,
 ) -> str:
-    """The C text that states what is to be proved of a part of a step: `admit`, `settle` or `run`.
+    """The C text that states what is to be proved of a part of a step: `admit`, `run` or `safe`.
 
-    `run` begins from what the reference's own admission and deferral leave, so that both sides compute on the
-    same terms; with the other two proved equal to the reference's, the whole step is.
+    `run` begins from what the reference's own admission and deferral leave, so that both sides compute on the same
+    terms; with the others proved equal to the reference's, the whole step is. Where `line` is given, only inputs of the
+    line in that position are looked at; of the position after the last, that there is none.
     """
     struct = symbols.struct
     top = [f'#include "{symbols.source}"', reference_c(program, symbols), SAME, *_arbitrary(program, symbols)]
     top += ["int main(void) {", f"{struct} a; arbitrary(&a); {KNOWN}"]
     same = list(_claims(program, symbols))
     if part == "admit":
-        body = [f"{struct} b = a; const int32_t refused = ref_admit(&b); {function}(&a);", *same]
+        body = [f"{struct} b = a; const int32_t refused = ref_admit(&b);"]
+        body += ["if (refused == REF_NONE) { ref_deferred(&b); }", f"{function}(&a);", *same]
         body += ['__ESBMC_assert(a.fault == ((refused == REF_NONE) ? 0 : 1), "fault code");']
         body += ['__ESBMC_assert(a.fault_at == refused, "reading refused");']
+    elif part == "safe":
+        body = [f"{struct} b = a; ref_safe(&b); {function}(&a);", *same]
     else:
-        body = [f"__ESBMC_assume(ref_admit(&a) == REF_NONE); {symbols.trace.clear('a')}"]
-        if part == "settle":
-            body += [f"{struct} b = a; ref_deferred(&b); {function}(&a);", *same]
-        else:
-            body += [f"ref_deferred(&a); {struct} b = a; ref_trace_t r = {{0}};"]
-            body += ["r.line = -1; r.fault_at = -1;"]
-            body += [f"ref_t{target.number}_body(&b, &r);"]
-            body += [AGAIN, f"{function}(&a); rcsc_calls(); const int32_t result = a.fault;", *same]
-            body += list(_trace_claims(program, symbols))
+        body = [f"__ESBMC_assume(ref_admit(&a) == REF_NONE); {symbols.trace.clear('a')} ref_deferred(&a);"]
+        table = program.tables[target.number]
+        if line == len(all_lines(table)):
+            body += [f"__ESBMC_assume(ref_t{target.number}_safe(&a));"]
+            body += [f"const int32_t at = ref_t{target.number}_line(&a);"]
+            body += [f'__ESBMC_assert(at >= 0 && at < {line}, "exactly one line");']
+            return "\n".join([*top, *body, "return 0; }"]) + "\n"
+        if line is not None:
+            defined = f"ref_t{target.number}_safe(&a)"
+            body += [f"__ESBMC_assume({defined} && ref_t{target.number}_line(&a) == {line});"]
+        body += [f"{struct} b = a; ref_trace_t r = {{0}}; r.line = -1; r.fault_at = -1;"]
+        body += [f"ref_t{target.number}_body(&b, &r);"]
+        body += [AGAIN, f"{function}(&a); rcsc_calls(); const int32_t result = a.fault;", *same]
+        body += list(_trace_claims(program, symbols))
     return "\n".join([*top, *body, "return 0; }"]) + "\n"
+
+
+def case_harness(program: Program, symbols: Symbols, target: ComparedFunction, value: Value | None) -> str:
+    """The C text of a whole cycle where inputs are refused (`None`), or admitted and a value selects the table.
+
+    The first also states that there is no other case.
+    """
+    struct = symbols.struct
+    selector, values = _selected(program, target)
+    place = f"c.{symbols.path(selector)}" if selector else "0"
+    among = " || ".join(f"{place} == {int(one)}" for one in values) or "1"
+    body = [f"{struct} c = a; const int32_t refused = ref_admit(&c);"]
+    if value is None:
+        body += [f'__ESBMC_assert(refused != REF_NONE || {among}, "a table for every value");']
+        body += ["__ESBMC_assume(refused != REF_NONE);"]
+    else:
+        body += [f"__ESBMC_assume(refused == REF_NONE && {place} == {int(value)});"]
+    return harness(program, symbols, target, body)
+
+
+def _selected(program: Program, target: ComparedFunction) -> tuple[str, tuple[Value, ...]]:
+    """The leaf whose value selects the table of a cycle, and its values; without one, a single case."""
+    choice = program.levels[target.number].tables
+    match choice:
+        case TableByCommand(selector=Read(name=name), tables=tables):
+            return str(name), tuple(value for value, _ in tables)
+    return "", (0,)
 
 
 def too_large(program: Program, target: ComparedFunction) -> bool:
@@ -223,23 +275,23 @@ def prove_function(
         target: The function.
         timeout_s: Time limit for each question, in seconds.
     """
-    if target.kind == "step":
-        parts = step_parts(symbols, files, target)
-        if parts is not None:
-            return _prove_parts(program, symbols, files, target, parts, timeout_s)
+    parts = step_parts(symbols, files, target) if target.kind == "step" else None
+    if parts is not None:
+        return _prove_parts(program, symbols, files, target, parts, timeout_s)
+    if target.kind == "cycle":
+        return _prove_cases(program, symbols, files, target, timeout_s)
     text = harness(program, symbols, target)
     return ask(files, target.function, text, timeout_s, with_sources=True)
 
 
 def step_parts(symbols: Symbols, files: Mapping[str, str], target: ComparedFunction) -> dict[str, str] | None:
-    """The three functions that a step runs in turn, read from its text; None if it does anything else."""
+    """The functions that a step runs in turn, read from its text; None if it does anything else."""
     source = next(text for path, text in files.items() if Path(path).name == symbols.source)
     try:
         body = function_body(source, f"int32_t {target.function}({symbols.struct} *s)")
     except ShapeError:
         return None
-    match = STEP.fullmatch(body)
-    return None if match is None else match.groupdict()
+    return next((match.groupdict() for form in STEPS if (match := form.fullmatch(body))), None)
 
 
 def _prove_parts(
@@ -250,15 +302,58 @@ def _prove_parts(
     parts: Mapping[str, str],
     timeout_s: float,
 ) -> EsbmcVerdict:
-    properties, seconds = 0, 0.0
+    """A step, part by part; what its line does, line by line where it is too large at once."""
+    asked: list[tuple[str, EsbmcVerdict]] = []
     for part, function in parts.items():
         text = part_harness(program, symbols, target, part, function)
         verdict = ask(files, target.function, text, timeout_s, with_sources=False)
-        properties, seconds = properties + verdict.properties, seconds + verdict.seconds
-        if verdict.answer is not EsbmcAnswer.PROVED:
-            detail = f"{function}: {verdict.detail}"
-            return EsbmcVerdict(target.function, verdict.answer, properties, seconds, detail)
-    return EsbmcVerdict(target.function, EsbmcAnswer.PROVED, properties, seconds)
+        lines = all_lines(program.tables[target.number])
+        if part != "run" or verdict.answer is not EsbmcAnswer.TOO_LARGE or len(lines) > MOST_LINES:
+            asked.append((function, verdict))
+            continue
+        for at, name in enumerate((*(f"line {name}" for name, _ in lines), "exactly one line")):
+            text = part_harness(program, symbols, target, part, function, at)
+            asked.append((name, ask(files, target.function, text, timeout_s, with_sources=False)))
+    return _together(target, asked)
+
+
+def _prove_cases(
+    program: Program, symbols: Symbols, files: Mapping[str, str], target: ComparedFunction, timeout_s: float
+) -> EsbmcVerdict:
+    """A cycle: where inputs are refused, and for each value that selects a table."""
+    selector, values = _selected(program, target)
+    kind = program.variable(VariableName(selector)).type if selector else None
+    named = [(f"{selector} = {spell(kind, value)}" if kind else "admitted inputs", value) for value in values]
+    cases: list[tuple[str, Value | None]] = [("refused inputs", None), *named]
+    return _together(
+        target,
+        [
+            (
+                name,
+                ask(
+                    files,
+                    target.function,
+                    case_harness(program, symbols, target, value),
+                    timeout_s,
+                    with_sources=True,
+                ),
+            )
+            for name, value in cases
+        ],
+    )
+
+
+def _together(target: ComparedFunction, asked: Sequence[tuple[str, EsbmcVerdict]]) -> EsbmcVerdict:
+    """One verdict of several; what is not proved is named, a refutation before what has no answer."""
+    lacking = [(name, verdict) for name, verdict in asked if verdict.answer is not EsbmcAnswer.PROVED]
+    answer = min((verdict.answer for _, verdict in lacking), key=WORST.index, default=EsbmcAnswer.PROVED)
+    detail = "; ".join(
+        f"{name}: {verdict.detail or verdict.answer}" for name, verdict in lacking if verdict.answer is answer
+    )
+    if lacking:
+        detail = f"{len(asked) - len(lacking)} of {len(asked)} parts proved; not: {detail}"
+    properties, seconds = sum(v.properties for _, v in asked), sum(v.seconds for _, v in asked)
+    return EsbmcVerdict(target.function, answer, properties, seconds, detail[:2000])
 
 
 def ask(
