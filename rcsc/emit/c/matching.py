@@ -37,7 +37,7 @@ from rcsc.emit.identifiers import comment
 from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, PlanTable, Truth, joined
 from rcsc.emit.translate import STATE
 from rcsc.lang import model
-from rcsc.lang.model import Bool, key_bounds, spell, value_of_key
+from rcsc.lang.model import I64_MIN, Bool, key_bounds, spell, value_of_key
 
 MOST_TOLD = 32
 """Masks in a table up to which each stands in a line of its own, with its class."""
@@ -112,8 +112,11 @@ def _above(c: CProgram, kind: model.Scalar, place: Place, low: int) -> Code:
     """How far a value is above the least that has a class."""
     if low == 0:
         return place
-    word, sign = word_type(*key_bounds(kind)), "+" if low < 0 else "-"
-    return c.text.converted(Round(infix(sign, Cast(word, place), Constant(abs(low), word))), word, "uint32_t")
+    word, sign = word_type(*key_bounds(kind)), "+" if I64_MIN < low < 0 else "-"
+    by = Constant(
+        abs(low) if low > I64_MIN else low, word
+    )  # the opposite of the least has no type with a sign
+    return c.text.converted(Round(infix(sign, Cast(word, place), by)), word, "uint32_t")
 
 
 def _classify(c: CProgram, name: str, doc: str, value: Code, kind: str, body: Body) -> Code:
