@@ -24,6 +24,7 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -59,9 +60,26 @@ Meaning = Callable[[State, Locals], Any]
 Doing = Callable[[State, Locals], None]
 
 
+REALS, IN_C = ("real", "single"), ("double", "float")
+
+
+def to_single(value: int | float) -> float:
+    """The nearest number of 24 binary digits, ties to even: a double by the machine, a whole number by its digits."""
+    if isinstance(value, float):
+        return ctypes.c_float(value).value
+    size = max(abs(value).bit_length() - 24, 0)
+    digits, rest = divmod(abs(value), 2**size)
+    digits += 2 * rest > 2**size or (2 * rest == 2**size and digits % 2 == 1)
+    return math.copysign(float(digits * 2**size), value)
+
+
+ROUNDED: dict[str, Callable[[float], float]] = {"real": float, "single": to_single}
+"""What becomes of the exact result, or the double nearest to it, of an operation of this sort."""
+
+
 @dataclass(frozen=True)
 class Kind:
-    """A scalar type: `bool`, `enum`, `int` or `real`, its text, its bounds (of an enumeration: of the index)."""
+    """A scalar type: `bool`, `enum`, `int`, `real` or `single`, its text, its bounds (of an enumeration: of the index)."""
 
     sort: str
     text: str
@@ -75,7 +93,9 @@ class Kind:
             return "true" if value else "false"
         if self.sort == "enum":
             return f"{self.text}.{self.members[int(value)]}"
-        text = repr(float(value)) if self.sort == "real" else str(int(value))
+        text = repr(float(value)) if self.sort in REALS else str(int(value))
+        if self.sort == "single":  # what is computed of numbers written is a double until it meets a single
+            return f"single({text})"
         return f"({text})" if text.startswith("-") else text
 
 
@@ -252,7 +272,7 @@ class Maker:
     def kind(self) -> Kind:
         """A scalar type that leans on ends."""
         rng = self.rng
-        sort = rng.choice(("bool", "enum", "int", "int", "int", "real", "real"))
+        sort = rng.choice(("bool", "enum", "int", "int", "int", "real", "real", "single"))
         if sort == "bool":
             return BOOL
         if sort == "enum":
@@ -273,17 +293,24 @@ class Maker:
             (-1e-320, 1e-320),
         )
         a, b = rng.choice(reals)
-        return Kind("real", f"real {a!r} .. {b!r}", a, b)
+        if sort == "single":
+            a, b = (
+                to_single(math.copysign(min(abs(x), 1e38), x) if abs(x) > 1e-300 else x * 1e276)
+                for x in (a, b)
+            )
+        return Kind(sort, f"{sort} {a!r} .. {b!r}", a, b)
 
     def value(self, kind: Kind) -> Value:
         """A value of a type, an end of it more often than not."""
         rng = self.rng
         if kind.sort == "bool":
             return rng.random() < 0.5
-        if kind.sort == "real":
-            inside = [x for x in (0.0, 1.0, -1.0, 0.1, 0.3, 5e-324, 1e300) if kind.low <= x <= kind.high]
+        if kind.sort in REALS:
+            known = (0.0, 1.0, -1.0, 0.1, 0.3, 5e-324, 1e300, 1e-44, 1e30)
+            inside = [x for x in map(ROUNDED[kind.sort], known) if kind.low <= x <= kind.high]
             middle = kind.low / 2 + kind.high / 2
-            return float(rng.choice((kind.low, kind.high, middle, rng.uniform(middle / 2, middle), *inside)))
+            value = rng.choice((kind.low, kind.high, middle, rng.uniform(middle / 2, middle), *inside))
+            return ROUNDED[kind.sort](float(value))
         low, high = int(kind.low), int(kind.high)
         return rng.choice((low, high, min(low + 1, high), max(high - 1, low), rng.randint(low, high)))
 
@@ -381,7 +408,7 @@ class Maker:
             return self.truth(depth)
         if kind.sort == "enum":
             return self.read(kind)
-        return self.pulled(kind, self.integer(depth) if kind.sort == "int" else self.real(depth))
+        return self.pulled(kind, self.integer(depth) if kind.sort == "int" else self.real(depth, kind.sort))
 
     def pulled(self, kind: Kind, one: Expr) -> Expr:
         """A number pulled into the range of a type; a value that is no number becomes an end."""
@@ -404,7 +431,7 @@ class Maker:
         if way == 2:
             return self.bits()
         if way == 0:
-            one = self.real(depth - 1)
+            one = self.real(depth - 1, rng.choice(REALS))
             return Expr(one.kind, f"int(min(900.0, max(-900.0, {one.text})))",
                         lambda s, v: math.trunc(least(900.0, most(-900.0, one.of(s, v)))), -900, 900)  # fmt: skip
         a, b = self.integer(depth - 1), self.integer(depth - 1)
@@ -491,20 +518,23 @@ class Maker:
             return None
         return Expr(a.kind, text, of, low, high)
 
-    def real(self, depth: int) -> Expr:
-        """A real expression; it may become infinite, or no number."""
-        rng = self.rng
-        wanted = Kind("real", "", -1e3, 1e3)
+    def real(self, depth: int, sort: str = "real") -> Expr:
+        """A real expression, or one of singles; it may become infinite, or no number."""
+        rng, rounded = self.rng, ROUNDED[sort]
+        wanted = Kind(sort, "", -1e3, 1e3)
         if depth <= 0 or rng.randrange(4) == 0:
             return self.read(wanted)
-        op = rng.choice(("+", "-", "*", "*", "/", "min", "max", "abs", "neg", "real"))
-        if op == "real":
-            n = self.integer(depth - 1)
-            return Expr(wanted, f"real({n.text})", lambda s, v: float(n.of(s, v)))
-        a, b = self.real(depth - 1), self.real(depth - 1)
+        op = rng.choice(("+", "-", "*", "*", "/", "min", "max", "abs", "neg", "converted"))
+        if op == "converted":
+            other = REALS[1 - REALS.index(sort)]
+            n = self.integer(depth - 1) if rng.randrange(3) else self.real(depth - 1, other)
+            return Expr(wanted, f"{sort}({n.text})", lambda s, v: rounded(n.of(s, v)))
+        a, b = self.real(depth - 1, sort), self.real(depth - 1, sort)
         if op == "/":
-            c = rng.choice((3.0, -0.1, 1e-300, 1e300))
-            return Expr(wanted, f"({a.text} / {wanted.literal(c)})", lambda s, v: a.of(s, v) / c)
+            c = rounded(
+                rng.choice((3.0, -0.1, 1e-300, 1e300) if sort == "real" else (3.0, -0.1, 1e-30, 1e30))
+            )
+            return Expr(wanted, f"({a.text} / ({c!r}))", lambda s, v: rounded(a.of(s, v) / c))
         if op in ("min", "max"):
             choose = least if op == "min" else most
             return Expr(wanted, f"{op}({a.text}, {b.text})", lambda s, v: choose(a.of(s, v), b.of(s, v)))
@@ -512,7 +542,7 @@ class Maker:
             return Expr(wanted, f"abs({a.text})" if op == "abs" else f"(-{a.text})",
                         lambda s, v: math.fabs(a.of(s, v)) if op == "abs" else -a.of(s, v))  # fmt: skip
         work = COMPUTE[op]
-        return Expr(wanted, f"({a.text} {op} {b.text})", lambda s, v: work(a.of(s, v), b.of(s, v)))
+        return Expr(wanted, f"({a.text} {op} {b.text})", lambda s, v: rounded(work(a.of(s, v), b.of(s, v))))
 
     def truth(self, depth: int) -> Expr:
         """A condition."""
@@ -535,7 +565,7 @@ class Maker:
     def compared(self, depth: int) -> Expr:
         """A comparison, a set or a range."""
         rng = self.rng
-        sort = rng.choice(("int", "int", "real", "enum", "bool"))
+        sort = rng.choice(("int", "int", "real", "single", "enum", "bool"))
         if sort == "enum":
             kind = rng.choice(self.enums)
             one = self.read(kind)
@@ -543,8 +573,10 @@ class Maker:
             text = f"({one.text} in {{{', '.join(kind.literal(x) for x in values)}}})"
             return Expr(BOOL, text, lambda s, v: one.of(s, v) in values)
         word = rng.choice(tuple(COMPARE) if sort != "bool" else ("=", "/="))
-        make = {"int": self.integer, "real": self.real, "bool": self.truth}[sort]
-        a, b = make(depth), make(depth)
+        make: dict[str, Callable[[int], Expr]] = {
+            "int": self.integer, "real": self.real, "single": partial(self.real, sort="single"), "bool": self.truth,
+        }  # fmt: skip
+        a, b = make[sort](depth), make[sort](depth)
         if sort == "int" and not fits((a.low, a.high), (b.low, b.high)):
             return self.read(BOOL)
         if sort == "int" and rng.randrange(4) == 0:
@@ -1011,16 +1043,16 @@ def driver_c(one: Built) -> Iterator[str]:
     yield f"static {p}_t {p}_state; void {p}_reset(void) {{ {p}_init(&{p}_state); }}"
     yield f"void {p}_go(const int64_t *in, int64_t *out) {{ {p}_t *s = &{p}_state; double x;"
     for at, leaf in enumerate(inputs):
-        real = leaf["c_type"] == "double"
+        real = leaf["c_type"] in IN_C
         yield (
-            f"memcpy(&x, &in[{at}], 8); s->{leaf['path']} = x;"
+            f"memcpy(&x, &in[{at}], 8); s->{leaf['path']} = ({leaf['c_type']})x;"
             if real
             else f"s->{leaf['path']} = ({leaf['c_type']})in[{at}];"
         )
     yield f"out[0] = {one.symbols['levels'][0]['cycle']}(s); out[1] = s->fault_at; out[2] = s->line;"
     yield "out[3] = (int64_t)s->assumptions_failed;"
     for at, leaf in enumerate(one.symbols["leaves"], 4):
-        real = leaf["c_type"] == "double"
+        real = leaf["c_type"] in IN_C
         yield (
             f"x = s->{leaf['path']} ; memcpy(&out[{at}], &x, 8);"
             if real
@@ -1059,7 +1091,7 @@ class InC:
         self.go(*(ctypes.c_void_p(one.buffer_info()[0]) for one in (given, found)))
         state: State = {}
         for value, leaf in zip(found[4:], self.one.symbols["leaves"], strict=True):
-            state[leaf["name"]] = struct.unpack("<d", struct.pack("<q", value))[0] if leaf["c_type"] == "double" else (
+            state[leaf["name"]] = struct.unpack("<d", struct.pack("<q", value))[0] if leaf["c_type"] in IN_C else (
                 value & U64 if leaf["c_type"] == "uint64_t" else value)  # fmt: skip
         fault, at, line, failed = found[:4]
         return traced(self.one, fault, at, line, failed, state)
@@ -1083,22 +1115,16 @@ def readings(drawn: Drawn, held: Mapping[str, tuple[int, int]], rng: random.Rand
     for leaf in drawn.leaves("input"):
         value = maker.value(leaf.kind)
         if rng.randrange(12) == 0 and leaf.kind.sort != "bool":
-            if leaf.kind.sort == "real":
-                value = rng.choice(
-                    (
-                        math.nan,
-                        math.inf,
-                        -math.inf,
-                        -0.0,
-                        leaf.kind.high * 2,
-                        math.nextafter(leaf.kind.low, -math.inf),
-                    )
-                )
+            if leaf.kind.sort in REALS:
+                low, high = leaf.kind.low, leaf.kind.high
+                below = math.nextafter(low, -math.inf)
+                if leaf.kind.sort == "single":  # or one a little farther below
+                    below = to_single(low - abs(low) * 2.0**-23 - 2.0**-149)
+                value = rng.choice((math.nan, math.inf, -math.inf, -0.0, high * 2, below))
             else:
-                low, high = held[leaf.name]
-                value = rng.choice(
-                    (low, high, max(low, int(leaf.kind.low) - 1), min(high, int(leaf.kind.high) + 1))
-                )
+                least_held, most_held = held[leaf.name]
+                near = max(least_held, int(leaf.kind.low) - 1), min(most_held, int(leaf.kind.high) + 1)
+                value = rng.choice((least_held, most_held, *near))
         given[leaf.name] = value
     return given
 

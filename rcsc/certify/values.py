@@ -67,7 +67,8 @@ def nearest_single(value: Number) -> float:
     size = max(abs(value).bit_length() - 24, 0)
     digits, rest = divmod(abs(value), 1 << size)
     digits += 2 * rest + digits % 2 > 1 << size  # past the middle, or there and odd
-    return math.copysign(float(digits << size) if size < 105 and digits << size < 2**128 else math.inf, value)
+    magnitude = float(digits << size) if size < 105 and digits << size < 2**128 else math.inf
+    return magnitude if value >= 0 else -magnitude
 
 
 class Terms:

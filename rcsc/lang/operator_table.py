@@ -47,7 +47,7 @@ def single(number: float) -> float:
         odd = abs(number) >> dropped | bool(abs(number) & (1 << dropped) - 1)
         number = (odd if number > 0 else -odd) << dropped
     try:
-        nearest: float = _SINGLE.unpack(_SINGLE.pack(number))[0]
+        nearest: float = _SINGLE.unpack(_SINGLE.pack(float(number)))[0]
     except OverflowError:
         return math.inf if number > 0 else -math.inf
     return nearest
