@@ -159,7 +159,7 @@ static void emove_do_vision_failure(emove_t *s)
 /* emove/common.rcs procedure pause */
 static void emove_do_pause(emove_t *s)
 {
-    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
@@ -180,7 +180,7 @@ static void emove_do_approach_position_fingers(emove_t *s)
 {
     s->to_primitive.obj_ptr = s->task.obj_ptr;
     s->to_primitive.grasp = s->task.grasp;
-    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS;
+    s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS;
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
@@ -189,7 +189,7 @@ static void emove_do_departure_position_fingers(emove_t *s)
 {
     s->to_primitive.obj_ptr = s->task.obj_ptr;
     s->to_primitive.grasp = s->task.grasp;
-    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS;
+    s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS;
 }
 
 /* emove/common.rcs procedure open_fully: So that vision sees the whole scene (section 4.1). */
@@ -197,7 +197,7 @@ static void emove_do_open_fully(emove_t *s)
 {
     s->to_primitive.obj_ptr = VOCABULARY_OBJECT_OPEN_GRIP;
     s->to_primitive.grasp = 0u;
-    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS;
+    s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS;
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
@@ -206,7 +206,7 @@ static void emove_do_immed_grasp(emove_t *s)
 {
     s->to_primitive.obj_ptr = s->task.obj_ptr;
     s->to_primitive.grasp = s->task.grasp;
-    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP;
+    s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_IMMED_GRASP;
 }
 
 /* emove/common.rcs procedure flood_flash */
@@ -366,7 +366,7 @@ static void emove_do_take_orders(emove_t *s)
         s->vision.status = s->from_vision.status_report;
         s->vision.failure = s->from_vision.failure;
     }
-    s->primitive.resting = ((s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) &&
+    s->primitive.resting = ((s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_PAUSE) &&
             (s->primitive.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
     s->vision.resting = ((s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE) &&
             (s->vision.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
@@ -414,7 +414,7 @@ static void emove_do_give_orders(emove_t *s)
 static void emove_do_settle(emove_t *s)
 {
     s->settling = true;
-    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     s->to_vision.input_command = VOCABULARY_VISION_COMMAND_PAUSE;
 }
 
@@ -468,7 +468,7 @@ static void emove_admit(emove_t *s)
         /* Not tested, as no value of their types is refused: task.inc_command, task.locpt_ptr,
            task.apoint_pos_flag, from_primitive.inc_command_echo, from_primitive.holds,
            from_vision.inc_command_echo, path.known, target.known, object_data.known, held_data.known. */
-        if (s->task.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE) {
+        if (s->task.input_command > VCBLRY_EMOVE_CMND_RELEASE) {
             at = EMOVE_LEAF_TASK_INPUT_COMMAND;
         } else if (s->task.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
             at = EMOVE_LEAF_TASK_OBJ_PTR;
@@ -478,7 +478,7 @@ static void emove_admit(emove_t *s)
             at = EMOVE_LEAF_TASK_SECTOR;
         } else if (s->task.gripped_obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
             at = EMOVE_LEAF_TASK_GRIPPED_OBJ_PTR;
-        } else if (s->from_primitive.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
+        } else if (s->from_primitive.ref_command_echo > VCBLRY_PRIMITIVE_COMMAND_IMMED_GRASP) {
             at = EMOVE_LEAF_FROM_PRIMITIVE_REF_COMMAND_ECHO;
         } else if (s->from_primitive.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
             at = EMOVE_LEAF_FROM_PRIMITIVE_STATUS_REPORT;
@@ -574,14 +574,14 @@ static bool emove_holds_locate_in_step(const emove_t *s)
 {
     return s->new_command ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) &&
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_PAUSE) &&
                 (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE)) ||
             (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LOOKING) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS) &&
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS) &&
                 (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_FLOODING) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) &&
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_PAUSE) &&
                 (s->vision.command == VOCABULARY_VISION_COMMAND_FLOOD_FLASH)) ||
             (((s->cur_state == EMOVE_COMMON_EMOVE_STATE_CENTERING) ||
                 (s->cur_state == EMOVE_COMMON_EMOVE_STATE_HOVERING) ||
@@ -589,10 +589,10 @@ static bool emove_holds_locate_in_step(const emove_t *s)
                 (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTO) &&
                 (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LINING) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) &&
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_PAUSE) &&
                 (s->vision.command == VOCABULARY_VISION_COMMAND_LINE_FLASH)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_CLOSING) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS) &&
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS) &&
                 (s->vision.command == VOCABULARY_VISION_COMMAND_PAUSE));
 }
 
@@ -602,7 +602,7 @@ static bool emove_holds_move_to_in_step(const emove_t *s)
 {
     return s->new_command ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_PAUSE)) ||
             (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_THROUGH) &&
                 (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTHRU)) ||
@@ -616,14 +616,14 @@ static bool emove_holds_move_to_obj_in_step(const emove_t *s)
 {
     return s->new_command ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_PAUSE)) ||
             (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_THROUGH) &&
                 (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTHRU)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_LAST) &&
                 (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_GOTO)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_OPENING) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS));
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS));
 }
 
 /* emove/pickup.rcs assumption pickup_in_step: Found from what the lines order, and proved: a state goes
@@ -633,9 +633,9 @@ static bool emove_holds_pickup_in_step(const emove_t *s)
     return s->new_command ||
             (((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) ||
                 (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE)) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_PAUSE)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_GRASPING) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP));
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_IMMED_GRASP));
 }
 
 /* emove/release.rcs assumption release_part_in_step: Found from what the lines order, and proved: a state
@@ -645,9 +645,9 @@ static bool emove_holds_release_part_in_step(const emove_t *s)
     return s->new_command ||
             (((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) ||
                 (s->cur_state == EMOVE_COMMON_EMOVE_STATE_F_STATE)) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_PAUSE)) ||
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_PAUSE)) ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_RELEASING) &&
-                (s->primitive.command == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS));
+                (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS));
 }
 
 /* Matches table locate and runs the line; returns the fault, 0 for none. */
@@ -1150,7 +1150,7 @@ void emove_init(emove_t *s)
     s->fault_at = -1;
     s->assumptions_failed = 0;
     s->task.inc_command = 0u;
-    s->task.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->task.input_command = VCBLRY_EMOVE_CMND_PAUSE;
     s->task.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->task.grasp = 0u;
     s->task.locpt_ptr = 0u;
@@ -1158,7 +1158,7 @@ void emove_init(emove_t *s)
     s->task.apoint_pos_flag = false;
     s->task.gripped_obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->to_task.inc_command_echo = 0u;
-    s->to_task.ref_command_echo = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->to_task.ref_command_echo = VCBLRY_EMOVE_CMND_PAUSE;
     s->to_task.status_report = VOCABULARY_LEVEL_STATUS_DONE;
     s->to_task.failure = VOCABULARY_REASON_NONE;
     s->new_command = false;
@@ -1166,12 +1166,12 @@ void emove_init(emove_t *s)
     s->settling = false;
     s->inc_command_seen = 0u;
     s->from_primitive.inc_command_echo = 0u;
-    s->from_primitive.ref_command_echo = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->from_primitive.ref_command_echo = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     s->from_primitive.status_report = VOCABULARY_LEVEL_STATUS_DONE;
     s->from_primitive.failure = VOCABULARY_REASON_NONE;
     s->from_primitive.holds = false;
     s->to_primitive.inc_command = 0u;
-    s->to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     s->to_primitive.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->to_primitive.grasp = 0u;
     s->to_primitive.pose_ptr = 0u;
@@ -1180,11 +1180,11 @@ void emove_init(emove_t *s)
     s->to_primitive.displaced.z = (-500.0);
     s->to_primitive.displaced.c = (-1.0);
     s->to_primitive.displaced.s = (-1.0);
-    s->primitive.command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->primitive.command = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     s->primitive.status = VOCABULARY_LEVEL_STATUS_DONE;
     s->primitive.resting = false;
     s->primitive.failure = VOCABULARY_REASON_NONE;
-    s->last_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->last_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     s->last_primitive.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->last_primitive.grasp = 0u;
     s->last_primitive.pose_ptr = 0u;
@@ -1274,7 +1274,7 @@ int32_t emove_check(const emove_t *s)
         at = EMOVE_CHECK_FOREIGN;
     } else if ((*(const uint8_t *)&s->task.apoint_pos_flag) > 1u) {
         at = EMOVE_LEAF_TASK_APOINT_POS_FLAG;
-    } else if (s->to_task.ref_command_echo > VOCABULARY_EMOVE_COMMAND_RELEASE) {
+    } else if (s->to_task.ref_command_echo > VCBLRY_EMOVE_CMND_RELEASE) {
         at = EMOVE_LEAF_TO_TASK_REF_COMMAND_ECHO;
     } else if (s->to_task.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = EMOVE_LEAF_TO_TASK_STATUS_REPORT;
@@ -1288,7 +1288,7 @@ int32_t emove_check(const emove_t *s)
         at = EMOVE_LEAF_SETTLING;
     } else if ((*(const uint8_t *)&s->from_primitive.holds) > 1u) {
         at = EMOVE_LEAF_FROM_PRIMITIVE_HOLDS;
-    } else if (s->to_primitive.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
+    } else if (s->to_primitive.input_command > VCBLRY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = EMOVE_LEAF_TO_PRIMITIVE_INPUT_COMMAND;
     } else if (s->to_primitive.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = EMOVE_LEAF_TO_PRIMITIVE_OBJ_PTR;
@@ -1306,7 +1306,7 @@ int32_t emove_check(const emove_t *s)
         at = EMOVE_LEAF_TO_PRMTV_DISPLACED_C;
     } else if (!((s->to_primitive.displaced.s >= (-1.0)) && (s->to_primitive.displaced.s <= 1.0))) {
         at = EMOVE_LEAF_TO_PRMTV_DISPLACED_S;
-    } else if (s->primitive.command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
+    } else if (s->primitive.command > VCBLRY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = EMOVE_LEAF_PRIMITIVE_COMMAND;
     } else if (s->primitive.status > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = EMOVE_LEAF_PRIMITIVE_STATUS;
@@ -1314,7 +1314,7 @@ int32_t emove_check(const emove_t *s)
         at = EMOVE_LEAF_PRIMITIVE_RESTING;
     } else if (s->primitive.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = EMOVE_LEAF_PRIMITIVE_FAILURE;
-    } else if (s->last_primitive.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
+    } else if (s->last_primitive.input_command > VCBLRY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_INPUT_COMMAND;
     } else if (s->last_primitive.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = EMOVE_LEAF_LAST_PRIMITIVE_OBJ_PTR;
@@ -1976,17 +1976,17 @@ int32_t emove_emove_cycle(emove_t *s)
         emove_do_look_below(s);
         emove_do_measure(s);
         const uint8_t chosen = s->task.input_command;
-        if (chosen == VOCABULARY_EMOVE_COMMAND_PAUSE) {
+        if (chosen == VCBLRY_EMOVE_CMND_PAUSE) {
             (void)emove_run_pause_emove(s);
         } else if (chosen == VCBLRY_EMOVE_CMND_MOVE_TO) {
             (void)emove_run_move_to(s);
         } else if (chosen == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ) {
             (void)emove_run_move_to_obj(s);
-        } else if (chosen == VOCABULARY_EMOVE_COMMAND_LOCATE) {
+        } else if (chosen == VCBLRY_EMOVE_CMND_LOCATE) {
             (void)emove_run_locate(s);
-        } else if (chosen == VOCABULARY_EMOVE_COMMAND_PICKUP) {
+        } else if (chosen == VCBLRY_EMOVE_CMND_PICKUP) {
             (void)emove_run_pickup(s);
-        } else if (chosen == VOCABULARY_EMOVE_COMMAND_RELEASE) {
+        } else if (chosen == VCBLRY_EMOVE_CMND_RELEASE) {
             (void)emove_run_release_part(s);
         } else {
             s->fault = EMOVE_FAULT_NO_LINE; /* no table for it: proved impossible */

@@ -39,7 +39,7 @@ static int32_t nbs_robot_restart_task(nbs_robot_t *s)
     now.inc_command_seen = now.workstation.inc_command;
     now.to_workstation.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
     now.to_workstation.failure = VOCABULARY_REASON_RESTART;
-    now.to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    now.to_emove.input_command = VCBLRY_EMOVE_CMND_PAUSE;
     number = (uint64_t)now.from_emove.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.task_to_emove.inc_command;
@@ -114,7 +114,7 @@ static int32_t nbs_robot_restart_emove(nbs_robot_t *s)
     now.inc_command_seen = now.task.inc_command;
     now.to_task.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
     now.to_task.failure = VOCABULARY_REASON_RESTART;
-    now.to_primitive.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    now.to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     number = (uint64_t)now.from_primitive.inc_command_echo;
     if (s->tick != UINT64_C(0)) {
         number = (uint64_t)s->between.emove_to_primitive.inc_command;

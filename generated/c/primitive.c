@@ -419,7 +419,7 @@ static void primitive_admit(primitive_t *s)
         int32_t at = -1;
         /* Not tested, as no value of their types is refused: emove.inc_command,
            from_robot.inc_command_echo, from_gripper.inc_command_echo, goal.known, fingers.known. */
-        if (s->emove.input_command > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
+        if (s->emove.input_command > VCBLRY_PRIMITIVE_COMMAND_IMMED_GRASP) {
             at = PRIMITIVE_LEAF_EMOVE_INPUT_COMMAND;
         } else if (s->emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
             at = PRIMITIVE_LEAF_EMOVE_OBJ_PTR;
@@ -970,7 +970,7 @@ void primitive_init(primitive_t *s)
     s->fault_at = -1;
     s->assumptions_failed = 0;
     s->emove.inc_command = 0u;
-    s->emove.input_command = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->emove.input_command = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     s->emove.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->emove.grasp = 0u;
     s->emove.pose_ptr = 0u;
@@ -980,7 +980,7 @@ void primitive_init(primitive_t *s)
     s->emove.displaced.c = (-1.0);
     s->emove.displaced.s = (-1.0);
     s->to_emove.inc_command_echo = 0u;
-    s->to_emove.ref_command_echo = VOCABULARY_PRIMITIVE_COMMAND_PAUSE;
+    s->to_emove.ref_command_echo = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     s->to_emove.status_report = VOCABULARY_LEVEL_STATUS_DONE;
     s->to_emove.failure = VOCABULARY_REASON_NONE;
     s->to_emove.holds = false;
@@ -1100,7 +1100,7 @@ int32_t primitive_check(const primitive_t *s)
        to_robot.inc_command, to_gripper.inc_command. */
     if (s->digest != PRIMITIVE_DIGEST) {
         at = PRIMITIVE_CHECK_FOREIGN;
-    } else if (s->to_emove.ref_command_echo > VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
+    } else if (s->to_emove.ref_command_echo > VCBLRY_PRIMITIVE_COMMAND_IMMED_GRASP) {
         at = PRIMITIVE_LEAF_TO_EMOVE_REF_COMMAND_ECHO;
     } else if (s->to_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = PRIMITIVE_LEAF_TO_EMOVE_STATUS_REPORT;
@@ -1636,17 +1636,17 @@ int32_t primitive_primitive_cycle(primitive_t *s)
         primitive_do_start_waiting(s);
         primitive_do_measure(s);
         const uint8_t chosen = s->emove.input_command;
-        if (chosen == VOCABULARY_PRIMITIVE_COMMAND_PAUSE) {
+        if (chosen == VCBLRY_PRIMITIVE_COMMAND_PAUSE) {
             (void)primitive_run_pause_primitive(s);
         } else if (chosen == VCBLRY_PRIMITIVE_COMMAND_GOTO) {
             (void)primitive_run_goto_(s);
         } else if (chosen == VCBLRY_PRIMITIVE_COMMAND_GOTHRU) {
             (void)primitive_run_gothru(s);
-        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS) {
+        } else if (chosen == VCBLRY_PRIMITIVE_COMMAND_APPROACH_POSITION_FINGERS) {
             (void)primitive_run_aprc_pstn_fngrs(s);
-        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS) {
+        } else if (chosen == VCBLRY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS) {
             (void)primitive_run_dprt_pstn_fngrs(s);
-        } else if (chosen == VOCABULARY_PRIMITIVE_COMMAND_IMMED_GRASP) {
+        } else if (chosen == VCBLRY_PRIMITIVE_COMMAND_IMMED_GRASP) {
             (void)primitive_run_immed_grasp(s);
         } else {
             s->fault = PRIMITIVE_FAULT_NO_LINE; /* no table for it: proved impossible */

@@ -131,7 +131,7 @@ static void task_do_locate(task_t *s)
 {
     s->to_emove.obj_ptr = s->workstation.obj;
     s->to_emove.locpt_ptr = s->source_loc;
-    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_LOCATE;
+    s->to_emove.input_command = VCBLRY_EMOVE_CMND_LOCATE;
 }
 
 /* task/common.rcs procedure move_to */
@@ -162,7 +162,7 @@ static void task_do_buffer_empty(task_t *s)
 {
     s->to_workstation.failure = VOCABULARY_REASON_BUF;
     task_do_none_acquired(s);
-    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->to_emove.input_command = VCBLRY_EMOVE_CMND_PAUSE;
     s->cur_state_next = TASK_COMMON_TASK_STATE_F_STATE;
 }
 
@@ -170,7 +170,7 @@ static void task_do_buffer_empty(task_t *s)
    echoed, and by then PICKUP is the old workstation. */
 static void task_do_remove_from_buffer_db(task_t *s)
 {
-    if (s->source_buffer && (s->last_emove.input_command != VOCABULARY_EMOVE_COMMAND_PICKUP)) {
+    if (s->source_buffer && (s->last_emove.input_command != VCBLRY_EMOVE_CMND_PICKUP)) {
         {
             const uint8_t subject = s->workstation.obj;
             if (subject == VOCABULARY_OBJECT_TBOX) {
@@ -209,7 +209,7 @@ static void task_do_remove_from_buffer_db(task_t *s)
 static void task_do_pickup(task_t *s)
 {
     s->to_emove.obj_ptr = s->workstation.obj;
-    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PICKUP;
+    s->to_emove.input_command = VCBLRY_EMOVE_CMND_PICKUP;
     s->obj_acquired = true;
     s->obj_now_in_gripper = s->workstation.obj;
     s->grasp_now = s->workstation.grasp;
@@ -288,7 +288,7 @@ static void task_do_add_to_buffer_db(task_t *s, vocabulary_object_t v_what)
    still; once: the order that follows is no PICKUP. */
 static void task_do_back_to_buffer_db(task_t *s)
 {
-    if (s->source_buffer && (s->last_emove.input_command == VOCABULARY_EMOVE_COMMAND_PICKUP)) {
+    if (s->source_buffer && (s->last_emove.input_command == VCBLRY_EMOVE_CMND_PICKUP)) {
         task_do_add_to_buffer_db(s, s->workstation.obj);
     }
 }
@@ -333,7 +333,7 @@ static void task_do_release(task_t *s)
 {
     s->to_emove.obj_ptr = s->obj_now_in_gripper;
     s->to_emove.grasp = s->grasp_now;
-    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_RELEASE;
+    s->to_emove.input_command = VCBLRY_EMOVE_CMND_RELEASE;
 }
 
 /* task/common.rcs procedure released: The part lies where the robot is; on the buffer it is counted, once:
@@ -401,7 +401,7 @@ static void task_do_take_orders(task_t *s)
         s->emove.status = s->from_emove.status_report;
         s->emove.failure = s->from_emove.failure;
     }
-    s->emove.resting = ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+    s->emove.resting = ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
             (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE) && (s->answered || s->echoed));
 }
 
@@ -432,7 +432,7 @@ static void task_do_give_orders(task_t *s)
 static void task_do_settle(task_t *s)
 {
     s->settling = true;
-    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->to_emove.input_command = VCBLRY_EMOVE_CMND_PAUSE;
 }
 
 /* task/common.rcs procedure done */
@@ -456,7 +456,7 @@ static void task_do_failed(task_t *s)
 /* task/common.rcs procedure pause */
 static void task_do_pause(task_t *s)
 {
-    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->to_emove.input_command = VCBLRY_EMOVE_CMND_PAUSE;
 }
 
 /* Deferred variables take their next values, all at once. */
@@ -490,7 +490,7 @@ static void task_admit(task_t *s)
         at = TASK_LEAF_WORKSTATION_GRASP;
     } else if (s->workstation.sector > 99u) {
         at = TASK_LEAF_WORKSTATION_SECTOR;
-    } else if (s->from_emove.ref_command_echo > VOCABULARY_EMOVE_COMMAND_RELEASE) {
+    } else if (s->from_emove.ref_command_echo > VCBLRY_EMOVE_CMND_RELEASE) {
         at = TASK_LEAF_FROM_EMOVE_REF_COMMAND_ECHO;
     } else if (s->from_emove.status_report > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = TASK_LEAF_FROM_EMOVE_STATUS_REPORT;
@@ -514,22 +514,22 @@ static bool task_holds_acquire_in_step(const task_t *s)
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_PAUSE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_2) &&
                 (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_3) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_LOCATE)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_LOCATE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_4) &&
                 (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_5) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP));
+                (s->emove.command == VCBLRY_EMOVE_CMND_PICKUP));
 }
 
 /* task/acquire.rcs assumption acquire_resting: What rests says so. */
 static bool task_holds_acquire_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
-            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+            ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
@@ -540,19 +540,19 @@ static bool task_holds_clear_in_step(const task_t *s)
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_PAUSE)) ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_STATE_6) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_STATE_8)) &&
                 (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_7) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE));
+                (s->emove.command == VCBLRY_EMOVE_CMND_RELEASE));
 }
 
 /* task/clear.rcs assumption clear_resting: What rests says so. */
 static bool task_holds_clear_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
-            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+            ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
@@ -563,15 +563,15 @@ static bool task_holds_move_in_step(const task_t *s)
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_PAUSE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_2) &&
                 (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_3) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_LOCATE)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_LOCATE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_4) &&
                 (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_5) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_PICKUP)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_6) &&
                 ((s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO) ||
                     (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ)));
@@ -581,7 +581,7 @@ static bool task_holds_move_in_step(const task_t *s)
 static bool task_holds_move_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
-            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+            ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
@@ -592,9 +592,9 @@ static bool task_holds_release_part_in_step(const task_t *s)
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_PAUSE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_7) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_RELEASE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_8) &&
                 (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO));
 }
@@ -603,7 +603,7 @@ static bool task_holds_release_part_in_step(const task_t *s)
 static bool task_holds_release_part_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
-            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+            ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
@@ -614,26 +614,26 @@ static bool task_holds_transfer_in_step(const task_t *s)
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_F_STATE)) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_PAUSE)) ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_STATE_2) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_STATE_6) ||
                 (s->cur_state == TASK_COMMON_TASK_STATE_STATE_8)) &&
                 (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_3) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_LOCATE)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_LOCATE)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_4) &&
                 (s->emove.command == VCBLRY_EMOVE_CMND_MOVE_TO_OBJ)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_5) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_PICKUP)) ||
+                (s->emove.command == VCBLRY_EMOVE_CMND_PICKUP)) ||
             ((s->cur_state == TASK_COMMON_TASK_STATE_STATE_7) &&
-                (s->emove.command == VOCABULARY_EMOVE_COMMAND_RELEASE));
+                (s->emove.command == VCBLRY_EMOVE_CMND_RELEASE));
 }
 
 /* task/transfer.rcs assumption transfer_resting: What rests says so. */
 static bool task_holds_transfer_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
-            ((s->emove.command == VOCABULARY_EMOVE_COMMAND_PAUSE) &&
+            ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
 }
 
@@ -1391,22 +1391,22 @@ void task_init(task_t *s)
     s->settling = false;
     s->inc_command_seen = 0u;
     s->from_emove.inc_command_echo = 0u;
-    s->from_emove.ref_command_echo = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->from_emove.ref_command_echo = VCBLRY_EMOVE_CMND_PAUSE;
     s->from_emove.status_report = VOCABULARY_LEVEL_STATUS_DONE;
     s->from_emove.failure = VOCABULARY_REASON_NONE;
     s->to_emove.inc_command = 0u;
-    s->to_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->to_emove.input_command = VCBLRY_EMOVE_CMND_PAUSE;
     s->to_emove.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->to_emove.grasp = 0u;
     s->to_emove.locpt_ptr = 0u;
     s->to_emove.sector = 0u;
     s->to_emove.apoint_pos_flag = false;
     s->to_emove.gripped_obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
-    s->emove.command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->emove.command = VCBLRY_EMOVE_CMND_PAUSE;
     s->emove.status = VOCABULARY_LEVEL_STATUS_DONE;
     s->emove.resting = false;
     s->emove.failure = VOCABULARY_REASON_NONE;
-    s->last_emove.input_command = VOCABULARY_EMOVE_COMMAND_PAUSE;
+    s->last_emove.input_command = VCBLRY_EMOVE_CMND_PAUSE;
     s->last_emove.obj_ptr = VOCABULARY_OBJECT_NULL_OBJ;
     s->last_emove.grasp = 0u;
     s->last_emove.locpt_ptr = 0u;
@@ -1481,7 +1481,7 @@ int32_t task_check(const task_t *s)
         at = TASK_LEAF_ANSWERED;
     } else if ((*(const uint8_t *)&s->settling) > 1u) {
         at = TASK_LEAF_SETTLING;
-    } else if (s->to_emove.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE) {
+    } else if (s->to_emove.input_command > VCBLRY_EMOVE_CMND_RELEASE) {
         at = TASK_LEAF_TO_EMOVE_INPUT_COMMAND;
     } else if (s->to_emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = TASK_LEAF_TO_EMOVE_OBJ_PTR;
@@ -1493,7 +1493,7 @@ int32_t task_check(const task_t *s)
         at = TASK_LEAF_TO_EMOVE_APOINT_POS_FLAG;
     } else if (s->to_emove.gripped_obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = TASK_LEAF_TO_EMOVE_GRIPPED_OBJ_PTR;
-    } else if (s->emove.command > VOCABULARY_EMOVE_COMMAND_RELEASE) {
+    } else if (s->emove.command > VCBLRY_EMOVE_CMND_RELEASE) {
         at = TASK_LEAF_EMOVE_COMMAND;
     } else if (s->emove.status > VOCABULARY_LEVEL_STATUS_FAILED) {
         at = TASK_LEAF_EMOVE_STATUS;
@@ -1501,7 +1501,7 @@ int32_t task_check(const task_t *s)
         at = TASK_LEAF_EMOVE_RESTING;
     } else if (s->emove.failure > VOCABULARY_REASON_NO_PICTURE) {
         at = TASK_LEAF_EMOVE_FAILURE;
-    } else if (s->last_emove.input_command > VOCABULARY_EMOVE_COMMAND_RELEASE) {
+    } else if (s->last_emove.input_command > VCBLRY_EMOVE_CMND_RELEASE) {
         at = TASK_LEAF_LAST_EMOVE_INPUT_COMMAND;
     } else if (s->last_emove.obj_ptr > VOCABULARY_OBJECT_OPEN_GRIP) {
         at = TASK_LEAF_LAST_EMOVE_OBJ_PTR;

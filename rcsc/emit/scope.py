@@ -6,6 +6,8 @@ two names are alike so far. What is too long to differ there loses vowels, its l
 >>> scope = c_scope()
 >>> scope.distinct([f"PRIMITIVE_LINE_APPROACH_POSITION_FINGERS_{line}" for line in (1, 20)])
 ('PRMTV_LINE_APRCH_PSTN_FNGRS_1', 'PRMTV_LINE_APRCH_PSTN_FNGRS_20')
+>>> scope.distinct([f"VOCABULARY_PRIMITIVE_COMMAND_{name}" for name in ("PAUSE", "GOTO", "GOTHRU")])
+('VCBLRY_PRIMITIVE_COMMAND_PAUSE', 'VCBLRY_PRIMITIVE_COMMAND_GOTO', 'VCBLRY_PRIMITIVE_COMMAND_GOTHRU')
 >>> scope.distinct(["TASK_FAULT_NONE", "A_NAME_THAT_IS_LONG_AND_HAS_NO_OTHER_LIKE_IT"])
 ('TASK_FAULT_NONE', 'A_NAME_THAT_IS_LONG_AND_HAS_NO_OTHER_LIKE_IT')
 """
@@ -93,10 +95,19 @@ class NameScope:
         return free
 
     def distinct(self, names: Sequence[str]) -> tuple[str, ...]:
-        """A spelling for each name of a group; those that are alike in what is significant are made short alike."""
+        """A spelling for each name of a group, which is made short alike where some are alike in what is significant.
+
+        Where few are alike, or the words that all begin with would lose too much, only those that are alike are.
+        """
         groups: dict[str, set[str]] = {}
         for name in names:
             groups.setdefault(self.key(name), set()).add(name)
+        alike = {name for group in groups.values() if len(group) > 1 for name in group}
+        shared = _shared(names) if 4 * len(alike) > len(names) else ""
+        room = self._room(shared, alike)
+        if 4 * room > 3 * len(shared) > 0:
+            begin = abbreviated(shared, room)
+            return tuple(self.fresh(f"{begin}{name[len(shared) :]}") for name in names)
         return tuple(self.fresh(self._within(name, groups[self.key(name)])) for name in names)
 
     def all(self, wanted: Iterable[tuple[str, str]], claims: "Claims | None" = None) -> dict[str, str]:
@@ -135,10 +146,14 @@ class NameScope:
         if len(alike) == 1:
             return name
         shared = _shared(alike)
-        room = self.significant - 1 - max(len(other) - len(shared) - 1 for other in alike)
+        room = self._room(shared, alike)
         if not shared or room < LEAST_STEM:
             return abbreviated(name, self.significant)
         return f"{abbreviated(shared, room)}{name[len(shared) :]}"
+
+    def _room(self, shared: str, names: Iterable[str]) -> int:
+        """Characters to which words that names begin with are cut, so that all of the longest is significant."""
+        return self.significant - 1 - max(len(name) - len(shared) - 1 for name in names) if shared else 0
 
     def _variants(self, name: str) -> Iterator[str]:
         most = self.significant or len(name) + LONGEST
