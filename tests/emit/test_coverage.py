@@ -17,6 +17,7 @@ from rcsc.emit.plan import Plan
 from rcsc.host.tools import c_compiler
 from rcsc.lang.model import Program, ProvedProgram, Value, seal_of_proof
 from rcsc.solvers.options import Options
+from rcsc.testing.coverage import directed
 from rcsc.testing.coverage.case import MODES, Case, Entry, entries, expected
 from rcsc.testing.coverage.choose import Choice, chosen
 from rcsc.testing.coverage.document import (
@@ -30,7 +31,7 @@ from rcsc.testing.coverage.document import (
 from rcsc.testing.coverage.goals import Reached, decides
 from rcsc.testing.coverage.harness import vectors_c
 from rcsc.testing.coverage.marks import marked, ways_of
-from rcsc.testing.coverage.vector_set import vector_set
+from rcsc.testing.coverage.vector_set import vector_set, write_vectors
 from rcsc.testing.executors.symbols import symbols_of
 from rcsc.testing.inputs.snapshot import search_in
 from rcsc.testing.inputs.vectors import vectors_of
@@ -282,6 +283,33 @@ def test_the_command_writes_them(
     assert "vectors of the whole C" in capsys.readouterr().out
     assert "vectors_play" in Path("v.c").read_text(encoding="utf-8")
     assert Path("s.csv").read_text(encoding="utf-8").startswith("session,cycle,function,")
-    Path("b.rcs").write_text(SMALL, encoding="utf-8")
-    assert run([*quick, "b.rcs", "--vectors", "v.c"]) == 1
-    assert "a C file holds what is of one program" in capsys.readouterr().out
+
+
+def test_a_file_that_holds_one_program_is_refused_for_two(tmp_path: Path) -> None:
+    document = set_of(SMALL)
+    for name in ("v.c", "v.csv"):
+        [finding] = write_vectors([document, document], tmp_path / name, None)
+        assert "holds what is of one program" in finding.message
+        assert not (tmp_path / name).exists()
+    assert list(write_vectors([document, document], tmp_path / "v.json", None)) == []
+    assert len(json.loads((tmp_path / "v.json").read_text("utf-8"))) == 2
+    [finding] = write_vectors([document], None, tmp_path / "no" / "s.json")
+    assert "cannot be written" in finding.message
+
+
+def test_answers_of_extern_procedures_are_told_by_leaf() -> None:
+    document = set_of(EXTERN)
+    vectors = json.loads(as_json([vectors_document(document)]), parse_constant=pytest.fail)["vectors"]
+    answers = [answer for vector in vectors for answer in vector.get("answers", ())]
+    assert {tuple(answer["values"]) for answer in answers} == {("height", "kind", "pull")}
+    given = [answer["values"]["pull"] for answer in answers]
+    assert "nan" in given
+    assert any(isinstance(value, float) and value > 1.0 for value in given)
+
+
+def test_where_a_decision_can_go_too_many_ways_nothing_is_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(directed, "MOST_QUESTIONS", 0)
+    document = set_of(SMALL, 1)
+    left = [unreached for unreached in document.unreached if unreached.key[0] == "decision"]
+    assert left
+    assert {(unreached.shown, unreached.reason) for unreached in left} == {(False, directed.MANY)}

@@ -33,7 +33,16 @@ from rcsc.testing.agree import NONE, SEVERAL
 from rcsc.testing.coverage.case import Case, Entry, entries
 from rcsc.testing.coverage.choose import Choice
 from rcsc.testing.coverage.goals import Goal, Hit, decides, pairs
-from rcsc.testing.coverage.marks import Compares, Condition, Decision, End, Marked, Outcomes, ways_of
+from rcsc.testing.coverage.marks import (
+    MOST_WAYS,
+    Compares,
+    Condition,
+    Decision,
+    End,
+    Marked,
+    Outcomes,
+    ways_of,
+)
 from rcsc.testing.executors.reference_file import monitored
 from rcsc.testing.inputs.snapshot import Missing, conjunction
 
@@ -345,6 +354,10 @@ class Director:
                     return self._unreached(goal, shown=False, reason=answer)
                 if not answer:
                     break
+            else:
+                return None if reached() else self._unreached(goal, shown=False, reason=MANY)
+        if not reached() and len(self._ways(goal.decision)) >= MOST_WAYS:
+            return self._unreached(goal, shown=False, reason=MANY)
         return None if reached() else self._unreached(goal, shown=True, reason=SHOWN)
 
     def _unreached(self, goal: Goal, *, shown: bool, reason: str) -> Unreached:
@@ -393,6 +406,7 @@ class Director:
         return len(self._known(decision)) > before
 
 
+MANY = "the decision can go too many ways"
 PROVED = "proved by `rcsc check`: exactly one line matches"
 SHOWN = "shown impossible for every admitted input and every state that `check` accepts"
 

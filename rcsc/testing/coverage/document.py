@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from rcsc.host.files import csv_text
 from rcsc.lang.interpret import Fault, initial
@@ -106,11 +107,26 @@ def expected_of(program: Program, case: Case, right: Expected) -> dict[str, obje
     return {"result": right.result, **trace, **named, **after}
 
 
+def _answers(program: Program, case: Case) -> list[dict[str, Any]]:
+    """What extern procedures give, in the order of their calls."""
+    writes = {str(procedure.name): procedure.writes for procedure in program.procedures}
+    return [
+        {
+            "procedure": answer.procedure,
+            "values": {
+                str(name): plain(program, name, value)
+                for name, value in zip(writes[answer.procedure], answer.values, strict=True)
+            },
+        }
+        for answer in case.answers
+    ]
+
+
 def _case(document: VectorSet, case: Case, right: Expected) -> dict[str, object]:
     program = document.program
     values = _values(program, case.before)
     inputs = {str(v.name) for v in program.variables if v.kind is Kind.INPUT}
-    answers = [{"procedure": a.procedure, "values": list(a.values)} for a in case.answers]
+    answers = _answers(program, case)
     return {
         "function": function_of(document.symbols, case.entry),
         "kind": case.entry.kind,
@@ -176,7 +192,7 @@ def _session(document: VectorSet, session: Session) -> dict[str, object]:
     cycles = []
     state: Snapshot = session.cases[0].before if session.cases else {}
     for case, right in zip(session.cases, session.expected, strict=True):
-        answers = [{"procedure": a.procedure, "values": list(a.values)} for a in case.answers]
+        answers = _answers(program, case)
         cycles.append(
             {
                 "inputs": _changes(program, state, case.before),
@@ -226,7 +242,8 @@ def _csv(
     ]
     for number, case, right in rows:
         told = expected_of(program, case, right)
-        answers = " ".join(str(value) for answer in case.answers for value in answer.values)
+        given = [value for answer in _answers(program, case) for value in answer["values"].values()]
+        answers = " ".join(str(_word(value)) for value in given)
         lines.append(
             [
                 *number,
