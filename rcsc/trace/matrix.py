@@ -51,7 +51,7 @@ class TableProof:
 
 @dataclass(frozen=True, slots=True)
 class Tests:
-    """The vectors of a line, by their numbers in its table: `3` is the third that `rcsc test --vectors` writes of it.
+    """The vectors of a line, by their numbers in its table: `3` is the third that `rcsc test --vectors` writes under the table.
 
     Attributes:
         made: Made for the line or one of its conditions.

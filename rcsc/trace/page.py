@@ -41,7 +41,7 @@ tr:target { outline: 2px solid var(--mark); }
 """
 _ABOUT = (
     "From requirements and lines of tables to generated code, tests and proofs, and back. Places of code are lines of a file, first "
-    "and last; vectors are numbered as <code>rcsc test --vectors</code> writes them, table by table."
+    "and last. Vectors are those of each table's own conditions, numbered as <code>rcsc test --vectors</code> writes them under the table."
 )
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 

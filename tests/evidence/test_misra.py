@@ -52,6 +52,14 @@ def test_every_guideline_has_a_row_and_each_deviation_its_place() -> None:
     assert "\nmisra-c2012-17.3\n" not in evidence.files["suppressions.txt"]
 
 
+def test_a_table_of_more_than_32_lines_complies() -> None:
+    rows = "".join(f"  | l{at} | {at} || {at} |\n" for at in range(41))
+    text = f"input n : int 0 .. 40\noutput o : int 0 .. 40\ntable t {{\n  | line | n || o |\n{rows}}}\n"
+    subject = subject_of(text)
+    assert "uint64_t m" in subject.files["c/probe.c"]
+    assert collect(subject).shortfalls == ()
+
+
 def test_what_is_planted_is_a_violation_although_its_rule_may_deviate_elsewhere(
     files: dict[str, str],
 ) -> None:

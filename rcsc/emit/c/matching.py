@@ -133,7 +133,7 @@ def _lowest(c: CProgram, bits: int, mask: Code) -> Code:
 def _one_word(c: CProgram, matcher: Matcher, masks: list[Element]) -> Iterator[Stmt]:
     bits = max(_width(matcher.lines), 32)
     word, none = f"uint{bits}_t", infix("==", M, _word(0, bits))
-    every = Round(Name(f"{2**matcher.lines - 1:#x}{'ull' if bits == 64 else 'u'}"))
+    every = Round(Name(f"{2**matcher.lines - 1:#x}{'ULL' if bits == 64 else 'u'}"))
     yield Let(f"const {word}", "m", Infix("&", tuple(Cast(word, mask) for mask in masks)) if masks else every)
     several = infix("!=", infix("&", M, infix("-", M, _word(1, bits))), _word(0, bits))
     yield Let("const bool", "several", several)
@@ -180,7 +180,7 @@ def _bit(condition: Code) -> Code:
 
 def _word(value: int, bits: int, digits: int = 1) -> Name:
     """A mask, as wide as 32 bits or 64; `digits` of it are written at least."""
-    return Name(f"0x{value:0{digits}x}{'ull' if bits == 64 else 'u'}")
+    return Name(f"0x{value:0{digits}x}{'ULL' if bits == 64 else 'u'}")
 
 
 def _width(lines: int) -> int:
