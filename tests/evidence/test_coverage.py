@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.commands import run
 from rcsc.evidence import coverage, llvm
 from rcsc.evidence.kind import Subject
 from rcsc.host.tools import Absent
@@ -72,3 +73,18 @@ def test_tools_that_are_not_there_are_named(monkeypatch: pytest.MonkeyPatch) -> 
     assert isinstance(absent, Absent)
     assert coverage.collect(subject_of(EVERYTHING)).missing == absent.reason
     assert "apt install clang-19 llvm-19" in absent.reason
+
+
+def test_the_command_shows_it_of_shipped_levels(
+    repo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    paths = [str(repo / "tables" / name) for name in ("gripper", "examples/approach.rcs")]
+    assert run(["evidence", "--only", "coverage", "--out", str(tmp_path), *paths]) == 0
+    told = capsys.readouterr().out
+    assert "15 of 16 MC/DC conditions, 1 shown to be out of reach" in told
+    for name in ("gripper", "approach"):
+        folder = tmp_path / name / "coverage"
+        assert {path.name for path in folder.iterdir()} == {
+            "report.md", "coverage.txt", "vectors.c", "vectors.json", "missed.json",
+        }  # fmt: skip
+        assert "**not shown**" not in (folder / "report.md").read_text("utf-8")
