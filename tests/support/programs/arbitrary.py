@@ -89,7 +89,9 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
         st.builds(tree.InSet, inner, _members(inner), negated=st.booleans()),
         st.builds(tree.InRange, inner, inner, inner, negated=st.booleans()),
         st.builds(
-            tree.Apply, st.sampled_from(["abs", "int", "real"]).map(Name), inner.map(lambda one: (one,))
+            tree.Apply,
+            st.sampled_from(["abs", "int", "real", "single"]).map(Name),
+            inner.map(lambda one: (one,)),
         ),
         st.builds(tree.Apply, st.sampled_from(["min", "max"]).map(Name), two),
         st.builds(tree.Apply, st.just(Name("count")), st.lists(inner, min_size=1, max_size=3).map(tuple)),
@@ -133,6 +135,7 @@ def types() -> SearchStrategy[tree.TypeExpr]:
         st.builds(tree.IntType, BARE, BARE, st.none()),
         st.builds(tree.IntType, BARE, st.builds(tree.IntLiteral, st.just("5"), st.none()), UNITS),
         st.builds(tree.RealType, BARE, st.builds(tree.RealLiteral, st.just("5.0"), st.none()), UNITS),
+        st.builds(tree.SingleType, BARE, st.builds(tree.RealLiteral, st.just("5.0"), st.none()), UNITS),
     )
     return st.recursive(simple, lambda inner: st.builds(tree.ArrayType, BARE, inner), max_leaves=2)
 
