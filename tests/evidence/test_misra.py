@@ -87,6 +87,12 @@ def test_a_reason_holds_where_the_line_says_what_it_needs(files: dict[str, str])
     assert explained(Finding("probe.c", 10_000, "misra-c2012-8.7", ""), files) is None
 
 
+def test_a_name_that_looks_like_a_number_is_told_from_one() -> None:
+    text = {"c/a.c": "s->decel = false;\nx = 1ul;\ns->decel = 0xfull;\n"}
+    found = [explained(Finding("a.c", at, "misra-c2012-7.3", ""), text) is None for at in (1, 2, 3)]
+    assert found == [False, True, True]
+
+
 def test_no_reason_is_good_enough_for_a_mandatory_guideline(files: dict[str, str]) -> None:
     builtin = 1 + next(
         at for at, line in enumerate(files["c/probe.c"].splitlines()) if "__builtin_ctz" in line

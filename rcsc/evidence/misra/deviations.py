@@ -43,6 +43,10 @@ DEVIATIONS = (
     Deviation("misra-c2012-2.4", "2.4", r"enum|struct|^\}", "a type of the header, for the user's own file", ".h"),
     Deviation("misra-c2012-2.5", "2.5", r"#\s*define", "a name of the header, for the user's own file", ".h"),
     Deviation(
+        "misra-c2012-7.3", "7.3", r"^(?!.*\b(?:0[xX][0-9a-fA-F]+|[0-9][0-9.]*)[uU]*l).*\b[a-fA-FpP][0-9a-fA-FpP]*l+\b",
+        "no violation: the checker takes a name of the letters of hexadecimal digits that ends in l for a number",
+    ),
+    Deviation(
         "knownConditionTrueFalse", "14.3", r"_exact\(\)",
         "no violation: cppcheck computes reals otherwise than the target, whose arithmetic this tests when it runs",
     ),
