@@ -9,6 +9,15 @@
 #define RCSC_CONST_SECTION
 #endif
 
+/* For a function that is called at one place of a cycle: put there, it costs no call. */
+#if !defined(RCSC_INLINE)
+#if defined(__GNUC__)
+#define RCSC_INLINE inline __attribute__((always_inline))
+#else
+#define RCSC_INLINE inline
+#endif
+#endif
+
 /* Each operation on reals is rounded by itself, as it was proved; -ffp-contract=fast may overrule it. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("fp-contract=off")
@@ -151,10 +160,62 @@ static void approach_admit(approach_t *s)
     }
 }
 
+/* Finds the line of table approach: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t approach_match_approach(const approach_t *s)
+{
+    /* Masks of examples/approach.rcs: from the lowest bit, lines blocked, arrived, brake, cruise; each set
+       where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[16];
+        uint8_t t1[4];
+    } t = {
+        /* examples/approach.rcs: force_n > limit_n, force_n <= limit_n, distance_mm - tolerance_mm <= 0,
+           distance_mm - tolerance_mm > 0 */
+        {
+            0x00u, /* false, false, false, false: no line */
+            0x00u, /* false, false, false, true: no line */
+            0x00u, /* false, false, true, false: no line */
+            0x00u, /* false, false, true, true: no line */
+            0x00u, /* false, true, false, false: no line */
+            0x0cu, /* false, true, false, true: lines brake, cruise */
+            0x02u, /* false, true, true, false: line arrived */
+            0x0eu, /* false, true, true, true: lines arrived, brake, cruise */
+            0x01u, /* true, false, false, false: line blocked */
+            0x01u, /* true, false, false, true: line blocked */
+            0x01u, /* true, false, true, false: line blocked */
+            0x01u, /* true, false, true, true: line blocked */
+            0x01u, /* true, true, false, false: line blocked */
+            0x0du, /* true, true, false, true: lines blocked, brake, cruise */
+            0x03u, /* true, true, true, false: lines blocked, arrived */
+            0x0fu /* true, true, true, true: every line */
+        },
+        /* examples/approach.rcs: distance_mm <= tolerance_mm + braking_mm, distance_mm > tolerance_mm +
+           braking_mm */
+        {
+            0x03u, /* false, false: lines blocked, arrived */
+            0x0bu, /* false, true: lines blocked, arrived, cruise */
+            0x07u, /* true, false: lines blocked, arrived, brake */
+            0x0fu /* true, true: every line */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(((((((s->force_n > s->limit_n) ? 1u : 0u) * 2u) +
+        ((s->force_n <= s->limit_n) ? 1u : 0u)) * 2u) +
+        ((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) <= 0) ? 1u : 0u)) * 2u) +
+        ((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) > 0) ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->distance_mm <= ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u :
+                0u) * 2u) +
+                ((s->distance_mm > ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = approach_bit32(m | 0x10u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
+}
+
 /* Matches table approach and runs the line; returns the fault, 0 for none. */
 static int32_t approach_run_approach(approach_t *s)
 {
-    s->line = approach_approach_line(s);
+    s->line = approach_match_approach(s);
     switch (s->line) {
     case APPROACH_LINE_APPROACH_BLOCKED: /* examples/approach.rcs line blocked: force_n > limit_n */
         approach_do_smooth(s);
@@ -236,53 +297,7 @@ int32_t approach_check(const approach_t *s)
 /* The line of table approach that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t approach_approach_line(const approach_t *s)
 {
-    /* Masks of examples/approach.rcs: from the lowest bit, lines blocked, arrived, brake, cruise; each set
-       where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[16];
-        uint8_t t1[4];
-    } t = {
-        /* examples/approach.rcs: force_n > limit_n, force_n <= limit_n, distance_mm - tolerance_mm <= 0,
-           distance_mm - tolerance_mm > 0 */
-        {
-            0x00u, /* false, false, false, false: no line */
-            0x00u, /* false, false, false, true: no line */
-            0x00u, /* false, false, true, false: no line */
-            0x00u, /* false, false, true, true: no line */
-            0x00u, /* false, true, false, false: no line */
-            0x0cu, /* false, true, false, true: lines brake, cruise */
-            0x02u, /* false, true, true, false: line arrived */
-            0x0eu, /* false, true, true, true: lines arrived, brake, cruise */
-            0x01u, /* true, false, false, false: line blocked */
-            0x01u, /* true, false, false, true: line blocked */
-            0x01u, /* true, false, true, false: line blocked */
-            0x01u, /* true, false, true, true: line blocked */
-            0x01u, /* true, true, false, false: line blocked */
-            0x0du, /* true, true, false, true: lines blocked, brake, cruise */
-            0x03u, /* true, true, true, false: lines blocked, arrived */
-            0x0fu /* true, true, true, true: every line */
-        },
-        /* examples/approach.rcs: distance_mm <= tolerance_mm + braking_mm, distance_mm > tolerance_mm +
-           braking_mm */
-        {
-            0x03u, /* false, false: lines blocked, arrived */
-            0x0bu, /* false, true: lines blocked, arrived, cruise */
-            0x07u, /* true, false: lines blocked, arrived, brake */
-            0x0fu /* true, true: every line */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(((((((s->force_n > s->limit_n) ? 1u : 0u) * 2u) +
-        ((s->force_n <= s->limit_n) ? 1u : 0u)) * 2u) +
-        ((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) <= 0) ? 1u : 0u)) * 2u) +
-        ((((int32_t)s->distance_mm - (int32_t)s->tolerance_mm) > 0) ? 1u : 0u)] &
-            (uint32_t)t.t1[(((s->distance_mm <= ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u :
-                0u) * 2u) +
-                ((s->distance_mm > ((uint32_t)s->tolerance_mm + (uint32_t)s->braking_mm)) ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = approach_bit32(m | 0x10u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return approach_match_approach(s);
 }
 
 /* The same for n inputs at once, table approach. */

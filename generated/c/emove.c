@@ -9,6 +9,15 @@
 #define RCSC_CONST_SECTION
 #endif
 
+/* For a function that is called at one place of a cycle: put there, it costs no call. */
+#if !defined(RCSC_INLINE)
+#if defined(__GNUC__)
+#define RCSC_INLINE inline __attribute__((always_inline))
+#else
+#define RCSC_INLINE inline
+#endif
+#endif
+
 /* Each operation on reals is rounded by itself, as it was proved; -ffp-contract=fast may overrule it. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("fp-contract=off")
@@ -570,7 +579,7 @@ static void emove_admit(emove_t *s)
 
 /* emove/locate.rcs assumption locate_in_step: Found from what the lines order, and proved: a state goes
    with the orders that it waits for (section 9). */
-static bool emove_holds_locate_in_step(const emove_t *s)
+static RCSC_INLINE bool emove_holds_locate_in_step(const emove_t *s)
 {
     return s->new_command ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) &&
@@ -598,7 +607,7 @@ static bool emove_holds_locate_in_step(const emove_t *s)
 
 /* emove/move_to.rcs assumption move_to_in_step: Found from what the lines order, and proved: a state goes
    with the orders that it waits for (section 9). */
-static bool emove_holds_move_to_in_step(const emove_t *s)
+static RCSC_INLINE bool emove_holds_move_to_in_step(const emove_t *s)
 {
     return s->new_command ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) &&
@@ -612,7 +621,7 @@ static bool emove_holds_move_to_in_step(const emove_t *s)
 
 /* emove/move_to_obj.rcs assumption move_to_obj_in_step: Found from what the lines order, and proved: a
    state goes with the orders that it waits for (section 9). */
-static bool emove_holds_move_to_obj_in_step(const emove_t *s)
+static RCSC_INLINE bool emove_holds_move_to_obj_in_step(const emove_t *s)
 {
     return s->new_command ||
             ((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) &&
@@ -628,7 +637,7 @@ static bool emove_holds_move_to_obj_in_step(const emove_t *s)
 
 /* emove/pickup.rcs assumption pickup_in_step: Found from what the lines order, and proved: a state goes
    with the orders that it waits for (section 9). */
-static bool emove_holds_pickup_in_step(const emove_t *s)
+static RCSC_INLINE bool emove_holds_pickup_in_step(const emove_t *s)
 {
     return s->new_command ||
             (((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) ||
@@ -640,7 +649,7 @@ static bool emove_holds_pickup_in_step(const emove_t *s)
 
 /* emove/release.rcs assumption release_part_in_step: Found from what the lines order, and proved: a state
    goes with the orders that it waits for (section 9). */
-static bool emove_holds_release_part_in_step(const emove_t *s)
+static RCSC_INLINE bool emove_holds_release_part_in_step(const emove_t *s)
 {
     return s->new_command ||
             (((s->cur_state == EMOVE_COMMON_EMOVE_STATE_D_STATE) ||
@@ -650,6 +659,464 @@ static bool emove_holds_release_part_in_step(const emove_t *s)
                 (s->primitive.command == VCBLRY_PRIMITIVE_COMMAND_DEPARTURE_POSITION_FINGERS));
 }
 
+/* Finds the line of table locate: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t emove_match_locate(const emove_t *s)
+{
+    /* Masks of emove/locate.rcs: from the lowest bit, lines 0, 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12,
+       13, 14; each set where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint16_t t0[14];
+        uint16_t t1[24];
+        uint16_t t2[6];
+        uint16_t t3[3];
+        uint16_t t4[3];
+    } t = {
+        { /* emove/locate.rcs: cur_state */
+            0x0407u, /* d_state: lines 0, 1, 2, 9 */
+            0x2007u, /* f_state: lines 0, 1, 2, 12 */
+            0x0007u, /* through: lines 0, 1, 2 */
+            0x0007u, /* last: lines 0, 1, 2 */
+            0x0007u, /* opening: lines 0, 1, 2 */
+            0x480fu, /* looking: lines 0 to 3, 10, 13 */
+            0x9817u, /* flooding: lines 0, 1, 2, 4, 10, 11, 14 */
+            0x4827u, /* centering: lines 0, 1, 2, 4a, 10, 13 */
+            0x9847u, /* lining: lines 0, 1, 2, 5, 10, 11, 14 */
+            0x4887u, /* closing: lines 0, 1, 2, 6, 10, 13 */
+            0x4907u, /* hovering: lines 0, 1, 2, 7, 10, 13 */
+            0x4a07u, /* lowering: lines 0, 1, 2, 8, 10, 13 */
+            0x0007u, /* grasping: lines 0, 1, 2 */
+            0x0007u /* releasing: lines 0, 1, 2 */
+        },
+        { /* emove/locate.rcs: primitive.command, new_command, target.known */
+            0xfc50u, /* pause, false, false: lines 4, 5, 9 to 14 */
+            0xfc50u, /* pause, false, true: lines 4, 5, 9 to 14 */
+            0x0003u, /* pause, true, false: lines 0, 1 */
+            0x0005u, /* pause, true, true: lines 0, 2 */
+            0xff70u, /* goto, false, false: lines 4, 4a, 5, 7 to 14 */
+            0xff70u, /* goto, false, true: lines 4, 4a, 5, 7 to 14 */
+            0x0003u, /* goto, true, false: lines 0, 1 */
+            0x0005u, /* goto, true, true: lines 0, 2 */
+            0xfc50u, /* gothru, false, false: lines 4, 5, 9 to 14 */
+            0xfc50u, /* gothru, false, true: lines 4, 5, 9 to 14 */
+            0x0003u, /* gothru, true, false: lines 0, 1 */
+            0x0005u, /* gothru, true, true: lines 0, 2 */
+            0xfcd0u, /* approach_position_fingers, false, false: lines 4, 5, 6, 9 to 14 */
+            0xfcd0u, /* approach_position_fingers, false, true: lines 4, 5, 6, 9 to 14 */
+            0x0003u, /* approach_position_fingers, true, false: lines 0, 1 */
+            0x0005u, /* approach_position_fingers, true, true: lines 0, 2 */
+            0xfc58u, /* departure_position_fingers, false, false: lines 3, 4, 5, 9 to 14 */
+            0xfc58u, /* departure_position_fingers, false, true: lines 3, 4, 5, 9 to 14 */
+            0x0003u, /* departure_position_fingers, true, false: lines 0, 1 */
+            0x0005u, /* departure_position_fingers, true, true: lines 0, 2 */
+            0xfc50u, /* immed_grasp, false, false: lines 4, 5, 9 to 14 */
+            0xfc50u, /* immed_grasp, false, true: lines 4, 5, 9 to 14 */
+            0x0003u, /* immed_grasp, true, false: lines 0, 1 */
+            0x0005u /* immed_grasp, true, true: lines 0, 2 */
+        },
+        { /* emove/locate.rcs: primitive.status, idle */
+            0xb7f9u, /* done, false: lines 0, 3 to 9, 11, 12, 14 */
+            0xb7feu, /* done, true: lines 1 to 9, 11, 12, 14 */
+            0xf451u, /* executing, false: lines 0, 4, 5, 9, 11 to 14 */
+            0xf456u, /* executing, true: lines 1, 2, 4, 5, 9, 11 to 14 */
+            0x2c01u, /* failed, false: lines 0, 9, 10, 12 */
+            0x2c06u /* failed, true: lines 1, 2, 9, 10, 12 */
+        },
+        { /* emove/locate.rcs: vision.command */
+            0xffafu, /* pause: lines 0 to 3, 4a, 6 to 14 */
+            0xffbfu, /* flood_flash: lines 0 to 4a, 6 to 14 */
+            0xffefu /* line_flash: lines 0 to 3, 4a to 14 */
+        },
+        { /* emove/locate.rcs: vision.status */
+            0x6fffu, /* done: lines 0 to 10, 12, 13 */
+            0xefafu, /* executing: lines 0 to 3, 4a, 6 to 10, 12, 13, 14 */
+            0x7fafu /* failed: lines 0 to 3, 4a, 6 to 13 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->cur_state] &
+            (uint32_t)t.t1[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->target.known ? 1u : 0u)] &
+            (uint32_t)t.t2[(s->primitive.status * 2u) + (s->idle ? 1u : 0u)] &
+            (uint32_t)t.t3[s->vision.command] & (uint32_t)t.t4[s->vision.status];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = emove_bit32(m | 0x10000u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table move_to: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t emove_match_move_to(const emove_t *s)
+{
+    /* Masks of emove/move_to.rcs: from the lowest bit, lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11;
+       each set where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint16_t t0[63];
+        uint16_t t1[14];
+        uint16_t t2[24];
+        uint16_t t3[24];
+        uint16_t t4[2];
+    } t = {
+        { /* emove/move_to.rcs: path_length */
+            0x1fe7u, /* 0: lines 0, 1, 2, 5 to 11 */
+            0x1febu, /* 1: lines 0, 1, 3, 5 to 11 */
+            /* 2 .. 62: lines 0, 1, 4 to 11 */
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u
+        },
+        { /* emove/move_to.rcs: cur_state */
+            0x061fu, /* d_state: lines 0 to 4, 8, 9 */
+            0x081fu, /* f_state: lines 0 to 4, 10 */
+            0x147fu, /* through: lines 0 to 6, 9, 11 */
+            0x159fu, /* last: lines 0 to 4, 7, 7a, 9, 11 */
+            0x041fu, /* opening: lines 0 to 4, 9 */
+            0x041fu, /* looking: lines 0 to 4, 9 */
+            0x041fu, /* flooding: lines 0 to 4, 9 */
+            0x041fu, /* centering: lines 0 to 4, 9 */
+            0x041fu, /* lining: lines 0 to 4, 9 */
+            0x041fu, /* closing: lines 0 to 4, 9 */
+            0x041fu, /* hovering: lines 0 to 4, 9 */
+            0x041fu, /* lowering: lines 0 to 4, 9 */
+            0x041fu, /* grasping: lines 0 to 4, 9 */
+            0x041fu /* releasing: lines 0 to 4, 9 */
+        },
+        { /* emove/move_to.rcs: primitive.command, new_command, target.known */
+            0x1a00u, /* pause, false, false: lines 8, 10, 11 */
+            0x1a00u, /* pause, false, true: lines 8, 10, 11 */
+            0x0003u, /* pause, true, false: lines 0, 1 */
+            0x001du, /* pause, true, true: lines 0, 2, 3, 4 */
+            0x1f80u, /* goto, false, false: lines 7 to 11 */
+            0x1f80u, /* goto, false, true: lines 7 to 11 */
+            0x0003u, /* goto, true, false: lines 0, 1 */
+            0x001du, /* goto, true, true: lines 0, 2, 3, 4 */
+            0x1e60u, /* gothru, false, false: lines 5, 6, 8 to 11 */
+            0x1e60u, /* gothru, false, true: lines 5, 6, 8 to 11 */
+            0x0003u, /* gothru, true, false: lines 0, 1 */
+            0x001du, /* gothru, true, true: lines 0, 2, 3, 4 */
+            0x1a00u, /* approach_position_fingers, false, false: lines 8, 10, 11 */
+            0x1a00u, /* approach_position_fingers, false, true: lines 8, 10, 11 */
+            0x0003u, /* approach_position_fingers, true, false: lines 0, 1 */
+            0x001du, /* approach_position_fingers, true, true: lines 0, 2, 3, 4 */
+            0x1a00u, /* departure_position_fingers, false, false: lines 8, 10, 11 */
+            0x1a00u, /* departure_position_fingers, false, true: lines 8, 10, 11 */
+            0x0003u, /* departure_position_fingers, true, false: lines 0, 1 */
+            0x001du, /* departure_position_fingers, true, true: lines 0, 2, 3, 4 */
+            0x1a00u, /* immed_grasp, false, false: lines 8, 10, 11 */
+            0x1a00u, /* immed_grasp, false, true: lines 8, 10, 11 */
+            0x0003u, /* immed_grasp, true, false: lines 0, 1 */
+            0x001du /* immed_grasp, true, true: lines 0, 2, 3, 4 */
+        },
+        { /* emove/move_to.rcs: primitive.status, idle, lost, path_length - path_at > 2 */
+            0x0ac1u, /* done, false, false, false: lines 0, 6, 7, 8, 10 */
+            0x0ae1u, /* done, false, false, true: lines 0, 5, 6, 7, 8, 10 */
+            0x0b41u, /* done, false, true, false: lines 0, 6, 7a, 8, 10 */
+            0x0b61u, /* done, false, true, true: lines 0, 5, 6, 7a, 8, 10 */
+            0x0adeu, /* done, true, false, false: lines 1 to 4, 6, 7, 8, 10 */
+            0x0afeu, /* done, true, false, true: lines 1 to 7, 8, 10 */
+            0x0b5eu, /* done, true, true, false: lines 1 to 4, 6, 7a, 8, 10 */
+            0x0b7eu, /* done, true, true, true: lines 1 to 6, 7a, 8, 10 */
+            0x1a01u, /* executing, false, false, false: lines 0, 8, 10, 11 */
+            0x1a01u, /* executing, false, false, true: lines 0, 8, 10, 11 */
+            0x1a01u, /* executing, false, true, false: lines 0, 8, 10, 11 */
+            0x1a01u, /* executing, false, true, true: lines 0, 8, 10, 11 */
+            0x1a1eu, /* executing, true, false, false: lines 1 to 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, false, true: lines 1 to 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, true, false: lines 1 to 4, 8, 10, 11 */
+            0x1a1eu, /* executing, true, true, true: lines 1 to 4, 8, 10, 11 */
+            0x0e01u, /* failed, false, false, false: lines 0, 8, 9, 10 */
+            0x0e01u, /* failed, false, false, true: lines 0, 8, 9, 10 */
+            0x0e01u, /* failed, false, true, false: lines 0, 8, 9, 10 */
+            0x0e01u, /* failed, false, true, true: lines 0, 8, 9, 10 */
+            0x0e1eu, /* failed, true, false, false: lines 1 to 4, 8, 9, 10 */
+            0x0e1eu, /* failed, true, false, true: lines 1 to 4, 8, 9, 10 */
+            0x0e1eu, /* failed, true, true, false: lines 1 to 4, 8, 9, 10 */
+            0x0e1eu /* failed, true, true, true: lines 1 to 4, 8, 9, 10 */
+        },
+        { /* emove/move_to.rcs: path_length - path_at <= 2 */
+            0x1fbfu, /* false: lines 0 to 5, 7 to 11 */
+            0x1fffu /* true: every line */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->path_length] & (uint32_t)t.t1[s->cur_state] &
+            (uint32_t)t.t2[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->target.known ? 1u : 0u)] &
+            (uint32_t)t.t3[(((((s->primitive.status * 2u) + (s->idle ? 1u : 0u)) * 2u) +
+                (s->lost ? 1u : 0u)) * 2u) +
+                ((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)] &
+            (uint32_t)t.t4[(((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = emove_bit32(m | 0x2000u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table move_to_obj: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t emove_match_move_to_obj(const emove_t *s)
+{
+    /* Masks of emove/move_to_obj.rcs: bit k is set where line k does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint16_t t0[63];
+        uint16_t t1[14];
+        uint16_t t2[24];
+        uint16_t t3[24];
+    } t = {
+        { /* emove/move_to_obj.rcs: path_length */
+            0x1fd7u, /* 0: lines 0, 1, 2, 4, 6 to 12 */
+            0x1fdbu, /* 1: lines 0, 1, 3, 4, 6 to 12 */
+            /* 2 .. 62: lines 0, 1, 3, 5 to 12 */
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
+            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu
+        },
+        { /* emove/move_to_obj.rcs: cur_state */
+            0x060fu, /* d_state: lines 0 to 3, 9, 10 */
+            0x080fu, /* f_state: lines 0 to 3, 11 */
+            0x14cfu, /* through: lines 0 to 3, 6, 7, 10, 12 */
+            0x150fu, /* last: lines 0 to 3, 8, 10, 12 */
+            0x143fu, /* opening: lines 0 to 5, 10, 12 */
+            0x040fu, /* looking: lines 0 to 3, 10 */
+            0x040fu, /* flooding: lines 0 to 3, 10 */
+            0x040fu, /* centering: lines 0 to 3, 10 */
+            0x040fu, /* lining: lines 0 to 3, 10 */
+            0x040fu, /* closing: lines 0 to 3, 10 */
+            0x040fu, /* hovering: lines 0 to 3, 10 */
+            0x040fu, /* lowering: lines 0 to 3, 10 */
+            0x040fu, /* grasping: lines 0 to 3, 10 */
+            0x040fu /* releasing: lines 0 to 3, 10 */
+        },
+        { /* emove/move_to_obj.rcs: primitive.command, new_command, target.known */
+            0x1a00u, /* pause, false, false: lines 9, 11, 12 */
+            0x1a00u, /* pause, false, true: lines 9, 11, 12 */
+            0x0003u, /* pause, true, false: lines 0, 1 */
+            0x000du, /* pause, true, true: lines 0, 2, 3 */
+            0x1f00u, /* goto, false, false: lines 8 to 12 */
+            0x1f00u, /* goto, false, true: lines 8 to 12 */
+            0x0003u, /* goto, true, false: lines 0, 1 */
+            0x000du, /* goto, true, true: lines 0, 2, 3 */
+            0x1ec0u, /* gothru, false, false: lines 6, 7, 9 to 12 */
+            0x1ec0u, /* gothru, false, true: lines 6, 7, 9 to 12 */
+            0x0003u, /* gothru, true, false: lines 0, 1 */
+            0x000du, /* gothru, true, true: lines 0, 2, 3 */
+            0x1e30u, /* approach_position_fingers, false, false: lines 4, 5, 9 to 12 */
+            0x1e30u, /* approach_position_fingers, false, true: lines 4, 5, 9 to 12 */
+            0x0003u, /* approach_position_fingers, true, false: lines 0, 1 */
+            0x000du, /* approach_position_fingers, true, true: lines 0, 2, 3 */
+            0x1a00u, /* departure_position_fingers, false, false: lines 9, 11, 12 */
+            0x1a00u, /* departure_position_fingers, false, true: lines 9, 11, 12 */
+            0x0003u, /* departure_position_fingers, true, false: lines 0, 1 */
+            0x000du, /* departure_position_fingers, true, true: lines 0, 2, 3 */
+            0x1a00u, /* immed_grasp, false, false: lines 9, 11, 12 */
+            0x1a00u, /* immed_grasp, false, true: lines 9, 11, 12 */
+            0x0003u, /* immed_grasp, true, false: lines 0, 1 */
+            0x000du /* immed_grasp, true, true: lines 0, 2, 3 */
+        },
+        /* emove/move_to_obj.rcs: primitive.status, idle, path_length - path_at > 2, path_length - path_at
+           <= 2 */
+        {
+            0x0b31u, /* done, false, false, false: lines 0, 4, 5, 8, 9, 11 */
+            0x0bb1u, /* done, false, false, true: lines 0, 4, 5, 7, 8, 9, 11 */
+            0x0b71u, /* done, false, true, false: lines 0, 4, 5, 6, 8, 9, 11 */
+            0x0bf1u, /* done, false, true, true: lines 0, 4 to 9, 11 */
+            0x0b3eu, /* done, true, false, false: lines 1 to 5, 8, 9, 11 */
+            0x0bbeu, /* done, true, false, true: lines 1 to 5, 7, 8, 9, 11 */
+            0x0b7eu, /* done, true, true, false: lines 1 to 6, 8, 9, 11 */
+            0x0bfeu, /* done, true, true, true: lines 1 to 9, 11 */
+            0x1a01u, /* executing, false, false, false: lines 0, 9, 11, 12 */
+            0x1a01u, /* executing, false, false, true: lines 0, 9, 11, 12 */
+            0x1a01u, /* executing, false, true, false: lines 0, 9, 11, 12 */
+            0x1a01u, /* executing, false, true, true: lines 0, 9, 11, 12 */
+            0x1a0eu, /* executing, true, false, false: lines 1, 2, 3, 9, 11, 12 */
+            0x1a0eu, /* executing, true, false, true: lines 1, 2, 3, 9, 11, 12 */
+            0x1a0eu, /* executing, true, true, false: lines 1, 2, 3, 9, 11, 12 */
+            0x1a0eu, /* executing, true, true, true: lines 1, 2, 3, 9, 11, 12 */
+            0x0e01u, /* failed, false, false, false: lines 0, 9, 10, 11 */
+            0x0e01u, /* failed, false, false, true: lines 0, 9, 10, 11 */
+            0x0e01u, /* failed, false, true, false: lines 0, 9, 10, 11 */
+            0x0e01u, /* failed, false, true, true: lines 0, 9, 10, 11 */
+            0x0e0eu, /* failed, true, false, false: lines 1, 2, 3, 9, 10, 11 */
+            0x0e0eu, /* failed, true, false, true: lines 1, 2, 3, 9, 10, 11 */
+            0x0e0eu, /* failed, true, true, false: lines 1, 2, 3, 9, 10, 11 */
+            0x0e0eu /* failed, true, true, true: lines 1, 2, 3, 9, 10, 11 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->path_length] & (uint32_t)t.t1[s->cur_state] &
+            (uint32_t)t.t2[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->target.known ? 1u : 0u)] &
+            (uint32_t)t.t3[(((((s->primitive.status * 2u) + (s->idle ? 1u : 0u)) * 2u) +
+                ((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)) * 2u) +
+                ((((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = emove_bit32(m | 0x2000u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table pause_emove: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t emove_match_pause_emove(const emove_t *s)
+{
+    /* Masks of emove/pause.rcs: from the lowest bit, lines 1, 2; each set where its line does not exclude
+       that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[2];
+    } t = {
+        { /* emove/pause.rcs: idle */
+            0x02u, /* false: line 2 */
+            0x01u /* true: line 1 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = emove_bit32(m | 0x4u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table pickup: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t emove_match_pickup(const emove_t *s)
+{
+    /* Masks of emove/pickup.rcs: bit k is set where line k does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[14];
+        uint8_t t1[24];
+        uint8_t t2[3];
+    } t = {
+        { /* emove/pickup.rcs: cur_state */
+            0x0bu, /* d_state: lines 0, 1, 3 */
+            0x23u, /* f_state: lines 0, 1, 5 */
+            0x03u, /* through: lines 0, 1 */
+            0x03u, /* last: lines 0, 1 */
+            0x03u, /* opening: lines 0, 1 */
+            0x03u, /* looking: lines 0, 1 */
+            0x03u, /* flooding: lines 0, 1 */
+            0x03u, /* centering: lines 0, 1 */
+            0x03u, /* lining: lines 0, 1 */
+            0x03u, /* closing: lines 0, 1 */
+            0x03u, /* hovering: lines 0, 1 */
+            0x03u, /* lowering: lines 0, 1 */
+            0x57u, /* grasping: lines 0, 1, 2, 4, 6 */
+            0x03u /* releasing: lines 0, 1 */
+        },
+        { /* emove/pickup.rcs: primitive.command, new_command, idle */
+            0x68u, /* pause, false, false: lines 3, 5, 6 */
+            0x68u, /* pause, false, true: lines 3, 5, 6 */
+            0x01u, /* pause, true, false: line 0 */
+            0x02u, /* pause, true, true: line 1 */
+            0x68u, /* goto, false, false: lines 3, 5, 6 */
+            0x68u, /* goto, false, true: lines 3, 5, 6 */
+            0x01u, /* goto, true, false: line 0 */
+            0x02u, /* goto, true, true: line 1 */
+            0x68u, /* gothru, false, false: lines 3, 5, 6 */
+            0x68u, /* gothru, false, true: lines 3, 5, 6 */
+            0x01u, /* gothru, true, false: line 0 */
+            0x02u, /* gothru, true, true: line 1 */
+            0x68u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
+            0x68u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
+            0x01u, /* approach_position_fingers, true, false: line 0 */
+            0x02u, /* approach_position_fingers, true, true: line 1 */
+            0x68u, /* departure_position_fingers, false, false: lines 3, 5, 6 */
+            0x68u, /* departure_position_fingers, false, true: lines 3, 5, 6 */
+            0x01u, /* departure_position_fingers, true, false: line 0 */
+            0x02u, /* departure_position_fingers, true, true: line 1 */
+            0x7cu, /* immed_grasp, false, false: lines 2 to 6 */
+            0x7cu, /* immed_grasp, false, true: lines 2 to 6 */
+            0x01u, /* immed_grasp, true, false: line 0 */
+            0x02u /* immed_grasp, true, true: line 1 */
+        },
+        { /* emove/pickup.rcs: primitive.status */
+            0x2fu, /* done: lines 0 to 3, 5 */
+            0x6bu, /* executing: lines 0, 1, 3, 5, 6 */
+            0x3bu /* failed: lines 0, 1, 3, 4, 5 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->cur_state] &
+            (uint32_t)t.t1[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->idle ? 1u : 0u)] &
+            (uint32_t)t.t2[s->primitive.status];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = emove_bit32(m | 0x80u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table release_part: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t emove_match_release_part(const emove_t *s)
+{
+    /* Masks of emove/release.rcs: from the lowest bit, lines 0, 1, 1a, 2, 3, 4, 5, 6; each set where its
+       line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[14];
+        uint8_t t1[24];
+        uint8_t t2[6];
+    } t = {
+        { /* emove/release.rcs: cur_state */
+            0x17u, /* d_state: lines 0, 1, 1a, 3 */
+            0x47u, /* f_state: lines 0, 1, 1a, 5 */
+            0x07u, /* through: lines 0, 1, 1a */
+            0x07u, /* last: lines 0, 1, 1a */
+            0x07u, /* opening: lines 0, 1, 1a */
+            0x07u, /* looking: lines 0, 1, 1a */
+            0x07u, /* flooding: lines 0, 1, 1a */
+            0x07u, /* centering: lines 0, 1, 1a */
+            0x07u, /* lining: lines 0, 1, 1a */
+            0x07u, /* closing: lines 0, 1, 1a */
+            0x07u, /* hovering: lines 0, 1, 1a */
+            0x07u, /* lowering: lines 0, 1, 1a */
+            0x07u, /* grasping: lines 0, 1, 1a */
+            0xafu /* releasing: lines 0 to 2, 4, 6 */
+        },
+        { /* emove/release.rcs: primitive.command, new_command, idle */
+            0xd0u, /* pause, false, false: lines 3, 5, 6 */
+            0xd0u, /* pause, false, true: lines 3, 5, 6 */
+            0x01u, /* pause, true, false: line 0 */
+            0x06u, /* pause, true, true: lines 1, 1a */
+            0xd0u, /* goto, false, false: lines 3, 5, 6 */
+            0xd0u, /* goto, false, true: lines 3, 5, 6 */
+            0x01u, /* goto, true, false: line 0 */
+            0x06u, /* goto, true, true: lines 1, 1a */
+            0xd0u, /* gothru, false, false: lines 3, 5, 6 */
+            0xd0u, /* gothru, false, true: lines 3, 5, 6 */
+            0x01u, /* gothru, true, false: line 0 */
+            0x06u, /* gothru, true, true: lines 1, 1a */
+            0xd0u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
+            0xd0u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
+            0x01u, /* approach_position_fingers, true, false: line 0 */
+            0x06u, /* approach_position_fingers, true, true: lines 1, 1a */
+            0xf8u, /* departure_position_fingers, false, false: lines 2 to 6 */
+            0xf8u, /* departure_position_fingers, false, true: lines 2 to 6 */
+            0x01u, /* departure_position_fingers, true, false: line 0 */
+            0x06u, /* departure_position_fingers, true, true: lines 1, 1a */
+            0xd0u, /* immed_grasp, false, false: lines 3, 5, 6 */
+            0xd0u, /* immed_grasp, false, true: lines 3, 5, 6 */
+            0x01u, /* immed_grasp, true, false: line 0 */
+            0x06u /* immed_grasp, true, true: lines 1, 1a */
+        },
+        { /* emove/release.rcs: primitive.status, lost */
+            0x5bu, /* done, false: lines 0, 1, 2, 3, 5 */
+            0x5du, /* done, true: lines 0, 1a, 2, 3, 5 */
+            0xd3u, /* executing, false: lines 0, 1, 3, 5, 6 */
+            0xd5u, /* executing, true: lines 0, 1a, 3, 5, 6 */
+            0x73u, /* failed, false: lines 0, 1, 3, 4, 5 */
+            0x75u /* failed, true: lines 0, 1a, 3, 4, 5 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->cur_state] &
+            (uint32_t)t.t1[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->idle ? 1u : 0u)] &
+            (uint32_t)t.t2[(s->primitive.status * 2u) + (s->lost ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = emove_bit32(m | 0x100u);
+    line = several ? (-2) : line;
+    return line;
+}
+
 /* Matches table locate and runs the line; returns the fault, 0 for none. */
 static int32_t emove_run_locate(emove_t *s)
 {
@@ -657,7 +1124,7 @@ static int32_t emove_run_locate(emove_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_LOCATE_IN_STEP);
     }
-    s->line = emove_locate_line(s);
+    s->line = emove_match_locate(s);
     switch (s->line) {
     case EMOVE_LINE_LOCATE_0: /* emove/locate.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
@@ -782,7 +1249,7 @@ static int32_t emove_run_move_to(emove_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_IN_STEP);
     }
-    s->line = emove_move_to_line(s);
+    s->line = emove_match_move_to(s);
     switch (s->line) {
     case EMOVE_LINE_MOVE_TO_0: /* emove/move_to.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
@@ -888,7 +1355,7 @@ static int32_t emove_run_move_to_obj(emove_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_MOVE_TO_OBJ_IN_STEP);
     }
-    s->line = emove_move_to_obj_line(s);
+    s->line = emove_match_move_to_obj(s);
     switch (s->line) {
     case EMOVE_LINE_MOVE_TO_OBJ_0: /* emove/move_to_obj.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
@@ -991,7 +1458,7 @@ static int32_t emove_run_move_to_obj(emove_t *s)
 /* Matches table pause_emove and runs the line; returns the fault, 0 for none. */
 static int32_t emove_run_pause_emove(emove_t *s)
 {
-    s->line = emove_pause_emove_line(s);
+    s->line = emove_match_pause_emove(s);
     switch (s->line) {
     case EMOVE_LINE_PAUSE_EMOVE_1: /* emove/pause.rcs line 1: idle true */
         emove_do_nextstate(s, EMOVE_COMMON_EMOVE_STATE_D_STATE);
@@ -1022,7 +1489,7 @@ static int32_t emove_run_pickup(emove_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_PICKUP_IN_STEP);
     }
-    s->line = emove_pickup_line(s);
+    s->line = emove_match_pickup(s);
     switch (s->line) {
     case EMOVE_LINE_PICKUP_0: /* emove/pickup.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
@@ -1082,7 +1549,7 @@ static int32_t emove_run_release_part(emove_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)EMOVE_ASSUMPTION_RELEASE_PART_IN_STEP);
     }
-    s->line = emove_release_part_line(s);
+    s->line = emove_match_release_part(s);
     switch (s->line) {
     case EMOVE_LINE_RELEASE_PART_0: /* emove/release.rcs line 0: new_command true; idle false */
         emove_do_settle(s);
@@ -1416,85 +1883,7 @@ int32_t emove_check(const emove_t *s)
 /* The line of table locate that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_locate_line(const emove_t *s)
 {
-    /* Masks of emove/locate.rcs: from the lowest bit, lines 0, 1, 2, 3, 4, 4a, 5, 6, 7, 8, 9, 10, 11, 12,
-       13, 14; each set where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint16_t t0[14];
-        uint16_t t1[24];
-        uint16_t t2[6];
-        uint16_t t3[3];
-        uint16_t t4[3];
-    } t = {
-        { /* emove/locate.rcs: cur_state */
-            0x0407u, /* d_state: lines 0, 1, 2, 9 */
-            0x2007u, /* f_state: lines 0, 1, 2, 12 */
-            0x0007u, /* through: lines 0, 1, 2 */
-            0x0007u, /* last: lines 0, 1, 2 */
-            0x0007u, /* opening: lines 0, 1, 2 */
-            0x480fu, /* looking: lines 0 to 3, 10, 13 */
-            0x9817u, /* flooding: lines 0, 1, 2, 4, 10, 11, 14 */
-            0x4827u, /* centering: lines 0, 1, 2, 4a, 10, 13 */
-            0x9847u, /* lining: lines 0, 1, 2, 5, 10, 11, 14 */
-            0x4887u, /* closing: lines 0, 1, 2, 6, 10, 13 */
-            0x4907u, /* hovering: lines 0, 1, 2, 7, 10, 13 */
-            0x4a07u, /* lowering: lines 0, 1, 2, 8, 10, 13 */
-            0x0007u, /* grasping: lines 0, 1, 2 */
-            0x0007u /* releasing: lines 0, 1, 2 */
-        },
-        { /* emove/locate.rcs: primitive.command, new_command, target.known */
-            0xfc50u, /* pause, false, false: lines 4, 5, 9 to 14 */
-            0xfc50u, /* pause, false, true: lines 4, 5, 9 to 14 */
-            0x0003u, /* pause, true, false: lines 0, 1 */
-            0x0005u, /* pause, true, true: lines 0, 2 */
-            0xff70u, /* goto, false, false: lines 4, 4a, 5, 7 to 14 */
-            0xff70u, /* goto, false, true: lines 4, 4a, 5, 7 to 14 */
-            0x0003u, /* goto, true, false: lines 0, 1 */
-            0x0005u, /* goto, true, true: lines 0, 2 */
-            0xfc50u, /* gothru, false, false: lines 4, 5, 9 to 14 */
-            0xfc50u, /* gothru, false, true: lines 4, 5, 9 to 14 */
-            0x0003u, /* gothru, true, false: lines 0, 1 */
-            0x0005u, /* gothru, true, true: lines 0, 2 */
-            0xfcd0u, /* approach_position_fingers, false, false: lines 4, 5, 6, 9 to 14 */
-            0xfcd0u, /* approach_position_fingers, false, true: lines 4, 5, 6, 9 to 14 */
-            0x0003u, /* approach_position_fingers, true, false: lines 0, 1 */
-            0x0005u, /* approach_position_fingers, true, true: lines 0, 2 */
-            0xfc58u, /* departure_position_fingers, false, false: lines 3, 4, 5, 9 to 14 */
-            0xfc58u, /* departure_position_fingers, false, true: lines 3, 4, 5, 9 to 14 */
-            0x0003u, /* departure_position_fingers, true, false: lines 0, 1 */
-            0x0005u, /* departure_position_fingers, true, true: lines 0, 2 */
-            0xfc50u, /* immed_grasp, false, false: lines 4, 5, 9 to 14 */
-            0xfc50u, /* immed_grasp, false, true: lines 4, 5, 9 to 14 */
-            0x0003u, /* immed_grasp, true, false: lines 0, 1 */
-            0x0005u /* immed_grasp, true, true: lines 0, 2 */
-        },
-        { /* emove/locate.rcs: primitive.status, idle */
-            0xb7f9u, /* done, false: lines 0, 3 to 9, 11, 12, 14 */
-            0xb7feu, /* done, true: lines 1 to 9, 11, 12, 14 */
-            0xf451u, /* executing, false: lines 0, 4, 5, 9, 11 to 14 */
-            0xf456u, /* executing, true: lines 1, 2, 4, 5, 9, 11 to 14 */
-            0x2c01u, /* failed, false: lines 0, 9, 10, 12 */
-            0x2c06u /* failed, true: lines 1, 2, 9, 10, 12 */
-        },
-        { /* emove/locate.rcs: vision.command */
-            0xffafu, /* pause: lines 0 to 3, 4a, 6 to 14 */
-            0xffbfu, /* flood_flash: lines 0 to 4a, 6 to 14 */
-            0xffefu /* line_flash: lines 0 to 3, 4a to 14 */
-        },
-        { /* emove/locate.rcs: vision.status */
-            0x6fffu, /* done: lines 0 to 10, 12, 13 */
-            0xefafu, /* executing: lines 0 to 3, 4a, 6 to 10, 12, 13, 14 */
-            0x7fafu /* failed: lines 0 to 3, 4a, 6 to 13 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->cur_state] &
-            (uint32_t)t.t1[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-                (s->target.known ? 1u : 0u)] &
-            (uint32_t)t.t2[(s->primitive.status * 2u) + (s->idle ? 1u : 0u)] &
-            (uint32_t)t.t3[s->vision.command] & (uint32_t)t.t4[s->vision.status];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = emove_bit32(m | 0x10000u);
-    line = several ? (-2) : line;
-    return line;
+    return emove_match_locate(s);
 }
 
 /* The same for n inputs at once, table locate. */
@@ -1509,111 +1898,7 @@ void emove_locate_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table move_to that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_move_to_line(const emove_t *s)
 {
-    /* Masks of emove/move_to.rcs: from the lowest bit, lines 0, 1, 2, 3, 4, 5, 6, 7, 7a, 8, 9, 10, 11;
-       each set where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint16_t t0[63];
-        uint16_t t1[14];
-        uint16_t t2[24];
-        uint16_t t3[24];
-        uint16_t t4[2];
-    } t = {
-        { /* emove/move_to.rcs: path_length */
-            0x1fe7u, /* 0: lines 0, 1, 2, 5 to 11 */
-            0x1febu, /* 1: lines 0, 1, 3, 5 to 11 */
-            /* 2 .. 62: lines 0, 1, 4 to 11 */
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
-            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u
-        },
-        { /* emove/move_to.rcs: cur_state */
-            0x061fu, /* d_state: lines 0 to 4, 8, 9 */
-            0x081fu, /* f_state: lines 0 to 4, 10 */
-            0x147fu, /* through: lines 0 to 6, 9, 11 */
-            0x159fu, /* last: lines 0 to 4, 7, 7a, 9, 11 */
-            0x041fu, /* opening: lines 0 to 4, 9 */
-            0x041fu, /* looking: lines 0 to 4, 9 */
-            0x041fu, /* flooding: lines 0 to 4, 9 */
-            0x041fu, /* centering: lines 0 to 4, 9 */
-            0x041fu, /* lining: lines 0 to 4, 9 */
-            0x041fu, /* closing: lines 0 to 4, 9 */
-            0x041fu, /* hovering: lines 0 to 4, 9 */
-            0x041fu, /* lowering: lines 0 to 4, 9 */
-            0x041fu, /* grasping: lines 0 to 4, 9 */
-            0x041fu /* releasing: lines 0 to 4, 9 */
-        },
-        { /* emove/move_to.rcs: primitive.command, new_command, target.known */
-            0x1a00u, /* pause, false, false: lines 8, 10, 11 */
-            0x1a00u, /* pause, false, true: lines 8, 10, 11 */
-            0x0003u, /* pause, true, false: lines 0, 1 */
-            0x001du, /* pause, true, true: lines 0, 2, 3, 4 */
-            0x1f80u, /* goto, false, false: lines 7 to 11 */
-            0x1f80u, /* goto, false, true: lines 7 to 11 */
-            0x0003u, /* goto, true, false: lines 0, 1 */
-            0x001du, /* goto, true, true: lines 0, 2, 3, 4 */
-            0x1e60u, /* gothru, false, false: lines 5, 6, 8 to 11 */
-            0x1e60u, /* gothru, false, true: lines 5, 6, 8 to 11 */
-            0x0003u, /* gothru, true, false: lines 0, 1 */
-            0x001du, /* gothru, true, true: lines 0, 2, 3, 4 */
-            0x1a00u, /* approach_position_fingers, false, false: lines 8, 10, 11 */
-            0x1a00u, /* approach_position_fingers, false, true: lines 8, 10, 11 */
-            0x0003u, /* approach_position_fingers, true, false: lines 0, 1 */
-            0x001du, /* approach_position_fingers, true, true: lines 0, 2, 3, 4 */
-            0x1a00u, /* departure_position_fingers, false, false: lines 8, 10, 11 */
-            0x1a00u, /* departure_position_fingers, false, true: lines 8, 10, 11 */
-            0x0003u, /* departure_position_fingers, true, false: lines 0, 1 */
-            0x001du, /* departure_position_fingers, true, true: lines 0, 2, 3, 4 */
-            0x1a00u, /* immed_grasp, false, false: lines 8, 10, 11 */
-            0x1a00u, /* immed_grasp, false, true: lines 8, 10, 11 */
-            0x0003u, /* immed_grasp, true, false: lines 0, 1 */
-            0x001du /* immed_grasp, true, true: lines 0, 2, 3, 4 */
-        },
-        { /* emove/move_to.rcs: primitive.status, idle, lost, path_length - path_at > 2 */
-            0x0ac1u, /* done, false, false, false: lines 0, 6, 7, 8, 10 */
-            0x0ae1u, /* done, false, false, true: lines 0, 5, 6, 7, 8, 10 */
-            0x0b41u, /* done, false, true, false: lines 0, 6, 7a, 8, 10 */
-            0x0b61u, /* done, false, true, true: lines 0, 5, 6, 7a, 8, 10 */
-            0x0adeu, /* done, true, false, false: lines 1 to 4, 6, 7, 8, 10 */
-            0x0afeu, /* done, true, false, true: lines 1 to 7, 8, 10 */
-            0x0b5eu, /* done, true, true, false: lines 1 to 4, 6, 7a, 8, 10 */
-            0x0b7eu, /* done, true, true, true: lines 1 to 6, 7a, 8, 10 */
-            0x1a01u, /* executing, false, false, false: lines 0, 8, 10, 11 */
-            0x1a01u, /* executing, false, false, true: lines 0, 8, 10, 11 */
-            0x1a01u, /* executing, false, true, false: lines 0, 8, 10, 11 */
-            0x1a01u, /* executing, false, true, true: lines 0, 8, 10, 11 */
-            0x1a1eu, /* executing, true, false, false: lines 1 to 4, 8, 10, 11 */
-            0x1a1eu, /* executing, true, false, true: lines 1 to 4, 8, 10, 11 */
-            0x1a1eu, /* executing, true, true, false: lines 1 to 4, 8, 10, 11 */
-            0x1a1eu, /* executing, true, true, true: lines 1 to 4, 8, 10, 11 */
-            0x0e01u, /* failed, false, false, false: lines 0, 8, 9, 10 */
-            0x0e01u, /* failed, false, false, true: lines 0, 8, 9, 10 */
-            0x0e01u, /* failed, false, true, false: lines 0, 8, 9, 10 */
-            0x0e01u, /* failed, false, true, true: lines 0, 8, 9, 10 */
-            0x0e1eu, /* failed, true, false, false: lines 1 to 4, 8, 9, 10 */
-            0x0e1eu, /* failed, true, false, true: lines 1 to 4, 8, 9, 10 */
-            0x0e1eu, /* failed, true, true, false: lines 1 to 4, 8, 9, 10 */
-            0x0e1eu /* failed, true, true, true: lines 1 to 4, 8, 9, 10 */
-        },
-        { /* emove/move_to.rcs: path_length - path_at <= 2 */
-            0x1fbfu, /* false: lines 0 to 5, 7 to 11 */
-            0x1fffu /* true: every line */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->path_length] & (uint32_t)t.t1[s->cur_state] &
-            (uint32_t)t.t2[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-                (s->target.known ? 1u : 0u)] &
-            (uint32_t)t.t3[(((((s->primitive.status * 2u) + (s->idle ? 1u : 0u)) * 2u) +
-                (s->lost ? 1u : 0u)) * 2u) +
-                ((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)] &
-            (uint32_t)t.t4[(((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = emove_bit32(m | 0x2000u);
-    line = several ? (-2) : line;
-    return line;
+    return emove_match_move_to(s);
 }
 
 /* The same for n inputs at once, table move_to. */
@@ -1628,106 +1913,7 @@ void emove_move_to_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table move_to_obj that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_move_to_obj_line(const emove_t *s)
 {
-    /* Masks of emove/move_to_obj.rcs: bit k is set where line k does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint16_t t0[63];
-        uint16_t t1[14];
-        uint16_t t2[24];
-        uint16_t t3[24];
-    } t = {
-        { /* emove/move_to_obj.rcs: path_length */
-            0x1fd7u, /* 0: lines 0, 1, 2, 4, 6 to 12 */
-            0x1fdbu, /* 1: lines 0, 1, 3, 4, 6 to 12 */
-            /* 2 .. 62: lines 0, 1, 3, 5 to 12 */
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
-            0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu
-        },
-        { /* emove/move_to_obj.rcs: cur_state */
-            0x060fu, /* d_state: lines 0 to 3, 9, 10 */
-            0x080fu, /* f_state: lines 0 to 3, 11 */
-            0x14cfu, /* through: lines 0 to 3, 6, 7, 10, 12 */
-            0x150fu, /* last: lines 0 to 3, 8, 10, 12 */
-            0x143fu, /* opening: lines 0 to 5, 10, 12 */
-            0x040fu, /* looking: lines 0 to 3, 10 */
-            0x040fu, /* flooding: lines 0 to 3, 10 */
-            0x040fu, /* centering: lines 0 to 3, 10 */
-            0x040fu, /* lining: lines 0 to 3, 10 */
-            0x040fu, /* closing: lines 0 to 3, 10 */
-            0x040fu, /* hovering: lines 0 to 3, 10 */
-            0x040fu, /* lowering: lines 0 to 3, 10 */
-            0x040fu, /* grasping: lines 0 to 3, 10 */
-            0x040fu /* releasing: lines 0 to 3, 10 */
-        },
-        { /* emove/move_to_obj.rcs: primitive.command, new_command, target.known */
-            0x1a00u, /* pause, false, false: lines 9, 11, 12 */
-            0x1a00u, /* pause, false, true: lines 9, 11, 12 */
-            0x0003u, /* pause, true, false: lines 0, 1 */
-            0x000du, /* pause, true, true: lines 0, 2, 3 */
-            0x1f00u, /* goto, false, false: lines 8 to 12 */
-            0x1f00u, /* goto, false, true: lines 8 to 12 */
-            0x0003u, /* goto, true, false: lines 0, 1 */
-            0x000du, /* goto, true, true: lines 0, 2, 3 */
-            0x1ec0u, /* gothru, false, false: lines 6, 7, 9 to 12 */
-            0x1ec0u, /* gothru, false, true: lines 6, 7, 9 to 12 */
-            0x0003u, /* gothru, true, false: lines 0, 1 */
-            0x000du, /* gothru, true, true: lines 0, 2, 3 */
-            0x1e30u, /* approach_position_fingers, false, false: lines 4, 5, 9 to 12 */
-            0x1e30u, /* approach_position_fingers, false, true: lines 4, 5, 9 to 12 */
-            0x0003u, /* approach_position_fingers, true, false: lines 0, 1 */
-            0x000du, /* approach_position_fingers, true, true: lines 0, 2, 3 */
-            0x1a00u, /* departure_position_fingers, false, false: lines 9, 11, 12 */
-            0x1a00u, /* departure_position_fingers, false, true: lines 9, 11, 12 */
-            0x0003u, /* departure_position_fingers, true, false: lines 0, 1 */
-            0x000du, /* departure_position_fingers, true, true: lines 0, 2, 3 */
-            0x1a00u, /* immed_grasp, false, false: lines 9, 11, 12 */
-            0x1a00u, /* immed_grasp, false, true: lines 9, 11, 12 */
-            0x0003u, /* immed_grasp, true, false: lines 0, 1 */
-            0x000du /* immed_grasp, true, true: lines 0, 2, 3 */
-        },
-        /* emove/move_to_obj.rcs: primitive.status, idle, path_length - path_at > 2, path_length - path_at
-           <= 2 */
-        {
-            0x0b31u, /* done, false, false, false: lines 0, 4, 5, 8, 9, 11 */
-            0x0bb1u, /* done, false, false, true: lines 0, 4, 5, 7, 8, 9, 11 */
-            0x0b71u, /* done, false, true, false: lines 0, 4, 5, 6, 8, 9, 11 */
-            0x0bf1u, /* done, false, true, true: lines 0, 4 to 9, 11 */
-            0x0b3eu, /* done, true, false, false: lines 1 to 5, 8, 9, 11 */
-            0x0bbeu, /* done, true, false, true: lines 1 to 5, 7, 8, 9, 11 */
-            0x0b7eu, /* done, true, true, false: lines 1 to 6, 8, 9, 11 */
-            0x0bfeu, /* done, true, true, true: lines 1 to 9, 11 */
-            0x1a01u, /* executing, false, false, false: lines 0, 9, 11, 12 */
-            0x1a01u, /* executing, false, false, true: lines 0, 9, 11, 12 */
-            0x1a01u, /* executing, false, true, false: lines 0, 9, 11, 12 */
-            0x1a01u, /* executing, false, true, true: lines 0, 9, 11, 12 */
-            0x1a0eu, /* executing, true, false, false: lines 1, 2, 3, 9, 11, 12 */
-            0x1a0eu, /* executing, true, false, true: lines 1, 2, 3, 9, 11, 12 */
-            0x1a0eu, /* executing, true, true, false: lines 1, 2, 3, 9, 11, 12 */
-            0x1a0eu, /* executing, true, true, true: lines 1, 2, 3, 9, 11, 12 */
-            0x0e01u, /* failed, false, false, false: lines 0, 9, 10, 11 */
-            0x0e01u, /* failed, false, false, true: lines 0, 9, 10, 11 */
-            0x0e01u, /* failed, false, true, false: lines 0, 9, 10, 11 */
-            0x0e01u, /* failed, false, true, true: lines 0, 9, 10, 11 */
-            0x0e0eu, /* failed, true, false, false: lines 1, 2, 3, 9, 10, 11 */
-            0x0e0eu, /* failed, true, false, true: lines 1, 2, 3, 9, 10, 11 */
-            0x0e0eu, /* failed, true, true, false: lines 1, 2, 3, 9, 10, 11 */
-            0x0e0eu /* failed, true, true, true: lines 1, 2, 3, 9, 10, 11 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->path_length] & (uint32_t)t.t1[s->cur_state] &
-            (uint32_t)t.t2[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-                (s->target.known ? 1u : 0u)] &
-            (uint32_t)t.t3[(((((s->primitive.status * 2u) + (s->idle ? 1u : 0u)) * 2u) +
-                ((((int32_t)s->path_length - (int32_t)s->path_at) > 2) ? 1u : 0u)) * 2u) +
-                ((((int32_t)s->path_length - (int32_t)s->path_at) <= 2) ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = emove_bit32(m | 0x2000u);
-    line = several ? (-2) : line;
-    return line;
+    return emove_match_move_to_obj(s);
 }
 
 /* The same for n inputs at once, table move_to_obj. */
@@ -1742,22 +1928,7 @@ void emove_move_to_obj_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table pause_emove that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_pause_emove_line(const emove_t *s)
 {
-    /* Masks of emove/pause.rcs: from the lowest bit, lines 1, 2; each set where its line does not exclude
-       that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[2];
-    } t = {
-        { /* emove/pause.rcs: idle */
-            0x02u, /* false: line 2 */
-            0x01u /* true: line 1 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = emove_bit32(m | 0x4u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return emove_match_pause_emove(s);
 }
 
 /* The same for n inputs at once, table pause_emove. */
@@ -1772,68 +1943,7 @@ void emove_pause_emove_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table pickup that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_pickup_line(const emove_t *s)
 {
-    /* Masks of emove/pickup.rcs: bit k is set where line k does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[14];
-        uint8_t t1[24];
-        uint8_t t2[3];
-    } t = {
-        { /* emove/pickup.rcs: cur_state */
-            0x0bu, /* d_state: lines 0, 1, 3 */
-            0x23u, /* f_state: lines 0, 1, 5 */
-            0x03u, /* through: lines 0, 1 */
-            0x03u, /* last: lines 0, 1 */
-            0x03u, /* opening: lines 0, 1 */
-            0x03u, /* looking: lines 0, 1 */
-            0x03u, /* flooding: lines 0, 1 */
-            0x03u, /* centering: lines 0, 1 */
-            0x03u, /* lining: lines 0, 1 */
-            0x03u, /* closing: lines 0, 1 */
-            0x03u, /* hovering: lines 0, 1 */
-            0x03u, /* lowering: lines 0, 1 */
-            0x57u, /* grasping: lines 0, 1, 2, 4, 6 */
-            0x03u /* releasing: lines 0, 1 */
-        },
-        { /* emove/pickup.rcs: primitive.command, new_command, idle */
-            0x68u, /* pause, false, false: lines 3, 5, 6 */
-            0x68u, /* pause, false, true: lines 3, 5, 6 */
-            0x01u, /* pause, true, false: line 0 */
-            0x02u, /* pause, true, true: line 1 */
-            0x68u, /* goto, false, false: lines 3, 5, 6 */
-            0x68u, /* goto, false, true: lines 3, 5, 6 */
-            0x01u, /* goto, true, false: line 0 */
-            0x02u, /* goto, true, true: line 1 */
-            0x68u, /* gothru, false, false: lines 3, 5, 6 */
-            0x68u, /* gothru, false, true: lines 3, 5, 6 */
-            0x01u, /* gothru, true, false: line 0 */
-            0x02u, /* gothru, true, true: line 1 */
-            0x68u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
-            0x68u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
-            0x01u, /* approach_position_fingers, true, false: line 0 */
-            0x02u, /* approach_position_fingers, true, true: line 1 */
-            0x68u, /* departure_position_fingers, false, false: lines 3, 5, 6 */
-            0x68u, /* departure_position_fingers, false, true: lines 3, 5, 6 */
-            0x01u, /* departure_position_fingers, true, false: line 0 */
-            0x02u, /* departure_position_fingers, true, true: line 1 */
-            0x7cu, /* immed_grasp, false, false: lines 2 to 6 */
-            0x7cu, /* immed_grasp, false, true: lines 2 to 6 */
-            0x01u, /* immed_grasp, true, false: line 0 */
-            0x02u /* immed_grasp, true, true: line 1 */
-        },
-        { /* emove/pickup.rcs: primitive.status */
-            0x2fu, /* done: lines 0 to 3, 5 */
-            0x6bu, /* executing: lines 0, 1, 3, 5, 6 */
-            0x3bu /* failed: lines 0, 1, 3, 4, 5 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->cur_state] &
-            (uint32_t)t.t1[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-                (s->idle ? 1u : 0u)] &
-            (uint32_t)t.t2[s->primitive.status];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = emove_bit32(m | 0x80u);
-    line = several ? (-2) : line;
-    return line;
+    return emove_match_pickup(s);
 }
 
 /* The same for n inputs at once, table pickup. */
@@ -1848,72 +1958,7 @@ void emove_pickup_lines(const emove_t *in, int32_t *out, uint32_t n)
 /* The line of table release_part that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_release_part_line(const emove_t *s)
 {
-    /* Masks of emove/release.rcs: from the lowest bit, lines 0, 1, 1a, 2, 3, 4, 5, 6; each set where its
-       line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[14];
-        uint8_t t1[24];
-        uint8_t t2[6];
-    } t = {
-        { /* emove/release.rcs: cur_state */
-            0x17u, /* d_state: lines 0, 1, 1a, 3 */
-            0x47u, /* f_state: lines 0, 1, 1a, 5 */
-            0x07u, /* through: lines 0, 1, 1a */
-            0x07u, /* last: lines 0, 1, 1a */
-            0x07u, /* opening: lines 0, 1, 1a */
-            0x07u, /* looking: lines 0, 1, 1a */
-            0x07u, /* flooding: lines 0, 1, 1a */
-            0x07u, /* centering: lines 0, 1, 1a */
-            0x07u, /* lining: lines 0, 1, 1a */
-            0x07u, /* closing: lines 0, 1, 1a */
-            0x07u, /* hovering: lines 0, 1, 1a */
-            0x07u, /* lowering: lines 0, 1, 1a */
-            0x07u, /* grasping: lines 0, 1, 1a */
-            0xafu /* releasing: lines 0 to 2, 4, 6 */
-        },
-        { /* emove/release.rcs: primitive.command, new_command, idle */
-            0xd0u, /* pause, false, false: lines 3, 5, 6 */
-            0xd0u, /* pause, false, true: lines 3, 5, 6 */
-            0x01u, /* pause, true, false: line 0 */
-            0x06u, /* pause, true, true: lines 1, 1a */
-            0xd0u, /* goto, false, false: lines 3, 5, 6 */
-            0xd0u, /* goto, false, true: lines 3, 5, 6 */
-            0x01u, /* goto, true, false: line 0 */
-            0x06u, /* goto, true, true: lines 1, 1a */
-            0xd0u, /* gothru, false, false: lines 3, 5, 6 */
-            0xd0u, /* gothru, false, true: lines 3, 5, 6 */
-            0x01u, /* gothru, true, false: line 0 */
-            0x06u, /* gothru, true, true: lines 1, 1a */
-            0xd0u, /* approach_position_fingers, false, false: lines 3, 5, 6 */
-            0xd0u, /* approach_position_fingers, false, true: lines 3, 5, 6 */
-            0x01u, /* approach_position_fingers, true, false: line 0 */
-            0x06u, /* approach_position_fingers, true, true: lines 1, 1a */
-            0xf8u, /* departure_position_fingers, false, false: lines 2 to 6 */
-            0xf8u, /* departure_position_fingers, false, true: lines 2 to 6 */
-            0x01u, /* departure_position_fingers, true, false: line 0 */
-            0x06u, /* departure_position_fingers, true, true: lines 1, 1a */
-            0xd0u, /* immed_grasp, false, false: lines 3, 5, 6 */
-            0xd0u, /* immed_grasp, false, true: lines 3, 5, 6 */
-            0x01u, /* immed_grasp, true, false: line 0 */
-            0x06u /* immed_grasp, true, true: lines 1, 1a */
-        },
-        { /* emove/release.rcs: primitive.status, lost */
-            0x5bu, /* done, false: lines 0, 1, 2, 3, 5 */
-            0x5du, /* done, true: lines 0, 1a, 2, 3, 5 */
-            0xd3u, /* executing, false: lines 0, 1, 3, 5, 6 */
-            0xd5u, /* executing, true: lines 0, 1a, 3, 5, 6 */
-            0x73u, /* failed, false: lines 0, 1, 3, 4, 5 */
-            0x75u /* failed, true: lines 0, 1a, 3, 4, 5 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->cur_state] &
-            (uint32_t)t.t1[(((s->primitive.command * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-                (s->idle ? 1u : 0u)] &
-            (uint32_t)t.t2[(s->primitive.status * 2u) + (s->lost ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = emove_bit32(m | 0x100u);
-    line = several ? (-2) : line;
-    return line;
+    return emove_match_release_part(s);
 }
 
 /* The same for n inputs at once, table release_part. */

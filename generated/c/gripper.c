@@ -9,6 +9,15 @@
 #define RCSC_CONST_SECTION
 #endif
 
+/* For a function that is called at one place of a cycle: put there, it costs no call. */
+#if !defined(RCSC_INLINE)
+#if defined(__GNUC__)
+#define RCSC_INLINE inline __attribute__((always_inline))
+#else
+#define RCSC_INLINE inline
+#endif
+#endif
+
 /* Each operation on reals is rounded by itself, as it was proved; -ffp-contract=fast may overrule it. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("fp-contract=off")
@@ -233,10 +242,142 @@ static void gripper_admit(gripper_t *s)
     }
 }
 
+/* Finds the line of table position: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t gripper_match_position(const gripper_t *s)
+{
+    /* Masks of gripper/gripper.rcs table position: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each
+       set where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[151];
+        uint8_t t1[24];
+        uint8_t t2[2];
+    } t = {
+        { /* gripper/gripper.rcs table position: waited */
+            /* 0 .. 149: lines 1 to 4, 6, 7 */
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
+            0x77u /* 150: lines 1, 2, 3, 5, 6, 7 */
+        },
+        { /* gripper/gripper.rcs table position: cur_state, new_command, at_opening, closing and forced */
+            0x20u, /* d_state, false, false, false: line 6 */
+            0x20u, /* d_state, false, false, true: line 6 */
+            0x20u, /* d_state, false, true, false: line 6 */
+            0x20u, /* d_state, false, true, true: line 6 */
+            0x01u, /* d_state, true, false, false: line 1 */
+            0x01u, /* d_state, true, false, true: line 1 */
+            0x01u, /* d_state, true, true, false: line 1 */
+            0x01u, /* d_state, true, true, true: line 1 */
+            0x40u, /* f_state, false, false, false: line 7 */
+            0x40u, /* f_state, false, false, true: line 7 */
+            0x40u, /* f_state, false, true, false: line 7 */
+            0x40u, /* f_state, false, true, true: line 7 */
+            0x01u, /* f_state, true, false, false: line 1 */
+            0x01u, /* f_state, true, false, true: line 1 */
+            0x01u, /* f_state, true, true, false: line 1 */
+            0x01u, /* f_state, true, true, true: line 1 */
+            0x18u, /* moving, false, false, false: lines 4, 5 */
+            0x1cu, /* moving, false, false, true: lines 3, 4, 5 */
+            0x02u, /* moving, false, true, false: line 2 */
+            0x02u, /* moving, false, true, true: line 2 */
+            0x01u, /* moving, true, false, false: line 1 */
+            0x01u, /* moving, true, false, true: line 1 */
+            0x01u, /* moving, true, true, false: line 1 */
+            0x01u /* moving, true, true, true: line 1 */
+        },
+        { /* gripper/gripper.rcs table position: not (closing and forced) */
+            0x67u, /* false: lines 1, 2, 3, 6, 7 */
+            0x7fu /* true: every line */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->at_opening ? 1u : 0u)) * 2u) +
+                ((s->closing && s->forced) ? 1u : 0u)] &
+            (uint32_t)t.t2[(!(s->closing && s->forced)) ? 1u : 0u];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = gripper_bit32(m | 0x80u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table grasp: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t gripper_match_grasp(const gripper_t *s)
+{
+    /* Masks of gripper/gripper.rcs table grasp: from the lowest bit, lines 1, 2, 3, 4, 5, 6; each set
+       where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[151];
+        uint8_t t1[12];
+    } t = {
+        { /* gripper/gripper.rcs table grasp: waited */
+            /* 0 .. 149: lines 1, 2, 3, 5, 6 */
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
+            0x3bu /* 150: lines 1, 2, 4, 5, 6 */
+        },
+        { /* gripper/gripper.rcs table grasp: cur_state, new_command, forced */
+            0x10u, /* d_state, false, false: line 5 */
+            0x10u, /* d_state, false, true: line 5 */
+            0x01u, /* d_state, true, false: line 1 */
+            0x01u, /* d_state, true, true: line 1 */
+            0x20u, /* f_state, false, false: line 6 */
+            0x20u, /* f_state, false, true: line 6 */
+            0x01u, /* f_state, true, false: line 1 */
+            0x01u, /* f_state, true, true: line 1 */
+            0x0cu, /* moving, false, false: lines 3, 4 */
+            0x02u, /* moving, false, true: line 2 */
+            0x01u, /* moving, true, false: line 1 */
+            0x01u /* moving, true, true: line 1 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) + (s->forced ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = gripper_bit32(m | 0x40u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table pause_gripper: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t gripper_match_pause_gripper(const gripper_t *s)
+{
+    const uint32_t m = (0x1u);
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    (void)s;
+    int32_t line = gripper_bit32(m | 0x2u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
+}
+
 /* Matches table position and runs the line; returns the fault, 0 for none. */
 static int32_t gripper_run_position(gripper_t *s)
 {
-    s->line = gripper_position_line(s);
+    s->line = gripper_match_position(s);
     switch (s->line) {
     case GRIPPER_LINE_POSITION_1: /* gripper/gripper.rcs line 1 of position: new_command true */
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_MOVING);
@@ -296,7 +437,7 @@ static int32_t gripper_run_position(gripper_t *s)
 /* Matches table grasp and runs the line; returns the fault, 0 for none. */
 static int32_t gripper_run_grasp(gripper_t *s)
 {
-    s->line = gripper_grasp_line(s);
+    s->line = gripper_match_grasp(s);
     switch (s->line) {
     case GRIPPER_LINE_GRASP_1: /* gripper/gripper.rcs line 1 of grasp: new_command true */
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_MOVING);
@@ -346,7 +487,7 @@ static int32_t gripper_run_grasp(gripper_t *s)
 /* Matches table pause_gripper and runs the line; returns the fault, 0 for none. */
 static int32_t gripper_run_pause_gripper(gripper_t *s)
 {
-    s->line = gripper_pause_gripper_line(s);
+    s->line = gripper_match_pause_gripper(s);
     switch (s->line) {
     case GRIPPER_LINE_PAUSE_GRIPPER_1: /* gripper/gripper.rcs line 1 of pause_gripper */
         gripper_do_state(s, GRIPPER_GRIPPER_STATE_D_STATE);
@@ -449,71 +590,7 @@ int32_t gripper_check(const gripper_t *s)
 /* The line of table position that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t gripper_position_line(const gripper_t *s)
 {
-    /* Masks of gripper/gripper.rcs table position: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each
-       set where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[151];
-        uint8_t t1[24];
-        uint8_t t2[2];
-    } t = {
-        { /* gripper/gripper.rcs table position: waited */
-            /* 0 .. 149: lines 1 to 4, 6, 7 */
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu, 0x6fu,
-            0x77u /* 150: lines 1, 2, 3, 5, 6, 7 */
-        },
-        { /* gripper/gripper.rcs table position: cur_state, new_command, at_opening, closing and forced */
-            0x20u, /* d_state, false, false, false: line 6 */
-            0x20u, /* d_state, false, false, true: line 6 */
-            0x20u, /* d_state, false, true, false: line 6 */
-            0x20u, /* d_state, false, true, true: line 6 */
-            0x01u, /* d_state, true, false, false: line 1 */
-            0x01u, /* d_state, true, false, true: line 1 */
-            0x01u, /* d_state, true, true, false: line 1 */
-            0x01u, /* d_state, true, true, true: line 1 */
-            0x40u, /* f_state, false, false, false: line 7 */
-            0x40u, /* f_state, false, false, true: line 7 */
-            0x40u, /* f_state, false, true, false: line 7 */
-            0x40u, /* f_state, false, true, true: line 7 */
-            0x01u, /* f_state, true, false, false: line 1 */
-            0x01u, /* f_state, true, false, true: line 1 */
-            0x01u, /* f_state, true, true, false: line 1 */
-            0x01u, /* f_state, true, true, true: line 1 */
-            0x18u, /* moving, false, false, false: lines 4, 5 */
-            0x1cu, /* moving, false, false, true: lines 3, 4, 5 */
-            0x02u, /* moving, false, true, false: line 2 */
-            0x02u, /* moving, false, true, true: line 2 */
-            0x01u, /* moving, true, false, false: line 1 */
-            0x01u, /* moving, true, false, true: line 1 */
-            0x01u, /* moving, true, true, false: line 1 */
-            0x01u /* moving, true, true, true: line 1 */
-        },
-        { /* gripper/gripper.rcs table position: not (closing and forced) */
-            0x67u, /* false: lines 1, 2, 3, 6, 7 */
-            0x7fu /* true: every line */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->waited] &
-            (uint32_t)t.t1[(((((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-                (s->at_opening ? 1u : 0u)) * 2u) +
-                ((s->closing && s->forced) ? 1u : 0u)] &
-            (uint32_t)t.t2[(!(s->closing && s->forced)) ? 1u : 0u];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = gripper_bit32(m | 0x80u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return gripper_match_position(s);
 }
 
 /* The same for n inputs at once, table position. */
@@ -528,51 +605,7 @@ void gripper_position_lines(const gripper_t *in, int32_t *out, uint32_t n)
 /* The line of table grasp that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t gripper_grasp_line(const gripper_t *s)
 {
-    /* Masks of gripper/gripper.rcs table grasp: from the lowest bit, lines 1, 2, 3, 4, 5, 6; each set
-       where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[151];
-        uint8_t t1[12];
-    } t = {
-        { /* gripper/gripper.rcs table grasp: waited */
-            /* 0 .. 149: lines 1, 2, 3, 5, 6 */
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x37u, 0x37u, 0x37u, 0x37u, 0x37u, 0x37u,
-            0x3bu /* 150: lines 1, 2, 4, 5, 6 */
-        },
-        { /* gripper/gripper.rcs table grasp: cur_state, new_command, forced */
-            0x10u, /* d_state, false, false: line 5 */
-            0x10u, /* d_state, false, true: line 5 */
-            0x01u, /* d_state, true, false: line 1 */
-            0x01u, /* d_state, true, true: line 1 */
-            0x20u, /* f_state, false, false: line 6 */
-            0x20u, /* f_state, false, true: line 6 */
-            0x01u, /* f_state, true, false: line 1 */
-            0x01u, /* f_state, true, true: line 1 */
-            0x0cu, /* moving, false, false: lines 3, 4 */
-            0x02u, /* moving, false, true: line 2 */
-            0x01u, /* moving, true, false: line 1 */
-            0x01u /* moving, true, true: line 1 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->waited] &
-            (uint32_t)t.t1[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) + (s->forced ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = gripper_bit32(m | 0x40u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return gripper_match_grasp(s);
 }
 
 /* The same for n inputs at once, table grasp. */
@@ -587,13 +620,7 @@ void gripper_grasp_lines(const gripper_t *in, int32_t *out, uint32_t n)
 /* The line of table pause_gripper that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t gripper_pause_gripper_line(const gripper_t *s)
 {
-    const uint32_t m = (0x1u);
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    (void)s;
-    int32_t line = gripper_bit32(m | 0x2u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return gripper_match_pause_gripper(s);
 }
 
 /* The same for n inputs at once, table pause_gripper. */

@@ -9,6 +9,15 @@
 #define RCSC_CONST_SECTION
 #endif
 
+/* For a function that is called at one place of a cycle: put there, it costs no call. */
+#if !defined(RCSC_INLINE)
+#if defined(__GNUC__)
+#define RCSC_INLINE inline __attribute__((always_inline))
+#else
+#define RCSC_INLINE inline
+#endif
+#endif
+
 /* Each operation on reals is rounded by itself, as it was proved; -ffp-contract=fast may overrule it. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("fp-contract=off")
@@ -540,7 +549,7 @@ static void primitive_admit(primitive_t *s)
 
 /* primitive/approach_position_fingers.rcs assumption approach_position_fingers_in_step: Found from what
    the lines order, and proved: a state goes with the orders that it waits for (section 9). */
-static bool primitive_holds_approach_position_fingers_in_step(const primitive_t *s)
+static RCSC_INLINE bool primitive_holds_approach_position_fingers_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) ||
@@ -549,7 +558,7 @@ static bool primitive_holds_approach_position_fingers_in_step(const primitive_t 
 
 /* primitive/departure_position_fingers.rcs assumption departure_position_fingers_in_step: Found from what
    the lines order, and proved: a state goes with the orders that it waits for (section 9). */
-static bool primitive_holds_departure_position_fingers_in_step(const primitive_t *s)
+static RCSC_INLINE bool primitive_holds_departure_position_fingers_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) ||
@@ -558,7 +567,7 @@ static bool primitive_holds_departure_position_fingers_in_step(const primitive_t
 
 /* primitive/goto.rcs assumption goto_in_step: Found from what the lines order, and proved: a state goes
    with the orders that it waits for (section 9). */
-static bool primitive_holds_goto_in_step(const primitive_t *s)
+static RCSC_INLINE bool primitive_holds_goto_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) || (s->cur_state == PRMTV_CMN_PRMTV_STATE_MOVING);
@@ -566,7 +575,7 @@ static bool primitive_holds_goto_in_step(const primitive_t *s)
 
 /* primitive/gothru.rcs assumption gothru_in_step: Found from what the lines order, and proved: a state
    goes with the orders that it waits for (section 9). */
-static bool primitive_holds_gothru_in_step(const primitive_t *s)
+static RCSC_INLINE bool primitive_holds_gothru_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) || (s->cur_state == PRMTV_CMN_PRMTV_STATE_MOVING);
@@ -574,11 +583,291 @@ static bool primitive_holds_gothru_in_step(const primitive_t *s)
 
 /* primitive/immed_grasp.rcs assumption immed_grasp_in_step: Found from what the lines order, and proved: a
    state goes with the orders that it waits for (section 9). */
-static bool primitive_holds_immed_grasp_in_step(const primitive_t *s)
+static RCSC_INLINE bool primitive_holds_immed_grasp_in_step(const primitive_t *s)
 {
     return s->new_command || (s->cur_state == PRMTV_CMN_PRMTV_STATE_D_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_F_STATE) ||
             (s->cur_state == PRMTV_CMN_PRMTV_STATE_FINGERING);
+}
+
+/* Finds the line of table approach_position_fingers: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t primitive_match_aprc_pstn_fngrs(const primitive_t *s)
+{
+    /* Masks of primitive/approach_position_fingers.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7;
+       each set where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[16];
+        uint8_t t1[3];
+    } t = {
+        { /* primitive/approach_position_fingers.rcs: cur_state, new_command, fingers.known */
+            0x20u, /* d_state, false, false: line 6 */
+            0x20u, /* d_state, false, true: line 6 */
+            0x02u, /* d_state, true, false: line 2 */
+            0x01u, /* d_state, true, true: line 1 */
+            0x40u, /* f_state, false, false: line 7 */
+            0x40u, /* f_state, false, true: line 7 */
+            0x02u, /* f_state, true, false: line 2 */
+            0x01u, /* f_state, true, true: line 1 */
+            0x00u, /* moving, false, false: no line */
+            0x00u, /* moving, false, true: no line */
+            0x02u, /* moving, true, false: line 2 */
+            0x01u, /* moving, true, true: line 1 */
+            0x1cu, /* fingering, false, false: lines 3, 4, 5 */
+            0x1cu, /* fingering, false, true: lines 3, 4, 5 */
+            0x02u, /* fingering, true, false: line 2 */
+            0x01u /* fingering, true, true: line 1 */
+        },
+        { /* primitive/approach_position_fingers.rcs: gripper.status */
+            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
+            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
+            0x73u /* failed: lines 1, 2, 5, 6, 7 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+        (s->fingers.known ? 1u : 0u)] &
+            (uint32_t)t.t1[s->gripper.status];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = primitive_bit32(m | 0x80u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table departure_position_fingers: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t primitive_match_dprt_pstn_fngrs(const primitive_t *s)
+{
+    /* Masks of primitive/departure_position_fingers.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7;
+       each set where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[16];
+        uint8_t t1[3];
+    } t = {
+        { /* primitive/departure_position_fingers.rcs: cur_state, new_command, fingers.known */
+            0x20u, /* d_state, false, false: line 6 */
+            0x20u, /* d_state, false, true: line 6 */
+            0x02u, /* d_state, true, false: line 2 */
+            0x01u, /* d_state, true, true: line 1 */
+            0x40u, /* f_state, false, false: line 7 */
+            0x40u, /* f_state, false, true: line 7 */
+            0x02u, /* f_state, true, false: line 2 */
+            0x01u, /* f_state, true, true: line 1 */
+            0x00u, /* moving, false, false: no line */
+            0x00u, /* moving, false, true: no line */
+            0x02u, /* moving, true, false: line 2 */
+            0x01u, /* moving, true, true: line 1 */
+            0x1cu, /* fingering, false, false: lines 3, 4, 5 */
+            0x1cu, /* fingering, false, true: lines 3, 4, 5 */
+            0x02u, /* fingering, true, false: line 2 */
+            0x01u /* fingering, true, true: line 1 */
+        },
+        { /* primitive/departure_position_fingers.rcs: gripper.status */
+            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
+            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
+            0x73u /* failed: lines 1, 2, 5, 6, 7 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+        (s->fingers.known ? 1u : 0u)] &
+            (uint32_t)t.t1[s->gripper.status];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = primitive_bit32(m | 0x80u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table goto: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t primitive_match_goto_(const primitive_t *s)
+{
+    /* Masks of primitive/goto.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 6a, 6b, 7, 8, 9; each set
+       where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint16_t t0[251];
+        uint16_t t1[16];
+        uint16_t t2[12];
+    } t = {
+        { /* primitive/goto.rcs: waited */
+            /* 0 .. 249: lines 1 to 4, 6, 6a, 7, 8, 9 */
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
+            0x07b7u /* 250: lines 1, 2, 3, 5, 6, 6b to 9 */
+        },
+        { /* primitive/goto.rcs: cur_state, new_command, goal.known */
+            0x0200u, /* d_state, false, false: line 8 */
+            0x0200u, /* d_state, false, true: line 8 */
+            0x0002u, /* d_state, true, false: line 2 */
+            0x0001u, /* d_state, true, true: line 1 */
+            0x0400u, /* f_state, false, false: line 9 */
+            0x0400u, /* f_state, false, true: line 9 */
+            0x0002u, /* f_state, true, false: line 2 */
+            0x0001u, /* f_state, true, true: line 1 */
+            0x01fcu, /* moving, false, false: lines 3 to 7 */
+            0x01fcu, /* moving, false, true: lines 3 to 7 */
+            0x0002u, /* moving, true, false: line 2 */
+            0x0001u, /* moving, true, true: line 1 */
+            0x0000u, /* fingering, false, false: no line */
+            0x0000u, /* fingering, false, true: no line */
+            0x0002u, /* fingering, true, false: line 2 */
+            0x0001u /* fingering, true, true: line 1 */
+        },
+        { /* primitive/goto.rcs: robot.status, there, settled */
+            0x0607u, /* done, false, false: lines 1, 2, 3, 8, 9 */
+            0x0607u, /* done, false, true: lines 1, 2, 3, 8, 9 */
+            0x06c3u, /* done, true, false: lines 1, 2, 6a, 6b, 8, 9 */
+            0x0623u, /* done, true, true: lines 1, 2, 6, 8, 9 */
+            0x0607u, /* executing, false, false: lines 1, 2, 3, 8, 9 */
+            0x0607u, /* executing, false, true: lines 1, 2, 3, 8, 9 */
+            0x061bu, /* executing, true, false: lines 1, 2, 4, 5, 8, 9 */
+            0x061bu, /* executing, true, true: lines 1, 2, 4, 5, 8, 9 */
+            0x0703u, /* failed, false, false: lines 1, 2, 7, 8, 9 */
+            0x0703u, /* failed, false, true: lines 1, 2, 7, 8, 9 */
+            0x0703u, /* failed, true, false: lines 1, 2, 7, 8, 9 */
+            0x0703u /* failed, true, true: lines 1, 2, 7, 8, 9 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->goal.known ? 1u : 0u)] &
+            (uint32_t)t.t2[(((s->robot.status * 2u) + (s->there ? 1u : 0u)) * 2u) + (s->settled ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = primitive_bit32(m | 0x800u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table gothru: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t primitive_match_gothru(const primitive_t *s)
+{
+    /* Masks of primitive/gothru.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each set where its
+       line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[16];
+        uint8_t t1[6];
+    } t = {
+        { /* primitive/gothru.rcs: cur_state, new_command, goal.known */
+            0x30u, /* d_state, false, false: lines 5, 6 */
+            0x30u, /* d_state, false, true: lines 5, 6 */
+            0x02u, /* d_state, true, false: line 2 */
+            0x01u, /* d_state, true, true: line 1 */
+            0x40u, /* f_state, false, false: line 7 */
+            0x40u, /* f_state, false, true: line 7 */
+            0x02u, /* f_state, true, false: line 2 */
+            0x01u, /* f_state, true, true: line 1 */
+            0x2cu, /* moving, false, false: lines 3, 4, 6 */
+            0x2cu, /* moving, false, true: lines 3, 4, 6 */
+            0x02u, /* moving, true, false: line 2 */
+            0x01u, /* moving, true, true: line 1 */
+            0x00u, /* fingering, false, false: no line */
+            0x00u, /* fingering, false, true: no line */
+            0x02u, /* fingering, true, false: line 2 */
+            0x01u /* fingering, true, true: line 1 */
+        },
+        { /* primitive/gothru.rcs: robot.status, near */
+            0x57u, /* done, false: lines 1, 2, 3, 5, 7 */
+            0x5bu, /* done, true: lines 1, 2, 4, 5, 7 */
+            0x57u, /* executing, false: lines 1, 2, 3, 5, 7 */
+            0x5bu, /* executing, true: lines 1, 2, 4, 5, 7 */
+            0x63u, /* failed, false: lines 1, 2, 6, 7 */
+            0x63u /* failed, true: lines 1, 2, 6, 7 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+        (s->goal.known ? 1u : 0u)] &
+            (uint32_t)t.t1[(s->robot.status * 2u) + (s->near_ ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = primitive_bit32(m | 0x80u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table immed_grasp: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t primitive_match_immed_grasp(const primitive_t *s)
+{
+    /* Masks of primitive/immed_grasp.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7, 8; each set
+       where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[16];
+        uint8_t t1[6];
+    } t = {
+        { /* primitive/immed_grasp.rcs: cur_state, new_command, fingers.known */
+            0x40u, /* d_state, false, false: line 7 */
+            0x40u, /* d_state, false, true: line 7 */
+            0x02u, /* d_state, true, false: line 2 */
+            0x01u, /* d_state, true, true: line 1 */
+            0x80u, /* f_state, false, false: line 8 */
+            0x80u, /* f_state, false, true: line 8 */
+            0x02u, /* f_state, true, false: line 2 */
+            0x01u, /* f_state, true, true: line 1 */
+            0x00u, /* moving, false, false: no line */
+            0x00u, /* moving, false, true: no line */
+            0x02u, /* moving, true, false: line 2 */
+            0x01u, /* moving, true, true: line 1 */
+            0x3cu, /* fingering, false, false: lines 3 to 6 */
+            0x3cu, /* fingering, false, true: lines 3 to 6 */
+            0x02u, /* fingering, true, false: line 2 */
+            0x01u /* fingering, true, true: line 1 */
+        },
+        { /* primitive/immed_grasp.rcs: gripper.status, fits */
+            0xd3u, /* done, false: lines 1, 2, 5, 7, 8 */
+            0xcbu, /* done, true: lines 1, 2, 4, 7, 8 */
+            0xc7u, /* executing, false: lines 1, 2, 3, 7, 8 */
+            0xc7u, /* executing, true: lines 1, 2, 3, 7, 8 */
+            0xe3u, /* failed, false: lines 1, 2, 6, 7, 8 */
+            0xe3u /* failed, true: lines 1, 2, 6, 7, 8 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+        (s->fingers.known ? 1u : 0u)] &
+            (uint32_t)t.t1[(s->gripper.status * 2u) + (s->fits ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = primitive_bit32(m | 0x100u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table pause_primitive: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t primitive_match_pause_primitive(const primitive_t *s)
+{
+    /* Masks of primitive/pause.rcs: from the lowest bit, lines 1, 2; each set where its line does not
+       exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[2];
+    } t = {
+        { /* primitive/pause.rcs: idle */
+            0x02u, /* false: line 2 */
+            0x01u /* true: line 1 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = primitive_bit32(m | 0x4u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
 }
 
 /* Matches table approach_position_fingers and runs the line; returns the fault, 0 for none. */
@@ -588,7 +877,7 @@ static int32_t primitive_run_aprc_pstn_fngrs(primitive_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_APPROACH_POSITION_FINGERS_IN_STEP);
     }
-    s->line = primitive_aprc_pstn_fngrs_line(s);
+    s->line = primitive_match_aprc_pstn_fngrs(s);
     switch (s->line) {
     /* primitive/approach_position_fingers.rcs line 1: new_command true; fingers.known true */
     case PRMTV_LINE_APRCH_PSTN_FINGERS_1:
@@ -653,7 +942,7 @@ static int32_t primitive_run_dprt_pstn_fngrs(primitive_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_DEPARTURE_POSITION_FINGERS_IN_STEP);
     }
-    s->line = primitive_dprt_pstn_fngrs_line(s);
+    s->line = primitive_match_dprt_pstn_fngrs(s);
     switch (s->line) {
     /* primitive/departure_position_fingers.rcs line 1: new_command true; fingers.known true */
     case PRMTV_LINE_DPRTR_PSTN_FINGERS_1:
@@ -718,7 +1007,7 @@ static int32_t primitive_run_goto_(primitive_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_GOTO_IN_STEP);
     }
-    s->line = primitive_goto__line(s);
+    s->line = primitive_match_goto_(s);
     switch (s->line) {
     case PRIMITIVE_LINE_GOTO_1: /* primitive/goto.rcs line 1: new_command true; goal.known true */
         primitive_do_start(s);
@@ -809,7 +1098,7 @@ static int32_t primitive_run_gothru(primitive_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_GOTHRU_IN_STEP);
     }
-    s->line = primitive_gothru_line(s);
+    s->line = primitive_match_gothru(s);
     switch (s->line) {
     case PRIMITIVE_LINE_GOTHRU_1: /* primitive/gothru.rcs line 1: new_command true; goal.known true */
         primitive_do_start(s);
@@ -871,7 +1160,7 @@ static int32_t primitive_run_immed_grasp(primitive_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)PRIMITIVE_ASSUMPTION_IMMED_GRASP_IN_STEP);
     }
-    s->line = primitive_immed_grasp_line(s);
+    s->line = primitive_match_immed_grasp(s);
     switch (s->line) {
     /* primitive/immed_grasp.rcs line 1: new_command true; fingers.known true */
     case PRIMITIVE_LINE_IMMED_GRASP_1:
@@ -937,7 +1226,7 @@ static int32_t primitive_run_immed_grasp(primitive_t *s)
 /* Matches table pause_primitive and runs the line; returns the fault, 0 for none. */
 static int32_t primitive_run_pause_primitive(primitive_t *s)
 {
-    s->line = primitive_pause_primitive_line(s);
+    s->line = primitive_match_pause_primitive(s);
     switch (s->line) {
     case PRMTV_LINE_PAUSE_PRIMITIVE_1: /* primitive/pause.rcs line 1: idle true */
         primitive_do_nextstate(s, PRMTV_CMN_PRMTV_STATE_D_STATE);
@@ -1251,43 +1540,7 @@ int32_t primitive_check(const primitive_t *s)
    several. */
 int32_t primitive_aprc_pstn_fngrs_line(const primitive_t *s)
 {
-    /* Masks of primitive/approach_position_fingers.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7;
-       each set where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[16];
-        uint8_t t1[3];
-    } t = {
-        { /* primitive/approach_position_fingers.rcs: cur_state, new_command, fingers.known */
-            0x20u, /* d_state, false, false: line 6 */
-            0x20u, /* d_state, false, true: line 6 */
-            0x02u, /* d_state, true, false: line 2 */
-            0x01u, /* d_state, true, true: line 1 */
-            0x40u, /* f_state, false, false: line 7 */
-            0x40u, /* f_state, false, true: line 7 */
-            0x02u, /* f_state, true, false: line 2 */
-            0x01u, /* f_state, true, true: line 1 */
-            0x00u, /* moving, false, false: no line */
-            0x00u, /* moving, false, true: no line */
-            0x02u, /* moving, true, false: line 2 */
-            0x01u, /* moving, true, true: line 1 */
-            0x1cu, /* fingering, false, false: lines 3, 4, 5 */
-            0x1cu, /* fingering, false, true: lines 3, 4, 5 */
-            0x02u, /* fingering, true, false: line 2 */
-            0x01u /* fingering, true, true: line 1 */
-        },
-        { /* primitive/approach_position_fingers.rcs: gripper.status */
-            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
-            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
-            0x73u /* failed: lines 1, 2, 5, 6, 7 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-        (s->fingers.known ? 1u : 0u)] &
-            (uint32_t)t.t1[s->gripper.status];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = primitive_bit32(m | 0x80u);
-    line = several ? (-2) : line;
-    return line;
+    return primitive_match_aprc_pstn_fngrs(s);
 }
 
 /* The same for n inputs at once, table approach_position_fingers. */
@@ -1303,43 +1556,7 @@ void primitive_aprc_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32
    several. */
 int32_t primitive_dprt_pstn_fngrs_line(const primitive_t *s)
 {
-    /* Masks of primitive/departure_position_fingers.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7;
-       each set where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[16];
-        uint8_t t1[3];
-    } t = {
-        { /* primitive/departure_position_fingers.rcs: cur_state, new_command, fingers.known */
-            0x20u, /* d_state, false, false: line 6 */
-            0x20u, /* d_state, false, true: line 6 */
-            0x02u, /* d_state, true, false: line 2 */
-            0x01u, /* d_state, true, true: line 1 */
-            0x40u, /* f_state, false, false: line 7 */
-            0x40u, /* f_state, false, true: line 7 */
-            0x02u, /* f_state, true, false: line 2 */
-            0x01u, /* f_state, true, true: line 1 */
-            0x00u, /* moving, false, false: no line */
-            0x00u, /* moving, false, true: no line */
-            0x02u, /* moving, true, false: line 2 */
-            0x01u, /* moving, true, true: line 1 */
-            0x1cu, /* fingering, false, false: lines 3, 4, 5 */
-            0x1cu, /* fingering, false, true: lines 3, 4, 5 */
-            0x02u, /* fingering, true, false: line 2 */
-            0x01u /* fingering, true, true: line 1 */
-        },
-        { /* primitive/departure_position_fingers.rcs: gripper.status */
-            0x6bu, /* done: lines 1, 2, 4, 6, 7 */
-            0x67u, /* executing: lines 1, 2, 3, 6, 7 */
-            0x73u /* failed: lines 1, 2, 5, 6, 7 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-        (s->fingers.known ? 1u : 0u)] &
-            (uint32_t)t.t1[s->gripper.status];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = primitive_bit32(m | 0x80u);
-    line = several ? (-2) : line;
-    return line;
+    return primitive_match_dprt_pstn_fngrs(s);
 }
 
 /* The same for n inputs at once, table departure_position_fingers. */
@@ -1354,86 +1571,7 @@ void primitive_dprt_pstn_fngrs_lines(const primitive_t *in, int32_t *out, uint32
 /* The line of table goto that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_goto__line(const primitive_t *s)
 {
-    /* Masks of primitive/goto.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 6a, 6b, 7, 8, 9; each set
-       where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint16_t t0[251];
-        uint16_t t1[16];
-        uint16_t t2[12];
-    } t = {
-        { /* primitive/goto.rcs: waited */
-            /* 0 .. 249: lines 1 to 4, 6, 6a, 7, 8, 9 */
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu, 0x076fu,
-            0x07b7u /* 250: lines 1, 2, 3, 5, 6, 6b to 9 */
-        },
-        { /* primitive/goto.rcs: cur_state, new_command, goal.known */
-            0x0200u, /* d_state, false, false: line 8 */
-            0x0200u, /* d_state, false, true: line 8 */
-            0x0002u, /* d_state, true, false: line 2 */
-            0x0001u, /* d_state, true, true: line 1 */
-            0x0400u, /* f_state, false, false: line 9 */
-            0x0400u, /* f_state, false, true: line 9 */
-            0x0002u, /* f_state, true, false: line 2 */
-            0x0001u, /* f_state, true, true: line 1 */
-            0x01fcu, /* moving, false, false: lines 3 to 7 */
-            0x01fcu, /* moving, false, true: lines 3 to 7 */
-            0x0002u, /* moving, true, false: line 2 */
-            0x0001u, /* moving, true, true: line 1 */
-            0x0000u, /* fingering, false, false: no line */
-            0x0000u, /* fingering, false, true: no line */
-            0x0002u, /* fingering, true, false: line 2 */
-            0x0001u /* fingering, true, true: line 1 */
-        },
-        { /* primitive/goto.rcs: robot.status, there, settled */
-            0x0607u, /* done, false, false: lines 1, 2, 3, 8, 9 */
-            0x0607u, /* done, false, true: lines 1, 2, 3, 8, 9 */
-            0x06c3u, /* done, true, false: lines 1, 2, 6a, 6b, 8, 9 */
-            0x0623u, /* done, true, true: lines 1, 2, 6, 8, 9 */
-            0x0607u, /* executing, false, false: lines 1, 2, 3, 8, 9 */
-            0x0607u, /* executing, false, true: lines 1, 2, 3, 8, 9 */
-            0x061bu, /* executing, true, false: lines 1, 2, 4, 5, 8, 9 */
-            0x061bu, /* executing, true, true: lines 1, 2, 4, 5, 8, 9 */
-            0x0703u, /* failed, false, false: lines 1, 2, 7, 8, 9 */
-            0x0703u, /* failed, false, true: lines 1, 2, 7, 8, 9 */
-            0x0703u, /* failed, true, false: lines 1, 2, 7, 8, 9 */
-            0x0703u /* failed, true, true: lines 1, 2, 7, 8, 9 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->waited] &
-            (uint32_t)t.t1[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-                (s->goal.known ? 1u : 0u)] &
-            (uint32_t)t.t2[(((s->robot.status * 2u) + (s->there ? 1u : 0u)) * 2u) + (s->settled ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = primitive_bit32(m | 0x800u);
-    line = several ? (-2) : line;
-    return line;
+    return primitive_match_goto_(s);
 }
 
 /* The same for n inputs at once, table goto. */
@@ -1448,46 +1586,7 @@ void primitive_goto__lines(const primitive_t *in, int32_t *out, uint32_t n)
 /* The line of table gothru that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_gothru_line(const primitive_t *s)
 {
-    /* Masks of primitive/gothru.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each set where its
-       line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[16];
-        uint8_t t1[6];
-    } t = {
-        { /* primitive/gothru.rcs: cur_state, new_command, goal.known */
-            0x30u, /* d_state, false, false: lines 5, 6 */
-            0x30u, /* d_state, false, true: lines 5, 6 */
-            0x02u, /* d_state, true, false: line 2 */
-            0x01u, /* d_state, true, true: line 1 */
-            0x40u, /* f_state, false, false: line 7 */
-            0x40u, /* f_state, false, true: line 7 */
-            0x02u, /* f_state, true, false: line 2 */
-            0x01u, /* f_state, true, true: line 1 */
-            0x2cu, /* moving, false, false: lines 3, 4, 6 */
-            0x2cu, /* moving, false, true: lines 3, 4, 6 */
-            0x02u, /* moving, true, false: line 2 */
-            0x01u, /* moving, true, true: line 1 */
-            0x00u, /* fingering, false, false: no line */
-            0x00u, /* fingering, false, true: no line */
-            0x02u, /* fingering, true, false: line 2 */
-            0x01u /* fingering, true, true: line 1 */
-        },
-        { /* primitive/gothru.rcs: robot.status, near */
-            0x57u, /* done, false: lines 1, 2, 3, 5, 7 */
-            0x5bu, /* done, true: lines 1, 2, 4, 5, 7 */
-            0x57u, /* executing, false: lines 1, 2, 3, 5, 7 */
-            0x5bu, /* executing, true: lines 1, 2, 4, 5, 7 */
-            0x63u, /* failed, false: lines 1, 2, 6, 7 */
-            0x63u /* failed, true: lines 1, 2, 6, 7 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-        (s->goal.known ? 1u : 0u)] &
-            (uint32_t)t.t1[(s->robot.status * 2u) + (s->near_ ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = primitive_bit32(m | 0x80u);
-    line = several ? (-2) : line;
-    return line;
+    return primitive_match_gothru(s);
 }
 
 /* The same for n inputs at once, table gothru. */
@@ -1502,46 +1601,7 @@ void primitive_gothru_lines(const primitive_t *in, int32_t *out, uint32_t n)
 /* The line of table immed_grasp that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_immed_grasp_line(const primitive_t *s)
 {
-    /* Masks of primitive/immed_grasp.rcs: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7, 8; each set
-       where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[16];
-        uint8_t t1[6];
-    } t = {
-        { /* primitive/immed_grasp.rcs: cur_state, new_command, fingers.known */
-            0x40u, /* d_state, false, false: line 7 */
-            0x40u, /* d_state, false, true: line 7 */
-            0x02u, /* d_state, true, false: line 2 */
-            0x01u, /* d_state, true, true: line 1 */
-            0x80u, /* f_state, false, false: line 8 */
-            0x80u, /* f_state, false, true: line 8 */
-            0x02u, /* f_state, true, false: line 2 */
-            0x01u, /* f_state, true, true: line 1 */
-            0x00u, /* moving, false, false: no line */
-            0x00u, /* moving, false, true: no line */
-            0x02u, /* moving, true, false: line 2 */
-            0x01u, /* moving, true, true: line 1 */
-            0x3cu, /* fingering, false, false: lines 3 to 6 */
-            0x3cu, /* fingering, false, true: lines 3 to 6 */
-            0x02u, /* fingering, true, false: line 2 */
-            0x01u /* fingering, true, true: line 1 */
-        },
-        { /* primitive/immed_grasp.rcs: gripper.status, fits */
-            0xd3u, /* done, false: lines 1, 2, 5, 7, 8 */
-            0xcbu, /* done, true: lines 1, 2, 4, 7, 8 */
-            0xc7u, /* executing, false: lines 1, 2, 3, 7, 8 */
-            0xc7u, /* executing, true: lines 1, 2, 3, 7, 8 */
-            0xe3u, /* failed, false: lines 1, 2, 6, 7, 8 */
-            0xe3u /* failed, true: lines 1, 2, 6, 7, 8 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-        (s->fingers.known ? 1u : 0u)] &
-            (uint32_t)t.t1[(s->gripper.status * 2u) + (s->fits ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = primitive_bit32(m | 0x100u);
-    line = several ? (-2) : line;
-    return line;
+    return primitive_match_immed_grasp(s);
 }
 
 /* The same for n inputs at once, table immed_grasp. */
@@ -1556,22 +1616,7 @@ void primitive_immed_grasp_lines(const primitive_t *in, int32_t *out, uint32_t n
 /* The line of table pause_primitive that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_pause_primitive_line(const primitive_t *s)
 {
-    /* Masks of primitive/pause.rcs: from the lowest bit, lines 1, 2; each set where its line does not
-       exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[2];
-    } t = {
-        { /* primitive/pause.rcs: idle */
-            0x02u, /* false: line 2 */
-            0x01u /* true: line 1 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->idle ? 1u : 0u];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = primitive_bit32(m | 0x4u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return primitive_match_pause_primitive(s);
 }
 
 /* The same for n inputs at once, table pause_primitive. */

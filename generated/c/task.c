@@ -9,6 +9,15 @@
 #define RCSC_CONST_SECTION
 #endif
 
+/* For a function that is called at one place of a cycle: put there, it costs no call. */
+#if !defined(RCSC_INLINE)
+#if defined(__GNUC__)
+#define RCSC_INLINE inline __attribute__((always_inline))
+#else
+#define RCSC_INLINE inline
+#endif
+#endif
+
 /* Position of the lowest set bit; the argument is not zero. */
 #if defined(__GNUC__)
 static inline int32_t task_bit32(uint32_t m)
@@ -509,7 +518,7 @@ static void task_admit(task_t *s)
 
 /* task/acquire.rcs assumption acquire_in_step: Found from what the lines order, and proved: a state goes
    with the orders that it waits for (section 9). */
-static bool task_holds_acquire_in_step(const task_t *s)
+static RCSC_INLINE bool task_holds_acquire_in_step(const task_t *s)
 {
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
@@ -526,7 +535,7 @@ static bool task_holds_acquire_in_step(const task_t *s)
 }
 
 /* task/acquire.rcs assumption acquire_resting: What rests says so. */
-static bool task_holds_acquire_resting(const task_t *s)
+static RCSC_INLINE bool task_holds_acquire_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
             ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
@@ -535,7 +544,7 @@ static bool task_holds_acquire_resting(const task_t *s)
 
 /* task/clear.rcs assumption clear_in_step: Found from what the lines order, and proved: a state goes with
    the orders that it waits for (section 9). */
-static bool task_holds_clear_in_step(const task_t *s)
+static RCSC_INLINE bool task_holds_clear_in_step(const task_t *s)
 {
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
@@ -549,7 +558,7 @@ static bool task_holds_clear_in_step(const task_t *s)
 }
 
 /* task/clear.rcs assumption clear_resting: What rests says so. */
-static bool task_holds_clear_resting(const task_t *s)
+static RCSC_INLINE bool task_holds_clear_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
             ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
@@ -558,7 +567,7 @@ static bool task_holds_clear_resting(const task_t *s)
 
 /* task/move.rcs assumption move_in_step: Found from what the lines order, and proved: a state goes with
    the orders that it waits for (section 9). */
-static bool task_holds_move_in_step(const task_t *s)
+static RCSC_INLINE bool task_holds_move_in_step(const task_t *s)
 {
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
@@ -578,7 +587,7 @@ static bool task_holds_move_in_step(const task_t *s)
 }
 
 /* task/move.rcs assumption move_resting: What rests says so. */
-static bool task_holds_move_resting(const task_t *s)
+static RCSC_INLINE bool task_holds_move_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
             ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
@@ -587,7 +596,7 @@ static bool task_holds_move_resting(const task_t *s)
 
 /* task/release.rcs assumption release_part_in_step: Found from what the lines order, and proved: a state
    goes with the orders that it waits for (section 9). */
-static bool task_holds_release_part_in_step(const task_t *s)
+static RCSC_INLINE bool task_holds_release_part_in_step(const task_t *s)
 {
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
@@ -600,7 +609,7 @@ static bool task_holds_release_part_in_step(const task_t *s)
 }
 
 /* task/release.rcs assumption release_part_resting: What rests says so. */
-static bool task_holds_release_part_resting(const task_t *s)
+static RCSC_INLINE bool task_holds_release_part_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
             ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
@@ -609,7 +618,7 @@ static bool task_holds_release_part_resting(const task_t *s)
 
 /* task/transfer.rcs assumption transfer_in_step: Found from what the lines order, and proved: a state goes
    with the orders that it waits for (section 9). */
-static bool task_holds_transfer_in_step(const task_t *s)
+static RCSC_INLINE bool task_holds_transfer_in_step(const task_t *s)
 {
     return s->new_command ||
             (((s->cur_state == TASK_COMMON_TASK_STATE_D_STATE) ||
@@ -630,11 +639,479 @@ static bool task_holds_transfer_in_step(const task_t *s)
 }
 
 /* task/transfer.rcs assumption transfer_resting: What rests says so. */
-static bool task_holds_transfer_resting(const task_t *s)
+static RCSC_INLINE bool task_holds_transfer_resting(const task_t *s)
 {
     return (!s->emove.resting) ||
             ((s->emove.command == VCBLRY_EMOVE_CMND_PAUSE) &&
                 (s->emove.status == VOCABULARY_LEVEL_STATUS_DONE));
+}
+
+/* Finds the line of table acquire: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t task_match_acquire(const task_t *s)
+{
+    /* Masks of task/acquire.rcs: bit k is set where line k does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint16_t t0[18];
+        uint16_t t1[24];
+        uint16_t t2[12];
+    } t = {
+        { /* task/acquire.rcs: cur_state, new_command */
+            0x3e00u, /* d_state, false: lines 9 to 13 */
+            0x001fu, /* d_state, true: lines 0 to 4 */
+            0x4000u, /* f_state, false: line 14 */
+            0x001fu, /* f_state, true: lines 0 to 4 */
+            0xbc40u, /* state_2, false: lines 6, 10 to 13, 15 */
+            0x001fu, /* state_2, true: lines 0 to 4 */
+            0xbc80u, /* state_3, false: lines 7, 10 to 13, 15 */
+            0x001fu, /* state_3, true: lines 0 to 4 */
+            0xbc20u, /* state_4, false: lines 5, 10 to 13, 15 */
+            0x001fu, /* state_4, true: lines 0 to 4 */
+            0xbd00u, /* state_5, false: lines 8, 10 to 13, 15 */
+            0x001fu, /* state_5, true: lines 0 to 4 */
+            0x3c00u, /* state_6, false: lines 10 to 13 */
+            0x001fu, /* state_6, true: lines 0 to 4 */
+            0x3c00u, /* state_7, false: lines 10 to 13 */
+            0x001fu, /* state_7, true: lines 0 to 4 */
+            0x3c00u, /* state_8, false: lines 10 to 13 */
+            0x001fu /* state_8, true: lines 0 to 4 */
+        },
+        { /* task/acquire.rcs: emove.command, emove.resting, loc_of_obj */
+            0xc201u, /* pause, false, vis_reqd: lines 0, 9, 14, 15 */
+            0xc201u, /* pause, false, known: lines 0, 9, 14, 15 */
+            0xc21cu, /* pause, true, vis_reqd: lines 2, 3, 4, 9, 14, 15 */
+            0xc20eu, /* pause, true, known: lines 1, 2, 3, 9, 14, 15 */
+            0xc441u, /* move_to, false, vis_reqd: lines 0, 6, 10, 14, 15 */
+            0xc441u, /* move_to, false, known: lines 0, 6, 10, 14, 15 */
+            0xc440u, /* move_to, true, vis_reqd: lines 6, 10, 14, 15 */
+            0xc440u, /* move_to, true, known: lines 6, 10, 14, 15 */
+            0xc821u, /* move_to_obj, false, vis_reqd: lines 0, 5, 11, 14, 15 */
+            0xc821u, /* move_to_obj, false, known: lines 0, 5, 11, 14, 15 */
+            0xc820u, /* move_to_obj, true, vis_reqd: lines 5, 11, 14, 15 */
+            0xc820u, /* move_to_obj, true, known: lines 5, 11, 14, 15 */
+            0xd081u, /* locate, false, vis_reqd: lines 0, 7, 12, 14, 15 */
+            0xd081u, /* locate, false, known: lines 0, 7, 12, 14, 15 */
+            0xd080u, /* locate, true, vis_reqd: lines 7, 12, 14, 15 */
+            0xd080u, /* locate, true, known: lines 7, 12, 14, 15 */
+            0xe101u, /* pickup, false, vis_reqd: lines 0, 8, 13, 14, 15 */
+            0xe101u, /* pickup, false, known: lines 0, 8, 13, 14, 15 */
+            0xe100u, /* pickup, true, vis_reqd: lines 8, 13, 14, 15 */
+            0xe100u, /* pickup, true, known: lines 8, 13, 14, 15 */
+            0xc001u, /* release, false, vis_reqd: lines 0, 14, 15 */
+            0xc001u, /* release, false, known: lines 0, 14, 15 */
+            0xc000u, /* release, true, vis_reqd: lines 14, 15 */
+            0xc000u /* release, true, known: lines 14, 15 */
+        },
+        { /* task/acquire.rcs: emove.status, source_spec, obj_acquired */
+            0x43e9u, /* done, false, false: lines 0, 3, 5 to 9, 14 */
+            0x43e5u, /* done, false, true: lines 0, 2, 5 to 9, 14 */
+            0x43f3u, /* done, true, false: lines 0, 1, 4 to 9, 14 */
+            0x43e5u, /* done, true, true: lines 0, 2, 5 to 9, 14 */
+            0xc201u, /* executing, false, false: lines 0, 9, 14, 15 */
+            0xc201u, /* executing, false, true: lines 0, 9, 14, 15 */
+            0xc201u, /* executing, true, false: lines 0, 9, 14, 15 */
+            0xc201u, /* executing, true, true: lines 0, 9, 14, 15 */
+            0x7e01u, /* failed, false, false: lines 0, 9 to 14 */
+            0x7e01u, /* failed, false, true: lines 0, 9 to 14 */
+            0x7e01u, /* failed, true, false: lines 0, 9 to 14 */
+            0x7e01u /* failed, true, true: lines 0, 9 to 14 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) + s->loc_of_obj] &
+            (uint32_t)t.t2[(((s->emove.status * 2u) + (s->source_spec ? 1u : 0u)) * 2u) +
+                (s->obj_acquired ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = task_bit32(m | 0x10000u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table clear: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t task_match_clear(const task_t *s)
+{
+    /* Masks of task/clear.rcs: bit k is set where line k does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint16_t t0[18];
+        uint16_t t1[24];
+        uint16_t t2[12];
+    } t = {
+        { /* task/clear.rcs: cur_state, new_command */
+            0x0700u, /* d_state, false: lines 8, 9, 10 */
+            0x001fu, /* d_state, true: lines 0 to 4 */
+            0x0800u, /* f_state, false: line 11 */
+            0x001fu, /* f_state, true: lines 0 to 4 */
+            0x0600u, /* state_2, false: lines 9, 10 */
+            0x001fu, /* state_2, true: lines 0 to 4 */
+            0x0600u, /* state_3, false: lines 9, 10 */
+            0x001fu, /* state_3, true: lines 0 to 4 */
+            0x0600u, /* state_4, false: lines 9, 10 */
+            0x001fu, /* state_4, true: lines 0 to 4 */
+            0x0600u, /* state_5, false: lines 9, 10 */
+            0x001fu, /* state_5, true: lines 0 to 4 */
+            0x1620u, /* state_6, false: lines 5, 9, 10, 12 */
+            0x001fu, /* state_6, true: lines 0 to 4 */
+            0x1640u, /* state_7, false: lines 6, 9, 10, 12 */
+            0x001fu, /* state_7, true: lines 0 to 4 */
+            0x1680u, /* state_8, false: lines 7, 9, 10, 12 */
+            0x001fu /* state_8, true: lines 0 to 4 */
+        },
+        { /* task/clear.rcs: emove.command, emove.resting, dest_spec */
+            0x1901u, /* pause, false, false: lines 0, 8, 11, 12 */
+            0x1901u, /* pause, false, true: lines 0, 8, 11, 12 */
+            0x1906u, /* pause, true, false: lines 1, 2, 8, 11, 12 */
+            0x191au, /* pause, true, true: lines 1, 3, 4, 8, 11, 12 */
+            0x1aa1u, /* move_to, false, false: lines 0, 5, 7, 9, 11, 12 */
+            0x1aa1u, /* move_to, false, true: lines 0, 5, 7, 9, 11, 12 */
+            0x1aa0u, /* move_to, true, false: lines 5, 7, 9, 11, 12 */
+            0x1aa0u, /* move_to, true, true: lines 5, 7, 9, 11, 12 */
+            0x1a21u, /* move_to_obj, false, false: lines 0, 5, 9, 11, 12 */
+            0x1a21u, /* move_to_obj, false, true: lines 0, 5, 9, 11, 12 */
+            0x1a20u, /* move_to_obj, true, false: lines 5, 9, 11, 12 */
+            0x1a20u, /* move_to_obj, true, true: lines 5, 9, 11, 12 */
+            0x1801u, /* locate, false, false: lines 0, 11, 12 */
+            0x1801u, /* locate, false, true: lines 0, 11, 12 */
+            0x1800u, /* locate, true, false: lines 11, 12 */
+            0x1800u, /* locate, true, true: lines 11, 12 */
+            0x1801u, /* pickup, false, false: lines 0, 11, 12 */
+            0x1801u, /* pickup, false, true: lines 0, 11, 12 */
+            0x1800u, /* pickup, true, false: lines 11, 12 */
+            0x1800u, /* pickup, true, true: lines 11, 12 */
+            0x1c41u, /* release, false, false: lines 0, 6, 10, 11, 12 */
+            0x1c41u, /* release, false, true: lines 0, 6, 10, 11, 12 */
+            0x1c40u, /* release, true, false: lines 6, 10, 11, 12 */
+            0x1c40u /* release, true, true: lines 6, 10, 11, 12 */
+        },
+        { /* task/clear.rcs: emove.status, names_known, obj_acquired */
+            0x09e3u, /* done, false, false: lines 0, 1, 5 to 8, 11 */
+            0x09e3u, /* done, false, true: lines 0, 1, 5 to 8, 11 */
+            0x09edu, /* done, true, false: lines 0, 2, 3, 5 to 8, 11 */
+            0x09f5u, /* done, true, true: lines 0, 2, 4 to 8, 11 */
+            0x1901u, /* executing, false, false: lines 0, 8, 11, 12 */
+            0x1901u, /* executing, false, true: lines 0, 8, 11, 12 */
+            0x1901u, /* executing, true, false: lines 0, 8, 11, 12 */
+            0x1901u, /* executing, true, true: lines 0, 8, 11, 12 */
+            0x0f01u, /* failed, false, false: lines 0, 8 to 11 */
+            0x0f01u, /* failed, false, true: lines 0, 8 to 11 */
+            0x0f01u, /* failed, true, false: lines 0, 8 to 11 */
+            0x0f01u /* failed, true, true: lines 0, 8 to 11 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) +
+                (s->dest_spec ? 1u : 0u)] &
+            (uint32_t)t.t2[(((s->emove.status * 2u) + (s->names_known ? 1u : 0u)) * 2u) +
+                (s->obj_acquired ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = task_bit32(m | 0x2000u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table move: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t task_match_move(const task_t *s)
+{
+    /* Masks of task/move.rcs: bit k is set where line k does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint32_t t0[18];
+        uint32_t t1[16];
+        uint32_t t2[24];
+        uint32_t t3[24];
+    } t = {
+        { /* task/move.rcs: cur_state, new_command */
+            0x0003c000u, /* d_state, false: lines 14 to 17 */
+            0x000001ffu, /* d_state, true: lines 0 to 8 */
+            0x00040000u, /* f_state, false: line 18 */
+            0x000001ffu, /* f_state, true: lines 0 to 8 */
+            0x000b8200u, /* state_2, false: lines 9, 15, 16, 17, 19 */
+            0x000001ffu, /* state_2, true: lines 0 to 8 */
+            0x000b8400u, /* state_3, false: lines 10, 15, 16, 17, 19 */
+            0x000001ffu, /* state_3, true: lines 0 to 8 */
+            0x000b8800u, /* state_4, false: lines 11, 15, 16, 17, 19 */
+            0x000001ffu, /* state_4, true: lines 0 to 8 */
+            0x000b9000u, /* state_5, false: lines 12, 15, 16, 17, 19 */
+            0x000001ffu, /* state_5, true: lines 0 to 8 */
+            0x000ba000u, /* state_6, false: lines 13, 15, 16, 17, 19 */
+            0x000001ffu, /* state_6, true: lines 0 to 8 */
+            0x00038000u, /* state_7, false: lines 15, 16, 17 */
+            0x000001ffu, /* state_7, true: lines 0 to 8 */
+            0x00038000u, /* state_8, false: lines 15, 16, 17 */
+            0x000001ffu /* state_8, true: lines 0 to 8 */
+        },
+        { /* task/move.rcs: workstation.obj, emove.resting */
+            0x000ffe01u, /* null_obj, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* null_obj, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* tbox, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* tbox, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* bbox, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* bbox, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* flag, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* flag, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* hous, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* hous, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* close_grip, false: lines 0, 9 to 19 */
+            0x000fffbeu, /* close_grip, true: lines 1 to 5, 7 to 19 */
+            0x000ffe01u, /* unknown_object, false: lines 0, 9 to 19 */
+            0x000ffe7eu, /* unknown_object, true: lines 1 to 6, 9 to 19 */
+            0x000ffe01u, /* open_grip, false: lines 0, 9 to 19 */
+            0x000ffe7eu /* open_grip, true: lines 1 to 6, 9 to 19 */
+        },
+        { /* task/move.rcs: emove.command, loc_of_obj, source_spec */
+            0x000c41c7u, /* pause, vis_reqd, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
+            0x000c402fu, /* pause, vis_reqd, true: lines 0 to 3, 5, 14, 18, 19 */
+            0x000c41c7u, /* pause, known, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
+            0x000c401fu, /* pause, known, true: lines 0 to 4, 14, 18, 19 */
+            0x000ca201u, /* move_to, vis_reqd, false: lines 0, 9, 13, 15, 18, 19 */
+            0x000ca201u, /* move_to, vis_reqd, true: lines 0, 9, 13, 15, 18, 19 */
+            0x000ca201u, /* move_to, known, false: lines 0, 9, 13, 15, 18, 19 */
+            0x000ca201u, /* move_to, known, true: lines 0, 9, 13, 15, 18, 19 */
+            0x000ca801u, /* move_to_obj, vis_reqd, false: lines 0, 11, 13, 15, 18, 19 */
+            0x000ca801u, /* move_to_obj, vis_reqd, true: lines 0, 11, 13, 15, 18, 19 */
+            0x000ca801u, /* move_to_obj, known, false: lines 0, 11, 13, 15, 18, 19 */
+            0x000ca801u, /* move_to_obj, known, true: lines 0, 11, 13, 15, 18, 19 */
+            0x000d0401u, /* locate, vis_reqd, false: lines 0, 10, 16, 18, 19 */
+            0x000d0401u, /* locate, vis_reqd, true: lines 0, 10, 16, 18, 19 */
+            0x000d0401u, /* locate, known, false: lines 0, 10, 16, 18, 19 */
+            0x000d0401u, /* locate, known, true: lines 0, 10, 16, 18, 19 */
+            0x000e1001u, /* pickup, vis_reqd, false: lines 0, 12, 17, 18, 19 */
+            0x000e1001u, /* pickup, vis_reqd, true: lines 0, 12, 17, 18, 19 */
+            0x000e1001u, /* pickup, known, false: lines 0, 12, 17, 18, 19 */
+            0x000e1001u, /* pickup, known, true: lines 0, 12, 17, 18, 19 */
+            0x000c0001u, /* release, vis_reqd, false: lines 0, 18, 19 */
+            0x000c0001u, /* release, vis_reqd, true: lines 0, 18, 19 */
+            0x000c0001u, /* release, known, false: lines 0, 18, 19 */
+            0x000c0001u /* release, known, true: lines 0, 18, 19 */
+        },
+        { /* task/move.rcs: emove.status, dest_spec, names_known, obj_acquired */
+            0x00047e03u, /* done, false, false, false: lines 0, 1, 9 to 14, 18 */
+            0x00047e03u, /* done, false, false, true: lines 0, 1, 9 to 14, 18 */
+            0x00047e05u, /* done, false, true, false: lines 0, 2, 9 to 14, 18 */
+            0x00047e05u, /* done, false, true, true: lines 0, 2, 9 to 14, 18 */
+            0x00047e03u, /* done, true, false, false: lines 0, 1, 9 to 14, 18 */
+            0x00047e03u, /* done, true, false, true: lines 0, 1, 9 to 14, 18 */
+            0x00047ef1u, /* done, true, true, false: lines 0, 4 to 7, 9 to 14, 18 */
+            0x00047f49u, /* done, true, true, true: lines 0, 3, 6, 8 to 14, 18 */
+            0x000c4001u, /* executing, false, false, false: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, false, false, true: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, false, true, false: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, false, true, true: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, true, false, false: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, true, false, true: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, true, true, false: lines 0, 14, 18, 19 */
+            0x000c4001u, /* executing, true, true, true: lines 0, 14, 18, 19 */
+            0x0007c001u, /* failed, false, false, false: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, false, false, true: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, false, true, false: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, false, true, true: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, true, false, false: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, true, false, true: lines 0, 14 to 18 */
+            0x0007c001u, /* failed, true, true, false: lines 0, 14 to 18 */
+            0x0007c001u /* failed, true, true, true: lines 0, 14 to 18 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(s->workstation.obj * 2u) + (s->emove.resting ? 1u : 0u)] &
+            (uint32_t)t.t2[(((s->emove.command * 2u) + s->loc_of_obj) * 2u) + (s->source_spec ? 1u : 0u)] &
+            (uint32_t)t.t3[(((((s->emove.status * 2u) + (s->dest_spec ? 1u : 0u)) * 2u) +
+                (s->names_known ? 1u : 0u)) * 2u) +
+                (s->obj_acquired ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = task_bit32(m | 0x100000u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table pause_task: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t task_match_pause_task(const task_t *s)
+{
+    /* Masks of task/pause.rcs: from the lowest bit, lines 1, 2; each set where its line does not exclude
+       that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[2];
+    } t = {
+        { /* task/pause.rcs: emove.resting */
+            0x02u, /* false: line 2 */
+            0x01u /* true: line 1 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->emove.resting ? 1u : 0u];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = task_bit32(m | 0x4u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table release_part: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t task_match_release_part(const task_t *s)
+{
+    /* Masks of task/release.rcs: bit k is set where line k does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint16_t t0[18];
+        uint16_t t1[24];
+        uint16_t t2[6];
+    } t = {
+        { /* task/release.rcs: cur_state, new_command */
+            0x01c0u, /* d_state, false: lines 6, 7, 8 */
+            0x000fu, /* d_state, true: lines 0 to 3 */
+            0x0200u, /* f_state, false: line 9 */
+            0x000fu, /* f_state, true: lines 0 to 3 */
+            0x0180u, /* state_2, false: lines 7, 8 */
+            0x000fu, /* state_2, true: lines 0 to 3 */
+            0x0180u, /* state_3, false: lines 7, 8 */
+            0x000fu, /* state_3, true: lines 0 to 3 */
+            0x0180u, /* state_4, false: lines 7, 8 */
+            0x000fu, /* state_4, true: lines 0 to 3 */
+            0x0180u, /* state_5, false: lines 7, 8 */
+            0x000fu, /* state_5, true: lines 0 to 3 */
+            0x0180u, /* state_6, false: lines 7, 8 */
+            0x000fu, /* state_6, true: lines 0 to 3 */
+            0x0590u, /* state_7, false: lines 4, 7, 8, 10 */
+            0x000fu, /* state_7, true: lines 0 to 3 */
+            0x05a0u, /* state_8, false: lines 5, 7, 8, 10 */
+            0x000fu /* state_8, true: lines 0 to 3 */
+        },
+        { /* task/release.rcs: emove.command, emove.resting, names_known */
+            0x0641u, /* pause, false, false: lines 0, 6, 9, 10 */
+            0x0641u, /* pause, false, true: lines 0, 6, 9, 10 */
+            0x0642u, /* pause, true, false: lines 1, 6, 9, 10 */
+            0x064cu, /* pause, true, true: lines 2, 3, 6, 9, 10 */
+            0x0721u, /* move_to, false, false: lines 0, 5, 8, 9, 10 */
+            0x0721u, /* move_to, false, true: lines 0, 5, 8, 9, 10 */
+            0x0720u, /* move_to, true, false: lines 5, 8, 9, 10 */
+            0x0720u, /* move_to, true, true: lines 5, 8, 9, 10 */
+            0x0601u, /* move_to_obj, false, false: lines 0, 9, 10 */
+            0x0601u, /* move_to_obj, false, true: lines 0, 9, 10 */
+            0x0600u, /* move_to_obj, true, false: lines 9, 10 */
+            0x0600u, /* move_to_obj, true, true: lines 9, 10 */
+            0x0601u, /* locate, false, false: lines 0, 9, 10 */
+            0x0601u, /* locate, false, true: lines 0, 9, 10 */
+            0x0600u, /* locate, true, false: lines 9, 10 */
+            0x0600u, /* locate, true, true: lines 9, 10 */
+            0x0601u, /* pickup, false, false: lines 0, 9, 10 */
+            0x0601u, /* pickup, false, true: lines 0, 9, 10 */
+            0x0600u, /* pickup, true, false: lines 9, 10 */
+            0x0600u, /* pickup, true, true: lines 9, 10 */
+            0x0691u, /* release, false, false: lines 0, 4, 7, 9, 10 */
+            0x0691u, /* release, false, true: lines 0, 4, 7, 9, 10 */
+            0x0690u, /* release, true, false: lines 4, 7, 9, 10 */
+            0x0690u /* release, true, true: lines 4, 7, 9, 10 */
+        },
+        { /* task/release.rcs: emove.status, obj_acquired */
+            0x0277u, /* done, false: lines 0, 1, 2, 4, 5, 6, 9 */
+            0x027bu, /* done, true: lines 0, 1, 3 to 6, 9 */
+            0x0641u, /* executing, false: lines 0, 6, 9, 10 */
+            0x0641u, /* executing, true: lines 0, 6, 9, 10 */
+            0x03c1u, /* failed, false: lines 0, 6 to 9 */
+            0x03c1u /* failed, true: lines 0, 6 to 9 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) +
+                (s->names_known ? 1u : 0u)] &
+            (uint32_t)t.t2[(s->emove.status * 2u) + (s->obj_acquired ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = task_bit32(m | 0x800u);
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table transfer: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t task_match_transfer(const task_t *s)
+{
+    /* Masks of task/transfer.rcs: bit k is set where line k does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint32_t t0[18];
+        uint32_t t1[24];
+        uint32_t t2[24];
+        uint32_t t3[2];
+    } t = {
+        { /* task/transfer.rcs: cur_state, new_command */
+            0x000f8000u, /* d_state, false: lines 15 to 19 */
+            0x000000ffu, /* d_state, true: lines 0 to 7 */
+            0x00100000u, /* f_state, false: line 20 */
+            0x000000ffu, /* f_state, true: lines 0 to 7 */
+            0x002f0100u, /* state_2, false: lines 8, 16 to 19, 21 */
+            0x000000ffu, /* state_2, true: lines 0 to 7 */
+            0x002f0200u, /* state_3, false: lines 9, 16 to 19, 21 */
+            0x000000ffu, /* state_3, true: lines 0 to 7 */
+            0x002f0400u, /* state_4, false: lines 10, 16 to 19, 21 */
+            0x000000ffu, /* state_4, true: lines 0 to 7 */
+            0x002f0800u, /* state_5, false: lines 11, 16 to 19, 21 */
+            0x000000ffu, /* state_5, true: lines 0 to 7 */
+            0x002f1000u, /* state_6, false: lines 12, 16 to 19, 21 */
+            0x000000ffu, /* state_6, true: lines 0 to 7 */
+            0x002f2000u, /* state_7, false: lines 13, 16 to 19, 21 */
+            0x000000ffu, /* state_7, true: lines 0 to 7 */
+            0x002f4000u, /* state_8, false: lines 14, 16 to 19, 21 */
+            0x000000ffu /* state_8, true: lines 0 to 7 */
+        },
+        { /* task/transfer.rcs: emove.command, emove.resting, loc_of_obj */
+            0x00308001u, /* pause, false, vis_reqd: lines 0, 15, 20, 21 */
+            0x00308001u, /* pause, false, known: lines 0, 15, 20, 21 */
+            0x003080eeu, /* pause, true, vis_reqd: lines 1, 2, 3, 5, 6, 7, 15, 20, 21 */
+            0x003080deu, /* pause, true, known: lines 1 to 4, 6, 7, 15, 20, 21 */
+            0x00315101u, /* move_to, false, vis_reqd: lines 0, 8, 12, 14, 16, 20, 21 */
+            0x00315101u, /* move_to, false, known: lines 0, 8, 12, 14, 16, 20, 21 */
+            0x00315100u, /* move_to, true, vis_reqd: lines 8, 12, 14, 16, 20, 21 */
+            0x00315100u, /* move_to, true, known: lines 8, 12, 14, 16, 20, 21 */
+            0x00311401u, /* move_to_obj, false, vis_reqd: lines 0, 10, 12, 16, 20, 21 */
+            0x00311401u, /* move_to_obj, false, known: lines 0, 10, 12, 16, 20, 21 */
+            0x00311400u, /* move_to_obj, true, vis_reqd: lines 10, 12, 16, 20, 21 */
+            0x00311400u, /* move_to_obj, true, known: lines 10, 12, 16, 20, 21 */
+            0x00320201u, /* locate, false, vis_reqd: lines 0, 9, 17, 20, 21 */
+            0x00320201u, /* locate, false, known: lines 0, 9, 17, 20, 21 */
+            0x00320200u, /* locate, true, vis_reqd: lines 9, 17, 20, 21 */
+            0x00320200u, /* locate, true, known: lines 9, 17, 20, 21 */
+            0x00340801u, /* pickup, false, vis_reqd: lines 0, 11, 18, 20, 21 */
+            0x00340801u, /* pickup, false, known: lines 0, 11, 18, 20, 21 */
+            0x00340800u, /* pickup, true, vis_reqd: lines 11, 18, 20, 21 */
+            0x00340800u, /* pickup, true, known: lines 11, 18, 20, 21 */
+            0x00382001u, /* release, false, vis_reqd: lines 0, 13, 19, 20, 21 */
+            0x00382001u, /* release, false, known: lines 0, 13, 19, 20, 21 */
+            0x00382000u, /* release, true, vis_reqd: lines 13, 19, 20, 21 */
+            0x00382000u /* release, true, known: lines 13, 19, 20, 21 */
+        },
+        { /* task/transfer.rcs: emove.status, source_spec, dest_spec, names_known */
+            0x0010ff03u, /* done, false, false, false: lines 0, 1, 8 to 15, 20 */
+            0x0010ff05u, /* done, false, false, true: lines 0, 2, 8 to 15, 20 */
+            0x0010ff03u, /* done, false, true, false: lines 0, 1, 8 to 15, 20 */
+            0x0010ffc1u, /* done, false, true, true: lines 0, 6 to 15, 20 */
+            0x0010ff03u, /* done, true, false, false: lines 0, 1, 8 to 15, 20 */
+            0x0010ff05u, /* done, true, false, true: lines 0, 2, 8 to 15, 20 */
+            0x0010ff03u, /* done, true, true, false: lines 0, 1, 8 to 15, 20 */
+            0x0010ff39u, /* done, true, true, true: lines 0, 3, 4, 5, 8 to 15, 20 */
+            0x00308001u, /* executing, false, false, false: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, false, false, true: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, false, true, false: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, false, true, true: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, true, false, false: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, true, false, true: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, true, true, false: lines 0, 15, 20, 21 */
+            0x00308001u, /* executing, true, true, true: lines 0, 15, 20, 21 */
+            0x001f8001u, /* failed, false, false, false: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, false, false, true: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, false, true, false: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, false, true, true: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, true, false, false: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, true, false, true: lines 0, 15 to 20 */
+            0x001f8001u, /* failed, true, true, false: lines 0, 15 to 20 */
+            0x001f8001u /* failed, true, true, true: lines 0, 15 to 20 */
+        },
+        { /* task/transfer.rcs: obj_acquired */
+            0x003fffb7u, /* false: lines 0, 1, 2, 4, 5, 7 to 21 */
+            0x003fff4fu /* true: lines 0 to 3, 6, 8 to 21 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
+            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) + s->loc_of_obj] &
+            (uint32_t)t.t2[(((((s->emove.status * 2u) + (s->source_spec ? 1u : 0u)) * 2u) +
+                (s->dest_spec ? 1u : 0u)) * 2u) +
+                (s->names_known ? 1u : 0u)] &
+            (uint32_t)t.t3[s->obj_acquired ? 1u : 0u];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = task_bit32(m | 0x400000u);
+    line = several ? (-2) : line;
+    return line;
 }
 
 /* Matches table acquire and runs the line; returns the fault, 0 for none. */
@@ -648,7 +1125,7 @@ static int32_t task_run_acquire(task_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_ACQUIRE_RESTING);
     }
-    s->line = task_acquire_line(s);
+    s->line = task_match_acquire(s);
     switch (s->line) {
     case TASK_LINE_ACQUIRE_0: /* task/acquire.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
@@ -784,7 +1261,7 @@ static int32_t task_run_clear(task_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_CLEAR_RESTING);
     }
-    s->line = task_clear_line(s);
+    s->line = task_match_clear(s);
     switch (s->line) {
     case TASK_LINE_CLEAR_0: /* task/clear.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
@@ -900,7 +1377,7 @@ static int32_t task_run_move(task_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_MOVE_RESTING);
     }
-    s->line = task_move_line(s);
+    s->line = task_match_move(s);
     switch (s->line) {
     case TASK_LINE_MOVE_0: /* task/move.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
@@ -1057,7 +1534,7 @@ static int32_t task_run_move(task_t *s)
 /* Matches table pause_task and runs the line; returns the fault, 0 for none. */
 static int32_t task_run_pause_task(task_t *s)
 {
-    s->line = task_pause_task_line(s);
+    s->line = task_match_pause_task(s);
     switch (s->line) {
     case TASK_LINE_PAUSE_TASK_1: /* task/pause.rcs line 1: emove.resting true */
         task_do_nextstate(s, TASK_COMMON_TASK_STATE_D_STATE);
@@ -1092,7 +1569,7 @@ static int32_t task_run_release_part(task_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_RELEASE_PART_RESTING);
     }
-    s->line = task_release_part_line(s);
+    s->line = task_match_release_part(s);
     switch (s->line) {
     case TASK_LINE_RELEASE_PART_0: /* task/release.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
@@ -1191,7 +1668,7 @@ static int32_t task_run_transfer(task_t *s)
         s->assumptions_failed = s->assumptions_failed |
                 ((uint32_t)1u << (uint32_t)TASK_ASSUMPTION_TRANSFER_RESTING);
     }
-    s->line = task_transfer_line(s);
+    s->line = task_match_transfer(s);
     switch (s->line) {
     case TASK_LINE_TRANSFER_0: /* task/transfer.rcs line 0: new_command true; emove.resting false */
         task_do_settle(s);
@@ -1576,81 +2053,7 @@ int32_t task_check(const task_t *s)
 /* The line of table acquire that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_acquire_line(const task_t *s)
 {
-    /* Masks of task/acquire.rcs: bit k is set where line k does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint16_t t0[18];
-        uint16_t t1[24];
-        uint16_t t2[12];
-    } t = {
-        { /* task/acquire.rcs: cur_state, new_command */
-            0x3e00u, /* d_state, false: lines 9 to 13 */
-            0x001fu, /* d_state, true: lines 0 to 4 */
-            0x4000u, /* f_state, false: line 14 */
-            0x001fu, /* f_state, true: lines 0 to 4 */
-            0xbc40u, /* state_2, false: lines 6, 10 to 13, 15 */
-            0x001fu, /* state_2, true: lines 0 to 4 */
-            0xbc80u, /* state_3, false: lines 7, 10 to 13, 15 */
-            0x001fu, /* state_3, true: lines 0 to 4 */
-            0xbc20u, /* state_4, false: lines 5, 10 to 13, 15 */
-            0x001fu, /* state_4, true: lines 0 to 4 */
-            0xbd00u, /* state_5, false: lines 8, 10 to 13, 15 */
-            0x001fu, /* state_5, true: lines 0 to 4 */
-            0x3c00u, /* state_6, false: lines 10 to 13 */
-            0x001fu, /* state_6, true: lines 0 to 4 */
-            0x3c00u, /* state_7, false: lines 10 to 13 */
-            0x001fu, /* state_7, true: lines 0 to 4 */
-            0x3c00u, /* state_8, false: lines 10 to 13 */
-            0x001fu /* state_8, true: lines 0 to 4 */
-        },
-        { /* task/acquire.rcs: emove.command, emove.resting, loc_of_obj */
-            0xc201u, /* pause, false, vis_reqd: lines 0, 9, 14, 15 */
-            0xc201u, /* pause, false, known: lines 0, 9, 14, 15 */
-            0xc21cu, /* pause, true, vis_reqd: lines 2, 3, 4, 9, 14, 15 */
-            0xc20eu, /* pause, true, known: lines 1, 2, 3, 9, 14, 15 */
-            0xc441u, /* move_to, false, vis_reqd: lines 0, 6, 10, 14, 15 */
-            0xc441u, /* move_to, false, known: lines 0, 6, 10, 14, 15 */
-            0xc440u, /* move_to, true, vis_reqd: lines 6, 10, 14, 15 */
-            0xc440u, /* move_to, true, known: lines 6, 10, 14, 15 */
-            0xc821u, /* move_to_obj, false, vis_reqd: lines 0, 5, 11, 14, 15 */
-            0xc821u, /* move_to_obj, false, known: lines 0, 5, 11, 14, 15 */
-            0xc820u, /* move_to_obj, true, vis_reqd: lines 5, 11, 14, 15 */
-            0xc820u, /* move_to_obj, true, known: lines 5, 11, 14, 15 */
-            0xd081u, /* locate, false, vis_reqd: lines 0, 7, 12, 14, 15 */
-            0xd081u, /* locate, false, known: lines 0, 7, 12, 14, 15 */
-            0xd080u, /* locate, true, vis_reqd: lines 7, 12, 14, 15 */
-            0xd080u, /* locate, true, known: lines 7, 12, 14, 15 */
-            0xe101u, /* pickup, false, vis_reqd: lines 0, 8, 13, 14, 15 */
-            0xe101u, /* pickup, false, known: lines 0, 8, 13, 14, 15 */
-            0xe100u, /* pickup, true, vis_reqd: lines 8, 13, 14, 15 */
-            0xe100u, /* pickup, true, known: lines 8, 13, 14, 15 */
-            0xc001u, /* release, false, vis_reqd: lines 0, 14, 15 */
-            0xc001u, /* release, false, known: lines 0, 14, 15 */
-            0xc000u, /* release, true, vis_reqd: lines 14, 15 */
-            0xc000u /* release, true, known: lines 14, 15 */
-        },
-        { /* task/acquire.rcs: emove.status, source_spec, obj_acquired */
-            0x43e9u, /* done, false, false: lines 0, 3, 5 to 9, 14 */
-            0x43e5u, /* done, false, true: lines 0, 2, 5 to 9, 14 */
-            0x43f3u, /* done, true, false: lines 0, 1, 4 to 9, 14 */
-            0x43e5u, /* done, true, true: lines 0, 2, 5 to 9, 14 */
-            0xc201u, /* executing, false, false: lines 0, 9, 14, 15 */
-            0xc201u, /* executing, false, true: lines 0, 9, 14, 15 */
-            0xc201u, /* executing, true, false: lines 0, 9, 14, 15 */
-            0xc201u, /* executing, true, true: lines 0, 9, 14, 15 */
-            0x7e01u, /* failed, false, false: lines 0, 9 to 14 */
-            0x7e01u, /* failed, false, true: lines 0, 9 to 14 */
-            0x7e01u, /* failed, true, false: lines 0, 9 to 14 */
-            0x7e01u /* failed, true, true: lines 0, 9 to 14 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
-            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) + s->loc_of_obj] &
-            (uint32_t)t.t2[(((s->emove.status * 2u) + (s->source_spec ? 1u : 0u)) * 2u) +
-                (s->obj_acquired ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = task_bit32(m | 0x10000u);
-    line = several ? (-2) : line;
-    return line;
+    return task_match_acquire(s);
 }
 
 /* The same for n inputs at once, table acquire. */
@@ -1665,82 +2068,7 @@ void task_acquire_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table clear that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_clear_line(const task_t *s)
 {
-    /* Masks of task/clear.rcs: bit k is set where line k does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint16_t t0[18];
-        uint16_t t1[24];
-        uint16_t t2[12];
-    } t = {
-        { /* task/clear.rcs: cur_state, new_command */
-            0x0700u, /* d_state, false: lines 8, 9, 10 */
-            0x001fu, /* d_state, true: lines 0 to 4 */
-            0x0800u, /* f_state, false: line 11 */
-            0x001fu, /* f_state, true: lines 0 to 4 */
-            0x0600u, /* state_2, false: lines 9, 10 */
-            0x001fu, /* state_2, true: lines 0 to 4 */
-            0x0600u, /* state_3, false: lines 9, 10 */
-            0x001fu, /* state_3, true: lines 0 to 4 */
-            0x0600u, /* state_4, false: lines 9, 10 */
-            0x001fu, /* state_4, true: lines 0 to 4 */
-            0x0600u, /* state_5, false: lines 9, 10 */
-            0x001fu, /* state_5, true: lines 0 to 4 */
-            0x1620u, /* state_6, false: lines 5, 9, 10, 12 */
-            0x001fu, /* state_6, true: lines 0 to 4 */
-            0x1640u, /* state_7, false: lines 6, 9, 10, 12 */
-            0x001fu, /* state_7, true: lines 0 to 4 */
-            0x1680u, /* state_8, false: lines 7, 9, 10, 12 */
-            0x001fu /* state_8, true: lines 0 to 4 */
-        },
-        { /* task/clear.rcs: emove.command, emove.resting, dest_spec */
-            0x1901u, /* pause, false, false: lines 0, 8, 11, 12 */
-            0x1901u, /* pause, false, true: lines 0, 8, 11, 12 */
-            0x1906u, /* pause, true, false: lines 1, 2, 8, 11, 12 */
-            0x191au, /* pause, true, true: lines 1, 3, 4, 8, 11, 12 */
-            0x1aa1u, /* move_to, false, false: lines 0, 5, 7, 9, 11, 12 */
-            0x1aa1u, /* move_to, false, true: lines 0, 5, 7, 9, 11, 12 */
-            0x1aa0u, /* move_to, true, false: lines 5, 7, 9, 11, 12 */
-            0x1aa0u, /* move_to, true, true: lines 5, 7, 9, 11, 12 */
-            0x1a21u, /* move_to_obj, false, false: lines 0, 5, 9, 11, 12 */
-            0x1a21u, /* move_to_obj, false, true: lines 0, 5, 9, 11, 12 */
-            0x1a20u, /* move_to_obj, true, false: lines 5, 9, 11, 12 */
-            0x1a20u, /* move_to_obj, true, true: lines 5, 9, 11, 12 */
-            0x1801u, /* locate, false, false: lines 0, 11, 12 */
-            0x1801u, /* locate, false, true: lines 0, 11, 12 */
-            0x1800u, /* locate, true, false: lines 11, 12 */
-            0x1800u, /* locate, true, true: lines 11, 12 */
-            0x1801u, /* pickup, false, false: lines 0, 11, 12 */
-            0x1801u, /* pickup, false, true: lines 0, 11, 12 */
-            0x1800u, /* pickup, true, false: lines 11, 12 */
-            0x1800u, /* pickup, true, true: lines 11, 12 */
-            0x1c41u, /* release, false, false: lines 0, 6, 10, 11, 12 */
-            0x1c41u, /* release, false, true: lines 0, 6, 10, 11, 12 */
-            0x1c40u, /* release, true, false: lines 6, 10, 11, 12 */
-            0x1c40u /* release, true, true: lines 6, 10, 11, 12 */
-        },
-        { /* task/clear.rcs: emove.status, names_known, obj_acquired */
-            0x09e3u, /* done, false, false: lines 0, 1, 5 to 8, 11 */
-            0x09e3u, /* done, false, true: lines 0, 1, 5 to 8, 11 */
-            0x09edu, /* done, true, false: lines 0, 2, 3, 5 to 8, 11 */
-            0x09f5u, /* done, true, true: lines 0, 2, 4 to 8, 11 */
-            0x1901u, /* executing, false, false: lines 0, 8, 11, 12 */
-            0x1901u, /* executing, false, true: lines 0, 8, 11, 12 */
-            0x1901u, /* executing, true, false: lines 0, 8, 11, 12 */
-            0x1901u, /* executing, true, true: lines 0, 8, 11, 12 */
-            0x0f01u, /* failed, false, false: lines 0, 8 to 11 */
-            0x0f01u, /* failed, false, true: lines 0, 8 to 11 */
-            0x0f01u, /* failed, true, false: lines 0, 8 to 11 */
-            0x0f01u /* failed, true, true: lines 0, 8 to 11 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
-            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) +
-                (s->dest_spec ? 1u : 0u)] &
-            (uint32_t)t.t2[(((s->emove.status * 2u) + (s->names_known ? 1u : 0u)) * 2u) +
-                (s->obj_acquired ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = task_bit32(m | 0x2000u);
-    line = several ? (-2) : line;
-    return line;
+    return task_match_clear(s);
 }
 
 /* The same for n inputs at once, table clear. */
@@ -1755,114 +2083,7 @@ void task_clear_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table move that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_move_line(const task_t *s)
 {
-    /* Masks of task/move.rcs: bit k is set where line k does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint32_t t0[18];
-        uint32_t t1[16];
-        uint32_t t2[24];
-        uint32_t t3[24];
-    } t = {
-        { /* task/move.rcs: cur_state, new_command */
-            0x0003c000u, /* d_state, false: lines 14 to 17 */
-            0x000001ffu, /* d_state, true: lines 0 to 8 */
-            0x00040000u, /* f_state, false: line 18 */
-            0x000001ffu, /* f_state, true: lines 0 to 8 */
-            0x000b8200u, /* state_2, false: lines 9, 15, 16, 17, 19 */
-            0x000001ffu, /* state_2, true: lines 0 to 8 */
-            0x000b8400u, /* state_3, false: lines 10, 15, 16, 17, 19 */
-            0x000001ffu, /* state_3, true: lines 0 to 8 */
-            0x000b8800u, /* state_4, false: lines 11, 15, 16, 17, 19 */
-            0x000001ffu, /* state_4, true: lines 0 to 8 */
-            0x000b9000u, /* state_5, false: lines 12, 15, 16, 17, 19 */
-            0x000001ffu, /* state_5, true: lines 0 to 8 */
-            0x000ba000u, /* state_6, false: lines 13, 15, 16, 17, 19 */
-            0x000001ffu, /* state_6, true: lines 0 to 8 */
-            0x00038000u, /* state_7, false: lines 15, 16, 17 */
-            0x000001ffu, /* state_7, true: lines 0 to 8 */
-            0x00038000u, /* state_8, false: lines 15, 16, 17 */
-            0x000001ffu /* state_8, true: lines 0 to 8 */
-        },
-        { /* task/move.rcs: workstation.obj, emove.resting */
-            0x000ffe01u, /* null_obj, false: lines 0, 9 to 19 */
-            0x000ffe7eu, /* null_obj, true: lines 1 to 6, 9 to 19 */
-            0x000ffe01u, /* tbox, false: lines 0, 9 to 19 */
-            0x000ffe7eu, /* tbox, true: lines 1 to 6, 9 to 19 */
-            0x000ffe01u, /* bbox, false: lines 0, 9 to 19 */
-            0x000ffe7eu, /* bbox, true: lines 1 to 6, 9 to 19 */
-            0x000ffe01u, /* flag, false: lines 0, 9 to 19 */
-            0x000ffe7eu, /* flag, true: lines 1 to 6, 9 to 19 */
-            0x000ffe01u, /* hous, false: lines 0, 9 to 19 */
-            0x000ffe7eu, /* hous, true: lines 1 to 6, 9 to 19 */
-            0x000ffe01u, /* close_grip, false: lines 0, 9 to 19 */
-            0x000fffbeu, /* close_grip, true: lines 1 to 5, 7 to 19 */
-            0x000ffe01u, /* unknown_object, false: lines 0, 9 to 19 */
-            0x000ffe7eu, /* unknown_object, true: lines 1 to 6, 9 to 19 */
-            0x000ffe01u, /* open_grip, false: lines 0, 9 to 19 */
-            0x000ffe7eu /* open_grip, true: lines 1 to 6, 9 to 19 */
-        },
-        { /* task/move.rcs: emove.command, loc_of_obj, source_spec */
-            0x000c41c7u, /* pause, vis_reqd, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
-            0x000c402fu, /* pause, vis_reqd, true: lines 0 to 3, 5, 14, 18, 19 */
-            0x000c41c7u, /* pause, known, false: lines 0, 1, 2, 6, 7, 8, 14, 18, 19 */
-            0x000c401fu, /* pause, known, true: lines 0 to 4, 14, 18, 19 */
-            0x000ca201u, /* move_to, vis_reqd, false: lines 0, 9, 13, 15, 18, 19 */
-            0x000ca201u, /* move_to, vis_reqd, true: lines 0, 9, 13, 15, 18, 19 */
-            0x000ca201u, /* move_to, known, false: lines 0, 9, 13, 15, 18, 19 */
-            0x000ca201u, /* move_to, known, true: lines 0, 9, 13, 15, 18, 19 */
-            0x000ca801u, /* move_to_obj, vis_reqd, false: lines 0, 11, 13, 15, 18, 19 */
-            0x000ca801u, /* move_to_obj, vis_reqd, true: lines 0, 11, 13, 15, 18, 19 */
-            0x000ca801u, /* move_to_obj, known, false: lines 0, 11, 13, 15, 18, 19 */
-            0x000ca801u, /* move_to_obj, known, true: lines 0, 11, 13, 15, 18, 19 */
-            0x000d0401u, /* locate, vis_reqd, false: lines 0, 10, 16, 18, 19 */
-            0x000d0401u, /* locate, vis_reqd, true: lines 0, 10, 16, 18, 19 */
-            0x000d0401u, /* locate, known, false: lines 0, 10, 16, 18, 19 */
-            0x000d0401u, /* locate, known, true: lines 0, 10, 16, 18, 19 */
-            0x000e1001u, /* pickup, vis_reqd, false: lines 0, 12, 17, 18, 19 */
-            0x000e1001u, /* pickup, vis_reqd, true: lines 0, 12, 17, 18, 19 */
-            0x000e1001u, /* pickup, known, false: lines 0, 12, 17, 18, 19 */
-            0x000e1001u, /* pickup, known, true: lines 0, 12, 17, 18, 19 */
-            0x000c0001u, /* release, vis_reqd, false: lines 0, 18, 19 */
-            0x000c0001u, /* release, vis_reqd, true: lines 0, 18, 19 */
-            0x000c0001u, /* release, known, false: lines 0, 18, 19 */
-            0x000c0001u /* release, known, true: lines 0, 18, 19 */
-        },
-        { /* task/move.rcs: emove.status, dest_spec, names_known, obj_acquired */
-            0x00047e03u, /* done, false, false, false: lines 0, 1, 9 to 14, 18 */
-            0x00047e03u, /* done, false, false, true: lines 0, 1, 9 to 14, 18 */
-            0x00047e05u, /* done, false, true, false: lines 0, 2, 9 to 14, 18 */
-            0x00047e05u, /* done, false, true, true: lines 0, 2, 9 to 14, 18 */
-            0x00047e03u, /* done, true, false, false: lines 0, 1, 9 to 14, 18 */
-            0x00047e03u, /* done, true, false, true: lines 0, 1, 9 to 14, 18 */
-            0x00047ef1u, /* done, true, true, false: lines 0, 4 to 7, 9 to 14, 18 */
-            0x00047f49u, /* done, true, true, true: lines 0, 3, 6, 8 to 14, 18 */
-            0x000c4001u, /* executing, false, false, false: lines 0, 14, 18, 19 */
-            0x000c4001u, /* executing, false, false, true: lines 0, 14, 18, 19 */
-            0x000c4001u, /* executing, false, true, false: lines 0, 14, 18, 19 */
-            0x000c4001u, /* executing, false, true, true: lines 0, 14, 18, 19 */
-            0x000c4001u, /* executing, true, false, false: lines 0, 14, 18, 19 */
-            0x000c4001u, /* executing, true, false, true: lines 0, 14, 18, 19 */
-            0x000c4001u, /* executing, true, true, false: lines 0, 14, 18, 19 */
-            0x000c4001u, /* executing, true, true, true: lines 0, 14, 18, 19 */
-            0x0007c001u, /* failed, false, false, false: lines 0, 14 to 18 */
-            0x0007c001u, /* failed, false, false, true: lines 0, 14 to 18 */
-            0x0007c001u, /* failed, false, true, false: lines 0, 14 to 18 */
-            0x0007c001u, /* failed, false, true, true: lines 0, 14 to 18 */
-            0x0007c001u, /* failed, true, false, false: lines 0, 14 to 18 */
-            0x0007c001u, /* failed, true, false, true: lines 0, 14 to 18 */
-            0x0007c001u, /* failed, true, true, false: lines 0, 14 to 18 */
-            0x0007c001u /* failed, true, true, true: lines 0, 14 to 18 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
-            (uint32_t)t.t1[(s->workstation.obj * 2u) + (s->emove.resting ? 1u : 0u)] &
-            (uint32_t)t.t2[(((s->emove.command * 2u) + s->loc_of_obj) * 2u) + (s->source_spec ? 1u : 0u)] &
-            (uint32_t)t.t3[(((((s->emove.status * 2u) + (s->dest_spec ? 1u : 0u)) * 2u) +
-                (s->names_known ? 1u : 0u)) * 2u) +
-                (s->obj_acquired ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = task_bit32(m | 0x100000u);
-    line = several ? (-2) : line;
-    return line;
+    return task_match_move(s);
 }
 
 /* The same for n inputs at once, table move. */
@@ -1877,22 +2098,7 @@ void task_move_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table pause_task that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_pause_task_line(const task_t *s)
 {
-    /* Masks of task/pause.rcs: from the lowest bit, lines 1, 2; each set where its line does not exclude
-       that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[2];
-    } t = {
-        { /* task/pause.rcs: emove.resting */
-            0x02u, /* false: line 2 */
-            0x01u /* true: line 1 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->emove.resting ? 1u : 0u];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = task_bit32(m | 0x4u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return task_match_pause_task(s);
 }
 
 /* The same for n inputs at once, table pause_task. */
@@ -1907,75 +2113,7 @@ void task_pause_task_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table release_part that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_release_part_line(const task_t *s)
 {
-    /* Masks of task/release.rcs: bit k is set where line k does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint16_t t0[18];
-        uint16_t t1[24];
-        uint16_t t2[6];
-    } t = {
-        { /* task/release.rcs: cur_state, new_command */
-            0x01c0u, /* d_state, false: lines 6, 7, 8 */
-            0x000fu, /* d_state, true: lines 0 to 3 */
-            0x0200u, /* f_state, false: line 9 */
-            0x000fu, /* f_state, true: lines 0 to 3 */
-            0x0180u, /* state_2, false: lines 7, 8 */
-            0x000fu, /* state_2, true: lines 0 to 3 */
-            0x0180u, /* state_3, false: lines 7, 8 */
-            0x000fu, /* state_3, true: lines 0 to 3 */
-            0x0180u, /* state_4, false: lines 7, 8 */
-            0x000fu, /* state_4, true: lines 0 to 3 */
-            0x0180u, /* state_5, false: lines 7, 8 */
-            0x000fu, /* state_5, true: lines 0 to 3 */
-            0x0180u, /* state_6, false: lines 7, 8 */
-            0x000fu, /* state_6, true: lines 0 to 3 */
-            0x0590u, /* state_7, false: lines 4, 7, 8, 10 */
-            0x000fu, /* state_7, true: lines 0 to 3 */
-            0x05a0u, /* state_8, false: lines 5, 7, 8, 10 */
-            0x000fu /* state_8, true: lines 0 to 3 */
-        },
-        { /* task/release.rcs: emove.command, emove.resting, names_known */
-            0x0641u, /* pause, false, false: lines 0, 6, 9, 10 */
-            0x0641u, /* pause, false, true: lines 0, 6, 9, 10 */
-            0x0642u, /* pause, true, false: lines 1, 6, 9, 10 */
-            0x064cu, /* pause, true, true: lines 2, 3, 6, 9, 10 */
-            0x0721u, /* move_to, false, false: lines 0, 5, 8, 9, 10 */
-            0x0721u, /* move_to, false, true: lines 0, 5, 8, 9, 10 */
-            0x0720u, /* move_to, true, false: lines 5, 8, 9, 10 */
-            0x0720u, /* move_to, true, true: lines 5, 8, 9, 10 */
-            0x0601u, /* move_to_obj, false, false: lines 0, 9, 10 */
-            0x0601u, /* move_to_obj, false, true: lines 0, 9, 10 */
-            0x0600u, /* move_to_obj, true, false: lines 9, 10 */
-            0x0600u, /* move_to_obj, true, true: lines 9, 10 */
-            0x0601u, /* locate, false, false: lines 0, 9, 10 */
-            0x0601u, /* locate, false, true: lines 0, 9, 10 */
-            0x0600u, /* locate, true, false: lines 9, 10 */
-            0x0600u, /* locate, true, true: lines 9, 10 */
-            0x0601u, /* pickup, false, false: lines 0, 9, 10 */
-            0x0601u, /* pickup, false, true: lines 0, 9, 10 */
-            0x0600u, /* pickup, true, false: lines 9, 10 */
-            0x0600u, /* pickup, true, true: lines 9, 10 */
-            0x0691u, /* release, false, false: lines 0, 4, 7, 9, 10 */
-            0x0691u, /* release, false, true: lines 0, 4, 7, 9, 10 */
-            0x0690u, /* release, true, false: lines 4, 7, 9, 10 */
-            0x0690u /* release, true, true: lines 4, 7, 9, 10 */
-        },
-        { /* task/release.rcs: emove.status, obj_acquired */
-            0x0277u, /* done, false: lines 0, 1, 2, 4, 5, 6, 9 */
-            0x027bu, /* done, true: lines 0, 1, 3 to 6, 9 */
-            0x0641u, /* executing, false: lines 0, 6, 9, 10 */
-            0x0641u, /* executing, true: lines 0, 6, 9, 10 */
-            0x03c1u, /* failed, false: lines 0, 6 to 9 */
-            0x03c1u /* failed, true: lines 0, 6 to 9 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
-            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) +
-                (s->names_known ? 1u : 0u)] &
-            (uint32_t)t.t2[(s->emove.status * 2u) + (s->obj_acquired ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = task_bit32(m | 0x800u);
-    line = several ? (-2) : line;
-    return line;
+    return task_match_release_part(s);
 }
 
 /* The same for n inputs at once, table release_part. */
@@ -1990,100 +2128,7 @@ void task_release_part_lines(const task_t *in, int32_t *out, uint32_t n)
 /* The line of table transfer that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_transfer_line(const task_t *s)
 {
-    /* Masks of task/transfer.rcs: bit k is set where line k does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint32_t t0[18];
-        uint32_t t1[24];
-        uint32_t t2[24];
-        uint32_t t3[2];
-    } t = {
-        { /* task/transfer.rcs: cur_state, new_command */
-            0x000f8000u, /* d_state, false: lines 15 to 19 */
-            0x000000ffu, /* d_state, true: lines 0 to 7 */
-            0x00100000u, /* f_state, false: line 20 */
-            0x000000ffu, /* f_state, true: lines 0 to 7 */
-            0x002f0100u, /* state_2, false: lines 8, 16 to 19, 21 */
-            0x000000ffu, /* state_2, true: lines 0 to 7 */
-            0x002f0200u, /* state_3, false: lines 9, 16 to 19, 21 */
-            0x000000ffu, /* state_3, true: lines 0 to 7 */
-            0x002f0400u, /* state_4, false: lines 10, 16 to 19, 21 */
-            0x000000ffu, /* state_4, true: lines 0 to 7 */
-            0x002f0800u, /* state_5, false: lines 11, 16 to 19, 21 */
-            0x000000ffu, /* state_5, true: lines 0 to 7 */
-            0x002f1000u, /* state_6, false: lines 12, 16 to 19, 21 */
-            0x000000ffu, /* state_6, true: lines 0 to 7 */
-            0x002f2000u, /* state_7, false: lines 13, 16 to 19, 21 */
-            0x000000ffu, /* state_7, true: lines 0 to 7 */
-            0x002f4000u, /* state_8, false: lines 14, 16 to 19, 21 */
-            0x000000ffu /* state_8, true: lines 0 to 7 */
-        },
-        { /* task/transfer.rcs: emove.command, emove.resting, loc_of_obj */
-            0x00308001u, /* pause, false, vis_reqd: lines 0, 15, 20, 21 */
-            0x00308001u, /* pause, false, known: lines 0, 15, 20, 21 */
-            0x003080eeu, /* pause, true, vis_reqd: lines 1, 2, 3, 5, 6, 7, 15, 20, 21 */
-            0x003080deu, /* pause, true, known: lines 1 to 4, 6, 7, 15, 20, 21 */
-            0x00315101u, /* move_to, false, vis_reqd: lines 0, 8, 12, 14, 16, 20, 21 */
-            0x00315101u, /* move_to, false, known: lines 0, 8, 12, 14, 16, 20, 21 */
-            0x00315100u, /* move_to, true, vis_reqd: lines 8, 12, 14, 16, 20, 21 */
-            0x00315100u, /* move_to, true, known: lines 8, 12, 14, 16, 20, 21 */
-            0x00311401u, /* move_to_obj, false, vis_reqd: lines 0, 10, 12, 16, 20, 21 */
-            0x00311401u, /* move_to_obj, false, known: lines 0, 10, 12, 16, 20, 21 */
-            0x00311400u, /* move_to_obj, true, vis_reqd: lines 10, 12, 16, 20, 21 */
-            0x00311400u, /* move_to_obj, true, known: lines 10, 12, 16, 20, 21 */
-            0x00320201u, /* locate, false, vis_reqd: lines 0, 9, 17, 20, 21 */
-            0x00320201u, /* locate, false, known: lines 0, 9, 17, 20, 21 */
-            0x00320200u, /* locate, true, vis_reqd: lines 9, 17, 20, 21 */
-            0x00320200u, /* locate, true, known: lines 9, 17, 20, 21 */
-            0x00340801u, /* pickup, false, vis_reqd: lines 0, 11, 18, 20, 21 */
-            0x00340801u, /* pickup, false, known: lines 0, 11, 18, 20, 21 */
-            0x00340800u, /* pickup, true, vis_reqd: lines 11, 18, 20, 21 */
-            0x00340800u, /* pickup, true, known: lines 11, 18, 20, 21 */
-            0x00382001u, /* release, false, vis_reqd: lines 0, 13, 19, 20, 21 */
-            0x00382001u, /* release, false, known: lines 0, 13, 19, 20, 21 */
-            0x00382000u, /* release, true, vis_reqd: lines 13, 19, 20, 21 */
-            0x00382000u /* release, true, known: lines 13, 19, 20, 21 */
-        },
-        { /* task/transfer.rcs: emove.status, source_spec, dest_spec, names_known */
-            0x0010ff03u, /* done, false, false, false: lines 0, 1, 8 to 15, 20 */
-            0x0010ff05u, /* done, false, false, true: lines 0, 2, 8 to 15, 20 */
-            0x0010ff03u, /* done, false, true, false: lines 0, 1, 8 to 15, 20 */
-            0x0010ffc1u, /* done, false, true, true: lines 0, 6 to 15, 20 */
-            0x0010ff03u, /* done, true, false, false: lines 0, 1, 8 to 15, 20 */
-            0x0010ff05u, /* done, true, false, true: lines 0, 2, 8 to 15, 20 */
-            0x0010ff03u, /* done, true, true, false: lines 0, 1, 8 to 15, 20 */
-            0x0010ff39u, /* done, true, true, true: lines 0, 3, 4, 5, 8 to 15, 20 */
-            0x00308001u, /* executing, false, false, false: lines 0, 15, 20, 21 */
-            0x00308001u, /* executing, false, false, true: lines 0, 15, 20, 21 */
-            0x00308001u, /* executing, false, true, false: lines 0, 15, 20, 21 */
-            0x00308001u, /* executing, false, true, true: lines 0, 15, 20, 21 */
-            0x00308001u, /* executing, true, false, false: lines 0, 15, 20, 21 */
-            0x00308001u, /* executing, true, false, true: lines 0, 15, 20, 21 */
-            0x00308001u, /* executing, true, true, false: lines 0, 15, 20, 21 */
-            0x00308001u, /* executing, true, true, true: lines 0, 15, 20, 21 */
-            0x001f8001u, /* failed, false, false, false: lines 0, 15 to 20 */
-            0x001f8001u, /* failed, false, false, true: lines 0, 15 to 20 */
-            0x001f8001u, /* failed, false, true, false: lines 0, 15 to 20 */
-            0x001f8001u, /* failed, false, true, true: lines 0, 15 to 20 */
-            0x001f8001u, /* failed, true, false, false: lines 0, 15 to 20 */
-            0x001f8001u, /* failed, true, false, true: lines 0, 15 to 20 */
-            0x001f8001u, /* failed, true, true, false: lines 0, 15 to 20 */
-            0x001f8001u /* failed, true, true, true: lines 0, 15 to 20 */
-        },
-        { /* task/transfer.rcs: obj_acquired */
-            0x003fffb7u, /* false: lines 0, 1, 2, 4, 5, 7 to 21 */
-            0x003fff4fu /* true: lines 0 to 3, 6, 8 to 21 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[(s->cur_state * 2u) + (s->new_command ? 1u : 0u)] &
-            (uint32_t)t.t1[(((s->emove.command * 2u) + (s->emove.resting ? 1u : 0u)) * 2u) + s->loc_of_obj] &
-            (uint32_t)t.t2[(((((s->emove.status * 2u) + (s->source_spec ? 1u : 0u)) * 2u) +
-                (s->dest_spec ? 1u : 0u)) * 2u) +
-                (s->names_known ? 1u : 0u)] &
-            (uint32_t)t.t3[s->obj_acquired ? 1u : 0u];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = task_bit32(m | 0x400000u);
-    line = several ? (-2) : line;
-    return line;
+    return task_match_transfer(s);
 }
 
 /* The same for n inputs at once, table transfer. */

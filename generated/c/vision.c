@@ -9,6 +9,15 @@
 #define RCSC_CONST_SECTION
 #endif
 
+/* For a function that is called at one place of a cycle: put there, it costs no call. */
+#if !defined(RCSC_INLINE)
+#if defined(__GNUC__)
+#define RCSC_INLINE inline __attribute__((always_inline))
+#else
+#define RCSC_INLINE inline
+#endif
+#endif
+
 /* Each operation on reals is rounded by itself, as it was proved; -ffp-contract=fast may overrule it. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("fp-contract=off")
@@ -267,10 +276,148 @@ static void vision_admit(vision_t *s)
     }
 }
 
+/* Finds the line of table flood_flash: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t vision_match_flood_flash(const vision_t *s)
+{
+    /* Masks of vision/vision.rcs table flood_flash: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each
+       set where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[101];
+        uint8_t t1[24];
+    } t = {
+        { /* vision/vision.rcs table flood_flash: waited */
+            /* 0 .. 99: lines 1, 2, 4 to 7 */
+            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7bu, 0x7bu, 0x7bu, 0x7bu,
+            0x7du /* 100: lines 1, 3 to 7 */
+        },
+        { /* vision/vision.rcs table flood_flash: cur_state, new_command, camera.matched, arrived */
+            0x20u, /* d_state, false, false, false: line 6 */
+            0x20u, /* d_state, false, false, true: line 6 */
+            0x20u, /* d_state, false, true, false: line 6 */
+            0x20u, /* d_state, false, true, true: line 6 */
+            0x01u, /* d_state, true, false, false: line 1 */
+            0x01u, /* d_state, true, false, true: line 1 */
+            0x01u, /* d_state, true, true, false: line 1 */
+            0x01u, /* d_state, true, true, true: line 1 */
+            0x40u, /* f_state, false, false, false: line 7 */
+            0x40u, /* f_state, false, false, true: line 7 */
+            0x40u, /* f_state, false, true, false: line 7 */
+            0x40u, /* f_state, false, true, true: line 7 */
+            0x01u, /* f_state, true, false, false: line 1 */
+            0x01u, /* f_state, true, false, true: line 1 */
+            0x01u, /* f_state, true, true, false: line 1 */
+            0x01u, /* f_state, true, true, true: line 1 */
+            0x06u, /* looking, false, false, false: lines 2, 3 */
+            0x10u, /* looking, false, false, true: line 5 */
+            0x06u, /* looking, false, true, false: lines 2, 3 */
+            0x08u, /* looking, false, true, true: line 4 */
+            0x01u, /* looking, true, false, false: line 1 */
+            0x01u, /* looking, true, false, true: line 1 */
+            0x01u, /* looking, true, true, false: line 1 */
+            0x01u /* looking, true, true, true: line 1 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->camera.matched ? 1u : 0u)) * 2u) +
+                (s->arrived ? 1u : 0u)];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = vision_bit32(m | 0x80u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table line_flash: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t vision_match_line_flash(const vision_t *s)
+{
+    /* Masks of vision/vision.rcs table line_flash: from the lowest bit, lines 1, 2, 3, 4, 5a, 5b, 6, 7;
+       each set where its line does not exclude that class. */
+    RCSC_CONST_SECTION static const struct {
+        uint8_t t0[101];
+        uint8_t t1[24];
+        uint8_t t2[2];
+    } t = {
+        { /* vision/vision.rcs table line_flash: waited */
+            /* 0 .. 99: lines 1, 2, 4 to 7 */
+            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfbu, 0xfbu, 0xfbu, 0xfbu,
+            0xfdu /* 100: lines 1, 3 to 7 */
+        },
+        { /* vision/vision.rcs table line_flash: cur_state, new_command, arrived, fits */
+            0x40u, /* d_state, false, false, false: line 6 */
+            0x40u, /* d_state, false, false, true: line 6 */
+            0x40u, /* d_state, false, true, false: line 6 */
+            0x40u, /* d_state, false, true, true: line 6 */
+            0x01u, /* d_state, true, false, false: line 1 */
+            0x01u, /* d_state, true, false, true: line 1 */
+            0x01u, /* d_state, true, true, false: line 1 */
+            0x01u, /* d_state, true, true, true: line 1 */
+            0x80u, /* f_state, false, false, false: line 7 */
+            0x80u, /* f_state, false, false, true: line 7 */
+            0x80u, /* f_state, false, true, false: line 7 */
+            0x80u, /* f_state, false, true, true: line 7 */
+            0x01u, /* f_state, true, false, false: line 1 */
+            0x01u, /* f_state, true, false, true: line 1 */
+            0x01u, /* f_state, true, true, false: line 1 */
+            0x01u, /* f_state, true, true, true: line 1 */
+            0x06u, /* looking, false, false, false: lines 2, 3 */
+            0x06u, /* looking, false, false, true: lines 2, 3 */
+            0x10u, /* looking, false, true, false: line 5a */
+            0x28u, /* looking, false, true, true: lines 4, 5b */
+            0x01u, /* looking, true, false, false: line 1 */
+            0x01u, /* looking, true, false, true: line 1 */
+            0x01u, /* looking, true, true, false: line 1 */
+            0x01u /* looking, true, true, true: line 1 */
+        },
+        { /* vision/vision.rcs table line_flash: faces */
+            0xf7u, /* false: lines 1, 2, 3, 5a to 7 */
+            0xdfu /* true: lines 1 to 5a, 6, 7 */
+        },
+    };
+    const uint32_t m = (uint32_t)t.t0[s->waited] &
+            (uint32_t)t.t1[(((((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
+                (s->arrived ? 1u : 0u)) * 2u) +
+                (s->fits ? 1u : 0u)] &
+            (uint32_t)t.t2[s->faces ? 1u : 0u];
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    int32_t line = vision_bit32(m | 0x100u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
+}
+
+/* Finds the line of table pause_vision: its position; -1 none, -2 several. */
+static RCSC_INLINE int32_t vision_match_pause_vision(const vision_t *s)
+{
+    const uint32_t m = (0x1u);
+    const bool several = (m & (m - 0x1u)) != 0x0u;
+    (void)s;
+    int32_t line = vision_bit32(m | 0x2u);
+    line = (m == 0x0u) ? (-1) : line;
+    line = several ? (-2) : line;
+    return line;
+}
+
 /* Matches table flood_flash and runs the line; returns the fault, 0 for none. */
 static int32_t vision_run_flood_flash(vision_t *s)
 {
-    s->line = vision_flood_flash_line(s);
+    s->line = vision_match_flood_flash(s);
     switch (s->line) {
     case VISION_LINE_FLOOD_FLASH_1: /* vision/vision.rcs line 1 of flood_flash: new_command true */
         vision_do_state(s, VISION_VISION_STATE_LOOKING);
@@ -331,7 +478,7 @@ static int32_t vision_run_flood_flash(vision_t *s)
 /* Matches table line_flash and runs the line; returns the fault, 0 for none. */
 static int32_t vision_run_line_flash(vision_t *s)
 {
-    s->line = vision_line_flash_line(s);
+    s->line = vision_match_line_flash(s);
     switch (s->line) {
     case VISION_LINE_LINE_FLASH_1: /* vision/vision.rcs line 1 of line_flash: new_command true */
         vision_do_state(s, VISION_VISION_STATE_LOOKING);
@@ -400,7 +547,7 @@ static int32_t vision_run_line_flash(vision_t *s)
 /* Matches table pause_vision and runs the line; returns the fault, 0 for none. */
 static int32_t vision_run_pause_vision(vision_t *s)
 {
-    s->line = vision_pause_vision_line(s);
+    s->line = vision_match_pause_vision(s);
     switch (s->line) {
     case VISION_LINE_PAUSE_VISION_1: /* vision/vision.rcs line 1 of pause_vision */
         vision_do_state(s, VISION_VISION_STATE_D_STATE);
@@ -523,61 +670,7 @@ int32_t vision_check(const vision_t *s)
 /* The line of table flood_flash that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t vision_flood_flash_line(const vision_t *s)
 {
-    /* Masks of vision/vision.rcs table flood_flash: from the lowest bit, lines 1, 2, 3, 4, 5, 6, 7; each
-       set where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[101];
-        uint8_t t1[24];
-    } t = {
-        { /* vision/vision.rcs table flood_flash: waited */
-            /* 0 .. 99: lines 1, 2, 4 to 7 */
-            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7bu, 0x7bu, 0x7bu, 0x7bu,
-            0x7du /* 100: lines 1, 3 to 7 */
-        },
-        { /* vision/vision.rcs table flood_flash: cur_state, new_command, camera.matched, arrived */
-            0x20u, /* d_state, false, false, false: line 6 */
-            0x20u, /* d_state, false, false, true: line 6 */
-            0x20u, /* d_state, false, true, false: line 6 */
-            0x20u, /* d_state, false, true, true: line 6 */
-            0x01u, /* d_state, true, false, false: line 1 */
-            0x01u, /* d_state, true, false, true: line 1 */
-            0x01u, /* d_state, true, true, false: line 1 */
-            0x01u, /* d_state, true, true, true: line 1 */
-            0x40u, /* f_state, false, false, false: line 7 */
-            0x40u, /* f_state, false, false, true: line 7 */
-            0x40u, /* f_state, false, true, false: line 7 */
-            0x40u, /* f_state, false, true, true: line 7 */
-            0x01u, /* f_state, true, false, false: line 1 */
-            0x01u, /* f_state, true, false, true: line 1 */
-            0x01u, /* f_state, true, true, false: line 1 */
-            0x01u, /* f_state, true, true, true: line 1 */
-            0x06u, /* looking, false, false, false: lines 2, 3 */
-            0x10u, /* looking, false, false, true: line 5 */
-            0x06u, /* looking, false, true, false: lines 2, 3 */
-            0x08u, /* looking, false, true, true: line 4 */
-            0x01u, /* looking, true, false, false: line 1 */
-            0x01u, /* looking, true, false, true: line 1 */
-            0x01u, /* looking, true, true, false: line 1 */
-            0x01u /* looking, true, true, true: line 1 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->waited] &
-            (uint32_t)t.t1[(((((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-                (s->camera.matched ? 1u : 0u)) * 2u) +
-                (s->arrived ? 1u : 0u)];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = vision_bit32(m | 0x80u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return vision_match_flood_flash(s);
 }
 
 /* The same for n inputs at once, table flood_flash. */
@@ -592,67 +685,7 @@ void vision_flood_flash_lines(const vision_t *in, int32_t *out, uint32_t n)
 /* The line of table line_flash that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t vision_line_flash_line(const vision_t *s)
 {
-    /* Masks of vision/vision.rcs table line_flash: from the lowest bit, lines 1, 2, 3, 4, 5a, 5b, 6, 7;
-       each set where its line does not exclude that class. */
-    RCSC_CONST_SECTION static const struct {
-        uint8_t t0[101];
-        uint8_t t1[24];
-        uint8_t t2[2];
-    } t = {
-        { /* vision/vision.rcs table line_flash: waited */
-            /* 0 .. 99: lines 1, 2, 4 to 7 */
-            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfbu, 0xfbu, 0xfbu, 0xfbu,
-            0xfdu /* 100: lines 1, 3 to 7 */
-        },
-        { /* vision/vision.rcs table line_flash: cur_state, new_command, arrived, fits */
-            0x40u, /* d_state, false, false, false: line 6 */
-            0x40u, /* d_state, false, false, true: line 6 */
-            0x40u, /* d_state, false, true, false: line 6 */
-            0x40u, /* d_state, false, true, true: line 6 */
-            0x01u, /* d_state, true, false, false: line 1 */
-            0x01u, /* d_state, true, false, true: line 1 */
-            0x01u, /* d_state, true, true, false: line 1 */
-            0x01u, /* d_state, true, true, true: line 1 */
-            0x80u, /* f_state, false, false, false: line 7 */
-            0x80u, /* f_state, false, false, true: line 7 */
-            0x80u, /* f_state, false, true, false: line 7 */
-            0x80u, /* f_state, false, true, true: line 7 */
-            0x01u, /* f_state, true, false, false: line 1 */
-            0x01u, /* f_state, true, false, true: line 1 */
-            0x01u, /* f_state, true, true, false: line 1 */
-            0x01u, /* f_state, true, true, true: line 1 */
-            0x06u, /* looking, false, false, false: lines 2, 3 */
-            0x06u, /* looking, false, false, true: lines 2, 3 */
-            0x10u, /* looking, false, true, false: line 5a */
-            0x28u, /* looking, false, true, true: lines 4, 5b */
-            0x01u, /* looking, true, false, false: line 1 */
-            0x01u, /* looking, true, false, true: line 1 */
-            0x01u, /* looking, true, true, false: line 1 */
-            0x01u /* looking, true, true, true: line 1 */
-        },
-        { /* vision/vision.rcs table line_flash: faces */
-            0xf7u, /* false: lines 1, 2, 3, 5a to 7 */
-            0xdfu /* true: lines 1 to 5a, 6, 7 */
-        },
-    };
-    const uint32_t m = (uint32_t)t.t0[s->waited] &
-            (uint32_t)t.t1[(((((s->cur_state * 2u) + (s->new_command ? 1u : 0u)) * 2u) +
-                (s->arrived ? 1u : 0u)) * 2u) +
-                (s->fits ? 1u : 0u)] &
-            (uint32_t)t.t2[s->faces ? 1u : 0u];
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = vision_bit32(m | 0x100u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return vision_match_line_flash(s);
 }
 
 /* The same for n inputs at once, table line_flash. */
@@ -667,13 +700,7 @@ void vision_line_flash_lines(const vision_t *in, int32_t *out, uint32_t n)
 /* The line of table pause_vision that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t vision_pause_vision_line(const vision_t *s)
 {
-    const uint32_t m = (0x1u);
-    const bool several = (m & (m - 0x1u)) != 0x0u;
-    (void)s;
-    int32_t line = vision_bit32(m | 0x2u);
-    line = (m == 0x0u) ? (-1) : line;
-    line = several ? (-2) : line;
-    return line;
+    return vision_match_pause_vision(s);
 }
 
 /* The same for n inputs at once, table pause_vision. */

@@ -195,11 +195,16 @@ Body: TypeAlias = tuple[Stmt, ...]
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function: what is said of it, its head, its body."""
+    """A function: what is said of it, its head, its body.
+
+    Attributes:
+        inline: Whether C puts it where it is called: for one that a step calls at one place, its call costs more than it.
+    """
 
     doc: str
     head: str
     body: Body
+    inline: bool = False
 
 
 def infix(op: str, *operands: Code) -> Code:

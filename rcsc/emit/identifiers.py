@@ -170,7 +170,7 @@ def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}),
     members = {r.name: c_scope().all((f.name, c_word(f.name)) for f in r.fields) for r in program.records}
     roots, paths = _paths(program, members, failed)
     tables = stems.of(
-        (t.name for t in program.tables), ("{p}_{x}_line", "{p}_{x}_lines", "{p}_{x}_step", "{p}_run_{x}"),
+        (t.name for t in program.tables), ("{p}_{x}_line", "{p}_{x}_lines", "{p}_{x}_step", "{p}_run_{x}", "{p}_match_{x}"),
         ("{x}_line", "{x}_lines", "{x}_step", "_run_{x}"),
     )  # fmt: skip
     levels = stems.of((level.name for level in program.levels), ("{p}_{x}_cycle",), ("{x}_cycle",))

@@ -144,7 +144,7 @@ class Reasons:
             return self._of_step(step, point, truth)
         if (level := self._level(function)) is not None:
             return self._of_level(level, point, truth, points)
-        keys = self._line_keys(table) if function.endswith("_line") and table else self._keys(function)
+        keys = self._line_keys(table) if table and self._matches(function, table) else self._keys(function)
         own = [other for other in points if not _generic(other.text)]
         place = own.index(point) - (len(own) - len(keys)) if point in own else -1
         if function.endswith(("_check", "_admit")) and 0 <= place < len(keys):
@@ -210,7 +210,7 @@ class Reasons:
                 if len(decision.shown) == len(ENDS)
                 else ""
             )
-        keys = self._line_keys(table) if function.endswith("_line") and table else self._keys(function)
+        keys = self._line_keys(table) if table and self._matches(function, table) else self._keys(function)
         joint: dict[int, list[int]] = {}
         for key in keys:
             match key:
@@ -232,9 +232,13 @@ class Reasons:
     def _table(self, function: str) -> Table | None:
         p, names = self.names.program, self.names.tables
         for table in self.plan.program.tables:
-            if function in (f"{p}_{names[table.name]}_line", f"{p}_run_{names[table.name]}"):
+            if self._matches(function, table) or function == f"{p}_run_{names[table.name]}":
                 return table
         return None
+
+    def _matches(self, function: str, table: Table) -> bool:
+        """Whether it is the function that finds the line of a table."""
+        return function == f"{self.names.program}_match_{self.names.tables[table.name]}"
 
     def _of_table(self, table: Table, point: Point, truth: bool) -> str:
         """Why no line matches, or several, or a line does not run, is out of reach."""

@@ -76,7 +76,7 @@ def _functions(plan: Plan, names: Names) -> Iterator[tuple[str, Origin]]:
     for name, stem in names.procedures.items():
         yield f"{p}_do_{stem}", Origin(Sort.PROCEDURE, name)
     for name, stem in names.tables.items():
-        for form in ("{p}_{x}_line", "{p}_{x}_lines", "{p}_{x}_step", "{p}_run_{x}"):
+        for form in ("{p}_{x}_line", "{p}_{x}_lines", "{p}_{x}_step", "{p}_run_{x}", "{p}_match_{x}"):
             yield form.format(p=p, x=stem), Origin(Sort.TABLE, name)
     for name, stem in names.levels.items():
         yield f"{p}_{stem}_cycle", Origin(Sort.LEVEL, name)

@@ -297,8 +297,8 @@ C_FAULTS = {
     ),
     "deferral": ("s->phase = s->phase_next;", ";", "step"),
     "monitor": (
-        "(1u << (uint32_t)CASE__ASSUMPTION_",
-        "(2u << (uint32_t)CASE__ASSUMPTION_",
+        "((uint32_t)1u << ",
+        "((uint32_t)2u << ",
         "step",
     ),
     "initial value": (

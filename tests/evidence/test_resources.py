@@ -22,9 +22,9 @@ from tests.evidence.subjects import EVERYTHING, subject_of
 
 ALL = {board.name: board for board in BOARDS}
 BUDGETS: Mapping[tuple[str, str], tuple[int, int, int]] = {
-    ("task", "Cortex-M0+"): (60, 450, 5500),
-    ("task", "Cortex-M3"): (44, 280, 5050),
-    ("task", "RV32IMAC"): (92, 385, 6300),
+    ("task", "Cortex-M0+"): (79, 427, 5260),
+    ("task", "Cortex-M3"): (62, 259, 4720),
+    ("task", "RV32IMAC"): (119, 372, 6250),
     ("vision", "Cortex-M4F"): (172, 5560, 4950),
     ("gripper", "Cortex-M4F"): (128, 3400, 4550),
     ("emove", "Cortex-M4F"): (260, 4650, 8800),

@@ -26,7 +26,7 @@ from rcsc.emit.c.declarations import (
 )
 from rcsc.emit.c.helpers import helper
 from rcsc.emit.c.layout import digest
-from rcsc.emit.c.matching import match_functions
+from rcsc.emit.c.matching import line_functions, match_function
 from rcsc.emit.c.procedures import callees_first, failing, procedure_function
 from rcsc.emit.c.symbols import symbols
 from rcsc.emit.code_tree import Invoke, read
@@ -38,10 +38,11 @@ from rcsc.emit.rendering import render
 def _view(c: CProgram) -> dict[str, object]:
     """What the templates lay out."""
     procedures = [procedure_function(c, procedure) for procedure in callees_first(c.program)]
-    tables = [function for table in c.plan.tables for function in match_functions(c, table)]
+    matchers = [match_function(c, table) for table in c.plan.tables]
+    tables = [function for table in c.plan.tables for function in line_functions(c, table)]
     levels = [cycle_function(c, level) for level in c.program.levels]
     settle = settle_function(c)
-    inner = [*safe_functions(c), *assumption_functions(c), *action_functions(c)]
+    inner = [*safe_functions(c), *assumption_functions(c), *matchers, *action_functions(c)]
     publics = (init_function(c), check_function(c), *tables, *step_functions(c), *levels)
     code = tuple(read((*procedures, settle, *inner, *publics, *c.classifiers)))
     kinds = {c_type(variable.type) for variable in c.program.variables}

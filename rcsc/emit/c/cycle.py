@@ -90,7 +90,7 @@ def assumption_functions(c: CProgram) -> Iterator[Function]:
         doc = comment(f"{words}: {assumption.doc}" if assumption.doc else words)
         body: Body = (Leave(c.text.expr(assumption.condition)),)
         unread = () if touches_state(body) else (discarded(STATE),)
-        yield Function(doc, f"bool {name}(const {c.p}_t *s)", (*unread, *body))
+        yield Function(doc, f"bool {name}(const {c.p}_t *s)", (*unread, *body), inline=True)
 
 
 def _told(c: CProgram, place: int, stops: tuple[int, ...]) -> Body:
@@ -119,7 +119,7 @@ def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
     none, several = (Set(FAULT, fault_name(c, fault)) for fault in (Fault.NO_LINE, Fault.SEVERAL_LINES))
     unmatched = Frame(("case ", Round(NONE), ":"), (none, Line("break;")))
     return (
-        Set(LINE, Invoke(f"{c.p}_{name}_line", (STATE,))),
+        Set(LINE, Invoke(f"{c.p}_match_{name}", (STATE,))),
         Frame(("switch (", LINE, ") {")),
         *cases,
         *(() if table.matcher.default else (unmatched,)),

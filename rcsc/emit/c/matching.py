@@ -46,13 +46,21 @@ NOTHING = Constant(0, "uint64_t")
 FOUND, M = Name("line"), Name("m")
 
 
-def match_functions(c: CProgram, table: PlanTable) -> Iterator[Function]:
-    """Give the function that finds the line of a table for one state, and the one for many."""
+def match_function(c: CProgram, table: PlanTable) -> Function:
+    """Give the function that finds the line of a table."""
     name = c.names.tables[table.table.name]
-    doc = f"The line of table {table.table.name} that matches admitted inputs{table.where}: its position; -1 none, -2 several."
+    doc = f"Finds the line of table {table.table.name}: its position; -1 none, -2 several."
     body = tuple(_match(c, table, name))
     unread = () if touches_state(body) else (discarded(STATE),)
-    yield Function(doc, f"int32_t {c.p}_{name}_line(const {c.p}_t *s)", (*unread, *body))
+    return Function(doc, f"int32_t {c.p}_match_{name}(const {c.p}_t *s)", (*unread, *body), inline=True)
+
+
+def line_functions(c: CProgram, table: PlanTable) -> Iterator[Function]:
+    """Give the function that tells the line of a table for one state, and the one for many."""
+    name = c.names.tables[table.table.name]
+    doc = f"The line of table {table.table.name} that matches admitted inputs{table.where}: its position; -1 none, -2 several."
+    found = Leave(Invoke(f"{c.p}_match_{name}", (STATE,)))
+    yield Function(doc, f"int32_t {c.p}_{name}_line(const {c.p}_t *s)", (found,))
     i, n = Name("i"), Name("n")
     line = Invoke(f"{c.p}_{name}_line", (Prefix("&", Element(Name("in"), i)),))
     each = counted_loop(i, n, Set(Element(Name("out"), i), line), bound="n times")

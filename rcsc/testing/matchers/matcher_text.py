@@ -140,6 +140,14 @@ def closing(text: str, start: int, pair: str) -> int:
     raise ShapeError("brackets do not match")
 
 
+def matching(source: str, function: str) -> str:
+    """The function that a `line` function calls, and does nothing else: it finds the line."""
+    called = re.search(rf"\nint32_t {function}\(const \w+ \*s\)\n{{\n +return (\w+)\(s\);\n}}", source)
+    if called is None:
+        raise ShapeError(f"`{function}` does not ask the function that finds the line")
+    return called[1]
+
+
 def parted(index: str) -> list[tuple[str, int]]:
     """The components of an index with their counts; 0 for the first."""
     index = bare(index)
@@ -207,7 +215,9 @@ def matcher_text(source: str, function: str, struct: str) -> MatcherText:
         ShapeError: The text has another shape.
     """
     source = without_comments(source)
-    body = function_body(source, f"int32_t {function}(const {struct} *s)")
+    body = function_body(
+        source, f"static RCSC_INLINE int32_t {matching(source, function)}(const {struct} *s)"
+    )
     stated = TABLES.search(body)
     declaration = stated[0] if stated else ""
     tables = list(FIELD.finditer(stated["fields"])) if stated else []
@@ -271,7 +281,9 @@ def numbers(source: str, function: str, parts: MatcherText) -> Iterator[Numbers]
     source = without_comments(source)
     for at, lookup in enumerate(parts.lookups):
         if at == 0:
-            start = source.index(lookup.declaration, source.index(f"int32_t {function}(const "))
+            start = source.index(
+                lookup.declaration, source.index(f"int32_t {matching(source, function)}(const ")
+            )
             start = source.index("} t = {", start) + len("} t = {")
         start = source.index("{", start)
         end = closing(source, start, "{}")
