@@ -16,6 +16,7 @@ Rooms: `misra` (MISRA C:2012, guideline by guideline).
 
 Modules: `kind` (what a kind takes and gives), `kinds` (their names), `collect` (all that was asked for, on one screen).
 Kinds: `coverage` (vectors of the whole C, measured in `llvm`; why the rest is `out_of_reach`), `runtime` (Frama-C's EVA),
-`analysers` (compilers, analysers, sanitizers); `harness` is the C that the last two give their tools. `resources` (what each
+`analysers` (compilers, analysers, sanitizers); `harness` is the C that the last two give their tools,
+`model_check` (ESBMC). `resources` (what each
 function needs) has a room of its own, `processors`.
 """

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from rcsc.evidence import analysers, coverage, resources, runtime
+from rcsc.evidence import analysers, coverage, model_check, resources, runtime
 from rcsc.evidence.kind import Kind
 from rcsc.evidence.misra import compliance
 
@@ -12,6 +12,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "coverage": coverage.KIND,
         "runtime": runtime.KIND,
         "analysers": analysers.KIND,
+        "model-check": model_check.KIND,
         "resources": resources.KIND,
         "misra": compliance.KIND,
     }

@@ -2,6 +2,7 @@
 
 import pytest
 
+from rcsc.evidence import model_check
 from rcsc.evidence.kind import Subject
 from rcsc.testing.esbmc import EsbmcAnswer, EsbmcVerdict, case_harness, prove_function, step_parts
 from rcsc.testing.executors.symbols import symbols_of
@@ -82,3 +83,11 @@ def test_a_fault_in_a_procedure_or_in_admission_is_refuted_in_its_part(
     said = verdict("cycle", (kept, lost))
     assert said.answer is EsbmcAnswer.REFUTED
     assert part in said.detail
+
+
+def test_the_evidence_lists_every_function_and_tells_of_a_difference() -> None:
+    whole = model_check.collect(subject_of(COUNTS))
+    assert not whole.shortfalls
+    assert whole.figures == ("ESBMC: 8 of 8 functions proved equal to the tables, whole",)
+    planted = model_check.collect(subject_of(COUNTS, ("s->wanted > PROBE_WISH_DOWN", "s->wanted > 2u")))
+    assert "probe_l_cycle" in {short.where for short in planted.shortfalls}
