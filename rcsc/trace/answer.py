@@ -7,7 +7,7 @@ nothing where nobody knows it.
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from rcsc.trace.matrix import Declared, Matrix, TracedLine
+from rcsc.trace.matrix import Declared, Matrix, Tests, TracedLine
 from rcsc.trace.origin import Origin, Piece, Sort
 from rcsc.trace.requirements import places
 from rcsc.trace.tables_of import ranges
@@ -76,7 +76,8 @@ def _of_line(matrix: Matrix, line: TracedLine) -> Iterator[str]:
         yield f"  {word}: {'; '.join(where for where in code if where) or 'nothing'}"
     tests = line.tests
     shown = f"{tests.shown} of {tests.conditions} conditions shown to decide it"
-    yield f"  vectors: {len(tests.made)} made for it, {len(tests.taken)} take it, {shown}"
+    made = f"{len(tests.made)} made for it, {len(tests.taken)} take it, {shown}"
+    yield f"  vectors: {'not looked for' if tests == Tests() else made}"
     if line.table in matrix.tables:
         proof = matrix.tables[line.table]
         yield f"  {proof.verdict}: {proof.method}"

@@ -184,6 +184,7 @@ def test_one_question_is_answered_in_both_directions(door: Path, capsys: pytest.
     assert not Path("trace").exists()
     assert run([*ask, "SR-4"]) == 0
     told = capsys.readouterr().out
+    assert "vectors: not looked for" in told
     assert "press_once line wait" in told
     assert "procedure hold" in told
     assert "press_once line go" not in told
