@@ -10,12 +10,10 @@
 #endif
 
 /* For a function that is called at one place of a cycle: put there, it costs no call. */
-#if !defined(RCSC_INLINE)
 #if defined(__GNUC__)
 #define RCSC_INLINE inline __attribute__((always_inline))
 #else
 #define RCSC_INLINE inline
-#endif
 #endif
 
 /* Each operation on reals is rounded by itself, as it was proved; -ffp-contract=fast may overrule it. */
