@@ -76,7 +76,7 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
             diagnostics += wrong
             figures.append(text)
     if effort.vectors is not None or effort.sessions is not None:
-        sets = [_vectors(program, settings) for _, program in project.executable]
+        sets = [whole_vectors(program, settings) for _, program in project.executable]
         diagnostics += write_vectors(sets, effort.vectors, effort.sessions)
         figures += map(figure, sets)
     settings.progress("")
@@ -216,7 +216,7 @@ def _try_out(
     return result.diagnostics, result.text()
 
 
-def _vectors(program: ProvedProgram, settings: Settings) -> VectorSet:
+def whole_vectors(program: ProvedProgram, settings: Settings) -> VectorSet:
     """Vectors of the whole C of a program."""
     plan, options = planned(program), settings.options
     return vector_set(plan, emitted(plan), options, proofs(options).solver, settings.progress)

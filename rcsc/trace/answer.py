@@ -76,8 +76,10 @@ def _of_line(matrix: Matrix, line: TracedLine) -> Iterator[str]:
         yield f"  {word}: {'; '.join(where for where in code if where) or 'nothing'}"
     tests = line.tests
     shown = f"{tests.shown} of {tests.conditions} conditions shown to decide it"
-    made = f"{len(tests.made)} made for it, {len(tests.taken)} take it, {shown}"
-    yield f"  vectors: {'not looked for' if tests == Tests() else made}"
+    yield f"  vectors: {'not looked for' if tests == Tests() else shown}"
+    for word, numbers in (("shown by", tests.made), ("taken by", tests.taken)):
+        if numbers:
+            yield f"    {word} {', '.join(map(str, numbers))}"
     if line.table in matrix.tables:
         proof = matrix.tables[line.table]
         yield f"  {proof.verdict}: {proof.method}"

@@ -15,16 +15,13 @@ from rcsc.diagnostics.source import Span
 from rcsc.driver.compile import Generated, planned, systems_in, tables_in
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import Conclusion, Settings
-from rcsc.driver.trials import proofs
+from rcsc.driver.trials import whole_vectors
 from rcsc.emit import TARGETS, emitted
 from rcsc.host.cache import Cache, open_cache
 from rcsc.host.files import write_atomically
 from rcsc.host.files.read import Malformed, json_of, text
-from rcsc.lang.model import Program, ProvedProgram
+from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import project_root
-from rcsc.solvers.options import Options
-from rcsc.testing.inputs.snapshot import search_in
-from rcsc.testing.inputs.vectors import Vectors, vectors_of
 from rcsc.trace.matrix import Known, Matrix, matrix, of_system
 from rcsc.trace.page import page
 from rcsc.trace.proofs import property_proofs, table_proofs
@@ -110,16 +107,11 @@ def _matrix(
     known = Known(
         table_proofs(proof.tables),
         tuple((found.primary.span, f"{found.code.value}: {found.message}") for found in proof.diagnostics),
-        _vectors(program.program, settings.options) if wanted.vectors else {},
+        whole_vectors(program, settings) if wanted.vectors else None,
         {} if cache is None else property_proofs(program.program, cache),
         project.loaded.sources,
     )
     return matrix(plan, emitted(plan), known)
-
-
-def _vectors(program: Program, options: Options) -> Mapping[str, Vectors]:
-    search = search_in(program, proofs(options).solver)
-    return {str(table.name): vectors_of(search, table) for table in program.tables}
 
 
 def _of_system(project: Proved, path: Path) -> Matrix:

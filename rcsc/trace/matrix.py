@@ -23,8 +23,9 @@ from rcsc.lang.model import (
     Property,
     Statement,
 )
+from rcsc.testing.coverage.document import VectorSet
+from rcsc.testing.coverage.lines import TakenLine, taken
 from rcsc.testing.inputs.condition_text import words
-from rcsc.testing.inputs.vectors import Vectors
 from rcsc.trace.c_code import c_names, c_pieces, system_pieces
 from rcsc.trace.origin import Origin, Piece, Sort
 from rcsc.trace.python_code import python_pieces
@@ -51,11 +52,11 @@ class TableProof:
 
 @dataclass(frozen=True, slots=True)
 class Tests:
-    """The vectors of a line, by their numbers in its table: `3` is the third that `rcsc test --vectors` writes under the table.
+    """The vectors of a line, by the numbers that they have in the file of `rcsc test --vectors`.
 
     Attributes:
-        made: Made for the line or one of its conditions.
-        taken: Those of the table whose inputs take the line.
+        made: They show that the line is reached, or one half of what shows a condition to decide it.
+        taken: Those whose call takes the line: it matches, or it runs in a step or a cycle.
         conditions: How many conditions the line states, and `shown` how many a pair of vectors shows to decide it.
         unshown: Conditions without such a pair, each with the reason.
     """
@@ -187,14 +188,14 @@ class Known:
     Attributes:
         tables: What is proved of each table.
         findings: Of the check, with their places.
-        vectors: Of each table; none where they were not asked for.
+        vectors: Of the whole C; None where they were not asked for.
         properties: What is proved of each property.
         sources: Texts of the tables, for the numbers of lines.
     """
 
     tables: Mapping[str, TableProof]
     findings: tuple[tuple[Span, str], ...] = ()
-    vectors: Mapping[str, Vectors] = field(default_factory=dict)
+    vectors: VectorSet | None = None
     properties: Mapping[str, str] = field(default_factory=dict)
     sources: Mapping[str, Source] = field(default_factory=dict)
 
@@ -257,6 +258,7 @@ class _Build:
 
     def __init__(self, plan: Plan, known: Known) -> None:
         self.plan, self.known = plan, known
+        self.taking = {} if known.vectors is None else dict(_taking(known.vectors))
         self.program: Program = plan.program
         self.procedures: dict[str, Procedure] = {str(one.name): one for one in self.program.procedures}
         self.spoken = {
@@ -311,17 +313,23 @@ class _Build:
                 yield name, "; ".join(why)
 
     def _tests(self, table: PlanTable, line: PlanLine) -> Tests:
-        vectors = self.known.vectors.get(str(table.table.name))
-        if vectors is None:
+        document = self.known.vectors
+        if document is None:
             return Tests()
-        numbered = list(enumerate(vectors.vectors, 1))
-        name = str(line.name)
+        table_name, name = str(table.table.name), str(line.name)
+        vectors = next(each for each in document.tables if each.table == table_name)
+        own = {at for at, vector in enumerate(vectors.vectors, 1) if vector.line == name}
+        made = (
+            number
+            for number, kept in enumerate(document.kept, 1)
+            if kept.case.entry.name == table_name and own.intersection(kept.case.shows)
+        )
         unshown = [one for one in vectors.unshown if one.line == name]
         shown = {(one.column, one.condition) for one in vectors.vectors if one.line == name and one.condition}
         lacking = [one for one in unshown if one.condition]
         return Tests(
-            tuple(at for at, one in numbered if one.line == name),
-            tuple(at for at, one in numbered if one.expected == name),
+            tuple(made),
+            tuple(self.taking.get((table_name, name), ())),
             len(shown) + len(lacking),
             len(shown),
             tuple(f"{one.column} {one.condition}: {one.reason}".strip() for one in unshown),
@@ -412,6 +420,15 @@ class _Build:
         """File and line of a span."""
         source = self.known.sources.get(span.file)
         return f"{span.file}:{source.position(span.start).line}" if source is not None else span.file
+
+
+def _taking(document: VectorSet) -> Mapping[TakenLine, list[int]]:
+    """The numbers of the vectors that take each line."""
+    numbers: dict[TakenLine, list[int]] = {}
+    for number, lines in enumerate(taken(document.program, document.kept), 1):
+        for line in dict.fromkeys(lines):
+            numbers.setdefault(line, []).append(number)
+    return numbers
 
 
 def _calls(level: Level) -> list[Statement]:

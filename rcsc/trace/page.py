@@ -31,6 +31,7 @@ td { font-size: .82rem; }
 code { font: .95em ui-monospace, monospace; }
 .soft { color: var(--soft); } .bad { color: var(--bad); font-weight: 600; }
 .for { color: var(--mark); font-weight: 600; } a { color: inherit; }
+.at { white-space: nowrap; }
 nav a { margin-right: 1rem; }
 tr:target { outline: 2px solid var(--mark); }
 @media print {
@@ -41,7 +42,8 @@ tr:target { outline: 2px solid var(--mark); }
 """
 _ABOUT = (
     "From requirements and lines of tables to generated code, tests and proofs, and back. Places of code are lines of a file, first "
-    "and last. Vectors are those of each table's own conditions, numbered as <code>rcsc test --vectors</code> writes them under the table."
+    "and last. Vectors have the numbers of the file that <code>rcsc test --vectors</code> writes: those that show a condition of the line "
+    "to decide it, and those that take the line."
 )
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
@@ -113,7 +115,7 @@ def _program(matrix: Matrix) -> Iterator[str]:
         yield f"<h3>Table {escape(name)} {names}</h3>"
         yield f"<p>{escape(known)}.<br>{code}.</p>"
         yield _table(
-            {"line": 10, "for": 8, "when": 24, "does": 16, "C": 13, "Python": 13, "vectors": 6, "shown": 10},
+            {"line": 10, "for": 7, "when": 22, "does": 15, "C": 13, "Python": 12, "vectors": 10, "shown": 11},
             (_line(matrix, line) for line in own),
         )
     if matrix.declared:
@@ -139,16 +141,38 @@ def _line(matrix: Matrix, line: TracedLine) -> str:
     proved = [*line.findings, *([f"properties: {spoken}"] if spoken else [])]
     shown = f"{tests.shown} of {tests.conditions}" if tests.conditions else ""
     return _row(
-        f'<b>{escape(line.name)}</b><br><span class="soft">{escape(line.place.rpartition("/")[2])}</span>',
+        f'<b>{escape(line.name)}</b><br><span class="soft">{_place(line.place.rpartition("/")[2])}</span>',
         _listing(line.requirements, "for"),
         _listing([*line.states]) + (f'<br><span class="soft">{_listing(proved)}</span>' if proved else ""),
         _listing(line.does),
         _where(code, (".c",)),
         _where(code, (".py",)),
-        f"{len(tests.made)} made<br>{len(tests.taken)} taken" if tests.made or tests.taken else "",
+        _numbered("show", tests.made) + _numbered("take", tests.taken),
         shown + (f'<br><span class="soft">{_listing(tests.unshown)}</span>' if tests.unshown else ""),
         name=f"{matrix.program}-{line.table}-{line.name}",
     )
+
+
+def _place(place: str) -> str:
+    """A place that breaks between file and number, never in the number."""
+    file, colon, number = place.rpartition(":")
+    return f"{escape(file)}:<wbr>{_unbroken(number)}" if colon and number.isdigit() else escape(place)
+
+
+def _unbroken(numbers: str) -> str:
+    return f'<span class="at">{escape(numbers)}</span>'
+
+
+def _numbered(word: str, numbers: Sequence[int]) -> str:
+    """Numbers of vectors, neighbours joined: `3-5, 9`."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    words = (_unbroken(f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0])) for run in runs)
+    return f'<div><span class="soft">{word}</span> {", ".join(words)}</div>' if runs else ""
 
 
 def _where(code: Iterable[tuple[str, tuple[Piece, ...]]], ends: tuple[str, ...]) -> str:
@@ -156,7 +180,7 @@ def _where(code: Iterable[tuple[str, tuple[Piece, ...]]], ends: tuple[str, ...])
     rows = []
     for word, pieces in code:
         for file, runs in spots(piece for piece in pieces if piece.file.endswith(ends)):
-            lines = ", ".join(f"{first}-{last}" for first, last in runs)
+            lines = ", ".join(_unbroken(f"{first}-{last}") for first, last in runs)
             name = escape(file.rpartition("/")[2])
             rows.append(f'<span class="soft">{word}</span> {name}: {lines}')
     return "<br>".join(rows)
@@ -164,7 +188,7 @@ def _where(code: Iterable[tuple[str, tuple[Piece, ...]]], ends: tuple[str, ...])
 
 def _declared(one: Declared) -> str:
     return _row(
-        f'<b>{escape(one.name)}</b><br><span class="soft">{escape(one.sort)}, {escape(one.place)}</span>',
+        f'<b>{escape(one.name)}</b><br><span class="soft">{escape(one.sort)}, {_place(one.place)}</span>',
         _listing(one.requirements, "for"),
         escape(one.states),
         escape(", ".join(one.used)),
@@ -191,9 +215,9 @@ def _piece(matrix: Matrix, same: list[Piece]) -> str:
     named = ", ".join(names) if len(names) < 4 else f"{names[0]}, {names[1]} and {len(names) - 2} more"
     words = escape(origin.words)
     return _row(
-        f"{same[0].first}-{max(piece.last for piece in same)}",
+        _unbroken(f"{same[0].first}-{max(piece.last for piece in same)}"),
         f"<code>{escape(named)}</code>" if named else "",
         f'<span class="soft">infrastructure: {words}</span>' if origin.sort is Sort.INFRASTRUCTURE else words,
-        escape(matrix.place(origin)),
+        _place(matrix.place(origin)),
         _listing(matrix.answers(origin), "for"),
     )

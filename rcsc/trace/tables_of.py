@@ -9,7 +9,7 @@ from rcsc.trace.matrix import Declared, Matrix, TracedLine
 from rcsc.trace.origin import Piece
 from rcsc.trace.requirements import places
 
-FORM = 1
+FORM = 2
 """Version of the JSON form; it rises when a member changes its meaning or goes away."""
 FORWARD = (
     "program", "table", "line", "place", "requirements", "of the table", "conditions", "actions", "C runs", "C matches",

@@ -30,6 +30,7 @@ from rcsc.testing.coverage.document import (
 )
 from rcsc.testing.coverage.goals import Reached, decides
 from rcsc.testing.coverage.harness import vectors_c
+from rcsc.testing.coverage.lines import taken
 from rcsc.testing.coverage.marks import marked, ways_of
 from rcsc.testing.coverage.vector_set import vector_set, write_vectors
 from rcsc.testing.executors.symbols import symbols_of
@@ -240,6 +241,40 @@ def test_json_and_csv_say_the_same() -> None:
             assert row[f"after {name}"] == (str(value).lower() if isinstance(value, bool) else str(value))
     assert parsed["tables"][0]["vectors"]
     assert [each["what"] for each in parsed["unreached"]].count("held = 0") == 2
+
+
+STAGES = (Path(__file__).parents[2] / "tables/gallery/plcopen_safety/guard.rcs").read_text("utf-8")
+
+
+def test_every_vector_of_a_table_is_one_of_the_whole_c_and_what_takes_a_line_is_told() -> None:
+    for text in (SMALL, STOPS, STAGES):
+        document = set_of(text)
+        parsed = json.loads(as_json([vectors_document(document)]))
+        numbered = {vector["number"]: vector for vector in parsed["vectors"]}
+        for table in parsed["tables"]:
+            for pair in table["vectors"]:
+                vector = numbered[pair["number"]]
+                assert (vector["kind"], vector["of"]) == ("line", table["table"])
+                assert {**vector["inputs"], **vector["state"]} == pair["inputs"]
+                wanted = {name: pair[name] for name in ("line", "column", "condition", "purpose")}
+                assert wanted in vector["shows"]
+                lines = [f"{table['table']} line {pair['expected']}"] if pair["expected"] else None
+                assert vector.get("takes") == lines
+        for vector in numbered.values():
+            named = vector["expected"].get("line_name")
+            assert named is None or vector["takes"] == [f"{vector['of']} line {named}"]
+
+
+def test_of_a_cycle_every_line_that_runs_is_told_and_not_the_last_alone() -> None:
+    document = set_of(STAGES)
+    ran = [
+        [table for table, _ in lines]
+        for kept, lines in zip(document.kept, taken(document.program, document.kept), strict=True)
+        if kept.case.entry.kind == "cycle" and kept.expected.line >= 0
+    ]
+    [level] = document.program.levels
+    assert ran
+    assert all(len(tables) == len(level.choices) > 1 for tables in ran)
 
 
 def test_sessions_carry_their_state_from_cycle_to_cycle() -> None:

@@ -158,6 +158,28 @@ def test_the_matrix_leads_from_a_requirement_to_code_tests_and_proof_and_back(do
     assert not program["untraced"]
 
 
+def test_a_vector_has_one_number_in_the_matrix_and_in_the_file_of_vectors(door: Path) -> None:
+    assert run(["trace", str(door), "-q"]) == 0
+    quick = ["test", "-q", "--examples", "1", "--mutants", "0", "--no-cortex", str(door)]
+    assert run([*quick, "--vectors", "vectors.json"]) == 0
+    vectors = json.loads(Path("vectors.json").read_text(encoding="utf-8"))
+    numbered = {vector["number"]: vector for vector in vectors["vectors"]}
+    [program] = json.loads(Path("trace/trace.json").read_text(encoding="utf-8"))["programs"]
+    for line in program["lines"]:
+        name = f"press_once line {line['line']}"
+        taking = [number for number, vector in numbered.items() if name in vector.get("takes", ())]
+        shows = [
+            number
+            for number, vector in numbered.items()
+            if line["line"] in {each["line"] for each in vector.get("shows", ())}
+        ]
+        assert line["vectors"]["taken"] == taking
+        assert line["vectors"]["made"] == shows
+        assert taking
+        assert shows
+    assert all(numbered[one["number"]]["kind"] == "line" for one in vectors["tables"][0]["vectors"])
+
+
 def test_tables_and_page_say_the_same_and_nothing_in_a_name_is_markup(door: Path) -> None:
     run(["trace", str(door), "-q", "--no-vectors"])
     forward = list(csv.DictReader(io.StringIO(Path("trace/lines.csv").read_text(encoding="utf-8"))))
@@ -170,6 +192,7 @@ def test_tables_and_page_say_the_same_and_nothing_in_a_name_is_markup(door: Path
     assert "<script" not in html
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in html
     assert f"{case['first']}-{case['last']}" in html
+    assert 'door.rcs:<wbr><span class="at">12</span>' in html
     assert page((), ()).startswith("<!doctype html>")
 
 

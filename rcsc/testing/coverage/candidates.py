@@ -43,7 +43,7 @@ from rcsc.testing.executors.sessions import Stimuli
 from rcsc.testing.executors.symbols import Symbols
 from rcsc.testing.inputs.sampling import declarations, session
 from rcsc.testing.inputs.snapshot import InputSearch, Missing
-from rcsc.testing.inputs.vectors import Vectors
+from rcsc.testing.inputs.vectors import Vector, Vectors
 
 TRIES = 10
 """Sessions that are drawn for each that starts where `check` accepts the state."""
@@ -110,10 +110,11 @@ def of_tables(search: InputSearch, plan: Plan, tables: Sequence[Vectors]) -> Ite
     for planned, vectors in zip(plan.tables, tables, strict=True):
         table = planned.table
         for kind in ("line", "lines", "step"):
-            for vector in vectors.vectors:
+            for at, vector in _distinct(vectors.vectors):
                 words = f"line {vector.line}: {vector.condition} {vector.purpose}" if vector.condition else ""
                 origin = words or f"line {vector.line} reached"
-                yield Case(Entry(kind, str(table.name)), vector.snapshot, origin=origin)
+                shows = at if kind == "line" else ()
+                yield Case(Entry(kind, str(table.name)), vector.snapshot, origin=origin, shows=shows)
         for leaf, classes in _classes(planned.matcher.groups):
             for value in classes:
                 given = search.find(
@@ -121,6 +122,15 @@ def of_tables(search: InputSearch, plan: Plan, tables: Sequence[Vectors]) -> Ite
                 )
                 if not isinstance(given, Missing):
                     yield Case(Entry("line", str(table.name)), given, origin=f"{leaf} looked up")
+
+
+def _distinct(vectors: Sequence[Vector]) -> Iterator[tuple[tuple[int, ...], Vector]]:
+    """The first vector of each snapshot, with the positions of all that have it."""
+    positions: dict[tuple[tuple[str, Value], ...], list[int]] = {}
+    for at, vector in enumerate(vectors, 1):
+        positions.setdefault(tuple(vector.snapshot.items()), []).append(at)
+    for same in positions.values():
+        yield tuple(same), vectors[same[0] - 1]
 
 
 def _classes(groups: Sequence[Group]) -> Iterator[tuple[str, tuple[Value, ...]]]:

@@ -73,6 +73,7 @@ class Case:
         origin: How it was come by, in words.
         foreign: Whether the state has the digest of other tables.
         mode: How the machine rounds, one of `MODES`; empty for as it should.
+        shows: Positions of the MC/DC vectors of its table that it is, from 1.
     """
 
     entry: Entry
@@ -81,6 +82,7 @@ class Case:
     origin: str = ""
     foreign: bool = False
     mode: str = ""
+    shows: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

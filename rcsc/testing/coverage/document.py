@@ -7,7 +7,7 @@ back to the same double.
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ from rcsc.testing.coverage.candidates import Session
 from rcsc.testing.coverage.case import Case, Entry, Expected
 from rcsc.testing.coverage.choose import Kept
 from rcsc.testing.coverage.directed import Unreached
+from rcsc.testing.coverage.lines import TakenLine, taken
 from rcsc.testing.executors.reference_file import all_lines
 from rcsc.testing.executors.symbols import Symbols
 from rcsc.testing.inputs.vectors import Vectors
@@ -122,7 +123,7 @@ def _answers(program: Program, case: Case) -> list[dict[str, Any]]:
     ]
 
 
-def _case(document: VectorSet, case: Case, right: Expected) -> dict[str, object]:
+def _case(document: VectorSet, case: Case, right: Expected, lines: Sequence[TakenLine]) -> dict[str, object]:
     program = document.program
     values = _values(program, case.before)
     inputs = {str(v.name) for v in program.variables if v.kind is Kind.INPUT}
@@ -134,11 +135,20 @@ def _case(document: VectorSet, case: Case, right: Expected) -> dict[str, object]
         "origin": case.origin,
         **({"foreign": True} if case.foreign else {}),
         **({"mode": case.mode} if case.mode else {}),
+        **({"shows": shown} if (shown := list(_shows(document, case))) else {}),
+        **({"takes": [f"{table} line {line}" for table, line in lines]} if lines else {}),
         "inputs": {name: value for name, value in values.items() if name in inputs},
         "state": {name: value for name, value in values.items() if name not in inputs},
         **({"answers": answers} if answers else {}),
         "expected": expected_of(program, case, right),
     }
+
+
+def _shows(document: VectorSet, case: Case) -> Iterator[dict[str, str]]:
+    """What a case shows of its table's conditions."""
+    vectors = next((part.vectors for part in document.tables if part.table == case.entry.name), ())
+    for at in case.shows:
+        yield {name: getattr(vectors[at - 1], name) for name in ("line", "column", "condition", "purpose")}
 
 
 def vectors_document(document: VectorSet) -> dict[str, object]:
@@ -149,26 +159,35 @@ def vectors_document(document: VectorSet) -> dict[str, object]:
         "format": FORMAT,
         "initial": _values(program, initial(program)),
         "vectors": [
-            {"number": number, **_case(document, kept.case, kept.expected)}
-            for number, kept in enumerate(document.kept, 1)
+            {"number": number, **_case(document, kept.case, kept.expected, lines)}
+            for number, (kept, lines) in enumerate(
+                zip(document.kept, taken(program, document.kept), strict=True), 1
+            )
         ],
         "unreached": [
             {name: getattr(each, name) for name in ("where", "what", "wanted", "shown", "reason")}
             for each in document.unreached
         ],
-        "tables": [_table(program, part) for part in document.tables],
+        "tables": [_table(document, part) for part in document.tables],
     }
 
 
-def _table(program: Program, part: Vectors) -> dict[str, object]:
+def _table(document: VectorSet, part: Vectors) -> dict[str, object]:
+    numbers = {
+        at: number
+        for number, kept in enumerate(document.kept, 1)
+        if kept.case.entry.name == part.table
+        for at in kept.case.shows
+    }
     return {
         "table": part.table,
         "conditions": part.conditions,
         "shown": part.shown,
         "vectors": [
-            {name: getattr(vector, name) for name in TABLE_COLUMNS[1:]}
-            | {"inputs": _values(program, vector.snapshot)}
-            for vector in part.vectors
+            {"number": numbers.get(at)}
+            | {name: getattr(vector, name) for name in TABLE_COLUMNS[1:]}
+            | {"inputs": _values(document.program, vector.snapshot)}
+            for at, vector in enumerate(part.vectors, 1)
         ],
         "unshown": [
             {name: getattr(unshown, name) for name in ("line", "column", "condition", "reason")}

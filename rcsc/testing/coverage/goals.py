@@ -92,6 +92,7 @@ class Reached:
         if case.entry.kind == "lines":
             return
         yield ("matched", table.name, min(right.result, 0))
+        yield from (("shows", table.name, at) for at in case.shows)
         for test in {id(t): t for line in table.lines for t in line.tests if t is not None}.values():
             if test.box is None:
                 holds(test.condition, case.before)
