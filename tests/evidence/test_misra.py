@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from pathlib import Path
 
 import pytest
@@ -110,6 +111,36 @@ def test_basic_types_and_compared_enumerators_are_searched_for_in_code_alone() -
     text = "enum {\n    A_ONE = 1\n};\n/* int == A_ONE */\nint x;\nbool f(void) { return y == A_ONE; }\nuint8_t z = B_TWO;\n"
     found = [(one.line, one.check) for one in own_findings({"c/a.c": text})]
     assert found == [(5, BASIC_TYPE), (6, ENUMERATOR)]
+
+
+EXAMPLES = {
+    "cortex_m": ("main.c", "startup.c"),
+    "freertos": ("main.c", "shim/FreeRTOS.h", "shim/queue.h", "shim/task.h"),
+}
+BASIC = re.compile(r"int main\((?:void)?\)|\bconst char \*text\)|^    double force_n;$|\bprintf\(")
+"""What the language and the libraries have named so, and the tables' reals."""
+SUPPRESSED = re.compile(r"/\* cppcheck-suppress(?:-begin|-end)? (\S+).*?\*/")
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_the_integration_examples_say_at_each_place_where_they_deviate(example: str) -> None:
+    """All of a PC's stand-in for FreeRTOS is left out but what the example includes: on a target its own sources stand there."""
+    folder = REPO / "tables/examples/integration" / example
+    own = {Path(name).name: (folder / name).read_text("utf-8") for name in EXAMPLES[example]}
+    headers = {path.name: path.read_text("utf-8") for path in (REPO / "generated/c").glob("*.h")}
+    sources = [name for name in own if name.endswith(".c")]
+    checked = check({**headers, **own}, "--inline-suppr")
+    assert not checked.failure
+    assert [one for one in checked.findings if one.file in sources] == []
+    basic = [
+        (one.file, one.line) for one in own_findings(own) if one.check == BASIC_TYPE and one.file in sources
+    ]
+    lines = [(file, own[file].splitlines()[line - 1]) for file, line in basic]
+    assert [each for each in lines if not BASIC.search(each[1])] == []
+    bare = check({**headers, **own})
+    for name in sources:
+        said = set(SUPPRESSED.findall(own[name]))
+        assert said == {one.check for one in bare.findings if one.file == name}
 
 
 def test_a_failure_of_the_checker_is_no_evidence(monkeypatch: pytest.MonkeyPatch) -> None:

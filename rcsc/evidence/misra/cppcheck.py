@@ -78,15 +78,20 @@ def installed() -> bool:
     return importlib.util.find_spec(PACKAGE) is not None
 
 
-def check(files: Mapping[str, str]) -> Checked:
-    """Ask about the C among these files; headers are looked at with what includes them."""
+def check(files: Mapping[str, str], *options: str) -> Checked:
+    """Ask about the C among these files; headers are looked at with what includes them.
+
+    Args:
+        files: Texts by path; they are put into one folder.
+        options: More of cppcheck's, such as `--inline-suppr` for C that says by itself where it deviates.
+    """
     rules = {
         **dict.fromkeys(_core_rules(), "cppcheck itself, which sees part of it"),
         **dict.fromkeys(_addon_rules(), "cppcheck's MISRA add-on"),
     }
     with scratch("misra") as place:
         sources = write_c(files, place)
-        ran = run_command([sys.executable, "-c", _RUN, *_OPTIONS, *sources], place, TIMEOUT_S)
+        ran = run_command([sys.executable, "-c", _RUN, *_OPTIONS, *options, *sources], place, TIMEOUT_S)
     failure = "" if ran.status == 0 else f"cppcheck ended with status {ran.status}: {ran.err[-300:]}"
     return Checked(_version(), rules, tuple(dict.fromkeys(_findings(ran.err))), failure)
 
