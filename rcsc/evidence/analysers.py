@@ -8,8 +8,6 @@ addresses and undefined behaviour, clang's for unsigned and implicit conversions
 states and inputs, some of them outside their ranges.
 """
 
-import csv
-import io
 import re
 import shutil
 from collections import Counter
@@ -21,6 +19,7 @@ from rcsc.emit import emitted
 from rcsc.evidence.harness import bounds, calls, stand_ins
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.host.children import scratch
+from rcsc.host.files import csv_text
 from rcsc.host.tools import run_command, write_c
 from rcsc.lang.model import Kind as Role
 from rcsc.lang.model import Program, Real, Scalar
@@ -289,11 +288,10 @@ def _figures(reports: list[Report]) -> Iterator[str]:
 
 
 def _kept(reports: list[Report]) -> dict[str, str]:
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(("tool", "file", "line", "check", "finding", "reason"))
-    for report in reports:
-        writer.writerows((f.tool, f.file, f.line, f.check, f.text, f.reason) for f in report.findings)
+    rows = [
+        (f.tool, f.file, f.line, f.check, f.text, f.reason) for report in reports for f in report.findings
+    ]
+    findings = csv_text([("tool", "file", "line", "check", "finding", "reason"), *rows])
     lines = ["# Analysers and sanitizers", "", "| Run | findings | meant |", "| --- | ---: | ---: |"]
     for report in reports:
         meant = sum(bool(finding.reason) for finding in report.findings)
@@ -306,7 +304,7 @@ def _kept(reports: list[Report]) -> dict[str, str]:
         for reason in _reasons(check)
     ]
     lines += ["", *_commands(), ""]
-    return {"analysers.md": "\n".join(lines), "findings.csv": out.getvalue()}
+    return {"analysers.md": "\n".join(lines), "findings.csv": findings}
 
 
 def _reasons(check: str) -> Iterator[str]:

@@ -4,7 +4,6 @@ In: the emitted files and a C file that plays vectors. Out: the outcomes of ever
 and the text that llvm-cov prints. Clang's runtime library is not needed: `profile.c` writes the profile.
 """
 
-import json
 import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rcsc.host.children import scratch
+from rcsc.host.files.read import json_of
 from rcsc.host.tools import Absent, BuildFailed, run_command, write_c
 
 VERSIONS = ("19", "20", "21", "22")
@@ -141,7 +141,7 @@ def measured(llvm: Tools, files: Mapping[str, str], source: str, vectors: str) -
             if ran.status != 0:
                 return BuildFailed("\n".join(ran.err.strip().splitlines()[:6]))
             text = ran.raw.decode() if command[1] == "show" else text
-        document = json.loads(ran.raw)
+        document = json_of(ran.raw, plain=False)
         return _read(
             document["data"][0], files_text(files, source), text, played.raw.decode(), played.status == 0
         )

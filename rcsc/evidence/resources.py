@@ -8,8 +8,6 @@ The sessions begin in the initial state or in drawn states that `check` accepts,
 meets combinations of the values of its own test variables. Values are ends of ranges, constants and their neighbours.
 """
 
-import csv
-import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,6 +18,7 @@ from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.evidence.processors.assembly import Bounds, UnboundedError, of_compiler, of_disassembly
 from rcsc.evidence.processors.boards import BOARDS, OPTIMIZED, Board, compiled, harness, link, run_image
 from rcsc.host.children import scratch
+from rcsc.host.files import csv_text
 from rcsc.host.tools import BuildFailed, run_command
 from rcsc.lang.model import Kind as VariableKind
 from rcsc.lang.model import Program
@@ -296,11 +295,8 @@ COLUMNS = (
 
 
 def _csv(needs: Sequence[Need]) -> str:
-    out = io.StringIO()
-    rows = csv.writer(out, lineterminator="\n")
-    rows.writerow(COLUMNS)
-    for n in needs:
-        row = (
+    rows = [
+        (
             n.board,
             n.function,
             n.code,
@@ -313,8 +309,9 @@ def _csv(needs: Sequence[Need]) -> str:
             n.bound,
             n.unbounded,
         )
-        rows.writerow(["" if value is None else value for value in row])
-    return out.getvalue()
+        for n in needs
+    ]
+    return csv_text([COLUMNS, *(["" if value is None else value for value in row] for row in rows)])
 
 
 def _page(name: str, boards: Sequence[Board], needs: Sequence[Need]) -> str:

@@ -15,8 +15,6 @@ or a NaN. EVA 25 does not follow that a comparison with NaN is false: that admis
 self-test of the machine's arithmetic, which EVA would take for a sensor: its reals are constants.
 """
 
-import csv
-import io
 import re
 import shutil
 from collections import Counter
@@ -29,6 +27,7 @@ from rcsc.emit import emitted
 from rcsc.evidence.harness import bounds, calls, stand_ins
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.host.children import scratch
+from rcsc.host.files import csv_text
 from rcsc.host.tools import run_command, write_c
 from rcsc.lang.model import I64_MAX, Program, Real, Scalar
 from rcsc.lang.model import Kind as Role
@@ -206,7 +205,8 @@ def _any(c_type: str, kind: Scalar, whole: bool) -> str:
 
 def _properties(text: str) -> Iterator[Property]:
     """What Frama-C's report says of the emitted C; not of the harness, and not what its library assumes of itself."""
-    for row in csv.DictReader(io.StringIO(text), delimiter="\t", quoting=csv.QUOTE_NONE):
+    heading, *rows = (line.split("\t") for line in text.splitlines() or [""])
+    for row in (dict(zip(heading, cells, strict=False)) for cells in rows):
         kind = row["property kind"]
         if row["file"] != "harness.c" and kind in WORDS:
             yield Property(
@@ -225,16 +225,15 @@ def _figures(runs: list[Analysis]) -> Iterator[str]:
 
 def _kept(subject: Subject, runs: list[Analysis]) -> dict[str, str]:
     symbols = symbols_of(subject.program, subject.files)
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(("run", "file", "line", "function", "class", "status", "property"))
-    for run in runs:
-        writer.writerows(
-            (run.name, p.file, p.line, p.function, p.kind, p.status, p.text) for p in run.properties
-        )
+    rows = [
+        (run.name, p.file, p.line, p.function, p.kind, p.status, p.text)
+        for run in runs
+        for p in run.properties
+    ]
+    heading = ("run", "file", "line", "function", "class", "status", "property")
     return {
         "certificate.md": _certificate(symbols, runs),
-        "properties.csv": out.getvalue(),
+        "properties.csv": csv_text([heading, *rows]),
         "harness.c": harness(subject.program, symbols, defensive=False, finite=False),
     }
 

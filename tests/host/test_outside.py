@@ -54,7 +54,7 @@ PARSERS = {
 """What makes values of text or bytes."""
 FORMATS_OF_OURS = {
     "rcsc/lang/model.py", "rcsc/solvers/smt.py", "rcsc/solvers/smtlib.py", "rcsc/testing/executors/native.py",
-    "rcsc/testing/executors/externs.py",  # doubles as bits
+    "rcsc/testing/executors/externs.py", "rcsc/testing/coverage/harness.py", "rcsc/lang/operator_table.py",  # reals as bits
     "rcsc/run/signature.py", "rcsc/run/executors.py", "rcsc/run/log/read.py", "rcsc/run/log/recorder.py",  # `FORMATS` by checked types
     "rcsc/run/log/records.py", "rcsc/run/log/replay.py", "rcsc/run/processes/memory.py", "rcsc/run/processes/block.py",
     "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py", "rcsc/link/beside.py",
@@ -89,8 +89,10 @@ READERS = (
     "rcsc/host/files/read.py:",
     "rcsc/testing/executors/python.py:",
     "rcsc/testing/executors/externs.py:",
+    "rcsc/lang/syntax/lalr.py:",
 )
-"""Who parses; a tested executor, and what stands in for its externs, are texts that were generated just now."""
+"""Who parses; a tested executor, and what stands in for its externs, are texts that were generated just now, and the tables of the
+grammar come with the compiler."""
 
 
 def test_only_the_bounded_readers_parse_text_from_outside() -> None:
@@ -727,8 +729,8 @@ SCRATCH = (
     "rcsc/compose/counterexample/rerun.py", "rcsc/shell/reload/sources.py", "rcsc/run/executors.py",
     "rcsc/diff/revision.py", "rcsc/testing/executors/native.py", "rcsc/testing/cortex.py", "rcsc/testing/esbmc.py",
     "rcsc/testing/matchers/matcher.py", "rcsc/host/tools.py", "rcsc/testing/code_mutants.py", "rcsc/run/orders/together.py",
-    "rcsc/link/beside.py",
-    "sim/rcsc_cell/episodes/setting.py",
+    "rcsc/link/beside.py", "rcsc/evidence/analysers.py", "rcsc/evidence/llvm.py", "rcsc/evidence/runtime.py",
+    "rcsc/evidence/processors/boards.py", "sim/rcsc_cell/episodes/setting.py",
 )  # fmt: skip
 """Who writes into temporary folders that end with the process."""
 STREAMS = (

@@ -15,6 +15,7 @@ import lark
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Source, Span
+from rcsc.host.files import write_atomically
 from rcsc.lang.syntax import screen, tree
 from rcsc.lang.syntax.build import Build
 from rcsc.lang.syntax.comments import Comments, words
@@ -498,4 +499,4 @@ class _Rows:
 
 
 if __name__ == "__main__":
-    (_grammar_folder() / _TABLES).write_text(made_tables().to_json(), "utf-8")
+    write_atomically(_grammar_folder() / _TABLES, made_tables().to_json().encode())
