@@ -405,3 +405,38 @@ def test_a_state_that_no_cycle_may_begin_with_tells_what_is_wrong_first(
     given: dict[str, Value], first: str
 ) -> None:
     assert unfit(UNFIT, {**initial(UNFIT), **given}) == first
+
+
+STAGES = """input a : int 0 .. 2
+state seen : int 0 .. 2
+output o : bool
+table first {
+  | line | a   || seen |
+  |------|-----||------|
+  | low  | < 1 || 0    |
+  | high | > 1 || 2    |
+}
+table second {
+  | line | seen || o     |
+  |------|------||-------|
+  | none | 0    || false |
+  | some | > 1  || true  |
+}
+level both {
+  table first
+  table second
+}
+"""
+
+
+@pytest.mark.parametrize(("a", "seen", "where"), [(1, 0, "first"), (0, 0, ""), (2, 0, "")])
+def test_a_fault_of_an_earlier_table_names_it(a: int, seen: int, where: str) -> None:
+    program = program_of(STAGES)
+    out = cycle(program, program.levels[0], {**initial(program), "seen": seen, "a": a})
+    assert (out.fault, out.fault_at) == (Fault.NO_LINE if where else Fault.OK, where)
+
+
+def test_a_fault_of_the_last_table_names_none() -> None:
+    program = program_of(STAGES.replace("| some | > 1  |", "| some | 1    |"))
+    out = cycle(program, program.levels[0], {**initial(program), "a": 2})
+    assert (out.fault, out.fault_at) == (Fault.NO_LINE, "")
