@@ -52,7 +52,7 @@ def differ_in_time(files: Mapping[str, str], folder: Path) -> None:
 
 
 def roots() -> list[str]:
-    tables = Path(__file__).parents[2] / "tables"
+    tables = Path(__file__).parents[3] / "tables"
     names = [
         path for path in tables.rglob("*.rcs") if re.search(r"^level ", path.read_text("utf-8"), re.MULTILINE)
     ]

@@ -15,7 +15,7 @@ from rcsc.emit.lower import lower, lower_by_force
 from rcsc.emit.rendering import WIDTH, folded
 from tests.support.programs.stages import verdict_of
 
-GENERATED = Path(__file__).parents[2] / "generated/c"
+GENERATED = Path(__file__).parents[3] / "generated/c"
 SHIPPED = sorted(path.name for path in GENERATED.glob("*.[ch]"))
 PROGRAMS = ("task", "emove", "primitive", "vision", "gripper", "approach")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.commands import run
-from tests.emit.test_layout import BELT, OTHER, edited
+from tests.emit.c.test_layout import BELT, OTHER, edited
 
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wpedantic", "-Werror")
 
