@@ -15,6 +15,7 @@ from rcsc.lang.model import (
     If,
     Literal,
     Local,
+    Op,
     Read,
     ReadLocal,
     Select,
@@ -45,6 +46,17 @@ def operands(expr: Expr) -> tuple[Expr, ...]:
             return ()
         case _:
             assert_never(expr)
+
+
+def conjuncts(condition: Expr) -> Iterator[Expr]:
+    """The conditions that `and` joins, left to right."""
+    waiting = [condition]
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, Apply) and part.op is Op.AND:
+            waiting += reversed(part.args)
+        else:
+            yield part
 
 
 def rebuilt(expr: Expr, change: Callable[[Expr], Expr]) -> Expr:

@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from rcsc.compose.contract.obligations import may_meet
-from rcsc.lang.model import Apply, Bool, Column, Expr, Literal, Op, Program, Table, Test
+from rcsc.lang.model import Bool, Column, Expr, Literal, Program, Table, Test
+from rcsc.lang.questions import conjunction, disjunction, negation
 
 TRUE = Literal(value=True, type=Bool())
 
@@ -46,7 +47,7 @@ def _first_match(table: Table) -> Table:
         return table
     earlier = {at: [before for before, after in meeting if after == at] for at in range(len(table.lines))}
     conditions = [
-        _all_of([test.condition for test in line.tests if test is not None]) for line in table.lines
+        conjunction(test.condition for test in line.tests if test is not None) for line in table.lines
     ]
     lines = []
     for at, line in enumerate(table.lines):
@@ -56,17 +57,7 @@ def _first_match(table: Table) -> Table:
 
 
 def _none_of(table: Table, conditions: list[Expr]) -> Test:
-    disjunction = conditions[0]
-    for condition in conditions[1:]:
-        disjunction = Apply(Op.OR, (disjunction, condition), Bool())
-    return Test("no line before", Apply(Op.NOT, (disjunction,), Bool()), table.variables, None)
-
-
-def _all_of(conditions: list[Expr]) -> Expr:
-    conjunction: Expr = TRUE
-    for condition in conditions:
-        conjunction = condition if conjunction is TRUE else Apply(Op.AND, (conjunction, condition), Bool())
-    return conjunction
+    return Test("no line before", negation(disjunction(conditions)), table.variables, None)
 
 
 VARIANTS: Mapping[str, Callable[[Program], Program]] = {

@@ -24,22 +24,19 @@ from rcsc.lang.expressions.words import Mask, mask_of
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
-    Apply,
-    Bool,
     Box,
     Column,
     Expr,
     Line,
     LineName,
-    Literal,
     Meeting,
-    Op,
     Real,
     Table,
     Test,
     key_bounds,
 )
 from rcsc.lang.operator_table import NEGATION, OPPOSITE
+from rcsc.lang.questions import conjunction, negation
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import Cell
@@ -402,15 +399,11 @@ class _Lines:
     ) -> Meeting:
         tests = [test for at in (first, second) for test in self.lines[at].tests if test is not None]
         none = [
-            Apply(
-                Op.NOT,
-                (_all_of([test.condition for test in self.lines[upper].tests if test is not None]),),
-                Bool(),
-            )
+            negation(conjunction(test.condition for test in self.lines[upper].tests if test is not None))
             for upper in uppers
             if not self._apart(first, upper) and not self._apart(second, upper)
         ]
-        where = _all_of([*(test.condition for test in tests), *none])
+        where = conjunction([*(test.condition for test in tests), *none])
         return Meeting(self.lines[first].name, self.lines[second].name, where, same, span)
 
     def _uppers(self, at: int) -> list[int]:
@@ -465,7 +458,7 @@ class _Lines:
 
     def _none_of(self, before: Sequence[_Before]) -> Test:
         """The test that none of these lines comes through."""
-        condition = _all_of([self._not(each) for each in before])
+        condition = conjunction(map(self._not, before))
         if condition not in self.shared:
             words = _merged([(self._words(each), self._of_one_leaf(each)) for each in before])
             text = " and ".join(dict.fromkeys(spell_expr(word, NEGATION) for word in words))
@@ -479,7 +472,7 @@ class _Lines:
         less = [
             self._not(_Before(other, tuple(range(len(self.lines[other].tests))))) for other in before.unless
         ]
-        return Apply(Op.NOT, (_all_of([*(test.condition for test in self._tests(before)), *less]),), Bool())
+        return negation(conjunction([*(test.condition for test in self._tests(before)), *less]))
 
     def _tests(self, before: _Before) -> list[Test]:
         tests = self.lines[before.line].tests
@@ -506,12 +499,6 @@ class _Lines:
             kinds = [self.scope.leaves[name].type for name in test.variables]
             return _other(terms[0], ordered=not any(isinstance(kind, Real) for kind in kinds))
         return tree.Unary("not", reduce(lambda left, right: tree.Binary("and", left, right), terms))
-
-
-def _all_of(conditions: Sequence[Expr]) -> Expr:
-    if not conditions:
-        return Literal(value=True, type=Bool())
-    return reduce(lambda left, right: Apply(Op.AND, (left, right), Bool()), conditions)
 
 
 def _merged(words: Sequence[tuple[tree.Expr, bool]]) -> list[tree.Expr]:

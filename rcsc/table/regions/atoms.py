@@ -8,13 +8,13 @@ form and one bound. Two doubles compare as their keys do, which is linear as wel
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
 
 from rcsc.lang.interval_sets import joined, meet, scaled
-from rcsc.lang.leaves import parts
+from rcsc.lang.leaves import conjuncts, parts
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     Among,
@@ -158,7 +158,7 @@ class Universe:
             case Apply(op=Op.NOT, args=(part,)):
                 return self.of(part, not wanted)
             case Apply(op=Op.AND) if wanted:
-                return every(map(self.of, _conjuncts(condition)))
+                return every(map(self.of, conjuncts(condition)))
             case Apply(op=op) if is_logic(op) and _written_out(condition) > MOST_WRITTEN_OUT:
                 return self._truth(condition, wanted)
             case Apply(op=op, args=(left, right)) if is_logic(op):
@@ -307,17 +307,6 @@ def _written_out(condition: Expr) -> int:
             return 2 * (_written_out(left) + _written_out(right))
         case _:
             return 1
-
-
-def _conjuncts(condition: Expr) -> Iterator[Expr]:
-    """The conditions that `and` joins, left to right."""
-    waiting = [condition]
-    while waiting:
-        part = waiting.pop()
-        if isinstance(part, Apply) and part.op is Op.AND:
-            waiting += reversed(part.args)
-        else:
-            yield part
 
 
 def _is_plain(expr: Expr) -> bool:

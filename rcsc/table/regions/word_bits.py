@@ -14,7 +14,7 @@ from itertools import pairwise
 from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.words import Field, Mask, field_of, mask_of
 from rcsc.lang.interval_sets import joined, meet
-from rcsc.lang.leaves import operands, rebuilt
+from rcsc.lang.leaves import conjuncts, operands, rebuilt
 from rcsc.lang.leaves import parts as every_part
 from rcsc.lang.model import (
     Apply,
@@ -116,7 +116,7 @@ def words_of(program: Program, table: Table) -> Words | None:
 def boxes_of(test: Test, parts: Sequence[Part]) -> dict[str, Box] | None:
     """The test of a split word as a box of its parts; None where it is none."""
     boxes: dict[str, Box] = {}
-    for condition in _conjuncts(test.condition):
+    for condition in conjuncts(test.condition):
         mask = _mask(condition)
         named = _of_mask(mask, parts) if mask is not None else _of_condition(condition, parts)
         if named is None:
@@ -164,7 +164,7 @@ def _parts(leaf: str, kind: Scalar, tests: Sequence[Test]) -> tuple[Part, ...]:
     for test in tests:
         if len(test.variables) != 1 or any(isinstance(part, Select) for part in every_part(test.condition)):
             return ()
-        for condition in _conjuncts(test.condition):
+        for condition in conjuncts(test.condition):
             if _mask(condition) is None:
                 fields = list(_fields(condition))
                 if not fields:
@@ -173,15 +173,6 @@ def _parts(leaf: str, kind: Scalar, tests: Sequence[Test]) -> tuple[Part, ...]:
     cuts = [at for at in range(width + 1) if not any(low < at <= high for high, low in together)]
     parts = tuple(Part(leaf, high - 1, low) for low, high in pairwise(cuts))[::-1]
     return parts if all(part.bits <= MOST_TOGETHER for part in parts) else ()
-
-
-def _conjuncts(condition: Expr) -> Iterator[Expr]:
-    match condition:
-        case Apply(op=Op.AND, args=(left, right)):
-            yield from _conjuncts(left)
-            yield from _conjuncts(right)
-        case _:
-            yield condition
 
 
 def _mask(condition: Expr) -> Mask | None:
