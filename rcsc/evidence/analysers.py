@@ -12,10 +12,9 @@ import re
 import shutil
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-from rcsc.emit import emitted
 from rcsc.evidence.harness import bounds, calls, stand_ins
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.host.children import scratch
@@ -55,7 +54,7 @@ EXPLAINED: Mapping[str, str] = {
     "readability-function-cognitive-complexity": "a table's lines and a state's ranges are one function each, without nesting",
     "readability-identifier-length": "`s` is the state, `m` the set of lines, `a` and `b` operands, throughout",
     "readability-magic-numbers": "constants are those that stand in the table",
-    "readability-uppercase-literal-suffix": "suffixes are small letters throughout",
+    "readability-uppercase-literal-suffix": "`u` is a small letter throughout; of 64 bits the suffix is `ULL`, as MISRA 7.3 asks of an `l`",
     "readability-math-missing-parentheses": "MISRA's precedence is kept by parentheses where it asks for them",
     "readability-non-const-parameter": "procedures take the state that they may write",
     "readability-avoid-nested-conditional-operator": "a choice of the table among more than two values",
@@ -116,7 +115,7 @@ def collect(subject: Subject) -> Evidence:
 
 def _texts(subject: Subject) -> Iterator[tuple[str, Mapping[str, str], bool]]:
     yield "", subject.files, False
-    yield "defensive, ", emitted(replace(subject.plan, defensive=True), ("c",)), True
+    yield "defensive, ", subject.defensive().files, True
 
 
 def _reports(

@@ -1,8 +1,9 @@
 """What a kind of evidence takes and gives."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from rcsc.emit import emitted
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.solvers.options import Options
@@ -28,6 +29,11 @@ class Subject:
     def program(self) -> Program:
         """What was proved."""
         return self.proved.program
+
+    def defensive(self) -> "Subject":
+        """Return the same program with the C that trusts no state: `rcsc compile --defensive`."""
+        plan = replace(self.plan, defensive=True)
+        return replace(self, plan=plan, files=emitted(plan, ("c",)))
 
 
 @dataclass(frozen=True, slots=True)

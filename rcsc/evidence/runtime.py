@@ -19,11 +19,10 @@ import re
 import shutil
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from rcsc.emit import emitted
 from rcsc.evidence.harness import bounds, calls, stand_ins
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.host.children import scratch
@@ -119,7 +118,7 @@ def collect(subject: Subject) -> Evidence:
     """Analyse the C of a program, and the C that trusts no state."""
     if version() is None:
         return Evidence((), missing=f"Frama-C is not installed (Debian's package {PACKAGE})")
-    guarded = emitted(replace(subject.plan, defensive=True), ("c",))
+    guarded = subject.defensive().files
     runs = [
         _analysis(subject, files, name, defensive=defensive, finite=finite)
         for files, defensive, title in ((subject.files, False, ""), (guarded, True, "defensive, "))

@@ -11,6 +11,7 @@ from rcsc.evidence.misra.compliance import Compliance, Summary, collect, main, s
 from rcsc.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, Checked, Finding, check
 from rcsc.evidence.misra.deviations import explained, own_findings
 from rcsc.evidence.misra.guidelines import Category, guidelines
+from rcsc.evidence.misra.words import RULES
 from tests.evidence.subjects import EVERYTHING, subject_of
 
 REPO = Path(__file__).parents[2]
@@ -69,6 +70,8 @@ def test_what_is_planted_is_a_violation_although_its_rule_may_deviate_elsewhere(
     found = {place.guideline for place in made.unexplained}
     assert all(place.finding.line > first for place in made.unexplained)
     assert {"13.4", "14.4", "15.1", "8.4"} <= found
+    assert all(place.what and "rule-texts" not in place.what for place in made.places)
+    assert made.checked.rules.keys() == RULES.keys()
     by_number = {one.number: one for one in guidelines()}
     assert made.of(by_number["13.4"])[0] is Compliance.VIOLATION
 

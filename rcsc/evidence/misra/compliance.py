@@ -16,6 +16,7 @@ from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.evidence.misra.cppcheck import MISSING, OWN, UNGUARDED, Checked, Finding, check, installed
 from rcsc.evidence.misra.deviations import Deviation, explained, own_findings
 from rcsc.evidence.misra.guidelines import Category, Guideline, guidelines
+from rcsc.evidence.misra.words import RULES
 from rcsc.host.files import csv_text
 
 ELSEWHERE: Mapping[str, str] = {
@@ -67,6 +68,11 @@ class Place:
     def where(self) -> str:
         """File and line."""
         return f"{self.finding.file}:{self.finding.line}"
+
+    @property
+    def what(self) -> str:
+        """What was found: the add-on says no more than a rule's number, and the rest is said here."""
+        return RULES.get(self.guideline, "") if self.finding.of_addon else self.finding.text
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +159,7 @@ def _shortfalls(made: Summary) -> Iterator[Shortfall]:
     for place in made.unexplained:
         yield Shortfall(
             place.where,
-            f"violates {place.guideline or 'no guideline'}: {place.finding.text} [{place.finding.check}]",
+            f"violates {place.guideline or 'no guideline'}: {place.what} [{place.finding.check}]",
         )
 
 
@@ -170,11 +176,18 @@ def _table(made: Summary) -> str:
 
 def _places(made: Summary) -> str:
     """One row for each finding."""
-    rows = [("guideline", "file", "line", "check", "reason")]
+    rows = [("guideline", "file", "line", "check", "finding", "reason")]
     for place in sorted(made.places, key=lambda one: (one.guideline, one.finding.file, one.finding.line)):
         reason = place.deviation.reason if place.deviation is not None else "VIOLATION"
         rows.append(
-            (place.guideline, place.finding.file, str(place.finding.line), place.finding.check, reason)
+            (
+                place.guideline,
+                place.finding.file,
+                str(place.finding.line),
+                place.finding.check,
+                place.what,
+                reason,
+            )
         )
     return csv_text(rows)
 
@@ -194,7 +207,7 @@ def main(folder: str) -> int:
     paths = sorted(path for path in Path(folder).iterdir() if path.suffix in {".c", ".h"})
     made = summary({path.name: path.read_text("utf-8") for path in paths})
     for place in made.unexplained:
-        sys.stdout.write(f"{place.where}: {place.guideline}: {place.finding.text} [{place.finding.check}]\n")
+        sys.stdout.write(f"{place.where}: {place.guideline}: {place.what} [{place.finding.check}]\n")
     sys.stdout.write(
         f"{len(made.places)} findings, {len(made.unexplained)} without a reason. {made.checked.failure}\n"
     )

