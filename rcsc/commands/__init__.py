@@ -33,7 +33,6 @@ from rcsc import __version__
 from rcsc.commands.group import commands
 from rcsc.commands.shared.show import UnwritableError
 from rcsc.diagnostics.printable import escape
-from rcsc.host.children import WorkerEndedError, leave
 
 PROVED, FINDINGS, USAGE, BUG, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -47,6 +46,8 @@ def main() -> None:
         status = status or _unwritable("standard output", error.strerror)
         _forget_stdout()
     if status == INTERRUPTED:
+        from rcsc.host.children import leave  # keep lazy: most commands begin no process
+
         leave(status)
     sys.exit(status)
 
@@ -95,6 +96,7 @@ def _forget_stdout() -> None:
 
 
 def _bug(error: Exception) -> int:
+    from rcsc.host.children import WorkerEndedError
 
     if isinstance(error, WorkerEndedError):
         click.echo(

@@ -16,8 +16,7 @@ from rcsc.diagnostics.report import Report, TableReport
 from rcsc.diagnostics.source import Source
 from rcsc.host.cache import Cache
 from rcsc.host.files.read import Malformed, content
-from rcsc.lang.project import MOST_BYTES, PROJECT_FILE, Loaded, listed, project_root
-from rcsc.lang.syntax import tree
+from rcsc.lang.project import MOST_BYTES, Loaded, listed, places
 from rcsc.solvers.options import Options
 
 _PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE}
@@ -67,7 +66,7 @@ def remember(cache: Cache, paths: tuple[str, ...], options: Options, loaded: Loa
 
 def digests(loaded: Loaded) -> dict[str, str] | None:
     """What stands at every place that was looked at, those where nothing stands too; None where a file has changed since."""
-    seen = {name: _seen(name) for name in _looked_at(loaded)}
+    seen = {name: _seen(name) for name in places(loaded)}
     for name, source in loaded.sources.items():
         if (seen[name][1] or b"").decode("utf-8-sig", "replace") != source.text:
             return None  # changed while it was checked
@@ -95,29 +94,6 @@ def _key(paths: tuple[str, ...], options: Options) -> tuple[str, ...]:
     stated = asdict(options)
     stated.pop("jobs", None)  # how many at once changes nothing
     return (os.getcwd(), *paths, "--", *(f"{name}={value}" for name, value in stated.items()))
-
-
-def _looked_at(loaded: Loaded) -> list[str]:
-    """Files read, and the places where a used file or a project file was looked for."""
-    names = set(loaded.sources)
-    for file in loaded.files:
-        folder = os.path.dirname(file)
-        here = Path(folder or ".").resolve()
-        names.update(str(above / PROJECT_FILE) for above in (here, *here.parents))
-    for folder, used in _uses(loaded):
-        for base in (folder, project_root(os.path.join(folder, "_"))):
-            names.add(os.path.normpath(os.path.join(base, used)))
-    return sorted(names)
-
-
-def _uses(loaded: Loaded) -> list[tuple[str, str]]:
-
-    return [
-        (os.path.dirname(name), f"{declaration.path}.rcs")
-        for name, file in loaded.files.items()
-        for declaration in file.declarations
-        if isinstance(declaration, tree.Use)
-    ]
 
 
 def _seen(name: str) -> tuple[str, bytes | None]:

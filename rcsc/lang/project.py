@@ -79,6 +79,21 @@ def listed(paths: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
 
 
+def places(loaded: Loaded) -> list[str]:
+    """Files read, and the places where a used file or a project file was looked for."""
+    from rcsc.lang.syntax.tree import Use
+
+    names = set(loaded.sources)
+    for file, parsed in loaded.files.items():
+        folder = os.path.dirname(file)
+        here = Path(folder or ".").resolve()
+        names.update(str(above / PROJECT_FILE) for above in (here, *here.parents))
+        bases = (folder, project_root(os.path.join(folder, "_")))
+        used = (each.path for each in parsed.declarations if isinstance(each, Use))
+        names.update(os.path.normpath(os.path.join(base, f"{path}.rcs")) for path in used for base in bases)
+    return sorted(names)
+
+
 def project_root(file: str) -> str:
     """The nearest folder upward with an `rcsc.toml`; else the file's own folder."""
     folder = os.path.dirname(file) or "."

@@ -3,7 +3,30 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from rcsc.solvers.smt import STEPS, TOGETHER, Limits
+STEPS = 20_000_000
+"""Steps of Z3 (its `rlimit`) a question: some seconds, and the same verdict on every machine."""
+TOGETHER = 20
+"""All questions about a table, or about a procedure, take at most as many steps as so many of them may."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one question may cost.
+
+    Attributes:
+        steps: Z3's own count of what it does (`rlimit`): the budget, which does not depend on the machine.
+        memory_mb: For all questions of the process.
+        cpu_s: Seconds of processor time, a backstop against what Z3 does without counting it; `smt.cut_short` tells of it.
+    """
+
+    steps: int = STEPS
+    memory_mb: int = 4_096
+    cpu_s: float = 60.0
+
+    @classmethod
+    def of(cls, steps: int, memory_mb: int = 4_096) -> "Limits":
+        """Limits whose backstop leaves the steps several times what they take."""
+        return cls(steps, memory_mb, max(60.0, 3e-6 * steps))
 
 
 @dataclass(frozen=True, slots=True)

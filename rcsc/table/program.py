@@ -24,14 +24,14 @@ from rcsc.procedures.invariants import assumptions_satisfiable, at_first, proper
 from rcsc.procedures.meetings import met
 from rcsc.procedures.obligations import Obligations, defined_alone
 from rcsc.solvers import smt
-from rcsc.solvers.options import Options
+from rcsc.solvers.options import TOGETHER, Options
 from rcsc.solvers.smt import Answer
 from rcsc.table.certificate import program_certificate, with_witness
 from rcsc.table.decide import prove_table
 from rcsc.table.diagnose import diagnostics
 from rcsc.table.verdict import ContradictoryAssumptions, TableFinding, TableVerdict, Undecided
 
-TOO_MANY_STEPS = f"the questions about it take, together, more than {smt.TOGETHER} times the steps of one"
+TOO_MANY_STEPS = f"the questions about it take, together, more than {TOGETHER} times the steps of one"
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,8 +32,9 @@ from rcsc.host.cache import Cache
 from rcsc.lang.model import Bool, Enum, Int, Op, Real, Scalar, real_key
 from rcsc.lang.operator_table import Arithmetic, divide
 from rcsc.solvers import smt
+from rcsc.solvers.options import Limits
 from rcsc.solvers.sat import Sat
-from rcsc.solvers.smt import Answer, Limits, Solver
+from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.bits import Bits, few, key_of_bits
 from rcsc.symbolic.encode import at_most_key

@@ -19,7 +19,8 @@ from rcsc.lang.leaves import parts
 from rcsc.lang.meaning import spelled as spelled_expression
 from rcsc.lang.model import Bool, Int, OneTable, TableName, VariableName
 from rcsc.run.description import BadDescription, Description, Wire, description
-from rcsc.solvers.smt import Answer, Limits, Solver
+from rcsc.solvers.options import Limits
+from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
 from tests.support.programs.systems import (

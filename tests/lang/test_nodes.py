@@ -12,7 +12,8 @@ from rcsc.lang.model import Among, Bool, Enum, Int, Kind, Read, Real, Scalar, Va
 from rcsc.lang.operator_table import Op
 from rcsc.procedures.discharge import MOST_CHOICES, fewest
 from rcsc.solvers import smt
-from rcsc.solvers.smt import Answer, Limits, Solver
+from rcsc.solvers.options import Limits
+from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import trial, values
 from rcsc.symbolic.encode import declared, encode
 from rcsc.symbolic.keyed import KEY

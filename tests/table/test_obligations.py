@@ -11,8 +11,8 @@ from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
 from rcsc.lang.model import Int
 from rcsc.solvers import smt
-from rcsc.solvers.options import Options
-from rcsc.solvers.smt import Answer, Limits, Solver, Term
+from rcsc.solvers.options import TOGETHER, Limits, Options
+from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic.encode import within
 from rcsc.table.program import prove_program
 from tests.support.programs.stages import BOXES, codes, program_of, verdict_of
@@ -544,7 +544,7 @@ def test_a_budget_is_for_all_solvers_inside_it_and_for_nothing_after_it() -> Non
 def test_the_manual_and_the_help_say_what_all_questions_together_get(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    said = f"{smt.TOGETHER} times"
+    said = f"{TOGETHER} times"
     assert run(["check", "--help"]) == 0
     assert said in " ".join(capsys.readouterr().out.split())
     manual = Path(__file__).parents[2] / "grammar" / "manual.md"

@@ -51,7 +51,7 @@ from rcsc.host.cache import open_cache
 from rcsc.host.files import write_atomically
 from rcsc.lang.model import Kind
 from rcsc.run.description import Description, description
-from rcsc.solvers.smt import Limits
+from rcsc.solvers.options import Limits
 
 _WORTH_PROCESSES = 40
 """Lines of the levels' tables from which several processes are quicker than one: each takes a second to begin."""

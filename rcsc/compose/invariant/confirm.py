@@ -12,7 +12,8 @@ from rcsc.compose.contract.transition import Cycle
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.model import Bool
 from rcsc.solvers import smt
-from rcsc.solvers.smt import Answer, Limits, Solver, Term
+from rcsc.solvers.options import Limits
+from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
 from rcsc.symbolic.values import Node

@@ -16,7 +16,7 @@ from rcsc.compose.contract.walk import Walk
 from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.invariant.pdr import PDR, Clause, Posed
 from rcsc.lang.model import Value
-from rcsc.solvers.smt import Limits
+from rcsc.solvers.options import Limits
 from rcsc.symbolic.values import TRUE, Node
 
 LIMITS = Limits.of(80_000_000)

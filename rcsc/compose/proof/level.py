@@ -21,8 +21,9 @@ from rcsc.compose.invariant.search import LIMITS, Effort, FoundInvariant, search
 from rcsc.compose.proof.context import Context, context, never_run
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
 from rcsc.solvers import smt
+from rcsc.solvers.options import Limits
 from rcsc.solvers.sat import GaveUpError
-from rcsc.solvers.smt import Answer, Limits, Solver
+from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
 
