@@ -21,11 +21,11 @@ from typing import TypeAlias
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
-from rcsc.lang.leaves import everything, parts, read_by
+from rcsc.lang.expressions.intervals import may_be_undefined
+from rcsc.lang.leaves import everything, read_by
 from rcsc.lang.model import (
     NOWHERE,
     Action,
-    Apply,
     Assign,
     Assumption,
     AssumptionName,
@@ -36,18 +36,15 @@ from rcsc.lang.model import (
     Kind,
     Line,
     Literal,
-    Op,
     Procedure,
     Program,
     Scalar,
-    Select,
     Standing,
     Statement,
     Table,
     ToLeaf,
     pending,
 )
-from rcsc.lang.operator_table import COMPARISONS, LOGIC
 from rcsc.procedures.causes import MOST_WITNESSES, Cause, diagnostic
 from rcsc.procedures.discharge import Asker, Tally, fewest
 from rcsc.solvers import smt
@@ -57,8 +54,6 @@ from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import Evaluation, Obligation, State, TooLongError
 from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import FALSE, TRUE, Node
-
-_DEFINED = COMPARISONS | LOGIC | {Op.NOT}
 
 
 def called_by_lines(program: Program) -> set[str]:
@@ -77,7 +72,7 @@ def defined_alone(program: Program, table: Table) -> bool:
     )
     tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
     for test in tests.values():
-        if _computes(test.condition):
+        if may_be_undefined(test.condition):
             run.evaluate(test.condition)
     return not run.obligations
 
@@ -220,7 +215,7 @@ class Obligations:
                     seen[id(test)] = test.condition, line.cell_span(at)
         where = f"in a condition of table `{table.name}`"
         for condition, span in seen.values():
-            if _computes(condition):
+            if may_be_undefined(condition):
                 yield _Owing(partial(self._test, condition, span), where, span, condition=True)
 
     def _test(self, condition: Expr, span: Span, assumed: list[Node]) -> tuple[Run, Known]:
@@ -471,11 +466,3 @@ class Obligations:
 def _name_of(line: Line | Default) -> Span:
     """The span of the line's name."""
     return line.cell_span(-1) if isinstance(line, Line) else line.span
-
-
-def _computes(expr: Expr) -> bool:
-    """Whether evaluating the condition can owe anything: more than comparisons of leaves and constants."""
-    return any(
-        isinstance(part, Select) or (isinstance(part, Apply) and part.op not in _DEFINED)
-        for part in parts(expr)
-    )

@@ -5,17 +5,15 @@ there. Once owed, an obligation is assumed to hold: later values rest on it, and
 first that fails is reported.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions import intervals
 from rcsc.lang.model import (
-    I64_MAX,
-    I64_MIN,
     NOWHERE,
-    U64_MAX,
     Among,
     Apply,
     Bool,
@@ -106,14 +104,11 @@ class State:
         return State(dict(self.leaves), dict(self.local), dict(self.assigned), dict(self.wrote))
 
 
-def word(kinds: Iterable[Int]) -> tuple[int, int]:
-    """The 64-bit type in which an operation on these is done: unsigned where none can be negative."""
-    return (0, U64_MAX) if min(kind.low for kind in kinds) >= 0 else (I64_MIN, I64_MAX)
-
-
 def _word_of(expr: Apply) -> tuple[int, int]:
     """The 64-bit type in which integer operands and result of an operation stand."""
-    return word(kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int))
+    return intervals.word(
+        kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int)
+    )
 
 
 @dataclass(slots=True)
@@ -317,7 +312,7 @@ class Evaluation:
 
     def _truncated(self, expr: Apply, arg: Node, kind: Int) -> Node:
         """A double without its fraction, where that is in 64 bits; never so of a NaN."""
-        low, high = word([kind])
+        low, high = intervals.word([kind])
         least = values.constant(arg.kind, -1.0 if low == 0 else float(low))
         above = values.compare(Op.LT if low == 0 else Op.LE, least, arg)
         below = values.compare(Op.LT, arg, values.constant(arg.kind, float(high)))

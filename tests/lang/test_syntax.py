@@ -524,11 +524,20 @@ def test_conditions_joined_by_and_are_what_the_whole_cell_says(parts: list[tree.
     [condition] = table.rows[-1].conditions
     assert isinstance(condition, tree.Comparison)
     assert condition.value == assumed.condition
-    if not again:
-        shift = text.rindex(cell) - len("assume a : ")
-        moved = [(span.start - shift, span.end - shift) for span in flat(spans(condition.value)) if span.file]
-        if moved:  # else the cell is parsed whole, and its places count from its start
-            assert moved == [(span.start, span.end) for span in flat(spans(assumed.condition)) if span.file]
+    begin = len("assume a : ")
+    written = [list(flat(spans(part))) for part in joined(condition.value, len(condition.places) or 1)]
+    alone = [list(flat(spans(part))) for part in joined(assumed.condition, len(condition.places) or 1)]
+    for (start, _), here, there in zip(condition.places or [(0, 0)], written, alone, strict=True):
+        moved = [(begin + start + span.start, begin + start + span.end) for span in here]
+        assert moved == [(span.start, span.end) if span.file else (begin + start,) * 2 for span in there]
+
+
+def joined(condition: tree.Expr, many: int) -> list[tree.Expr]:
+    """So many conditions that `and` joins."""
+    if many == 1:
+        return [condition]
+    assert isinstance(condition, tree.Binary)
+    return [*joined(condition.left, many - 1), condition.right]
 
 
 def flat(places: object) -> Iterator[Span]:
@@ -555,11 +564,3 @@ def test_each_condition_is_parsed_once_though_many_lines_join_it(monkeypatch: py
     assert len(pieces) > 3 * len(set(pieces))
     assert sorted(piece for piece in asked if piece in set(pieces)) == sorted(set(pieces))
     assert not [cell for cell in asked if cell in set(cells) - set(pieces)]
-
-
-def test_a_division_is_told_in_each_line_that_has_it() -> None:
-    rows = ["y and 10 / x > 1", "y and 10 / x <= 1", "not y and 10 / x > 1", "not y and 10 / x <= 1"]
-    lines = "".join(f"| {at} | {row} ||\n" for at, row in enumerate(rows))
-    text = f"input x : int -5 .. 5\ninput y : bool\ntable t {{\n| line | when ||\n|---|---||\n{lines}}}\n"
-    told = {text.count("\n", 0, finding.primary.span.start) for finding in reported(text)}
-    assert told == {5, 6, 7, 8}

@@ -1,21 +1,25 @@
 """What procedures, lines and conditions owe: each kind found at its line, and nothing found where all is well."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.source import Source
+from rcsc.diagnostics.source import Source, Span
 from rcsc.lang.model import Int
+from rcsc.procedures.obligations import Obligations
 from rcsc.solvers import smt
 from rcsc.solvers.options import TOGETHER, Limits, Options
 from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic.encode import within
 from rcsc.table.program import prove_program
-from tests.support.programs.stages import BOXES, codes, program_of, verdict_of
+from tests.support.programs.stages import BOXES, codes, drawn_program, program_of, verdict_of
 from tests.support.programs.texts import edited
 
 VARIABLES = """
@@ -549,3 +553,42 @@ def test_the_manual_and_the_help_say_what_all_questions_together_get(
     assert said in " ".join(capsys.readouterr().out.split())
     manual = Path(__file__).parents[2] / "grammar" / "manual.md"
     assert f"{said} the steps of one" in manual.read_text(encoding="utf-8")
+
+
+VAST = """input a : int 0 .. 9_000_000_000
+input b : int -9_223_372_036_854_775_808 .. 9_223_372_036_854_775_807
+input x : real -1e30 .. 1e30
+input xs : array[4] of int 0 .. 9
+output o : int 0 .. 9
+"""
+GUARDS = ["a < 4", "a >= 4", "a > 3_100_000_000", "b > 0", "b < 0", "b = 0", "x < 1.0", "x >= 1.0"]
+MAY_BE_UNDEFINED = [
+    "a * a > 5", "a * 2_100_000_000 > 5", "b + 1 > 2", "-b /= 2", "abs(b) > 2", "b - a < 3", "10 / b > 1", "a mod b = 1",
+    "int(x) > 3", "xs[a] = 1", "a in 0 .. b + 7", "(o = 1 or b * 2 > 3)",
+]  # fmt: skip
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.sampled_from(GUARDS), min_size=2, max_size=3, unique=True),
+    st.lists(st.sampled_from(MAY_BE_UNDEFINED), min_size=1, max_size=2, unique=True),
+)
+def test_what_may_be_undefined_is_told_in_the_line_where_it_can_be(
+    guards: list[str], parts: list[str]
+) -> None:
+    """As it is of a procedure that asks the same; lines share conditions."""
+    cells = [f"{guard} and {part}" for part in parts for guard in guards]
+    procedures = [f"procedure p{at} {{ if {cell} {{ }} }}" for at, cell in enumerate(cells)]
+    rows = [f"| {at} | {cell} || 1 |" for at, cell in enumerate(cells)]
+    head = f"{VAST}table t {{\n| line | when || o |\n|--|--||--|"
+
+    def told(*text: str) -> set[tuple[Code, str, str]]:
+        program = drawn_program("\n".join(text), "RCS314")  # no value satisfies a cell
+        found = Obligations(program, BOXES).prove(program.tables)
+        return {(finding.code, *place("\n".join(text), finding.primary.span)) for finding in found}
+
+    def place(text: str, span: Span) -> tuple[str, str]:
+        [number] = re.findall(r"[0-9]", text[text.rindex("\n", 0, span.start) :])[:1]
+        return number, text[span.start : span.end]
+
+    assert told(head, *rows, "| else | DEFAULT || 0 |", "}") == told(VAST, *procedures)

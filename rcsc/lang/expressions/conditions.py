@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
+from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.scope import Body, Scope
@@ -118,7 +119,10 @@ class Tests:
         scope, body = self.scope, Body()
         if self.headings[column].subject is None:
             assert isinstance(written, tree.Comparison)
-            return self._joined(written.value)
+            cell = scope.cell
+            if not written.places or cell is None:
+                return boolean(scope, body, written.value)
+            return self._joined(written.value, written.places, cell)
         subject = self.subjects[column]
         if subject is None:
             return None
@@ -143,20 +147,28 @@ class Tests:
             condition = other_than(condition)
         return None if condition is None else condition.expr
 
-    def _joined(self, written: tree.Expr) -> Expr | None:
-        """What a condition under `when` means; pieces that the parser shares between cells are resolved once."""
-        if not written.span.file:
-            return boolean(self.scope, Body(), written)
-        if isinstance(written, tree.Binary) and written.op == "and":
-            left, right = self._joined(written.left), self._joined(written.right)
-            return (
-                None if left is None or right is None else Apply(Op.AND, (left, right), Bool(), written.span)
-            )
+    def _joined(self, written: tree.Expr, places: tuple[tuple[int, int], ...], cell: Cell) -> Expr | None:
+        """What the conditions mean that `and` joins, at these places of a cell."""
+        if len(places) == 1:
+            return self._piece(written, cell.part(*places[0]))
+        assert isinstance(written, tree.Binary)
+        left = self._joined(written.left, places[:-1], cell)
+        right = self._piece(written.right, cell.part(*places[-1]))
+        if left is None or right is None:
+            return None
+        return Apply(Op.AND, (left, right), Bool(), tree.absolute(written.span, cell))
+
+    def _piece(self, written: tree.Expr, cell: Cell) -> Expr | None:
+        """What one of them means, which is resolved once; where it may be undefined, with spans of its own in each line."""
         if id(written) not in self.pieces:
-            condition = self.pieces[id(written)] = boolean(self.scope, Body(), written)
+            self.scope.cell = cell
+            condition = boolean(self.scope, Body(), written)
             if condition is not None:
+                condition = condition if may_be_undefined(condition) else placed(condition, cell)
                 self.reads[id(condition)] = frozenset(read_by(condition))
-        return self.pieces[id(written)]
+            self.pieces[id(written)] = condition
+        condition = self.pieces[id(written)]
+        return None if condition is None else placed(condition, cell)
 
     def _reads(self, condition: Expr) -> frozenset[VariableName]:
         if id(condition) in self.reads:

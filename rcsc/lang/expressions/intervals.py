@@ -5,10 +5,12 @@ those of the extreme operands, computed in the same arithmetic. Singles alike, r
 """
 
 import math
+from collections.abc import Iterable
 from itertools import product
 from typing import TypeVar
 
-from rcsc.lang.model import Int, Real, Scalar, Single, Unit
+from rcsc.lang.leaves import parts
+from rcsc.lang.model import I64_MAX, I64_MIN, U64_MAX, Apply, Expr, Int, Real, Scalar, Select, Single, Unit
 from rcsc.lang.operator_table import Arithmetic, Op, divide, single
 
 WIDEST = 2**200
@@ -27,6 +29,29 @@ def apply(op: Arithmetic, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
     if isinstance(kinds[0], Single):
         return Single(single(least), single(greatest), unit)
     return Real(least, greatest, unit)
+
+
+def word(kinds: Iterable[Int]) -> tuple[int, int]:
+    """The 64-bit type in which an operation on these is done: unsigned where none can be negative."""
+    return (0, U64_MAX) if min(kind.low for kind in kinds) >= 0 else (I64_MIN, I64_MAX)
+
+
+def may_be_undefined(expr: Expr) -> bool:
+    """Whether the types of an expression leave open that it is defined: that nothing in it overflows, or divides by zero."""
+    return any(
+        isinstance(part, Select) or (isinstance(part, Apply) and _may_fail(part)) for part in parts(expr)
+    )
+
+
+def _may_fail(applied: Apply) -> bool:
+    kinds = [part.type for part in (*applied.args, applied)]
+    numbers = [kind for kind in kinds if isinstance(kind, Int)]
+    if numbers:
+        low, high = word(numbers)
+        if any(kind.low < low or kind.high > high for kind in numbers):
+            return True
+    divisor = kinds[1]
+    return applied.op in (Op.DIV, Op.MOD) and not (isinstance(divisor, Int | Real) and divisor.low > 0)
 
 
 def _integers(op: Arithmetic, a: tuple[int, int], b: tuple[int, int] = (0, 0)) -> tuple[int, int]:

@@ -25,28 +25,22 @@ class Rows(Protocol):
 
 
 class Build:
-    """Builds the nodes of one file, or of one table cell (then `file` is "" and `rows` None).
+    """Builds the nodes of one file, or of one table cell (then `file` is "" and `rows` None)."""
 
-    Attributes:
-        begin: Where in the file the text begins that was parsed.
-    """
-
-    def __init__(self, file: str, comments: Comments, rows: Rows | None, begin: int = 0) -> None:
+    def __init__(self, file: str, comments: Comments, rows: Rows | None) -> None:
         self.file = file
         self.comments = comments
         self.rows = rows
-        self.begin = begin
 
     # --- pieces ---
 
     def _span(self, node: ParseNode) -> Span:
         if node.start_pos < 0:
             return Span(self.file, 0, 0)
-        return Span(self.file, self.begin + node.start_pos, self.begin + node.end_pos)
+        return Span(self.file, node.start_pos, node.end_pos)
 
     def _name(self, token: Any) -> tree.Name:
-        begin = self.begin
-        return tree.Name(str(token), Span(self.file, begin + token.start_pos, begin + token.end_pos))
+        return tree.Name(str(token), Span(self.file, token.start_pos, token.end_pos))
 
     def _names(self, node: ParseNode | None) -> tuple[tree.Name, ...]:
         return tuple(self._name(token) for token in node.children) if node is not None else ()

@@ -426,39 +426,44 @@ class _Rows:
         if not cell.text or _says_default(cell):  # which is reported
             return None
         if heading.subject is None:
-            whole = self._conjunction(cell) or self._parse("when", cell)
+            joined = self._conjunction(cell)
+            if joined is not None:
+                return joined
+            whole = self._parse("when", cell)
             return None if whole is None else tree.Comparison("=", whole, Span("", 0, len(cell.text)))
         helps = ONE_GROUP.format(cell.text) if BITS.fullmatch(cell.text) else ""
         return cast("tree.Condition | None", self._parse("cell", cell, helps))
 
-    def _conjunction(self, cell: Cell) -> tree.Expr | None:
-        """What a cell says that joins conditions by `and`; each distinct one is parsed once, and stands where it stood first.
+    def _conjunction(self, cell: Cell) -> tree.Comparison | None:
+        """What a cell says that joins conditions by `and`; each distinct one is parsed once.
 
         None where the cell is no such list, goes on in another row, or is wrong: then it is parsed whole.
         """
+        if cell.further:
+            return None
         if ("ands", cell.text) in self.memory:
-            return cast("tree.Expr", self.memory["ands", cell.text])
-        places = conjuncts(cell.text) if not cell.further else []
+            return cast("tree.Comparison", self.memory["ands", cell.text])
+        places = conjuncts(cell.text)
         if not 0 < len(places) <= MOST_CONJUNCTS:
             return None
         whole: tree.Expr | None = None
         for start, end in places:
-            part = self._conjunct(cell, start, end)
+            part = self._conjunct(cell.text[start:end])
             if part is None:
                 return None
-            span = cell.at(places[0][0], end)
+            span = Span("", places[0][0], end)
             whole = part if whole is None else tree.Binary("and", whole, part, span)
-        self.memory["ands", cell.text] = whole
-        return whole
+        assert whole is not None
+        joined = tree.Comparison("=", whole, Span("", 0, len(cell.text)), tuple(places))
+        self.memory["ands", cell.text] = joined
+        return joined
 
-    def _conjunct(self, cell: Cell, start: int, end: int) -> tree.Expr | None:
-        text = cell.text[start:end]
+    def _conjunct(self, text: str) -> tree.Expr | None:
         if ("and", text) not in self.memory:
             node = _tables().parse(text, "when")
             if node is None or _deep_in(node):
                 return None
-            build = Build(self.source.name, _NO_COMMENTS, None, cell.start + start)
-            self.memory["and", text] = build.cell(node)
+            self.memory["and", text] = Build("", _NO_COMMENTS, None).cell(node)
         return cast("tree.Expr", self.memory["and", text])
 
     def _action(self, cell: Cell, heading: tree.Heading) -> tuple[tree.Statement, ...] | tree.Comparison:

@@ -142,12 +142,8 @@ def stub_of(cell: Cell) -> Stub:
 _JOINTS = re.compile(r"[\[({]|[\])}]|(?<![\w.@])(?:and|or|xor|implies|when)(?!\w)", re.ASCII)
 
 
-_OWES = re.compile(r"/(?!=)|<<|>>|\[|(?<!\w)mod(?!\w)", re.ASCII)
-"""What may be undefined for some values: a finding about it points at its own line."""
-
-
 def conjuncts(text: str) -> list[tuple[int, int]]:
-    """Where each of the conditions stands that `and` joins in a text; none where it is no such list, or may be undefined.
+    """Where each of the conditions stands that `and` joins in a text; none where it is no such list.
 
     >>> text = "a = 1 and (b or c)"
     >>> [text[start:end] for start, end in conjuncts(text)]
@@ -155,8 +151,6 @@ def conjuncts(text: str) -> list[tuple[int, int]]:
     >>> conjuncts("a and b or c"), conjuncts("a")
     ([], [])
     """
-    if _OWES.search(text):
-        return []
     depth, cuts = 0, [(0, 0)]
     for joint in _JOINTS.finditer(text):
         word = joint[0]

@@ -410,11 +410,17 @@ Statement: TypeAlias = Assign | Local | If | Case | For | Call
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A condition cell `op expr`; a bare `expr` is `= expr`."""
+    """A condition cell `op expr`; a bare `expr` is `= expr`.
+
+    Attributes:
+        places: Where in the cell each of the conditions stands that `and` joins, if each was parsed by itself: its spans count
+            from there.
+    """
 
     op: str  # = /= < <= > >=
     value: Expr
     span: Span = at()
+    places: tuple[tuple[int, int], ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
