@@ -60,7 +60,9 @@ def scan_c(program: Program, name: str) -> str:
     rows = []
     for at, line in enumerate(program.tables[0].lines):
         tests = (
-            " && ".join(IN_C.code(text.expr(test.condition)) for test in line.tests if test is not None)
+            " && ".join(
+                f"({IN_C.code(text.expr(test.condition))})" for test in line.tests if test is not None
+            )
             or "true"
         )
         rows.append(f"    if ({tests}) {{ line = {at}; found++; }}")
