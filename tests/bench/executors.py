@@ -12,6 +12,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from rcsc.emit import emit_c, emit_python
@@ -224,8 +225,33 @@ def quickest(function: Callable[[object], int], states: list[object]) -> float:
     return best
 
 
-def measured(label: str, program: Program) -> str:
-    """One row."""
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A row.
+
+    Attributes:
+        ours: Instructions of a match in C; `scan` of a scan of all lines.
+        batch_ns: Of a row of the batch entry.
+        python_ns: Of a match in Python; `nested_ns` of nested ifs, None where they are too many.
+        size: Bytes of the object file.
+    """
+
+    label: str
+    ours: float
+    scan: float
+    batch_ns: float
+    python_ns: float
+    nested_ns: float | None
+    size: int
+
+    def __str__(self) -> str:
+        beside = f"{self.nested_ns:12.0f}" if self.nested_ns else f"{'-':>12}"
+        c = f"{self.label:12}{self.ours:10.1f}{self.scan:12.1f}{self.batch_ns:10.1f}"
+        return f"{c}{self.python_ns:12.0f}{beside}{self.size / 1024:10.0f}"
+
+
+def measured(label: str, program: Program) -> Measured:
+    """Measure one table."""
     if label == "ACQUIRE":
         verdict = prove_program(program, Options())
         assert verdict.proved is not None
@@ -253,8 +279,7 @@ def measured(label: str, program: Program) -> str:
         ours, scan = instructions(folder, function), instructions(folder, "scan")
         batch = batch_ns(folder, program, names.program, samples)
     python, nested = python_ns(files, program, samples)
-    beside = f"{nested:12.0f}" if nested else f"{'-':>12}"
-    return f"{label:12}{ours:10.1f}{scan:12.1f}{batch:10.1f}{python:12.0f}{beside}{size / 1024:10.0f}"
+    return Measured(label, ours, scan, batch, python, nested, size)
 
 
 def main() -> None:
