@@ -5,7 +5,9 @@ In: the text of a file. Out: spans (character offsets) and, here alone, lines an
 
 from bisect import bisect_right
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
+
+from rcsc.records import dataclass
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -5,7 +5,6 @@ In: a system's description and the cache. Out: a `SystemOutline` and what is kno
 """
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +18,7 @@ from rcsc.compose.proof.standing import (
 )
 from rcsc.driver.unchanged import as_before, digest_at, digests
 from rcsc.host.cache import Cache
+from rcsc.records import dataclass
 from rcsc.run.description import BadDescription, description, places
 
 if TYPE_CHECKING:

@@ -1,7 +1,6 @@
 """What all commands that prove begin with: the files read, each root resolved and proved."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
 from rcsc.diagnostics.report import Report, merged
@@ -11,6 +10,7 @@ from rcsc.host.cache import Cache
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import resolve
+from rcsc.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,11 @@ a solver.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from rcsc.diagnostics.source import Span
 from rcsc.lang.model import Expr, Procedure, Program, Scalar, Statement, Table
+from rcsc.records import dataclass
 from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import Obligation
 from rcsc.symbolic.execution import Run

@@ -1,7 +1,7 @@
 """What operators make of typed operands: kinds and units checked, bounds computed, constants folded."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -27,6 +27,7 @@ from rcsc.lang.model import (
     spell,
 )
 from rcsc.lang.operator_table import Arithmetic, Comparison, Conversion, Op, single
+from rcsc.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

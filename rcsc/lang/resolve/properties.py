@@ -11,7 +11,6 @@ In: a declaration. Out: a `Property`, whose one condition says all of it, or dia
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.expressions.scope import Body, Scope
@@ -21,6 +20,7 @@ from rcsc.lang.model import Apply, Bool, Expr, Op, Property
 from rcsc.lang.resolve.declarations import requirements
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr
+from rcsc.records import dataclass
 
 
 def resolve_property(scope: Scope, written: tree.PropertyDecl) -> Property | None:

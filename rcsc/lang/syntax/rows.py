@@ -8,10 +8,11 @@ In: rows and their offsets. Out: `Cells`, or what is wrong with them. A table ha
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 from rcsc.diagnostics.source import Span
+from rcsc.records import dataclass
 
 ACTION_WORDS = frozenset({"procedures", "command_out", "status_out"})
 REQUIREMENTS = "req"

@@ -3,11 +3,12 @@
 Equality means "says the same": spans and layout do not count, comments do.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeAlias
 
 from rcsc.diagnostics.source import Span
 from rcsc.lang.syntax.rows import Cell
+from rcsc.records import dataclass
 
 NOWHERE = Span("", 0, 0)
 
