@@ -67,6 +67,18 @@ static inline int32_t approach_bit32(uint32_t m)
 }
 #endif
 
+/* A value that was proved to be no less than this: it is as it was. */
+static inline uint32_t approach_atleast_u32(uint32_t a, uint32_t least)
+{
+    return (a >= least) ? a : least;
+}
+
+/* A value that was proved to be no more than this: it is as it was. */
+static inline uint32_t approach_atmost_u32(uint32_t a, uint32_t most)
+{
+    return (a <= most) ? a : most;
+}
+
 /* The lesser of two; the first where it is no number. */
 static inline uint32_t approach_min_u32(uint32_t a, uint32_t b)
 {
@@ -77,6 +89,12 @@ static inline uint32_t approach_min_u32(uint32_t a, uint32_t b)
 static inline uint32_t approach_u32_of_i32(int32_t a)
 {
     return (uint32_t)a;
+}
+
+/* A value that was proved to lie between these two: it is as it was. */
+static inline int32_t approach_within_i32(int32_t a, int32_t least, int32_t most)
+{
+    return (a >= least) ? ((a <= most) ? a : most) : least;
 }
 
 /* examples/approach.rcs procedure smooth */
@@ -97,8 +115,10 @@ static void approach_do_full_speed(approach_t *s)
 static void approach_do_slow_down(approach_t *s)
 {
     uint32_t v_left_mm = 0u;
-    v_left_mm = approach_u32_of_i32((int32_t)s->distance_mm - (int32_t)s->tolerance_mm);
-    s->speed_mm_s = (uint16_t)(50u + ((900u * v_left_mm) / (uint32_t)s->braking_mm));
+    v_left_mm = approach_u32_of_i32(approach_within_i32((int32_t)s->distance_mm - (int32_t)s->tolerance_mm, 0,
+            500));
+    s->speed_mm_s = (uint16_t)approach_atmost_u32(50u +
+            ((900u * v_left_mm) / approach_atleast_u32((uint32_t)s->braking_mm, 1u)), 1000u);
     s->settled = 0u;
 }
 

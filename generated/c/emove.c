@@ -67,6 +67,12 @@ static inline int32_t emove_bit32(uint32_t m)
 }
 #endif
 
+/* A value that was proved to be no less than this: it is as it was. */
+static inline int32_t emove_atleast_i32(int32_t a, int32_t least)
+{
+    return (a >= least) ? a : least;
+}
+
 /* The greater of two; the first where it is no number. */
 static inline double emove_max_f64(double a, double b)
 {
@@ -264,9 +270,11 @@ static void emove_do_aim(emove_t *s, uint32_t v_at)
         s->to_primitive.displaced.x = s->displaced_here.x + 0.0;
         s->to_primitive.displaced.y = s->displaced_here.y + 0.0;
     } else {
-        s->to_primitive.pose_ptr = emove_u16_of_i32(emove_min_i32(((int32_t)s->approach_first +
+        s->to_primitive.pose_ptr =
+            emove_u16_of_i32(emove_atleast_i32(emove_min_i32(((int32_t)s->approach_first +
             (int32_t)v_at) - (int32_t)s->depart_count,
-                9999));
+            9999),
+                0));
         s->to_primitive.displaced.z = s->lift_mm + 0.0;
     }
 }

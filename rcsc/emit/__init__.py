@@ -27,9 +27,10 @@ bytes on every machine: no time, version or absolute path is in them. Trusted: a
 `rcsc test` compares them with the interpreter, and with `--deep` has the C proved.
 
 Modules, in the order the data flows: `lower` makes a `plan`; `identifiers` spells every name, free in its `scope`;
-`code_tree` is a small tree of code, which C and Python share, and its spelling in each; `translate` makes it of expressions
-and statements, the room `c` and `python` of whole files, by the templates of `rendering`; `generated`
-writes them or says whether they are fresh. `TARGETS` names the languages: a new one is a module and its line here.
+`code_tree` is a small tree of code, which C and Python share, and its spelling in each; `translate` makes it of
+expressions and statements, the room `c` and `python` of whole files, by the templates of `rendering`; `ranges` says
+what an analyser sees that keeps ranges alone: where that is too little, the C says what was proved. `generated` writes
+the files or says whether they are fresh. `TARGETS` names the languages: a new one is a module and its line here.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping

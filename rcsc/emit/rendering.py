@@ -44,7 +44,8 @@ def render(template: str, view: Mapping[str, object]) -> str:
 def folded(line: str) -> Iterator[str]:
     """A line of C as lines of at most `WIDTH` columns, as far as it can be broken.
 
-    A comment that follows code stands before it then. Code breaks after an operator or a comma that is least nested.
+    A comment that follows code stands before it then. Code breaks after an operator or a comma that is least nested, and after
+    the sign of an assignment where nothing else is left.
 
     >>> list(folded("    x = " + " + ".join(["a_quite_long_name"] * 7) + ";"))[1]
     '            a_quite_long_name;'
@@ -70,6 +71,8 @@ def _comment(words: str, pad: str) -> Iterator[str]:
 def _code(code: str, pad: str, step: str) -> Iterator[str]:
     """Fills lines with the pieces of code; a piece that is too long by itself is broken in turn."""
     pieces = _pieces(code)
+    if len(pad) + len(code) > WIDTH and len(pieces) == 1:
+        pieces = code.replace(" = ", " =\n", 1).split("\n")
     if len(pad) + len(code) <= WIDTH or len(pieces) == 1:
         yield pad + code
         return

@@ -118,11 +118,6 @@ class Text(ABC):
         """What must hold in a loop that it goes on."""
         return ()
 
-    def arms(self, subject: Code, statement: model.Case) -> tuple[tuple[Code, Body], ...]:
-        """The arms of a choice."""
-        kind = statement.subject.type
-        return tuple((self.among(subject, kind, arm.values), self.block(arm.body)) for arm in statement.arms)
-
     def call(self, name: str, args: Sequence[Expr] = ()) -> Invoke:
         """A call of a procedure."""
         kinds = self.parameters.get(name, tuple(arg.type for arg in args))
@@ -234,5 +229,6 @@ class PyText(Text):
         self.cases += 1
         subject = Name(f"case_{self.cases}")
         let = Set(subject, self.expr(statement.subject))
-        arms = self.arms(subject, statement)
+        kind = statement.subject.type
+        arms = tuple((self.among(subject, kind, arm.values), self.block(arm.body)) for arm in statement.arms)
         return let, Branch(arms, self.block(statement.orelse) if statement.orelse else None)

@@ -6,10 +6,11 @@ the conditions of its procedure in the same order; where their numbers differ, n
 """
 
 import re
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.emit.c.ctext import SHORT, c_type
+from rcsc.emit.c.helpers import HELD
 from rcsc.emit.identifiers import Names
 from rcsc.emit.plan import Cuts, Direct, Plan, Truth
 from rcsc.evidence.llvm import Decision, Measured, Point, Region
@@ -33,6 +34,7 @@ COMPLETE = "every value of the selector has a table, and no other is admitted"
 FAULTLESS = (
     "no table of this cycle can leave a fault: that none of its lines matches, or several, is out of reach"
 )
+PROVED = "the value was proved to lie there, wherever the function is called"
 NO_WAY = "no branch leads here: see those of this function"
 OTHER_LINE = "the table has no other line, and no other outcome is within reach"
 
@@ -59,6 +61,7 @@ class Reasons:
     Attributes:
         decisions: Of the language, in order.
         shown: Reasons by key (see `Unreached`), of what was shown to be out of reach.
+        held: Functions that keep a number where it was proved to lie.
     """
 
     plan: Plan
@@ -67,10 +70,12 @@ class Reasons:
     unreached: Sequence[Unreached]
     shown: Mapping[Hashable, str] = field(init=False)
     places: Mapping[str, list[Place]] = field(init=False)
+    held: Collection[str] = field(init=False)
 
     def __post_init__(self) -> None:
         self.shown = {each.key: each.reason for each in self.unreached if each.shown}
         self.places = dict(self._places())
+        self.held = {f"{self.names.program}_{op}_{short}" for op in HELD for short in SHORT}
 
     def _places(self) -> Iterator[tuple[str, list[Place]]]:
         """The places of the decisions of each function."""
@@ -137,6 +142,8 @@ class Reasons:
             f"!{self.names.program}_exact()"
         ):
             return MACHINE
+        if function in self.held:
+            return "" if truth else PROVED
         table = self._table(function)
         if table is not None and (reason := self._of_table(table, point, truth)):
             return reason

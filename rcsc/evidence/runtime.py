@@ -6,12 +6,15 @@ undefined, or that loses something, where it stands and what EVA says of it.
 Every function that the header declares is called on a state of which nothing is known: `check` and `init` on any
 bytes; a cycle, or a step of a table, where `check` accepts it, with any inputs; a matcher with admitted inputs.
 With `--defensive` a cycle is called on any bytes, without `check`. The RTE plugin writes down what must hold; EVA
-proves it by abstract interpretation, which errs on one side only. The options are the same for every program: states
-are kept apart in the functions that are one chain of comparisons or that call one (`-eva-slevel-function`).
+proves it by abstract interpretation, which errs on one side only. EVA keeps a range for each variable, and no relation
+between two: where a line's conditions, or two variables together, keep a value where it was proved to be, the C says so
+(`emit.ranges`). The options are the same for every program: states are kept apart in the functions that are one chain of
+comparisons or that call one (`-eva-slevel-function`).
 
 A second run takes the reals that come from outside as any finite ones and shows that no operation gives an infinity
 or a NaN. EVA 25 does not follow that a comparison with NaN is false: that admission refuses one is shown by tests and by
-`model-check`, not here. In the first run a NaN is a value like others. The second run takes `volatile` out of the
+`model-check`, not here. In the first run a NaN is a value like others; what the first run does not show because of one, and
+the second does, is counted apart. The second run takes `volatile` out of the
 self-test of the machine's arithmetic, which EVA would take for a sensor: its reals are constants.
 """
 
@@ -19,7 +22,7 @@ import re
 import shutil
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -41,6 +44,8 @@ GREATEST = {"double": "0x1.fffffffffffffp+1023", "float": "0x1.fffffep+127"}
 OPTIONS = (
     "-machdep", "gcc_x86_64", "-rte", "-warn-signed-downcast", "-warn-unsigned-downcast", "-warn-special-float",
 )  # fmt: skip
+NUMBER = "is_nan_or_infinite"
+"""The class of what must be a number: in the first run where its whole part is taken, in the second after every operation."""
 WORDS: Mapping[str, str] = {
     "mem_access": "accesses to memory",
     "index_bound": "indices",
@@ -50,23 +55,17 @@ WORDS: Mapping[str, str] = {
     "signed_downcast": "conversions to a signed type",
     "unsigned_downcast": "conversions to an unsigned type",
     "float_to_int": "conversions of a real to a whole number",
-    "is_nan_or_infinite": "reals that are numbers",
+    NUMBER: "reals that are numbers",
     "bool_value": "booleans that are 0 or 1",
     "initialization": "reads of what was written",
     "precondition of __builtin_ctz": "arguments of __builtin_ctz that are not zero",
 }
 """What the classes of EVA's alarms are called."""
-OWED = frozenset(
-    {"division_by_zero", "signed_overflow", "signed_downcast", "unsigned_downcast", "float_to_int"}
-)
-"""What `rcsc check` proves of every expression of a table: divisors that are not 0, results that fit.
-
-EVA keeps a range for each variable, and no relation between two: where a line's conditions or an `if` make the
-difference, the place is listed with the proof that it rests on, and counted apart.
-"""
 PROVED = frozenset({"Valid", "Considered valid"})
 DEAD = "Dead"
-VERDICTS = ("shown", "by the table's proof", "not shown", "never reached")
+FINITE = "Valid for finite reals"
+"""The status of a place that one run does not show and the other does: it rests on a real, such as the whole part of one."""
+VERDICTS = ("shown", "shown for finite reals", "not shown", "never reached")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +86,18 @@ class Property:
     text: str
 
     @property
+    def place(self) -> tuple[str, int, str, str]:
+        """Where it stands and what it says, whatever a run shows of it."""
+        return self.file, self.line, self.kind, self.text
+
+    @property
     def verdict(self) -> str:
         """What became of it: a column of the certificate."""
         if self.status in PROVED:
             return "shown"
-        if self.status == DEAD:
-            return "never reached"
-        return "by the table's proof" if self.kind in OWED and self.status == "Unknown" else "not shown"
+        if self.status == FINITE:
+            return "shown for finite reals"
+        return "never reached" if self.status == DEAD else "not shown"
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,25 +122,31 @@ def collect(subject: Subject) -> Evidence:
     """Analyse the C of a program, and the C that trusts no state."""
     if version() is None:
         return Evidence((), missing=f"Frama-C is not installed (Debian's package {PACKAGE})")
-    guarded = subject.defensive().files
     runs = [
-        _analysis(subject, files, name, defensive=defensive, finite=finite)
-        for files, defensive, title in ((subject.files, False, ""), (guarded, True, "defensive, "))
-        for finite, name in _runs(subject.program, title)
+        *_analyses(subject, "", defensive=False),
+        *_analyses(subject.defensive(), "defensive, ", defensive=True),
     ]
     return Evidence(tuple(_figures(runs)), _kept(subject, runs), tuple(_shortfalls(runs)))
 
 
-def _runs(program: Program, title: str) -> Iterator[tuple[bool, str]]:
+def _analyses(subject: Subject, title: str, *, defensive: bool) -> tuple[Analysis, ...]:
     """What EVA is asked of one text: any bytes; and, of a program with reals, finite ones."""
-    yield False, f"{title}any bytes"
-    if any(isinstance(variable.type, Real) for variable in program.variables):
-        yield True, f"{title}finite reals"
+    whole = _analysis(subject, f"{title}any bytes", defensive=defensive, finite=False)
+    if not any(isinstance(variable.type, Real) for variable in subject.program.variables):
+        return (whole,)
+    finite = _analysis(subject, f"{title}finite reals", defensive=defensive, finite=True)
+    shown = {place.place for place in finite.properties if place.status in PROVED}
+    if all(place.verdict != "not shown" for place in finite.properties if place.kind == NUMBER):
+        shown |= {place.place for place in whole.properties if place.kind == NUMBER}
+    places = tuple(
+        replace(place, status=FINITE) if place.verdict == "not shown" and place.place in shown else place
+        for place in whole.properties
+    )
+    return replace(whole, properties=places), finite
 
 
-def _analysis(
-    subject: Subject, files: Mapping[str, str], name: str, *, defensive: bool, finite: bool
-) -> Analysis:
+def _analysis(subject: Subject, name: str, *, defensive: bool, finite: bool) -> Analysis:
+    files = subject.files
     symbols = symbols_of(subject.program, files)
     sources = {Path(path).name: text for path, text in files.items()}
     text = harness(subject.program, symbols, defensive=defensive, finite=finite)
@@ -250,16 +260,6 @@ def _certificate(symbols: Symbols, runs: list[Analysis]) -> str:
     for run in runs:
         lines += [f"## {run.name}", "", f"    {' '.join(run.command)}", ""]
         lines += [*_rows(run), ""]
-        if resting := [*_resting(run, run.sources)]:
-            lines += [
-                "By the table's proof: EVA knows each variable's range, not how two go together. `rcsc check` proved that"
-            ]
-            lines += [
-                "no divisor is 0 and that every result fits, which the C rests on here:",
-                "",
-                *resting,
-                "",
-            ]
     return "\n".join(lines)
 
 
@@ -270,13 +270,6 @@ def _rows(run: Analysis) -> Iterator[str]:
         count = Counter(place.verdict for place in run.properties if place.kind == kind)
         if count:
             yield f"| {words} (`{kind}`) | {' | '.join(str(count[verdict]) for verdict in VERDICTS)} |"
-
-
-def _resting(run: Analysis, text: Mapping[str, str]) -> Iterator[str]:
-    """The places that rest on the table's proof, each with what must hold there."""
-    for place in run.properties:
-        if place.verdict == "by the table's proof":
-            yield f"- {_where(place, text)}: `{place.text}`"
 
 
 def _where(place: Property, text: Mapping[str, str]) -> str:

@@ -1,9 +1,11 @@
 """What Frama-C's EVA shows of the generated C, and that it tells of a guard that is lost."""
 
+import re
 from pathlib import Path
 
 import pytest
 
+from rcsc.emit.c.helpers import HELD
 from rcsc.evidence import runtime
 from rcsc.evidence.kind import Evidence
 from rcsc.evidence.runtime import line_of
@@ -28,10 +30,99 @@ def test_every_access_index_and_boolean_is_shown() -> None:
     ]  # fmt: skip
 
 
-def test_a_division_that_a_line_guards_rests_on_the_proof_and_is_named() -> None:
-    evidence = runtime.collect(subject_of(EVERYTHING))
-    assert classes(evidence, "by the table's proof") == {"division_by_zero"}
-    assert "probe_do_part): `(uint32_t)s_0->width ≢ 0`" in evidence.files["certificate.md"]
+RELATIONS = """
+const most = 9223372036854775807
+input left : int 0 .. 2000
+input kept : int 1 .. 20
+input part : int 0 .. 500
+input turn : int -3 .. 3
+input load : real 0.0 .. 500.0
+input huge : int 0 .. most
+input huger : int 0 .. 18446744073709551615
+state share : int 0 .. 1000
+state at : int 0 .. 3
+state slack : real 0.0 .. 20.0
+state whole : int 0 .. 500
+state ring : array[4] of int -40 .. 40
+state sum : int 0 .. 90
+state long : int 0 .. most
+output go : bool safe false
+output seen : bool safe false
+
+procedure relate(room : int 1 .. 2000) {
+  local more : int 0 .. 500 := left - kept
+  share := 900 * more / part + room / room
+  ring[at + 1] := 40 / turn
+  slack := load - 480.0
+  whole := int(slack)
+  long := huge - 5
+  seen := huger - 1 > 5
+}
+
+procedure loop {
+  sum := 0
+  for k in 0 .. 3 {
+    local here : int -40 .. 40 := ring[k]
+    if here > 0 and sum < 50 { sum := sum + here }
+  }
+  if not (at = 0 or ring[at - 1] = 7) { at := at - 1 }
+  if at /= 3 { at := at + 1 } else { at := 0 }
+}
+
+table t {
+  | line | left - kept | left - kept - part | at  | turn | load    | huge - 5 | huger   || procedures          | go    |
+  | 1    | > 0         | <= 0              | < 3 | /= 0 | > 480.0 | >= 0     | <= most || relate(left - kept) | true  |
+  | 2    | DEFAULT     |                   |     |      |         |          |         || loop                | false |
+}
+
+level l {
+  period 10 [ms]
+  table t
+}
+"""
+"""Operations that are safe by what a line, or two variables together, say; and, in the other line, by what stands around them."""
+
+
+def test_what_a_line_or_two_variables_show_is_said_in_the_c_and_seen() -> None:
+    subject = subject_of(RELATIONS)
+    c = subject.files["c/probe.c"]
+    for helper in (
+        "atleast_u32",
+        "atmost_u32",
+        "within_i32",
+        "nonzero_i32",
+        "atleast_f64",
+        "atleast_i64",
+        "atmost_u64",
+    ):
+        assert f" probe_{helper}(" in c, helper
+    evidence = runtime.collect(subject)
+    assert not evidence.shortfalls, evidence.shortfalls
+    relational = {"division_by_zero", "index_bound", "unsigned_downcast", "signed_downcast"}
+    assert relational <= classes(evidence, "shown")
+    assert "unsigned_downcast" in classes(evidence, "shown for finite reals")  # the whole part of a real
+
+
+def test_what_stands_around_an_operation_needs_no_word() -> None:
+    text = RELATIONS.replace("relate(left - kept) | true ", "loop | true ")
+    before, _, after = text.partition("procedure relate")
+    c = subject_of(before + after[after.index("procedure loop") :]).files["c/probe.c"]
+    assert not [helper for helper in HELD if f"probe_{helper}_" in c]
+
+
+def test_every_word_that_is_lost_is_told() -> None:
+    c = subject_of(RELATIONS).files["c/probe.c"]
+    held = re.findall(rf"(probe_(?:{'|'.join(HELD)})_\w+\(.*\)\n{{\n    return) (.*);", c)
+    evidence = runtime.collect(
+        subject_of(RELATIONS, *((f"{head} {value};", f"{head} a;") for head, value in held))
+    )
+    told = {shortfall.what.split(": ")[1] for shortfall in evidence.shortfalls}
+    assert told >= {
+        "indices",
+        "divisions and remainders",
+        "conversions to an unsigned type",
+        "conversions to a signed type",
+    }
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ stored has no -0.0.
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, assert_never
 
 from rcsc.emit.code_tree import (
@@ -36,12 +36,13 @@ from rcsc.emit.code_tree import (
     when,
 )
 from rcsc.emit.identifiers import Names
+from rcsc.emit.ranges import Ends, Ranges
 from rcsc.emit.translate import FAULT, Text, constant, local
 from rcsc.lang import model
 from rcsc.lang.expressions.words import bits_of, field_of, mask_of
 from rcsc.lang.leaves import everything
-from rcsc.lang.model import I64_MAX, Bool, Enum, Expr, Int, Op, Real, Scalar, Single, Value
-from rcsc.lang.operator_table import Arithmetic, Comparison, Operator, is_arithmetic, is_comparison
+from rcsc.lang.model import I64_MAX, Bool, Enum, Expr, Int, Op, Real, Scalar, Single, Value, next_value
+from rcsc.lang.operator_table import Arithmetic, Comparison, Operator, is_arithmetic, is_comparison, is_logic
 
 _INFIX = {
     Op.AND: "&&", Op.OR: "||", Op.EQ: "==", Op.NE: "!=", Op.LT: "<", Op.LE: "<=", Op.GT: ">", Op.GE: ">=",
@@ -240,6 +241,13 @@ def _narrower(source: str, target: str) -> bool:
     )
 
 
+def _whole_ends(kind: Scalar, target: str) -> Ends:
+    """The least and the greatest number of a kind that is no integer of which the whole part is of an integer type."""
+    low, high = type_bounds(target)
+    greatest = float(high)
+    return float(low), greatest if greatest <= high else next_value(kind, greatest, -1)
+
+
 def _unsigned(word: Expr) -> str:
     """The type without a sign in which bits of a word are computed."""
     return "uint32_t" if bits_of(word) <= 32 else "uint64_t"
@@ -260,6 +268,7 @@ class CText(Text):
 
     failing: frozenset[str] = frozenset()
     _nested: int = 0
+    _ranges: Ranges = field(default_factory=Ranges)
 
     @property
     def faultless(self) -> Code:
@@ -335,11 +344,19 @@ class CText(Text):
             return self.in_type(expr, local_type(kind))
         return self.expr(expr)
 
-    def in_type(self, expr: Expr, target: str) -> Code:
+    def in_type(self, expr: Expr, target: str, ends: Ends | None = None) -> Code:
         """The value of an expression as one of C type `target`, in which it was proved to fit.
 
         What is computed on the way is computed there, too, where all of it fits: nothing is cast twice.
+
+        Args:
+            expr: The expression.
+            target: An integer type.
+            ends: Between which it was proved to lie; those of the type, where none are given.
         """
+        if self._unseen(expr, ends or type_bounds(target)) is not None:
+            held = word_type(*_bounds((expr,)))
+            return self.converted(self._held(expr, held, ends or type_bounds(target)), held, target)
         if isinstance(expr, model.Literal):
             return self.constant(expr.type, expr.value, target)
         if (
@@ -352,8 +369,49 @@ class CText(Text):
             low, high = type_bounds(target)
             least, most = _bounds((*expr.args, expr))
             if low <= least and most <= high:
-                return self._operation(expr.op, tuple(self.in_type(arg, target) for arg in expr.args), target)
+                return self._operation(expr.op, self._arguments(expr, target), target)
         return self.converted(self.expr(expr), carried(expr), target)
+
+    def _unseen(self, expr: Expr, ends: Ends) -> Ends | None:
+        """The ends that ranges alone show of a number, where they do not show it to lie between others.
+
+        None also for one of which they show that it is never there: it is never computed.
+        """
+        kind, (low, high) = expr.type, ends
+        if not isinstance(kind, Int | Real) or (low <= kind.low and kind.high <= high):
+            return None
+        least, most = self._ranges.of(expr)
+        if isinstance(kind, Int):
+            first, last = type_bounds(word_type(kind.low, kind.high))
+            least, most = max(least, first), min(most, last)
+        return None if (low <= least and most <= high) or most < low or high < least else (least, most)
+
+    def _held(self, expr: Expr, held: str, ends: Ends) -> Code:
+        """A number in type `held`, kept between the ends by a call that changes nothing that was proved to lie there."""
+        code = self.expr(expr) if held in FLOATS else self.in_type(expr, held)
+        unseen = self._unseen(expr, ends)
+        if unseen is None:
+            return code
+        below, above = unseen[0] < ends[0], unseen[1] > ends[1]
+        name = "within" if below and above else "atleast" if below else "atmost"
+        inside = [Constant(end, held) for end, passed in zip(ends, (below, above), strict=True) if passed]
+        return self._helper(f"{name}_{CALLED[held]}", (code, *inside), held)
+
+    def _arguments(self, expr: model.Apply, held: str) -> tuple[Code, ...]:
+        """The operands of an operation on whole numbers, in the type in which it is done; a divisor is none that can be 0."""
+        if expr.op not in (Op.DIV, Op.MOD):
+            return tuple(self.in_type(arg, held) for arg in expr.args)
+        whole, divisor = expr.args
+        low, high = self._ranges.of(divisor)
+        least, most = type_bounds(held)
+        given = self.in_type(divisor, held)
+        if low == 0 < high:
+            given = self._held(divisor, held, (1, most))
+        elif low < 0 == high:
+            given = self._held(divisor, held, (least, -1))
+        elif low < 0 < high:
+            given = self._helper(f"nonzero_{CALLED[held]}", (given,), held)
+        return self.in_type(whole, held), given
 
     def _element(self, leaves: Sequence[str], kind: Scalar, index: Expr | None = None) -> Place:
         """An array element by a computed index, which is left out where it can only be 0."""
@@ -361,8 +419,15 @@ class CText(Text):
         if index is not None and len(leaves) > 1:
             pairs = zip(steps, self.names.paths[leaves[1]], strict=True)
             at = next(at for at, (step, other) in enumerate(pairs) if step != other)
-            steps = (*steps[:at], self.expr(index), *steps[at + 1 :])
+            steps = (*steps[:at], self._index(index, len(leaves)), *steps[at + 1 :])
         return Place(steps, c_type(kind))
+
+    def _index(self, index: Expr, length: int) -> Code:
+        """An index of an array of this length."""
+        ends = 0, length - 1
+        if self._unseen(index, ends) is None:
+            return self.expr(index)
+        return self._held(index, word_type(*_bounds((index,))), ends)
 
     def among(self, subject: Code, kind: Scalar, values: Sequence[Value]) -> Code:
         """Whether it is one of the values."""
@@ -382,11 +447,23 @@ class CText(Text):
             given = self.expr(args[0])
             if isinstance(args[0].type, Bool):
                 return Choice(given, Constant(1, "uint32_t"), Constant(0, "uint32_t"))
-            return self.converted(given, carried(args[0]), carried(expr))
+            source, target = carried(args[0]), carried(expr)
+            if op is Op.TO_INT and self._unseen(expr, type_bounds(target)) is not None:
+                given = self._held(args[0], source, _whole_ends(args[0].type, target))
+            return self.converted(given, source, target)
         held = carried(expr)
         if isinstance(expr.type, Int):
-            return self._operation(op, tuple(self.in_type(arg, held) for arg in args), held)
-        return self._operation(op, tuple(map(self.expr, args)), held)
+            return self._operation(op, self._arguments(expr, held), held)
+        return self._operation(op, self._given(expr) if is_logic(op) else tuple(map(self.expr, args)), held)
+
+    def _given(self, expr: model.Apply) -> tuple[Code, ...]:
+        """The operands of a truth function, of which the second is looked at where the first does not decide."""
+        (first, second), before = expr.args, self._ranges
+        given = self.expr(first)
+        self._ranges = before.where(first, holds=expr.op is not Op.OR)
+        codes = given, self.expr(second)
+        self._ranges = before
+        return codes
 
     def _operands(self, args: tuple[Expr, ...]) -> tuple[Code, ...]:
         """The two sides of a comparison: each as it is where C compares them by their values."""
@@ -449,13 +526,22 @@ class CText(Text):
     def stored(self, kind: Scalar, value: Expr, *, leaf: bool = False) -> Code:
         """A value for a leaf, or for a local, in the type that it is kept in."""
         if isinstance(kind, Real):
-            return infix("+", self.expr(value), constant(kind, 0))
+            return infix("+", self._held(value, carried(value), (kind.low, kind.high)), constant(kind, 0))
         target, source = c_type(kind) if leaf else local_type(kind), carried(value)
+        if isinstance(kind, Int) and self._unseen(value, (kind.low, kind.high)) is not None:
+            return self.in_type(value, target, (kind.low, kind.high))
         if isinstance(kind, Bool) or (isinstance(value, LEAVES) and _narrower(target, source)):
             return self.expr(value)  # C widens a variable by itself
         return self.in_type(value, target)
 
     # --- statements ---
+
+    def body(self, body: Sequence[model.Statement]) -> Body:
+        """The statements of a procedure or a line, before which nothing is known but what is declared."""
+        self._ranges = Ranges()
+        done = self.block(body)
+        self._ranges = Ranges()
+        return done
 
     def block(self, body: Sequence[model.Statement]) -> Body:
         """Statements; after a call that may fail the rest is guarded."""
@@ -463,7 +549,10 @@ class CText(Text):
         for at, statement in enumerate(body, 1):
             done += self.statement(statement)
             if at < len(body) and self._may_fail(statement):
-                return (*done, when(self.faultless, *self.block(body[at:])))
+                skipped = self._ranges
+                done.append(when(self.faultless, *self.block(body[at:])))
+                self._ranges = skipped.joined(self._ranges)
+                break
         return tuple(done)
 
     def _may_fail(self, statement: model.Statement) -> bool:
@@ -482,10 +571,24 @@ class CText(Text):
             case model.For(low=low, high=high) if low > high:
                 return
             case model.For(name=name, low=low, high=high, body=body):
-                counted = word_type(low, high)
+                counted, before = word_type(low, high), self._ranges.without(body)
+                self._ranges = before
                 yield Loop(local(name).text, low, high, self.block(body), self.guard(statement), counted)
+                self._ranges = before
+            case model.If(condition=condition, then=then, orelse=orelse):
+                given, before = self.expr(condition), self._ranges
+                taken, after = self._inside(then, before.where(condition))
+                other, beside = self._inside(orelse, before.where(condition, holds=False))
+                yield Branch(((given, taken),), other if orelse else None)
+                self._ranges = after.joined(beside)
             case _:
                 yield from super().statement(statement)
+                self._ranges = self._ranges.after(statement)
+
+    def _inside(self, body: Sequence[model.Statement], ranges: Ranges) -> tuple[Body, Ranges]:
+        """Statements before which these ranges are known, and the ranges after them."""
+        self._ranges = ranges
+        return self.block(body), self._ranges
 
     def assigned(self, place: model.Place, value: Expr) -> Stmt:
         """An assignment."""
@@ -508,9 +611,14 @@ class CText(Text):
         held = c_type(kind) if isinstance(given, Place) else local_type(kind)
         subject = Name("subject" if self._nested == 1 else f"subject_{self._nested}", held)
         let = Let(f"const {held}", subject.text, given)
-        arms = self.arms(subject, statement)
-        orelse = self.block(statement.orelse) if statement.orelse else (Line("/* nothing */"),)
+        before = self._ranges
+        arms = tuple(
+            (self.among(subject, kind, arm.values), self._inside(arm.body, before)[0])
+            for arm in statement.arms
+        )
+        orelse = self._inside(statement.orelse, before)[0] or (Line("/* nothing */"),)
         self._nested -= 1
+        self._ranges = before
         return (Frame(("{",), (let, Branch(arms, orelse)), "}"),)
 
 

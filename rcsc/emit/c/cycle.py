@@ -113,7 +113,7 @@ def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
     cases: list[Stmt] = []
     named = zip(c.names.lines[table.table.name], table.lines, strict=True)
     for number, (line_name, line) in enumerate(named, 1):
-        body = c.text.block([action.statement for action in line.actions])
+        body = c.text.body([action.statement for action in line.actions])
         head = (f"case {line_name}: /* {comment(line.told)} */",)
         cases.append(Frame(head, (*_kept(c, table, number), *body, Line("break;"))))
     none, several = (Set(FAULT, fault_name(c, fault)) for fault in (Fault.NO_LINE, Fault.SEVERAL_LINES))

@@ -1,5 +1,7 @@
 """Functions of one operator or conversion, which expressions call."""
 
+from collections.abc import Mapping
+
 from rcsc.emit.c.ctext import (
     FLOATS,
     SHORT,
@@ -15,6 +17,30 @@ from rcsc.emit.code_tree import (
     Prefix,
     infix,
 )
+
+HELD: Mapping[str, str] = {
+    "atleast": "A value that was proved to be no less than this: it is as it was.",
+    "atmost": "A value that was proved to be no more than this: it is as it was.",
+    "within": "A value that was proved to lie between these two: it is as it was.",
+    "nonzero": "A value that was proved not to be 0: it is as it was.",
+}
+"""What is said of the functions that change nothing, and without which an analyser of ranges could not follow a proof."""
+
+
+def _held(program: str, op: str, short: str) -> Function:
+    """The function that keeps a number where it was proved to lie; the outcome that changes one is never taken."""
+    kind, a, one = SHORT[short], Name("a"), Constant(1, SHORT[short])
+    least, most = Name("least"), Name("most")
+    from_below, from_above = (infix(sign, a, end) for sign, end in ((">=", least), ("<=", most)))
+    values = {
+        "atleast": ((least,), Choice(from_below, a, least)),
+        "atmost": ((most,), Choice(from_above, a, most)),
+        "within": ((least, most), Choice(from_below, Choice(from_above, a, most), least)),
+        "nonzero": ((), Choice(infix("!=", a, Constant(0, kind)), a, one)),
+    }
+    ends, value = values[op]
+    params = ", ".join(f"{kind} {name.text}" for name in (a, *ends))
+    return Function(HELD[op], f"{kind} {program}_{op}_{short}({params})", (Leave(value),))
 
 
 def helper(program: str, name: str) -> Function:
@@ -41,6 +67,8 @@ def helper(program: str, name: str) -> Function:
         elif not kind.startswith("u"):
             absolute = Choice(infix("<", a, zero), Prefix("-", a), a)
         return Function("The absolute value.", f"{kind} {program}_{name}({kind} a)", (Leave(absolute or a),))
+    if op in HELD:
+        return _held(program, op, short)
     sign, word = ("<", "lesser") if op == "min" else (">", "greater")
     return Function(
         f"The {word} of two; the first where it is no number.",

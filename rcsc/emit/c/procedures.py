@@ -29,7 +29,7 @@ def _body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:
         Let(_held(c, kind), local_word(name), c.text.constant(kind, 0, local_type(kind)))
         for name, kind in kinds.items()
     )
-    body = c.text.block(procedure.body)
+    body = c.text.body(procedure.body)
     used = {code.text for code in read(body) if isinstance(code, Name)}
     named = (local(name) for name in (*kinds, *(param.name for param in procedure.params)))
     yield from (

@@ -1,0 +1,176 @@
+"""What ranges alone show of an expression: where a proof knows more, the C has to say so.
+
+In: expressions, and the statements and conditions around them. Out: bounds as an analyser has them that keeps a range
+for each variable and no relation between two, and that knows nothing of the line that a procedure runs for.
+
+>>> from rcsc.lang.model import Apply, Bool, Int, Literal, Op, Read, VariableName
+>>> n = Read(VariableName("n"), Int(0, 99))
+>>> less = Apply(Op.SUB, (n, Literal(1, Int(1, 1))), Int(-1, 98))
+>>> Ranges().of(less), Ranges().where(Apply(Op.GT, (n, Literal(0, Int(0, 0))), Bool())).of(less)
+((-1, 98), (0, 98))
+
+What is learned here must be no more than an analyser learns: too little costs a call that changes nothing.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+from rcsc.lang.expressions import intervals
+from rcsc.lang.leaves import everything, written_by
+from rcsc.lang.model import (
+    Apply,
+    Assign,
+    Call,
+    Expr,
+    Int,
+    Literal,
+    Local,
+    Op,
+    Read,
+    ReadLocal,
+    Real,
+    Statement,
+    ToLeaf,
+    ToLocal,
+)
+from rcsc.lang.operator_table import MIRRORED, OPPOSITE, Comparison, is_arithmetic, is_comparison
+
+Ends: TypeAlias = tuple[int | float, int | float]
+"""The least and the greatest value, both included."""
+
+_LOCAL = "local "
+"""What keys of locals begin with: no leaf has a blank in its name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """The ranges of numbers at one place of the C.
+
+    Attributes:
+        known: Ends by variable, where they are not those that it is declared with.
+    """
+
+    known: Mapping[str, Ends] = field(default_factory=dict)
+
+    def of(self, expr: Expr) -> Ends:
+        """Bounds of a number."""
+        kind = expr.type
+        assert isinstance(kind, Int | Real)
+        match expr:
+            case Literal(value=value):
+                return value, value
+            case Apply(op=op, args=args) if is_arithmetic(op):
+                given = tuple(self._kind(arg) for arg in args)
+                found = intervals.apply(op, given, kind.unit)
+                assert isinstance(found, Int | Real)
+                return _met((kind.low, kind.high), (found.low, found.high))
+            case _:
+                return self.known.get(_key(expr), (kind.low, kind.high))
+
+    def _kind(self, expr: Expr) -> Int | Real:
+        kind, (low, high) = expr.type, self.of(expr)
+        if isinstance(kind, Int):
+            return replace(kind, low=int(low), high=int(high))
+        assert isinstance(kind, Real)
+        return replace(kind, low=low, high=high)
+
+    def where(self, condition: Expr, *, holds: bool = True) -> "Ranges":
+        """The ranges where a condition holds, or where it does not."""
+        match condition:
+            case Apply(op=Op.NOT, args=(inner,)):
+                return self.where(inner, holds=not holds)
+            case Apply(op=Op.AND | Op.OR as op, args=(first, second)) if holds is (op is Op.AND):
+                return self.where(first, holds=holds).where(second, holds=holds)
+            case Apply(op=Op.IMPLIES, args=(first, second)) if not holds:
+                return self.where(first).where(second, holds=False)
+            case Apply(op=op, args=(first, second)) if is_comparison(op) and isinstance(
+                first.type, Int | Real
+            ):
+                told = op if holds else OPPOSITE[op]
+                ends = self.of(first)
+                return self.compared(first, told, self.of(second)).compared(second, MIRRORED[told], ends)
+            case _:
+                return self
+
+    def compared(self, expr: Expr, op: Comparison, other: Ends) -> "Ranges":
+        """The ranges where a number stands in this relation to some value between the ends."""
+        key, own = _key(expr), self.of(expr)
+        return Ranges({**self.known, key: _met(own, _compared(op, own, other, expr))}) if key else self
+
+    def after(self, statement: Statement) -> "Ranges":
+        """The ranges after a statement: an assignment is kept within what its place is declared to hold."""
+        left = self.without((statement,))
+        match statement:
+            case Assign(place=ToLeaf(name=name, type=kind), value=value):
+                key = str(name)
+            case Assign(place=ToLocal(name=name, type=kind), value=value):
+                key = _LOCAL + name
+            case Local(name=name, type=kind, value=value) if value is not None:
+                key = _LOCAL + name
+            case _:
+                return left
+        if not isinstance(kind, Int | Real):
+            return left
+        return Ranges({**left.known, key: _met((kind.low, kind.high), self.of(value))})
+
+    def without(self, body: Iterable[Statement]) -> "Ranges":
+        """The ranges of what no statement of a body writes; a call may write any leaf."""
+        inside = [*everything(body)]
+        calls = any(isinstance(statement, Call) for statement in inside)
+        written = {str(name) for statement in inside for name in written_by(statement)}
+        written |= {_LOCAL + name for statement in inside for name in _locals(statement)}
+        kept = (key for key in self.known if key.startswith(_LOCAL) or not calls)
+        return Ranges({key: self.known[key] for key in kept if key not in written})
+
+    def joined(self, other: "Ranges") -> "Ranges":
+        """The ranges where two ways meet."""
+        both = self.known.keys() & other.known.keys()
+        hulls = {key: (self.known[key], other.known[key]) for key in sorted(both)}
+        return Ranges({key: (min(a, c), max(b, d)) for key, ((a, b), (c, d)) in hulls.items()})
+
+
+def _key(expr: Expr) -> str:
+    """What a variable is known by; empty for what is none."""
+    match expr:
+        case Read(name=name):
+            return name
+        case ReadLocal(name=name):
+            return _LOCAL + name
+        case _:
+            return ""
+
+
+def _locals(statement: Statement) -> Iterator[str]:
+    """The locals that a statement itself writes."""
+    match statement:
+        case Local(name=name) | Assign(place=ToLocal(name=name)):
+            yield name
+
+
+def _met(one: Ends, other: Ends) -> Ends:
+    """What is in both; the first where nothing is, which is then never reached."""
+    low, high = max(one[0], other[0]), min(one[1], other[1])
+    return (low, high) if low <= high else one
+
+
+def _compared(op: Comparison, ends: Ends, other: Ends, expr: Expr) -> Ends:
+    """The ends within which a number lies that stands in this relation to some value between other ends.
+
+    A real is not brought below the next one: that is more than every analyser does.
+    """
+    (low, high), (least, most), step = ends, other, int(isinstance(expr.type, Int))
+    match op:
+        case Op.EQ:
+            return other
+        case Op.NE:
+            alone = step if least == most else 0
+            return low + alone * (low == least), high - alone * (high == most)
+        case Op.LT:
+            return low, most - step
+        case Op.LE:
+            return low, most
+        case Op.GT:
+            return least + step, high
+        case Op.GE:
+            return least, high
