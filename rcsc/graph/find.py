@@ -5,7 +5,7 @@ runs it, or what is wrong.
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -43,16 +43,19 @@ class NotFound:
     sources: dict[str, Source]
 
 
-def tables(named: str, *, running: bool = False) -> list[FoundTable] | NotFound:
+def tables(
+    named: str, *, running: bool = False, preferred: Collection[str] = ()
+) -> list[FoundTable] | NotFound:
     """The tables that a name means, each once, in order of file and place.
 
     Args:
         named: A table, a file, a file and its table, or a folder.
         running: Whether to look through a file's project for the program that has the level which runs the table.
+        preferred: Root files whose table is meant where several programs have one of that name.
     """
     file, name = _parted(named)
     if file is None:
-        return _by_name(name, load([_here()]))
+        return _by_name(name, load([_here()]), {os.path.realpath(root) for root in preferred})
     if os.path.isdir(file):
         return _every(load([file]))
     loaded = load([file])
@@ -104,12 +107,14 @@ def _every(loaded: Loaded) -> list[FoundTable] | NotFound:
     return [by_name[key] for key in sorted(by_name)]
 
 
-def _by_name(name: str, loaded: Loaded) -> list[FoundTable] | NotFound:
+def _by_name(name: str, loaded: Loaded, preferred: Collection[str]) -> list[FoundTable] | NotFound:
     every = _every(loaded)
     if isinstance(every, NotFound):
         return every
     named = [entry for entry in every if entry.table.name == name]
     named = [entry for entry in named if _run_here(entry)] or named  # an example is meant only by its file
+    if len(named) > 1:
+        named = [entry for entry in named if os.path.realpath(entry.root) in preferred] or named
     if len(named) == 1:
         return named
     if named:

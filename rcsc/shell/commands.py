@@ -5,7 +5,7 @@ In: a line. Out: what to show; a refusal where it is not done.
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
 from rcsc.run.faults import UnknownFault, faults_of, switch
@@ -54,6 +54,7 @@ reload [LEVEL] [anyway] prove and take a level's tables as they are now, with wh
 reload [LEVEL] proved   the same, but first prove the levels together, which may take minutes, and take it only then
 diff [LEVEL]            the same, but take nothing
 expect CONDITION        fail unless it holds
+clear                   clear the screen; a module that is called so runs as CLEAR or LEVEL.clear
 help, quit
 A CONDITION compares variables: task.cur_state = state_3 and not (new_command or primitive.travelled_mm > 40).
 Everything from # on is a comment."""
@@ -65,10 +66,12 @@ class Commands:
 
     Attributes:
         over: Whether `quit` was typed.
+        clear: Clears the screen, where there is one.
     """
 
     session: Session
     over: bool = False
+    clear: Callable[[], None] = field(default=lambda: None, repr=False)
 
     def do(self, line: str) -> Output:
         """Run a line and return what to show.
@@ -78,6 +81,9 @@ class Commands:
         """
         text = line.partition("#")[0].strip()
         if not text:
+            return []
+        if text == "clear":  # as in every terminal; in capitals, as the paper types names, it is a module
+            self.clear()
             return []
         shown, set_ = _SHOW.match(text), _SET.match(text)
         if shown:
@@ -101,7 +107,7 @@ class Commands:
 
     def completions(self) -> Iterator[str]:
         """Every word that may be typed."""
-        yield from self._words
+        yield from ("clear", *self._words)
         for level in self.session.levels:
             yield from (level.name, f"{level.name}-level")
             yield from (f"{level.name}.{leaf.name}" for leaf in level.sign.leaves)

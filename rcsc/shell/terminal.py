@@ -44,7 +44,9 @@ def follow(commands: Commands, lines: Iterable[str], name: str, show: Show, comp
 
 def converse(commands: Commands, show: Show, complain: Complain) -> int:
     """Run lines as they are typed until `quit` or the end of the input; show a refusal and go on."""
-    prompt = _prompt(commands)
+    from prompt_toolkit.shortcuts import clear
+
+    prompt, commands.clear = _prompt(commands), clear
     while not commands.over:
         try:
             line = prompt.prompt(f"{commands.session.chosen}> ")

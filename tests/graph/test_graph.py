@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from rcsc.commands.group import commands
+from rcsc.commands.shared.graphs import WrongError, found_tables
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
@@ -94,6 +95,18 @@ def test_every_table_of_the_system_comes_back_from_every_form_and_is_proved_the_
         assert len(texts) == 1, name  # the forms hold the same, so that one proof is enough
         verdict = said(entry, FORMS["dot"].write(made.graph), "dot")
         assert verdict.diagnostics == (), name
+
+
+def test_a_name_of_several_tables_means_that_of_the_system_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    several = tables("acquire")
+    assert isinstance(several, NotFound)
+    assert "`tables/task/acquire.rcs:acquire`" in several.diagnostics[0].help[0]
+    [meant] = found_tables("acquire")
+    assert Path(meant.table.file) == Path("tables/task/acquire.rcs")
+    monkeypatch.setattr("rcsc.commands.shared.systems.PLACES", ("tables/examples/later/last_echo.toml",))
+    with pytest.raises(WrongError):
+        found_tables("acquire")  # of a system that has no such table
 
 
 def test_the_graph_of_acquire_is_fig_10(shipped: dict[str, FoundTable]) -> None:

@@ -571,12 +571,14 @@ def test_a_run_of_a_level_alone_that_ends_in_a_fault_replays(
 def test_the_first_cycle_where_something_holds(log: Log) -> None:
     asked = {
         "task.workstation.inc_command == 2": 27,
+        "task.workstation.inc_command = 2": 27,
+        "task.workstation.inc_command=2 and task.workstation.input_command /= move": 27,
         "task.workstation.inc_command >= 2 and not task.workstation.inc_command > 2": 27,
         "1 < task.workstation.inc_command < 3": 27,
         "primitive.from_robot.plate[1] == 1.1 or task.workstation.inc_command == 9": 4,
         "task.workstation.input_command == move": 2,
-        "task.workstation.input_command == 'release'": 27,
-        "gripper.fault != none": None,
+        "task.workstation.input_command = 'release'": 27,
+        "gripper.fault /= none": None,
         "primitive.from[0] < -1e9": None,
     }
     for text, tick in asked.items():
@@ -599,7 +601,8 @@ def test_the_first_cycle_where_something_holds(log: Log) -> None:
         "", "1 +", "task.nothing == 1", "task.cur_state", "task.cur_state == wrong", "task.cur_state < d_state",
         "task.cur_state == 1", "d_state == d_state", "__import__('os').system('true')", "task.cur_state is d_state",
         "(lambda: 1)() == 1", "task.workstation.inc_command + 1 == 2", "task['x'] == 1", "x.y.z", "[1] == [1]",
-        "(" * 500, "not " * 2_000 + "task.new_command",
+        "(" * 500, "task.new_command = = true", "task.new_command := true", "= 1", "task.workstation.input_command = 'a=b'",
+        "not " * 2_000 + "task.new_command",
     ],
 )  # fmt: skip
 def test_a_question_that_cannot_be_asked(log: Log, text: str) -> None:

@@ -291,6 +291,18 @@ def test_a_procedure_a_module_an_owner_and_a_table_run_by_name(shell: Commands) 
     assert do(shell, "gripper 2") == ["gripper alone: gripper.pause_gripper.1"]
 
 
+def test_clear_clears_the_screen_and_in_capitals_runs_the_table(shell: Commands) -> None:
+    cleared: list[int] = []
+    shell.clear = lambda: cleared.append(1)
+    assert do(shell, "clear") == []
+    assert cleared == [1]
+    said = do(shell, "CLEAR")
+    assert said[0].startswith("task: table `clear`")
+    assert do(shell, "undo", "task.clear") == said
+    assert cleared == [1]
+    assert "clear" in shell.completions()
+
+
 def test_parts_run_only_from_the_sources_that_the_executors_were_made_of(project: Path) -> None:
     edit_file(
         project.parent / GRIPPER,

@@ -7,11 +7,14 @@ import click
 
 from rcsc.commands.shared.options import steps_option
 from rcsc.commands.shared.show import Output, show, writing
+from rcsc.commands.shared.systems import NoSystem, system_path
 from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
 from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Source
+from rcsc.driver.compile import tables_in
 from rcsc.graph.find import FoundTable, NotFound, tables
 from rcsc.host.files import write_atomically
+from rcsc.run.description import BadDescription
 
 ENDINGS = {"svg": ".svg", "dot": ".dot", "mermaid": ".mmd", "scxml": ".scxml"}
 STEPS = steps_option(20)
@@ -48,10 +51,18 @@ def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
     file = named if named.endswith(".rcs") else named.rpartition(":")[0]
     if file.endswith(".rcs") and not Path(file).exists():
         raise click.UsageError(f"path `{file}` does not exist")
-    answer = tables(named, running=running)
+    answer = tables(named, running=running, preferred=_of_system())
     if isinstance(answer, NotFound):
         raise WrongError(answer.diagnostics, answer.sources)
     return answer
+
+
+def _of_system() -> tuple[str, ...]:
+    """The root files of the levels of the system that is here; none where there is no system, or its description is not in order."""
+    try:
+        return tables_in((), (system_path(None),))
+    except (NoSystem, BadDescription):
+        return ()
 
 
 def written(text: str, out: Path | None) -> None:

@@ -25,7 +25,7 @@ Examples:
   rcsc replay run.mcap --executor python        with the Python executors
   rcsc replay run.mcap --generated edited       what would other tables have done?
   rcsc replay run.mcap --at 120 --show task     one cycle, and a level's whole state
-  rcsc replay run.mcap --find "task.cur_state == state_3 and not task.idle" """,
+  rcsc replay run.mcap --find "task.cur_state = state_3 and not task.idle" """,
 )
 @FILE
 @click.option("--executor", type=click.Choice(["c", "python"]), default="c", show_default=True,

@@ -10,7 +10,7 @@ who made the log. *Replay* takes each recorded state, runs one cycle with the re
 bit for bit; with other tables it says what they would have done.
 
     rcsc run make_boxt --plant kinematic --log boxt.mcap
-    rcsc replay boxt.mcap --find 'task.cur_state == state_3'
+    rcsc replay boxt.mcap --find 'task.cur_state = state_3'
 
 >>> from rcsc.run.log.records import Seal
 >>> [one.name for one in Seal]

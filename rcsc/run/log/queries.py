@@ -1,8 +1,8 @@
-"""Questions to a log: `task.cur_state == state_3 and primitive.travelled_mm > 40`.
+"""Questions to a log: `task.cur_state = state_3 and primitive.travelled_mm > 40`.
 
-In: a text, and the levels that it may name. Out: a predicate over the levels' values. The text is parsed as Python is,
-and only comparisons, `and`, `or`, `not`, leaves, numbers, texts and members of enumerations are let through; nothing
-is ever evaluated but these.
+In: a text, and the levels that it may name. Out: a predicate over the levels' values. `=` and `/=` are read as in tables, `==`
+and `!=` too. The text is parsed as Python is, and only comparisons, `and`, `or`, `not`, leaves, numbers, texts and members of
+enumerations are let through; nothing is ever evaluated but these.
 """
 
 import ast
@@ -29,6 +29,7 @@ _COMPARE: Mapping[type[ast.cmpop], Callable[[Value | str, Value | str], bool]] =
 _EQUALITY = (ast.Eq, ast.NotEq)
 _BOOLS = {"true": True, "false": False, "True": True, "False": False}
 _KEYWORD, _MARK = re.compile(r"(?<=\.)[A-Za-z_]\w*"), "__keyword"
+_AS_IN_TABLES = re.compile(r"""(?P<text>"[^"]*"|'[^']*')|(?P<equal>(?<![=!<>/])=(?!=))|(?P<other>/=)""")
 
 
 class BadExpression(Exception):  # noqa: N818  # what happened, not an error of ours
@@ -56,13 +57,16 @@ def predicate(text: str, log: Log) -> Predicate:
     Raises:
         BadExpression: It is no question, or names what the log does not have.
     """
-    marked = _KEYWORD.sub(lambda match: match[0] + _MARK * keyword.iskeyword(match[0]), text)
+    spelled = _AS_IN_TABLES.sub(
+        lambda match: match[0] if match["text"] else "==" if match["equal"] else "!=", text
+    )
+    marked = _KEYWORD.sub(lambda match: match[0] + _MARK * keyword.iskeyword(match[0]), spelled)
     try:
         parsed = ast.parse(marked.strip(), mode="eval").body
         return _Building(named_columns(log)).predicate(parsed)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise BadExpression(
-            f"`{text[:200]}` cannot be read: write such as `level.leaf == value and ...`"
+            f"`{text[:200]}` cannot be read: write such as `level.leaf = value and ...`"
         ) from error
 
 
@@ -143,13 +147,13 @@ class _Building:
 
 def _compared(left: _Operand, op: ast.cmpop, right: _Operand) -> Predicate:
     if type(op) not in _COMPARE:
-        raise BadExpression("only ==, !=, <, <=, > and >= compare")
+        raise BadExpression("only =, /=, <, <=, > and >= compare")
     if left.kind != right.kind:
         raise BadExpression(
             f"`{left.text}` and `{right.text}` cannot be compared: {left.kind} and {right.kind}"
         )
     if left.kind != "number" and not isinstance(op, _EQUALITY):
-        raise BadExpression(f"`{left.text}` and `{right.text}` have no order: use == or !=")
+        raise BadExpression(f"`{left.text}` and `{right.text}` have no order: use = or /=")
     for operand, other in ((left, right), (right, left)):
         if operand.bare and other.members and operand.text not in other.members:
             raise BadExpression(
