@@ -20,8 +20,7 @@ for every input in the declared ranges, or shows the least input for which it is
 
 The rooms, in the order in which data flows; each imports only from those before it:
 
-- `records` are dataclasses that are cheap to declare; `diagnostics` says what is wrong, `host` is the machine: files,
-  processes, the cache;
+- `diagnostics` says what is wrong, `host` is the machine: files, processes, the cache;
 - `lang` makes a program of text and says what it means; `solvers` and `symbolic` turn that into questions;
 - `procedures` and `table` prove one program; `relation` compares lines and tables; `certify` checks a proof anew,
   with no code of theirs;

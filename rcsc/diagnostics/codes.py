@@ -1,12 +1,11 @@
 """Every code in one catalogue: a code's title, why it is reported, and an example with its message and its mend."""
 
 import re
+from dataclasses import dataclass
 from enum import StrEnum
 from inspect import cleandoc
 from textwrap import dedent
 from typing import Self
-
-from rcsc.records import dataclass
 
 FAMILIES = {
     "1": "syntax and files",

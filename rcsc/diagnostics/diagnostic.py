@@ -1,10 +1,10 @@
 """`Diagnostic` and `Label`: what is wrong, as data; `render` turns it into text."""
 
+from dataclasses import dataclass
 from enum import StrEnum
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
-from rcsc.records import dataclass
 
 
 class Severity(StrEnum):

@@ -5,13 +5,13 @@ added by `paint`, the only importer of rich, and only when it is wanted.
 """
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from enum import StrEnum
 from itertools import groupby
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, WitnessColumn
 from rcsc.diagnostics.printable import clip, escape, pad, width
 from rcsc.diagnostics.source import Source, Sources
-from rcsc.records import dataclass
 
 WIDEST_LINE = 110
 """Cells shown of a source line where the terminal's width is not known: as wide as `rcsc fmt` makes tables."""

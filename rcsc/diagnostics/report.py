@@ -1,12 +1,11 @@
 """What a command found and what backs it: the one value that every output form shows."""
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.diagnostics.source import Source
-from rcsc.records import dataclass
 
 
 class Verdict(StrEnum):

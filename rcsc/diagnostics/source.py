@@ -5,9 +5,7 @@ In: the text of a file. Out: spans (character offsets) and, here alone, lines an
 
 from bisect import bisect_right
 from collections.abc import Mapping
-from dataclasses import field
-
-from rcsc.records import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True, order=True)

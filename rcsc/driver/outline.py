@@ -5,6 +5,7 @@ In: a system's description and the cache. Out: a `SystemOutline` and what is kno
 """
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,6 @@ from rcsc.compose.proof.standing import (
 )
 from rcsc.driver.unchanged import as_before, digest_at, digests
 from rcsc.host.cache import Cache
-from rcsc.records import dataclass
 from rcsc.run.description import BadDescription, description, places
 
 if TYPE_CHECKING:

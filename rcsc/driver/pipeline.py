@@ -1,6 +1,7 @@
 """What all commands that prove begin with: the files read, each root resolved and proved."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
 from rcsc.diagnostics.report import Report, merged
@@ -10,7 +11,6 @@ from rcsc.host.cache import Cache
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import resolve
-from rcsc.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ assumptions, invariants, levels. So when one table changes, its neighbours are n
 import hashlib
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
@@ -21,7 +21,6 @@ from rcsc.lang.model import Program, Table
 from rcsc.lang.project import Loaded
 from rcsc.procedures.invariants import properties_elsewhere
 from rcsc.procedures.obligations import called_by_lines
-from rcsc.records import dataclass
 from rcsc.solvers.options import Options
 from rcsc.table.certificate import must_cover
 from rcsc.table.program import prove_program

@@ -1,12 +1,12 @@
 """What the commands are given, and what they hand back."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.report import Report, TableReport
-from rcsc.records import dataclass
 
 if TYPE_CHECKING:
     from rcsc.lang.model import Program, ProvedProgram

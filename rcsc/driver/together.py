@@ -7,7 +7,7 @@ them changes nothing is read but these and the verdicts.
 
 import os
 from collections.abc import Collection, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.compose.contract.claims import UNREACHED, Promise
@@ -19,7 +19,6 @@ from rcsc.diagnostics.source import Source, Span
 from rcsc.driver.outline import known
 from rcsc.host.cache import Cache, cache_of
 from rcsc.lang.project import PROJECT_FILE
-from rcsc.records import dataclass
 from rcsc.run.description import BadDescription, description, places
 
 SYSTEM_FILE = "system.toml"

@@ -7,7 +7,7 @@ file by content, and every place where a file would have been found first is sti
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
@@ -17,7 +17,6 @@ from rcsc.diagnostics.source import Source
 from rcsc.host.cache import Cache
 from rcsc.host.files.read import Malformed, content
 from rcsc.lang.project import MOST_BYTES, Loaded, listed, places
-from rcsc.records import dataclass
 from rcsc.solvers.options import Options
 
 _PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE}

@@ -13,7 +13,7 @@ import os
 import secrets
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TypeVar
@@ -22,7 +22,6 @@ from rcsc import __version__
 from rcsc.host.files import write_atomically
 from rcsc.host.files.plain import plain, read
 from rcsc.host.files.read import Malformed, content, json_of
-from rcsc.records import dataclass
 
 FOLDER = ".rcsc-cache"
 MOST_ENTRIES = 4096

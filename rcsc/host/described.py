@@ -6,7 +6,7 @@ granted that the text is TOML. Source: TOML 1.0.0 (toml.io), of which only the s
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
@@ -18,7 +18,6 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Source, Span
 from rcsc.host.files import read
 from rcsc.host.files.names import MOST_FILE_CHARACTERS, is_file_name, is_identifier, is_member
-from rcsc.records import dataclass
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 

@@ -8,7 +8,7 @@ import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import partial
 from typing import Any, TypeAlias, assert_never
@@ -52,7 +52,6 @@ from rcsc.lang.model import (
     pending,
 )
 from rcsc.lang.operator_table import UNDECIDED, Op, is_logic, single
-from rcsc.records import dataclass
 
 
 class Fault(IntEnum):

@@ -13,7 +13,7 @@ keys every leaf is a bounded integer, so that conditions on one leaf are sets of
 import math
 import struct
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NewType, TypeAlias
 
@@ -22,7 +22,6 @@ from rcsc.lang.operator_table import COMPARISONS as COMPARISONS  # noqa: PLC0414
 from rcsc.lang.operator_table import Op as Op  # noqa: PLC0414 - as above
 from rcsc.lang.operator_table import Operator, single, spell_single
 from rcsc.lang.restart import Adopted, Part, by_names
-from rcsc.records import dataclass
 
 VariableName = NewType("VariableName", str)
 ProcedureName = NewType("ProcedureName", str)

@@ -7,7 +7,7 @@ import os
 import re
 import stat
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,6 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
 from rcsc.diagnostics.source import Source, Span
 from rcsc.host.files.read import Malformed, toml_of
-from rcsc.records import dataclass
 
 if TYPE_CHECKING:  # who only looks for the folder of a project, as a running level does, needs no syntax
     from rcsc.lang.syntax import tree

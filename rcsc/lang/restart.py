@@ -9,9 +9,8 @@ rest of a program that writes the protocol by hand it goes by the names that the
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import TypeAlias
-
-from rcsc.records import dataclass
 
 Value: TypeAlias = bool | int | float
 

@@ -3,14 +3,13 @@
 In: failures and where they arose. Out: one diagnostic a place and kind, with at most three witnesses.
 """
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
 from rcsc.diagnostics.source import Span
 from rcsc.lang.model import spell
 from rcsc.procedures.discharge import Discharge, Failure
-from rcsc.records import dataclass
 
 MOST_WITNESSES = 3
 

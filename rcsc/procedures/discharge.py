@@ -5,13 +5,12 @@ open. Domains of the variables are asserted here. Z3 is loaded only when somethi
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import Enum, auto
 from itertools import combinations
 from typing import TypeVar
 
 from rcsc.lang.model import Kind, Real, Value, Variable, VariableName, value_of_key
-from rcsc.records import dataclass
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.search import halved

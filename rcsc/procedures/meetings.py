@@ -6,12 +6,11 @@ differ the least such input is shown, with what each line leaves there.
 """
 
 from collections.abc import Collection, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Effects, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.lang.model import AssumptionName, Line, Meeting, Program, Table, spell
-from rcsc.records import dataclass
 from rcsc.solvers.options import Options
 from rcsc.symbolic.alike import Disagreement, alike, disagreement, meets
 

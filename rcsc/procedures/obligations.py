@@ -14,7 +14,7 @@ count as safety: one that a failed assumption breaks would take the ground from 
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TypeAlias
 
@@ -47,7 +47,6 @@ from rcsc.lang.model import (
 )
 from rcsc.procedures.causes import MOST_WITNESSES, Cause, diagnostic
 from rcsc.procedures.discharge import Asker, Tally, fewest
-from rcsc.records import dataclass
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Budget

@@ -5,7 +5,7 @@ is, `rcsc.run.plant` says; whether it fits the levels is seen when it is loaded.
 """
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,6 @@ from rcsc.host.described import (
 )
 from rcsc.host.files.names import BadName, is_identifier, is_member, within
 from rcsc.lang.project import project_root
-from rcsc.records import dataclass
 
 PYTHON: Mapping[str, Kind] = {
     "python": Text(),

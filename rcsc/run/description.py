@@ -5,7 +5,7 @@ rest is automatic (Haynes et al. 1984, section 9).
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,6 @@ from rcsc.host.described import (
 from rcsc.host.files.names import BadName, is_member, member, within
 from rcsc.host.files.read import CheckedFields
 from rcsc.lang.project import Neighbours, neighbours, project_root
-from rcsc.records import dataclass
 from rcsc.run.declared_plant import PlantSpec, plants
 
 

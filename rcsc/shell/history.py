@@ -86,4 +86,4 @@ def _parts(whole: object) -> list[object]:
 
 
 def _is_frozen(value: object) -> bool:
-    return is_dataclass(value) and type(value).__setattr__ is not object.__setattr__
+    return is_dataclass(value) and bool(getattr(type(value), "__dataclass_params__").frozen)  # noqa: B009  # unknown to mypy

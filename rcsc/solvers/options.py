@@ -1,8 +1,7 @@
 """How a proof is to be made."""
 
+from dataclasses import dataclass
 from typing import Literal
-
-from rcsc.records import dataclass
 
 STEPS = 20_000_000
 """Steps of Z3 (its `rlimit`) a question: some seconds, and the same verdict on every machine."""

@@ -10,13 +10,13 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from enum import Enum, auto
 from fractions import Fraction
 from functools import cache
 from typing import Any, NewType
 
 from rcsc.lang.model import Bool, Real, Scalar, Single, Value
-from rcsc.records import dataclass
 from rcsc.solvers.options import Limits
 
 Term = NewType("Term", object)

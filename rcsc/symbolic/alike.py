@@ -10,10 +10,10 @@ It costs a question a variable that the lines may leave different.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 from rcsc.diagnostics.diagnostic import Effects
 from rcsc.lang.model import Expr, Line, Program, Table, Value, VariableName
-from rcsc.records import dataclass
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver

@@ -8,11 +8,10 @@ a solver.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from rcsc.diagnostics.source import Span
 from rcsc.lang.model import Expr, Procedure, Program, Scalar, Statement, Table
-from rcsc.records import dataclass
 from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import Obligation
 from rcsc.symbolic.execution import Run

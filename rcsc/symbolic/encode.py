@@ -5,7 +5,7 @@ that is defined; that it is defined is proved apart (`obligations`).
 """
 
 from collections.abc import Iterable
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import partial
 
 from rcsc.lang.model import (
@@ -28,7 +28,6 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.operator_table import Comparison, Op, Operator, Signed, is_comparison, is_logic, truth_function
-from rcsc.records import dataclass
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.search import lowest

@@ -7,7 +7,7 @@ first that fails is reported.
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -27,7 +27,6 @@ from rcsc.lang.model import (
     Select,
 )
 from rcsc.lang.operator_table import UNDECIDED, Arithmetic, Logic, Op, is_comparison, is_logic
-from rcsc.records import dataclass
 from rcsc.symbolic import values
 from rcsc.symbolic.values import FALSE, TRUE, Fact, Node
 

@@ -5,6 +5,7 @@ In: statements and a state. Out: the state after them, and what they owe (`evalu
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import assert_never
 
 from rcsc.diagnostics.codes import Code
@@ -34,7 +35,6 @@ from rcsc.lang.model import (
     pending,
     spell,
 )
-from rcsc.records import dataclass
 from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import Evaluation, ExternResults, State
 from rcsc.symbolic.values import FALSE, TRUE, Node

@@ -9,7 +9,7 @@ A node of type Real whose bounds are infinite may also be a NaN. Source of the b
 import math
 import sys
 from collections.abc import Container, Iterable, Iterator, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rcsc.lang.expressions import intervals
@@ -26,7 +26,6 @@ from rcsc.lang.operator_table import (
     single,
     truth_function,
 )
-from rcsc.records import dataclass
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Term
 from rcsc.symbolic.encode import operation, within

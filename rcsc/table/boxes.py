@@ -5,12 +5,11 @@ overlapping pair, the dead lines, and the inputs that no line matches, with leas
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from math import prod
 
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.model import Box, Program, Table, Test, Value, key_bounds, value_of_key
-from rcsc.records import dataclass
 from rcsc.table.regions.partition import Boxes, BudgetError, Gaps, common
 from rcsc.table.regions.word_bits import Part, Words, boxes_of
 from rcsc.table.verdict import Gap, Overlap, Region, Witness

@@ -4,7 +4,7 @@ The only place where a `ProvedProgram` is made, and only when nothing is wrong a
 """
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity, sort_key
 from rcsc.host import children
@@ -23,7 +23,6 @@ from rcsc.procedures.discharge import Tally
 from rcsc.procedures.invariants import assumptions_satisfiable, at_first, properties_elsewhere
 from rcsc.procedures.meetings import met
 from rcsc.procedures.obligations import Obligations, defined_alone
-from rcsc.records import dataclass
 from rcsc.solvers import smt
 from rcsc.solvers.options import TOGETHER, Options
 from rcsc.solvers.smt import Answer

@@ -6,7 +6,7 @@ one solver that is made when first needed; *unknown* is a finding, never a proof
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 from rcsc.lang.expressions.folding import fold
@@ -24,7 +24,6 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.questions import question
-from rcsc.records import dataclass
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.search import furthest

@@ -5,7 +5,7 @@ In: a finding of a table. Out: a sentence, or nothing.
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from math import gcd
 
@@ -32,7 +32,6 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.operator_table import OPPOSITE, Op, is_comparison
-from rcsc.records import dataclass
 from rcsc.table import boxes, cells
 from rcsc.table.regions.atoms import (
     Atom,

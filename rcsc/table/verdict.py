@@ -4,10 +4,10 @@ Keys are those of `rcsc.lang.model`: order-preserving integers for every kind of
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TypeAlias
 
 from rcsc.lang.model import Backing, Box, Snapshot, Table
-from rcsc.records import dataclass
 
 Witness: TypeAlias = Snapshot
 """A value for every test variable of the table."""

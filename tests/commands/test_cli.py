@@ -1,7 +1,5 @@
 """The command line as a user meets it: exit statuses, forms, files, pipes, and what a second run costs."""
 
-import dataclasses
-import importlib
 import io
 import json
 import os
@@ -358,9 +356,6 @@ def test_a_second_check_imports_nothing_heavy() -> None:
     shutil.copytree(REPO / "tables", "tables")
     status, first = loaded("check", "tables")
     assert {"lark", "rcsc.lang.model", "rcsc.lang.syntax.tree"} <= first
-    modules = [importlib.import_module(name) for name in first if name.startswith("rcsc.")]
-    dear = {module.__name__ for module in modules if vars(module).get("dataclass") is dataclasses.dataclass}
-    assert not dear, "take `dataclass` from `rcsc.records`"
     again, second = loaded("check", "tables")
     assert again == status
     assert not second & HEAVY

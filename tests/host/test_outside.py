@@ -87,13 +87,12 @@ def _word(node: ast.expr) -> str:
 
 READERS = (
     "rcsc/host/files/read.py:",
-    "rcsc/records.py:",
     "rcsc/testing/executors/python.py:",
     "rcsc/testing/executors/externs.py:",
     "rcsc/lang/syntax/lalr.py:",
 )
-"""Who parses; a tested executor, and what stands in for its externs, are texts that were generated just now, the tables of the
-grammar come with the compiler, and records are made of the names of their fields."""
+"""Who parses; a tested executor, and what stands in for its externs, are texts that were generated just now, and the tables of the
+grammar come with the compiler."""
 
 
 def test_only_the_bounded_readers_parse_text_from_outside() -> None:

@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from enum import StrEnum
 from itertools import groupby
 from pathlib import Path
@@ -40,7 +41,6 @@ from rcsc.diagnostics.report import (
 )
 from rcsc.diagnostics.sarif import sarif
 from rcsc.host.files import write_atomically
-from rcsc.records import dataclass
 
 
 class OutputForm(StrEnum):

@@ -12,10 +12,9 @@ Example: `p` rests on `safe`, `safe` on invariant `i`, and `i` on `safe`. If all
 """
 
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeAlias
-
-from rcsc.records import dataclass
 
 Key: TypeAlias = tuple[str, str, str]
 """Identifies a claim about a level: sort, table and name."""

@@ -6,7 +6,7 @@ proved of that neighbour as it is now before anything counts as proved of the le
 """
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rcsc.compose.contract.claims import (
@@ -25,7 +25,6 @@ from rcsc.compose.contract.claims import (
 )
 from rcsc.compose.contract.claims import UNKNOWN as UNLOOKED_AT
 from rcsc.host.cache import Cache
-from rcsc.records import dataclass
 
 ASSUMPTION, PROPERTY = "assumption", "property"
 """Sorts of obligations: a table's assumption, a property."""

@@ -11,11 +11,11 @@ import os
 import re
 import stat
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, BinaryIO
 
 from rcsc.host.files.names import BadName, identifier, line_name, member, shown
-from rcsc.records import dataclass
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -1,6 +1,6 @@
 """Condition cells to tests; where a test looks at one leaf only, to its set of keys."""
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -55,7 +55,6 @@ from rcsc.lang.operator_table import (
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import Cell
 from rcsc.lang.syntax.spell import spell_condition
-from rcsc.records import dataclass
 
 _SMALL = 512
 

@@ -1,7 +1,7 @@
 """What operators make of typed operands: kinds and units checked, bounds computed, constants folded."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -27,7 +27,6 @@ from rcsc.lang.model import (
     spell,
 )
 from rcsc.lang.operator_table import Arithmetic, Comparison, Conversion, Op, single
-from rcsc.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """The names of one program and what is wrong with their use; shared by the parts of `resolve`."""
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 
 from rcsc.diagnostics.codes import Code
@@ -24,7 +24,6 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import BITS, CALL_UNDER, ONE_GROUP, Cell
-from rcsc.records import dataclass
 
 MOST_LEAVES = 10_000
 BASE_UNITS = frozenset("m mm s ms N kg deg rad Hz A V lb".split())

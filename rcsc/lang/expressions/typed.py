@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import reduce
 
 from rcsc.diagnostics.codes import Code
@@ -47,7 +48,6 @@ from rcsc.lang.model import (
 from rcsc.lang.operator_table import BITWISE, Op, Operator, is_comparison, is_logic
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr
-from rcsc.records import dataclass
 
 DEEPEST = 200
 

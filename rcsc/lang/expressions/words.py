@@ -8,7 +8,7 @@ test a bit, so that two masks of one word speak of the same things, however thei
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import reduce
 
 from rcsc.diagnostics.codes import Code
@@ -18,7 +18,6 @@ from rcsc.lang.expressions.operators import Typed, applied, kind_word
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.model import Apply, Bool, Expr, Int, Literal, Read, ReadLocal, Select, Value
 from rcsc.lang.operator_table import Arithmetic, Op
-from rcsc.records import dataclass
 
 MOST_BITS = 64
 NARROWER = "head the column by a part, as `WORD[7..0]`, or write `x` for the other bits"

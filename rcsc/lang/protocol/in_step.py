@@ -10,6 +10,7 @@ constants that lines assign: `prove` shows that it holds, and the executors watc
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 from math import prod
 from typing import TypeAlias
@@ -37,7 +38,6 @@ from rcsc.lang.model import (
     Value,
     key_bounds,
 )
-from rcsc.records import dataclass
 
 MOST_PATHS, MOST_TUPLES = 512, 20_000
 """Ways through a line, and combinations of states and commands, beyond which nothing is guessed."""

@@ -1,6 +1,7 @@
 """Who is whose superior, as a program declares it: checked before anything is made of it."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rcsc.diagnostics.codes import Code
@@ -8,7 +9,6 @@ from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.literals import number_of
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.syntax import tree
-from rcsc.records import dataclass
 
 MOST_DEPTH, MOST_LENGTH = 16, 1024
 """How deep types nest, and how long arrays are, that an order is numbered by."""

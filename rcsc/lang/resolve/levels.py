@@ -24,6 +24,7 @@ each reads values of this cycle, and the order in which they are written means n
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain, count
 
 from rcsc.diagnostics.codes import Code
@@ -62,7 +63,6 @@ from rcsc.lang.resolve.owners import Owners
 from rcsc.lang.resolve.procedures import touched
 from rcsc.lang.resolve.variables import fits
 from rcsc.lang.syntax import tree
-from rcsc.records import dataclass
 
 USUAL_PERIOD = 40
 LONGEST_PERIOD = 3_600_000

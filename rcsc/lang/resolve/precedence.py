@@ -11,7 +11,7 @@ where the two never meet. Where `stop` (called = stop) stands above `ended` (now
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import TypeAlias
 
@@ -41,7 +41,6 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import Cell
 from rcsc.lang.syntax.spell import spell_expr
-from rcsc.records import dataclass
 
 ALL = "all"
 """What stands for every line but those that stand above this one, or above all, too."""

@@ -11,6 +11,7 @@ In: a declaration. Out: a `Property`, whose one condition says all of it, or dia
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.expressions.scope import Body, Scope
@@ -20,7 +21,6 @@ from rcsc.lang.model import Apply, Bool, Expr, Op, Property
 from rcsc.lang.resolve.declarations import requirements
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr
-from rcsc.records import dataclass
 
 
 def resolve_property(scope: Scope, written: tree.PropertyDecl) -> Property | None:

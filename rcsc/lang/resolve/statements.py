@@ -1,6 +1,6 @@
 """Statements: places found, values and arguments checked, locals renamed apart."""
 
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import assert_never
 
 from rcsc.diagnostics.codes import Code
@@ -42,7 +42,6 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.resolve.variables import fits
 from rcsc.lang.syntax import tree
-from rcsc.records import dataclass
 
 MOST_ROUNDS = 4096
 MOST_STATEMENTS = 1_000_000

@@ -9,9 +9,8 @@ Lark says.
 import json
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
-
-from rcsc.records import dataclass
 
 END = "$END"
 

@@ -5,7 +5,7 @@ In: a `Source`. Out: a `tree.File`, or every syntax error that was found. No tex
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, cast
@@ -49,7 +49,6 @@ from rcsc.lang.syntax.rows import (
     parts,
     stub_of,
 )
-from rcsc.records import dataclass
 
 MOST_ERRORS = 20
 MOST_CONJUNCTS = 100

@@ -8,11 +8,10 @@ In: rows and their offsets. Out: `Cells`, or what is wrong with them. A table ha
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from rcsc.diagnostics.source import Span
-from rcsc.records import dataclass
 
 ACTION_WORDS = frozenset({"procedures", "command_out", "status_out"})
 REQUIREMENTS = "req"

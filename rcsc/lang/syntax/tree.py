@@ -3,12 +3,11 @@
 Equality means "says the same": spans and layout do not count, comments do.
 """
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from rcsc.diagnostics.source import Span
 from rcsc.lang.syntax.rows import Cell
-from rcsc.records import dataclass
 
 NOWHERE = Span("", 0, 0)
 

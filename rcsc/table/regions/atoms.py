@@ -9,6 +9,7 @@ form and one bound. Two doubles compare as their keys do, which is linear as wel
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
 
@@ -41,7 +42,6 @@ from rcsc.lang.operator_table import (
     is_logic,
     truth_function,
 )
-from rcsc.records import dataclass
 
 Form: TypeAlias = tuple[tuple[int, int], ...]
 """Columns and their coefficients: sorted, none zero, the first positive, greatest divisor 1."""

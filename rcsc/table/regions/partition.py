@@ -9,14 +9,13 @@ are alike.
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import combinations, islice
 from math import prod
 from typing import Generic, TypeAlias, TypeVar
 
 from rcsc.lang.interval_sets import holds, joined, meet, size
 from rcsc.lang.model import Box
-from rcsc.records import dataclass
 
 MOST_PAIRS = 10_000
 """Overlapping pairs that are told apart; a report shows a few."""

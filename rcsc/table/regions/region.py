@@ -5,13 +5,12 @@ region is bounds on forms; a leaf of the tree says why exactly one line holds al
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TypeAlias
 
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.model import Box, Snapshot
-from rcsc.records import dataclass
 from rcsc.table.regions.atoms import FALSE, Atom, Every, Formula, Some, every, some
 from rcsc.table.regions.linear import Multipliers, Simplex
 

@@ -8,6 +8,7 @@ least of them, is what it is of words. A word whose range is not that of all its
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 from rcsc.lang.expressions.conditions import box_of
@@ -34,7 +35,6 @@ from rcsc.lang.model import (
     key_bounds,
 )
 from rcsc.lang.operator_table import Arithmetic
-from rcsc.records import dataclass
 
 MOST_TOGETHER = 12
 """Bits of one part: what a condition says of them is tried for each value."""
