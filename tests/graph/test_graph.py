@@ -758,6 +758,7 @@ def test_default_is_drawn_where_it_can_be_reached_and_a_choice_is_dashed(tmp_pat
         ("new_command = true and idle = false", "new_command, not idle"),
         ("goal.known = true and x = 1", "goal.known, x = 1"),
         ("a = false or b = true", "not a or b"),
+        ("not (x = 1 and y = 2) and z = 3 and w in {1, 2}", "not (x = 1 and y = 2), z = 3, w in {1, 2}"),
         ("x + y = true_enough", "x + y = true_enough"),
     ],
 )
