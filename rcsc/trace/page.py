@@ -24,7 +24,7 @@ h1 { font-size: 1.5rem; margin: 0 0 .3rem; }
 h2 { font-size: 1.2rem; margin: 2rem 0 .4rem; border-bottom: 2px solid var(--edge); }
 h3 { font-size: 1rem; margin: 1.2rem 0 .2rem; }
 p { margin: .2rem 0 .5rem; color: var(--soft); max-width: 80rem; }
-table { border-collapse: collapse; width: 100%; table-layout: fixed; margin-bottom: .6rem; }
+table { border-collapse: collapse; width: 100%; margin-bottom: .6rem; }
 th, td { padding: .2rem .5rem; text-align: left; vertical-align: top; border-bottom: 1px solid var(--edge); overflow-wrap: anywhere; }
 th { font-size: .8rem; color: var(--soft); background: var(--panel); }
 td { font-size: .82rem; }
@@ -154,13 +154,17 @@ def _line(matrix: Matrix, line: TracedLine) -> str:
 
 
 def _place(place: str) -> str:
-    """A place that breaks between file and number, never in the number."""
+    """A place that breaks between folders, file and number, never in one of them."""
     file, colon, number = place.rpartition(":")
-    return f"{escape(file)}:<wbr>{_unbroken(number)}" if colon and number.isdigit() else escape(place)
+    file, number = (f"{file}:", number) if colon and number.isdigit() else (place, "")
+    *folders, name = file.split("/")
+    pieces = (*(f"{folder}/" for folder in folders), name, number)
+    return "<wbr>".join(_unbroken(piece) for piece in pieces if piece)
 
 
-def _unbroken(numbers: str) -> str:
-    return f'<span class="at">{escape(numbers)}</span>'
+def _unbroken(words: str) -> str:
+    """A name or numbers that stay on one line: a column grows with its longest."""
+    return f'<span class="at">{escape(words)}</span>'
 
 
 def _numbered(word: str, numbers: Sequence[int]) -> str:
@@ -181,8 +185,8 @@ def _where(code: Iterable[tuple[str, tuple[Piece, ...]]], ends: tuple[str, ...])
     for word, pieces in code:
         for file, runs in spots(piece for piece in pieces if piece.file.endswith(ends)):
             lines = ", ".join(_unbroken(f"{first}-{last}") for first, last in runs)
-            name = escape(file.rpartition("/")[2])
-            rows.append(f'<span class="soft">{word}</span> {name}: {lines}')
+            name = _unbroken(f"{file.rpartition('/')[2]}:")
+            rows.append(f'<span class="soft">{word}</span> {name} {lines}')
     return "<br>".join(rows)
 
 

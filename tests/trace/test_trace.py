@@ -22,6 +22,7 @@ from rcsc.trace.chunks import chunks
 from rcsc.trace.matrix import Known, matrix, untraced
 from rcsc.trace.origin import Origin, Sort
 from rcsc.trace.page import page
+from tests.support.browser import Browser
 from tests.support.programs.stages import program_of
 from tests.support.programs.texts import edited
 
@@ -251,8 +252,26 @@ def test_tables_and_page_say_the_same_and_nothing_in_a_name_is_markup(door: Path
     assert "<script" not in html
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in html
     assert f"{case['first']}-{case['last']}" in html
-    assert 'door.rcs:<wbr><span class="at">12</span>' in html
+    assert '<span class="at">door.rcs:</span><wbr><span class="at">12</span>' in html
     assert page((), ()).startswith("<!doctype html>")
+
+
+@pytest.mark.needs("chromium")
+def test_names_of_files_stay_whole_and_in_their_column(door: Path) -> None:
+    long = door.parent / "folder_of_doors" / f"door_{'with_a_long_name_' * 3}.rcs"
+    long.parent.mkdir()
+    door.rename(long)
+    assert run(["trace", str(long), "-q", "--no-vectors"]) == 0
+    with Browser() as browser:
+        browser.open(Path("trace/trace.html").resolve().as_uri())
+        cells = "[...document.querySelectorAll('td')]"
+        parts = "[...cell.querySelectorAll('.at')].filter(part => /name_[.]/.test(part.innerText))"
+        named = "(cell.innerText.match(/name_[.](rcs|c|py)/g) || []).length"
+        assert browser.value(f"{cells}.filter(cell => {named}).length") > 20
+        assert browser.value(f"{cells}.every(cell => {parts}.length === {named})")
+        whole = "part.getClientRects().length === 1"
+        inside = "part.getBoundingClientRect().right <= cell.getBoundingClientRect().right"
+        assert browser.value(f"{cells}.every(cell => {parts}.every(part => {whole} && {inside}))")
 
 
 def test_one_question_is_answered_in_both_directions(door: Path, capsys: pytest.CaptureFixture[str]) -> None:
