@@ -128,7 +128,7 @@ class emove_state(IntEnum):
     releasing = 13
 
 
-DIGEST = 0xe48f9953
+DIGEST = 0x091b4b4d
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 111
 """What `check` gives of a state that other tables made."""

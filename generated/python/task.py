@@ -130,7 +130,7 @@ class locating(IntEnum):
     known = 1
 
 
-DIGEST = 0x7c2a9834
+DIGEST = 0x09c4e0ee
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 80
 """What `check` gives of a state that other tables made."""

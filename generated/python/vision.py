@@ -125,7 +125,7 @@ class flash(IntEnum):
     line = 2
 
 
-DIGEST = 0xcb40c93f
+DIGEST = 0x3806e1b0
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 38
 """What `check` gives of a state that other tables made."""

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from rcsc.lang.leaves import everything, expressions, read_by, written_by
+from rcsc.lang.meaning import checked
 from rcsc.lang.model import (
     Action,
     Assumption,
@@ -72,7 +73,9 @@ class Digests:
         return hashed.hexdigest()
 
     def whole(self) -> str:
-        """Digest all that a cycle does with a state: variables, tables, procedures, levels; whatever the program's files are called.
+        """Digest all that a cycle does with a state: variables, tables, procedures, levels, and each assumption that it checks.
+
+        Whatever the program's files are called.
 
         Returns:
             64 hexadecimal digits.
@@ -81,14 +84,19 @@ class Digests:
         variables = [
             (v.name, v.kind, v.type, v.initial, v.admit, v.deferred_until, v.safe) for v in program.variables
         ]
-        procedures = [(p.name, p.params, p.body, p.extern) for p in program.procedures]
+        procedures = [(p.name, p.params, p.body, p.extern, p.reads, p.writes) for p in program.procedures]
+        watched = [
+            (program.assumptions[at].name, program.assumptions[at].condition) for at in checked(program)
+        ]
         invariants = [(invariant.name, invariant.condition) for invariant in program.invariants]
         levels = [
             (level.name, level.period_ms, level.preprocess, level.choices, level.postprocess)
             for level in program.levels
         ]
         tables = [(table.name, self.table(table), table.stops) for table in program.tables]
-        return hashlib.sha256(repr((variables, procedures, invariants, levels, tables)).encode()).hexdigest()
+        return hashlib.sha256(
+            repr((variables, procedures, watched, invariants, levels, tables)).encode()
+        ).hexdigest()
 
     def body(self, body: Iterable[Statement]) -> str:
         """Digest statements and all they call."""

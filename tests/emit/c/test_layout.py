@@ -5,9 +5,12 @@ import importlib.util
 import re
 import subprocess
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
@@ -15,7 +18,8 @@ from rcsc.emit import TARGETS
 from rcsc.emit.c.layout import Digest, digest
 from rcsc.emit.identifiers import names_of
 from rcsc.solvers.options import Options
-from tests.support.programs.stages import program_of
+from tests.support.programs.examples import EVERYTHING
+from tests.support.programs.stages import drawn_program, emitted, program_of
 
 BELT = """enum mode { idle, moving }
 input go : bool
@@ -39,6 +43,8 @@ SAME = {
     "a doc line": ("input go ", "## Starts the belt.\ninput go "),
     "an empty line": ("level drive", "\n\nlevel drive"),
     "wider columns": ("| > 250   ||", "|   > 250 ||"),
+    "a requirement": ("procedure stop {", 'procedure stop req "SR-1" {'),
+    "a property": ("level drive", "property slow : speed < 3.0 [m/s]\nlevel drive"),
 }
 OTHER = {
     "a cell": ("<= 250  |", "<= 240  |"),
@@ -53,6 +59,7 @@ OTHER = {
     "the order of members": ("idle, moving", "moving, idle"),
     "the name of a variable": ("again", "before"),
     "the period": ("10 [ms]", "20 [ms]"),
+    "a check that no table relies on": ("level drive", "assume light monitored : load < 300\nlevel drive"),
     "an invariant": ("speed = 0.0\n", "speed <= 0.0\n"),
 }
 
@@ -79,6 +86,56 @@ def test_words_change_no_digest(change: str) -> None:
 @pytest.mark.parametrize("change", OTHER)
 def test_what_means_something_changes_it(change: str) -> None:
     assert digested(edited(OTHER[change])).state != digested(BELT).state
+
+
+@cache
+def bare(text: str) -> tuple[int, str]:
+    """The digest of a program, and its C without comments."""
+    program = drawn_program(text)
+    code = "\n".join(text for path, text in emitted(program).items() if path.endswith((".c", ".h")))
+    code = re.sub(r"/\*.*?\*/", "", code, flags=re.DOTALL)
+    return digest(program, names_of(program)).state, re.sub(r"DIGEST 0x\w+", "", code)
+
+
+PIECES = [
+    match.span() for match in re.finditer(r"\d+|<=?|>=?|\b(?:min|max|true|false|[abwk]|clamp)\b", EVERYTHING)
+]
+
+
+@settings(
+    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much]
+)
+@given(
+    st.sampled_from(PIECES), st.sampled_from(["1", "3", "<", ">=", "a", "b", "k", "max", "true", "reject"])
+)
+def test_programs_of_other_code_have_other_digests(piece: tuple[int, int], put: str) -> None:
+    changed = EVERYTHING[: piece[0]] + put + EVERYTHING[piece[1] :]
+    digests, codes = zip(
+        *(bare(text.replace("{real}", "single")) for text in (EVERYTHING, changed)), strict=True
+    )
+    assert len(set(digests)) >= len(set(codes))
+
+
+CALLED_BY_A_LEVEL = """
+input a : int 0 .. 9
+state n : int 0 .. 9
+state m : int 0 .. 9
+extern procedure ask reads a writes n python "mine:ask" c "ask"
+table t {
+  | line | a       ||
+  | any  | DEFAULT ||
+}
+level it { period 10 [ms] preprocess ask table t }
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "after"), [("writes n", "writes m"), ("reads a", "reads n"), ('"ask"', '"tell"')]
+)
+def test_what_an_extern_procedure_is_given_and_gives_changes_it(before: str, after: str) -> None:
+    changed = CALLED_BY_A_LEVEL.replace(before, after)
+    assert changed != CALLED_BY_A_LEVEL
+    assert digested(changed).meaning != digested(CALLED_BY_A_LEVEL).meaning
 
 
 def test_the_layout_is_told_apart_from_the_meaning() -> None:

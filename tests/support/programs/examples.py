@@ -269,3 +269,50 @@ table watch assuming brief {
 level button { period 100 [ms] preprocess guess table watch }
 """
 """Conditions that have to hold for a time, of inputs and states."""
+
+EVERYTHING = """\
+enum hue { red, green, blue }
+record spot { x : int 0 .. 9 y : bool }
+set odd : int 0 .. 9 = {1, 3, 5 .. 7}
+const half = 0.5
+input a : int 0 .. 9 clamp
+input b : bool
+input w : int 0 .. 255
+input n : int -9223372036854775808 .. 9223372036854775807
+input f : {real} -9.5 .. 9.5 clamp
+input h : hue
+input p : spot
+state g : {real} -9.5 .. 9.5 = half deferred until b
+state u : int 0 .. 18446744073709551615
+state q : array[4] of int 0 .. 9
+state r : array[2] of spot
+output o : hue safe blue
+output k : int 0 .. 9
+assume seen monitored : a > 3 or b
+invariant low : k < 9
+property kept : k < 9
+extern procedure ask(by : int 0 .. 9) reads a writes q[0] python "mymod:ask" c "my_ask"
+procedure numbers { k := min(abs(a - 5), max(a / 2, 3)) mod 7 next g := min(max(f * 0.3, {real}(-1)), abs(f)) u := u / 3 }
+procedure words { if w[3] and w = 0b01x1_xxx0 or (w & 12) = 4 { k := w[5..4] } k := count(b, p.y) }
+procedure places(at : int 0 .. 3) { for i in 0 .. 3 { q[i] := i } q[at] := a r[1].x := p.x }
+procedure colours { case h { red { o := green } green, blue { o := red } } }
+procedure times { local t : bool := b for 2 [s] if @T(a > 3) when b or was a < a or t and int(f) > 2 { k := 1 } ask(3) }
+owner first { words, times }
+table mod_ assuming seen {
+  | line  | a     | f     | w         || procedures         | o |
+  |-------|-------|-------|-----------||--------------------|---|
+  | case_ | > 3   | < 0.5 |           || numbers            |   |
+  | more  | > 3   | >= 0.5 | xxx1 xxxx || words; places(3)  |   |
+  | rest  | DEFAULT |     |           || colours            |   |
+}
+table mod {
+  | line         | when          || procedures | k |
+  |--------------|---------------||------------|---|
+  | up           | n - 1 > 0 and n > -4 || numbers |   |
+  | down above all | n = -3      ||            | a mod 3 |
+  | not_odd      | n <= -4 and a not in odd || times | |
+  | else         | DEFAULT       ||            |   |
+}
+level whole { period 40 [ms] preprocess first table by b { true : mod_ false : mod } postprocess colours }
+"""
+"""All of the language, with `real` or `single` for `{real}`."""
