@@ -19,7 +19,7 @@ from rcsc.evidence.harness import bounds, calls, stand_ins
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.host.children import scratch
 from rcsc.host.files import csv_text
-from rcsc.host.tools import run_command, write_c
+from rcsc.host.tools import ending, run_command, write_c
 from rcsc.lang.model import Kind as Role
 from rcsc.lang.model import Program, Real, Scalar
 from rcsc.testing.executors.symbols import Symbols, symbols_of
@@ -62,6 +62,17 @@ EXPLAINED: Mapping[str, str] = {
     "unsigned-shift-base": "the portable position of a bit multiplies and shifts as C defines it",
 }
 """Why a finding of a kind is meant; those of any other kind are shortfalls."""
+PLANTED = """int planted(const int *at);
+int planted(const int *at) { int here; if (at == 0) { here = *at; } return here; }
+"""
+TELLS: Mapping[str, str] = {
+    "gcc": "-Wanalyzer-null-dereference",
+    "clang-19": "-Wsometimes-uninitialized",
+    "clang-tidy-19": "clang-analyzer-core.NullDereference",
+}
+"""What each tool must find in `PLANTED`: one that is silent there shows nothing elsewhere."""
+SANITIZED = ("signed integer overflow", "AddressSanitizer")
+"""What a sanitizer must say of the faults that are planted at the end of the drawn calls."""
 LINE = re.compile(
     r"^(?:.*/)?(?P<file>[\w.]+):(?P<line>\d+)(?::\d+)?: (?:warning|error|runtime error): (?P<text>.*)$"
 )
@@ -102,7 +113,8 @@ def collect(subject: Subject) -> Evidence:
             (),
             missing="none of gcc, clang-19 and clang-tidy-19 is installed (Debian's packages of these names)",
         )
-    reports = [
+    reports = [*_deaf(here)]
+    reports += [
         report
         for title, files, defensive in _texts(subject)
         for report in _reports(subject, title, files, here, defensive=defensive)
@@ -164,23 +176,39 @@ def _sanitized(source: str) -> Iterator[tuple[str, list[str]]]:
                 yield f"sanitizers of {compiler}{text}", command
 
 
+def _deaf(here: set[str]) -> Iterator[Report]:
+    """Let each tool look at planted faults; a report of those that do not tell of them."""
+    for name, command in _static("planted.c"):
+        if command[0] in here:
+            with scratch("analysers") as place:
+                write_c({"planted.c": PLANTED}, place)
+                ran = run_command(command, place, TIMEOUT_S)
+            told = {check for found in _findings(name, ran.out + ran.err) for check in found.check.split(",")}
+            if TELLS[command[0]] not in told:
+                yield Report(name, (), f"it tells nothing of a planted fault: {ending(ran, TIMEOUT_S)}")
+
+
 def _asked(name: str, command: list[str], place: Path) -> Report:
     ran = run_command(command, place, TIMEOUT_S)
-    text = ran.out + ran.err
-    found = tuple(_findings(name, text))
-    failed = ran.status is None or (ran.status != 0 and not found)
-    return Report(name, found, text.strip()[-400:] or "no answer" if failed else "")
+    found = tuple(_findings(name, ran.out + ran.err))
+    return Report(name, found, ending(ran, TIMEOUT_S) if ran.status != 0 else "")
 
 
 def _ran(name: str, command: list[str], place: Path) -> Report:
-    """Build the drawn calls with a sanitizer and run them."""
+    """Build the drawn calls with a sanitizer and run them; then the faults that are planted after them."""
+    program = place / "drawn"
+    program.unlink(missing_ok=True)
     built = run_command(command, place, TIMEOUT_S)
-    if built.status != 0:
-        return Report(name, (), (built.out + built.err).strip()[-400:] or "not built")
-    ran = run_command([str(place / "drawn")], place, TIMEOUT_S)
+    if built.status != 0 or not program.is_file():
+        return Report(name, (), f"not built: {ending(built, TIMEOUT_S)}")
+    planted = run_command([str(program), "planted"], place, TIMEOUT_S)
+    if not all(word in planted.err for word in SANITIZED):
+        return Report(name, (), f"it tells nothing of a planted fault: {ending(planted, TIMEOUT_S)}")
+    ran = run_command([str(program)], place, TIMEOUT_S)
     found = tuple(_findings(name, ran.err))
-    done = f"{CALLS} calls" in ran.out
-    return Report(name, found, "" if done else f"stopped: {ran.err.strip()[:400]}")
+    done = f"{CALLS} calls" in ran.out and ran.status == 0
+    stopped = ran.err.strip()[:400] if ran.status is not None else ""
+    return Report(name, found, "" if done else f"stopped: {stopped or ending(ran, TIMEOUT_S)}")
 
 
 def _findings(tool: str, text: str) -> Iterator[Finding]:
@@ -223,7 +251,11 @@ def drawn(program: Program, symbols: Symbols, *, defensive: bool) -> str:
     for name, strange in (("any", True), ("admitted", False)):
         state = [*_state(program, symbols, strange=strange), *(_bytes() if strange and defensive else ())]
         lines += [f"static void {name}(void) {{", *state, "}"]
-    lines += ["int main(void) {", f"    for (uint32_t n = 0u; n < {CALLS}u; n = n + 1u) {{"]
+    lines += ["static volatile int32_t room[4];", "int main(int argc, char **argv) {", "    (void)argv;"]
+    lines += ["    if (argc > 1) { /* faults that must be told */"]
+    lines += ["        volatile int32_t most = INT32_MAX;", "        room[0] = most + argc;"]
+    lines += ["        ((volatile int32_t *)room)[argc + 2] = room[0];", "        return 0;", "    }"]
+    lines += [f"    for (uint32_t n = 0u; n < {CALLS}u; n = n + 1u) {{"]
     bodies = [*calls(symbols, defensive=defensive)]
     lines += [f"        switch (next() % {len(bodies)}u) {{"]
     lines += [f"        case {number}: {body} break;" for number, body in enumerate(bodies)]

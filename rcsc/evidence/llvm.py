@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rcsc.host.children import scratch
-from rcsc.host.files.read import json_of
-from rcsc.host.tools import Absent, BuildFailed, run_command, write_c
+from rcsc.host.children import Ran, scratch
+from rcsc.host.files.read import Malformed, json_of
+from rcsc.host.tools import Absent, BuildFailed, ending, run_command, write_c
 
 VERSIONS = ("19", "20", "21", "22")
 """Of LLVM: from 18 on clang measures MC/DC; from 19 on of decisions of more than six conditions."""
@@ -117,34 +117,45 @@ def measured(llvm: Tools, files: Mapping[str, str], source: str, vectors: str) -
         source: File name of the C that is measured.
         vectors: A C file that plays vectors of it.
     """
+    profile = ["-instr-profile", "vectors.profdata", "play"]
     with scratch("coverage") as place:
         write_c(files, place)
         (place / "vectors.c").write_text(vectors, "utf-8")
         shutil.copyfile(PROFILE, place / "profile.c")
-        build = [
-            [llvm.clang, "-std=c99", "-O1", "-w", *MEASURED, "-c", source, "-o", "measured.o"],
-            [llvm.clang, "-std=gnu11", "-O1", "-w", "-o", "play", "vectors.c", "profile.c", "measured.o"],
-        ]
-        for command in build:
-            ran = run_command(command, place, COMPILE_S)
-            if ran.status != 0:
-                return BuildFailed("\n".join(ran.err.strip().splitlines()[:6]))
-        played = run_command([str(place / "play")], place, COMPILE_S)
-        profile = ["-instr-profile", "vectors.profdata", "play"]
-        text = ""
-        for command in (
-            [llvm.profdata, "merge", "-o", "vectors.profdata", "vectors.profraw"],
-            [llvm.cov, "show", *profile, "--show-mcdc", "--show-branches=count"],
-            [llvm.cov, "export", *profile],
+        play = [llvm.clang, "-std=gnu11", "-O1", "-w", "-o", "play", "vectors.c", "profile.c", "measured.o"]
+        said = list[Ran]()
+        for command, made in (
+            (
+                [llvm.clang, "-std=c99", "-O1", "-w", *MEASURED, "-c", source, "-o", "measured.o"],
+                "measured.o",
+            ),
+            (play, "play"),
+            ([str(place / "play")], "vectors.profraw"),
+            ([llvm.profdata, "merge", "-o", "vectors.profdata", "vectors.profraw"], "vectors.profdata"),
+            ([llvm.cov, "show", *profile, "--show-mcdc", "--show-branches=count"], ""),
+            ([llvm.cov, "export", *profile], ""),
         ):
-            ran = run_command(command, place, COMPILE_S)
-            if ran.status != 0:
-                return BuildFailed("\n".join(ran.err.strip().splitlines()[:6]))
-            text = ran.raw.decode() if command[1] == "show" else text
-        document = json_of(ran.raw, plain=False)
-        return _read(
-            document["data"][0], files_text(files, source), text, played.raw.decode(), played.status == 0
+            said.append(run_command(command, place, COMPILE_S))
+            wrong = (
+                said[-1].status != 0 and made != "vectors.profraw"
+            )  # vectors may be wrong, and are told then
+            if wrong or not (place / made).exists():
+                return BuildFailed(_stopped(Path(command[0]).name, said[-1]))
+    played, shown, exported = said[2], said[4], said[5]
+    try:
+        data = json_of(exported.raw, plain=False)["data"][0]
+        seen = _read(data, files_text(files, source), shown.out, played.out, played.status == 0)
+    except (Malformed, LookupError, TypeError):
+        return BuildFailed(
+            f"what {Path(llvm.cov).name} exports cannot be read: {ending(exported, COMPILE_S)}"
         )
+    return seen if seen.regions else BuildFailed(f"{Path(llvm.cov).name} counted nothing")
+
+
+def _stopped(tool: str, ran: Ran) -> str:
+    """Why a command gave nothing: its first lines, which have the first error."""
+    first = "\n".join(ran.err.strip().splitlines()[:6])
+    return first or f"{tool} {ending(ran, COMPILE_S)}"
 
 
 def files_text(files: Mapping[str, str], source: str) -> str:

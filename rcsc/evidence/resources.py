@@ -15,11 +15,11 @@ from pathlib import Path
 
 from rcsc.emit.plan import Plan
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
-from rcsc.evidence.processors.assembly import Bounds, UnboundedError, of_compiler, of_disassembly
+from rcsc.evidence.processors.assembly import Assembly, Bounds, UnboundedError, of_compiler, of_disassembly
 from rcsc.evidence.processors.boards import BOARDS, OPTIMIZED, Board, compiled, harness, link, run_image
 from rcsc.host.children import scratch
 from rcsc.host.files import csv_text
-from rcsc.host.tools import BuildFailed, run_command
+from rcsc.host.tools import BuildFailed, ending, run_command
 from rcsc.lang.model import Kind as VariableKind
 from rcsc.lang.model import Program
 from rcsc.testing.cortex import choices, constant_in_c, leaf_values
@@ -34,6 +34,7 @@ TOLD = re.compile(r"rcsc (\w+) (\d+) (\d+) (\d+)")
 FRAME = re.compile(r"[^\t]*:([\w.$]+)\t(\d+)\t([\w,]+)")
 LOOP = re.compile(r"/\* (?:at most )?(?:(\d+) times|once) \*/$")
 OVERRUN = 0xFFFF_FFFF
+TOOL_S = 60.0
 TOOLS = "packages gcc-arm-none-eabi and qemu-system-arm, gcc-riscv64-unknown-elf and qemu-system-misc"
 
 
@@ -111,7 +112,22 @@ def measure(board: Board, plan: Plan, files: Mapping[str, str]) -> list[Need] | 
         told = {match[1]: tuple(map(int, match.groups()[1:])) for match in TOLD.finditer(said)}
         if not set(entries) <= told.keys():
             return BuildFailed(f"the image ended early: {said[-200:]!r}")
-        return list(_needs(board, place, symbols, entries, told))
+        image = _disassembled(board, place)
+        if isinstance(image, BuildFailed):
+            return image
+        return list(_needs(board, place, symbols, entries, told, image))
+
+
+def _disassembled(board: Board, place: Path) -> Assembly | BuildFailed:
+    """The image as its tools tell it; what they say where they do not even name `main`."""
+    dumped = run_command([f"{board.tools}objdump", "-d", "--no-show-raw-insn", "image.elf"], place, TOOL_S)
+    named = run_command([f"{board.tools}nm", "image.elf"], place, TOOL_S)
+    for tool, ran, word in (("objdump", dumped, "<main>:"), ("nm", named, " main\n")):
+        if ran.status != 0 or word not in ran.out:
+            return BuildFailed(
+                f"{board.tools}{tool} does not tell what the image holds: {ending(ran, TOOL_S)[:300]}"
+            )
+    return of_disassembly(dumped.out, named.out)
 
 
 def _entries(plan: Plan, symbols: Symbols) -> dict[str, str]:
@@ -177,14 +193,13 @@ def _needs(
     symbols: Symbols,
     entries: Mapping[str, str],
     told: Mapping[str, tuple[int, ...]],
+    image: Assembly,
 ) -> Iterator[Need]:
     stem = Path(symbols.source).stem
     compiled(board, place, (*OPTIMIZED, "-I.", "-g", "-fstack-usage", "-S", f"{stem}.c", "-o", f"{stem}.s"))
     text = (place / f"{stem}.c").read_text("utf-8")
     program = of_compiler((place / f"{stem}.s").read_text("utf-8"))
-    dumped = run_command([f"{board.tools}objdump", "-d", "--no-show-raw-insn", "image.elf"], place, 60.0)
-    named = run_command([f"{board.tools}nm", "image.elf"], place, 60.0)
-    bounds = Bounds(program, of_disassembly(dumped.out, named.out), _loops(text))
+    bounds = Bounds(program, image, _loops(text))
     frames = _frames((place / f"{stem}.su").read_text("utf-8"))
     codes = _codes(board, place, f"{stem}.o")
     for function in sorted(program.routines, key=lambda name: (name in entries, name)):
@@ -230,11 +245,15 @@ def _frames(text: str) -> dict[str, tuple[int, bool]]:
     return found
 
 
-def _chain(function: str, bounds: Bounds, frames: Mapping[str, tuple[int, bool]]) -> int | None:
-    """The stack of the deepest chain of calls within the file."""
+def _chain(
+    function: str, bounds: Bounds, frames: Mapping[str, tuple[int, bool]], above: tuple[str, ...] = ()
+) -> int | None:
+    """The stack of the deepest chain of calls within the file; None where a frame is not static, or a chain has no end."""
+    if function in above:
+        return None
     own, static = frames.get(_original(function), (0, True))
     called = [name for name in bounds.calls(function) if name in bounds.program.routines]
-    chains = [_chain(name, bounds, frames) for name in called]
+    chains = [_chain(name, bounds, frames, (*above, function)) for name in called]
     whole = [chain for chain in chains if chain is not None]
     return own + max(whole, default=0) if static and len(whole) == len(chains) else None
 
@@ -248,7 +267,7 @@ def _bound(bounds: Bounds, function: str) -> tuple[int | None, str]:
 
 def _codes(board: Board, place: Path, compiled_file: str) -> dict[str, int]:
     """The bytes of the code of each function."""
-    said = run_command([f"{board.tools}nm", "-S", compiled_file], place, 60.0).out
+    said = run_command([f"{board.tools}nm", "-S", compiled_file], place, TOOL_S).out
     rows = (line.split() for line in said.splitlines())
     return {row[3]: int(row[1], 16) for row in rows if len(row) == 4 and row[2] in "tT"}
 
@@ -267,7 +286,7 @@ def _alone(board: Board, place: Path, function: str) -> int | None:
     )
     if isinstance(made, BuildFailed):
         return None
-    said = run_command([f"{board.tools}size", "alone.elf"], place, 60.0).out.splitlines()
+    said = run_command([f"{board.tools}size", "alone.elf"], place, TOOL_S).out.splitlines()
     return int(said[1].split()[0]) if len(said) == 2 else None
 
 
@@ -284,8 +303,10 @@ def _doubts(needs: Sequence[Need]) -> Iterator[Shortfall]:
             yield Shortfall(
                 where, f"a call took {need.observed} instructions, and {need.bound} was told as the bound"
             )
+        if need.code == 0 or (need.calls and need.alone is None):
+            yield Shortfall(where, "nm or size does not tell its bytes")
         if need.chain is None:
-            yield Shortfall(where, "its stack is not known when it is compiled")
+            yield Shortfall(where, "its stack is not known when it is compiled, or it calls itself")
 
 
 COLUMNS = (

@@ -30,7 +30,7 @@ from rcsc.evidence.harness import bounds, calls, stand_ins
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.host.children import scratch
 from rcsc.host.files import csv_text
-from rcsc.host.tools import run_command, write_c
+from rcsc.host.tools import ending, run_command, write_c
 from rcsc.lang.model import I64_MAX, Program, Real, Scalar
 from rcsc.lang.model import Kind as Role
 from rcsc.testing.executors.symbols import Symbols, symbols_of
@@ -158,11 +158,10 @@ def _analysis(subject: Subject, name: str, *, defensive: bool, finite: bool) -> 
         command = _command(symbols, place, finite=finite, defensive=defensive)
         ran = run_command(command, place, TIMEOUT_S, MEMORY_MB)
         table = place / "properties.csv"
-        if ran.status is None:
-            return Analysis(name, shown, sources, (), f"no answer in {TIMEOUT_S:.0f} s")
         if ran.status != 0 or not table.is_file():
-            return Analysis(name, shown, sources, (), (ran.out + ran.err).strip()[-400:])
-        return Analysis(name, shown, sources, tuple(_properties(table.read_text("utf-8"))))
+            return Analysis(name, shown, sources, (), ending(ran, TIMEOUT_S))
+        found = tuple(_properties(table.read_text("utf-8")))
+        return Analysis(name, shown, sources, found, "" if found else "its report names no place")
 
 
 def _command(symbols: Symbols, place: Path, *, finite: bool, defensive: bool) -> list[str]:

