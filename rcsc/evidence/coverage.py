@@ -12,16 +12,30 @@ from rcsc.host.tools import Absent, BuildFailed
 from rcsc.testing.coverage.document import VectorSet, as_json, vectors_document
 from rcsc.testing.coverage.harness import vectors_c
 from rcsc.testing.coverage.marks import marked
-from rcsc.testing.coverage.vector_set import figure, vector_set
+from rcsc.testing.coverage.vector_set import defended, figure, vector_set
+
+GUARDED = "defensive"
+"""What stands before the places, and over the files, of C that trusts no state."""
 
 
 def collect(subject: Subject) -> Evidence:
-    """Make vectors, play them in the C as clang counts it, and say why what is not covered cannot be."""
+    """Make vectors, play them in the C as clang counts it, and say why what is not covered cannot be; the same for `--defensive`."""
     llvm = tools()
     if isinstance(llvm, Absent):
         return Evidence((), missing=llvm.reason)
-    options, plan = subject.options, subject.plan
-    document = vector_set(plan, subject.files, options, proofs(options).solver, subject.progress)
+    options, guarded = subject.options, subject.defensive()
+    document = vector_set(subject.plan, subject.files, options, proofs(options).solver, subject.progress)
+    plain, whole = _of(llvm, subject, document), _of(llvm, guarded, defended(document, guarded.files))
+    return Evidence(
+        (*plain.figures, *(f"{GUARDED}: {line}" for line in whole.figures)),
+        {**plain.files, **{f"{GUARDED}/{path}": text for path, text in whole.files.items()}},
+        (*plain.shortfalls, *(Shortfall(f"{GUARDED}, {each.where}", each.what) for each in whole.shortfalls)),
+    )
+
+
+def _of(llvm: Tools, subject: Subject, document: VectorSet) -> Evidence:
+    """Play the vectors of one text of the C, and say what they do not cover."""
+    plan = subject.plan
     vectors = vectors_c(document.program, document.symbols, document.kept)
     subject.progress(f"measuring the C of {document.program.name}")
     seen = measured(llvm, subject.files, document.symbols.source, vectors)

@@ -318,8 +318,8 @@ class Reasons:
         return not extern and all(self._matched_once(table, level) and not table.stops for table in tables)
 
     def _refuses(self) -> bool:
-        """Whether some input can be refused."""
-        return any(
+        """Whether some input can be refused, or the state."""
+        return self.plan.defensive or any(
             variable.kind is Kind.INPUT
             and not isinstance(variable.type, Bool)
             and (variable.admit is Admit.REJECT or isinstance(variable.type, Real))

@@ -33,11 +33,12 @@ def test_all_is_covered_or_out_of_reach(text: str) -> None:
     evidence = coverage.collect(subject_of(text))
     assert not evidence.missing
     assert evidence.shortfalls == ()
-    assert " 0 wrong" in evidence.figures[-1]
     assert "open" not in "".join(evidence.figures)
-    missed = json.loads(evidence.files["missed.json"])
-    assert all(each["reason"] for each in missed)
-    assert "Branch (" in evidence.files["coverage.txt"]
+    assert sum(" 0 wrong" in figure for figure in evidence.figures) == 2
+    for folder in ("", "defensive/"):
+        missed = json.loads(evidence.files[f"{folder}missed.json"])
+        assert all(each["reason"] for each in missed)
+        assert "Branch (" in evidence.files[f"{folder}coverage.txt"]
 
 
 def test_a_branch_that_no_vector_takes_is_a_shortfall() -> None:
@@ -53,6 +54,27 @@ def test_a_wrong_result_is_a_shortfall() -> None:
     assert any(each.what.startswith("vector ") for each in evidence.shortfalls)
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("const int32_t at = probe_check(s);", "const int32_t at = -1;"),
+        ("s->go > 1u", "s->go > 2u"),
+        ("s->both.right > 1u", "s->both.right > 2u"),
+        ("s->fault = PROBE_FAULT_STATE;", "s->fault = PROBE_FAULT_ADMIT;"),
+        ("s->fault_at = at;\n        s->assumptions", "s->fault_at = -1;\n        s->assumptions"),
+    ],
+)
+def test_a_state_that_defensive_c_takes_is_a_shortfall(
+    right: str, wrong: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    subject = subject_of(EVERYTHING)
+    guarded = edited_c(subject.defensive(), right, wrong)
+    monkeypatch.setattr(Subject, "defensive", lambda _: guarded)
+    told = coverage.collect(subject).shortfalls
+    assert any(each.where == "defensive, probe.c" and each.what.startswith("vector ") for each in told)
+    assert all(each.where.startswith("defensive, ") for each in told)
+
+
 def test_without_a_proof_nothing_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Director, "all", lambda _: iter(()))
     evidence = coverage.collect(subject_of(EVERYTHING))
@@ -63,7 +85,7 @@ def test_c_that_does_not_compile_is_a_shortfall() -> None:
     evidence = coverage.collect(
         edited_c(subject_of(EVERYTHING), "int32_t probe_check(", "int32_t probe_chuck(")
     )
-    assert len(evidence.shortfalls) == 1
+    assert [each.where for each in evidence.shortfalls] == ["probe.c"]
     assert "error" in evidence.shortfalls[0].what
 
 
@@ -85,6 +107,6 @@ def test_the_command_shows_it_of_shipped_levels(
     for name in ("gripper", "approach"):
         folder = tmp_path / name / "coverage"
         assert {path.name for path in folder.iterdir()} == {
-            "report.md", "coverage.txt", "vectors.c", "vectors.json", "missed.json",
+            "report.md", "coverage.txt", "vectors.c", "vectors.json", "missed.json", "defensive",
         }  # fmt: skip
         assert "**not shown**" not in (folder / "report.md").read_text("utf-8")

@@ -105,6 +105,24 @@ def always(program: Program, symbols: Symbols, *, reals: bool) -> Iterator[Case]
                 yield Case(entry, {**start, variable.name: value}, origin=f"{variable.name} {end} its range")
 
 
+def untrusted(program: Program, refused: Sequence[Case]) -> Iterator[Case]:
+    """For C that trusts no state: cycles on states that `check` refuses, and truths that are bytes above 1.
+
+    Args:
+        program: The program.
+        refused: Cases of `check` that it refuses; each is given to some cycle, and each cycle some of them.
+    """
+    start = initial(program)
+    cycles = [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
+    for at in range(max(len(refused), len(cycles))):
+        case = refused[at % len(refused)]
+        yield replace(case, entry=cycles[at % len(cycles)])
+    for variable in program.variables:
+        if variable.kind is Kind.INPUT and isinstance(variable.type, Bool):
+            before = {**start, variable.name: 2}
+            yield from (Case(entry, before, origin=f"{variable.name} above its range") for entry in cycles)
+
+
 def of_tables(search: InputSearch, plan: Plan, tables: Sequence[Vectors]) -> Iterator[Case]:
     """The tables' own vectors, and each class of each leaf."""
     for planned, vectors in zip(plan.tables, tables, strict=True):

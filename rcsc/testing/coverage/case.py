@@ -91,7 +91,8 @@ class Expected:
 
     Attributes:
         result: What the function gives: a position of a line, a fault, or what `check` says.
-        fault_at: The leaf that was refused, the assumption, or the table before the last without its line; else empty.
+        fault_at: The leaf that was refused, the assumption, the table before the last without its line, or what of the state was
+            refused; else empty.
         line: Position of the line that ran; -1 for none.
         failed: Assumptions that were told, by name.
         after: Every leaf afterwards; None where the function changes nothing.
@@ -111,22 +112,38 @@ def entries(program: Program) -> tuple[Entry, ...]:
     return (Entry("init"), Entry("check"), *kinds, *(Entry("cycle", level.name) for level in program.levels))
 
 
-def expected(program: Program, case: Case) -> Expected | None:
-    """What the language says; None where it says nothing: the state may not be gone on from, or a table not be matched."""
+def expected(program: Program, case: Case, *, defensive: bool = False) -> Expected | None:
+    """What the language says; None where it says nothing: the state may not be gone on from, or a table not be matched.
+
+    Args:
+        program: The program.
+        case: What is put in.
+        defensive: Whether the C trusts no state, and refuses such a one.
+    """
     match case.entry.kind:
         case "init":
             return Expected(0, after=initial(program))
         case "check":
-            foreign = len(program.variables) + len(program.invariants)
-            return Expected(foreign if case.foreign else refused_at(program, case.before))
+            return Expected(checked(program, case, defensive=defensive))
         case "line" | "lines":
             table = table_of(program, case.entry)
             if not may_be_matched(program, table, case.before):
                 return None
             return Expected(line_number(table, matching_lines(table, case.before)))
+    refused = checked(program, case, defensive=defensive)
+    if refused != NONE:
+        safe = shown_safe(program, case.before)
+        names = [*(v.name for v in program.variables), *(i.name for i in program.invariants), ""]
+        return Expected(Fault.STATE, str(names[refused]), after=safe) if defensive else None
     if case.mode:
         return Expected(Fault.ARITHMETIC, after=shown_safe(program, case.before))
-    return ran(program, case) if refused_at(program, case.before) == NONE else None
+    return ran(program, case)
+
+
+def checked(program: Program, case: Case, *, defensive: bool) -> int:
+    """What `check` says: `NONE`, the position of what it refuses, or one past the last for a state of other tables."""
+    foreign = len(program.variables) + len(program.invariants)
+    return foreign if case.foreign else refused_at(program, case.before, defensive=defensive)
 
 
 def shown_safe(program: Program, state: Snapshot) -> Snapshot:
@@ -165,10 +182,11 @@ def _told(outcome: Outcome) -> Expected:
     return Expected(int(outcome.fault), str(outcome.fault_at), line, failed, outcome.snapshot)
 
 
-def refused_at(program: Program, state: Snapshot) -> int:
-    """What `check` says: the first variable outside its range, or, counted after the variables, the first invariant that fails."""
+def refused_at(program: Program, state: Snapshot, *, defensive: bool = False) -> int:
+    """The first variable outside its range, or, counted after the variables, the first invariant that fails; else `NONE`."""
     for at, variable in enumerate(program.variables):
-        if unfit(variable, state[variable.name]):
+        admitted = defensive and variable.kind is Kind.INPUT  # a truth, too: it is a byte there
+        if not admitted and unfit(variable, state[variable.name]):
             return at
     for at, invariant in enumerate(program.invariants, len(program.variables)):
         if not holds(invariant.condition, state):

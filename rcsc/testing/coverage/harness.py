@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Procedure, Program, Real, Scalar, Snapshot, Value
-from rcsc.testing.coverage.case import MODES, Entry, Expected, entries
+from rcsc.testing.coverage.case import MODES, Entry, checked, entries
 from rcsc.testing.coverage.choose import Kept
 from rcsc.testing.executors.externs import externs
 from rcsc.testing.executors.reference_file import monitored
@@ -261,8 +261,11 @@ class _Numbers:
     assumptions: Sequence[str]
     tables: Sequence[str]
 
-    def fault_at(self, right: Expected) -> int:
+    def fault_at(self, program: Program, each: Kept) -> int:
         """What `fault_at` is."""
+        right = each.expected
+        if each.case.entry.kind in ("step", "cycle") and right.result == Fault.STATE:
+            return checked(program, each.case, defensive=True)
         if not right.fault_at:
             return -1
         match right.result:
@@ -301,7 +304,7 @@ def _data(program: Program, kept: Sequence[Kept]) -> tuple[list[str], list[str]]
         failed = ", ".join(_hex(bits >> WORD_BITS * at & (2**WORD_BITS - 1)) for at in range(words))
         counts = f"{numbers.entries[each.case.entry]}u, {len(sets)}u, {len(after)}u, {len(answers)}u, {mode}u, {first}u"
         rows.append(
-            f"    {{{counts}, {right.result}, {right.line}, {numbers.fault_at(right)}, {{{failed}}}}}, "
+            f"    {{{counts}, {right.result}, {right.line}, {numbers.fault_at(program, each)}, {{{failed}}}}}, "
             f"/* {each.case.entry.kind} {each.case.entry.name}: {_plain(each.case.origin)} */"
         )
     return rows, changes or ["{0u, 0u}"]

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias, cast
 
+from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Action, Apply, Bool, Default, Line, Literal, Local, Program, Table
 from rcsc.lang.operator_table import Operator
 from rcsc.testing.coverage.case import Case, ran, table_of
@@ -70,7 +71,7 @@ def taken(program: Program, kept: Sequence[Kept]) -> Iterator[tuple[TakenLine, .
         match case.entry.kind:
             case "line" | "lines" if right.result >= 0:
                 yield ((case.entry.name, all_lines(table_of(program, case.entry))[right.result][0]),)
-            case "step" | "cycle" if not case.mode:
+            case "step" | "cycle" if not case.mode and right.result != Fault.STATE:
                 yield noting.lines(noted, case)
             case _:
                 yield ()

@@ -4,6 +4,7 @@ In: a proved program's plan and emitted files. Out: vectors that cover the C, wh
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
@@ -17,7 +18,9 @@ from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import trial, values
 from rcsc.symbolic.values import Node
-from rcsc.testing.coverage.choose import chosen
+from rcsc.testing.coverage.candidates import untrusted
+from rcsc.testing.coverage.case import expected
+from rcsc.testing.coverage.choose import Kept, chosen
 from rcsc.testing.coverage.directed import Director
 from rcsc.testing.coverage.document import (
     VectorSet,
@@ -67,6 +70,31 @@ def vector_set(
     unreached = tuple(Director(choice, asking(options)).all())
     choice.spare()
     return VectorSet(program, symbols, tables, tuple(choice.kept), unreached, tuple(choice.sessions))
+
+
+def defended(document: VectorSet, files: Mapping[str, str]) -> VectorSet:
+    """The vectors for C that trusts no state: the same, with what it must give, and states that it must refuse.
+
+    Args:
+        document: Vectors of the program's plain C.
+        files: What `rcsc compile --defensive` emits of the program.
+    """
+    program = document.program
+    cases = [kept.case for kept in document.kept]
+    rights = [expected(program, case, defensive=True) for case in cases]
+    refused = [
+        case
+        for case, right in zip(cases, rights, strict=True)
+        if case.entry.kind == "check" and right is not None and right.result >= 0
+    ]
+    more = list(untrusted(program, refused))
+    rights += [expected(program, case, defensive=True) for case in more]
+    kept = tuple(
+        Kept(case, right, frozenset())
+        for case, right in zip((*cases, *more), rights, strict=True)
+        if right is not None
+    )
+    return replace(document, symbols=symbols_of(program, files), kept=kept, sessions=())
 
 
 def asking(options: Options) -> Callable[[Sequence[Node]], Mapping[str, Value] | Missing]:
