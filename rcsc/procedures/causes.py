@@ -30,14 +30,16 @@ _HELP: dict[Code, tuple[str, ...]] = {
 
 @dataclass(slots=True)
 class Cause:
-    """One place and what can go wrong there, in every context where it can."""
+    """One place and what can go wrong there, in every context where it can; told `there` where that is another place."""
 
     failures: list[Failure] = field(default_factory=list)
     where: list[tuple[str, str]] = field(default_factory=list)  # note, table
+    there: Span | None = None
 
 
 def diagnostic(code: Code, span: Span, message: str, cause: Cause) -> Diagnostic:
     """One cause as it is reported."""
+    span = cause.there or span
     failing = [
         (failure, place)
         for failure, place in zip(cause.failures, cause.where, strict=True)

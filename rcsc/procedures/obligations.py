@@ -21,6 +21,7 @@ from typing import TypeAlias
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.leaves import everything, read_by
 from rcsc.lang.model import (
@@ -46,7 +47,7 @@ from rcsc.lang.model import (
     pending,
 )
 from rcsc.procedures.causes import MOST_WITNESSES, Cause, diagnostic
-from rcsc.procedures.discharge import Asker, Tally, fewest
+from rcsc.procedures.discharge import Asker, Failure, Tally, fewest
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Budget
@@ -87,13 +88,13 @@ class _Owing:
 
     Attributes:
         run: What it owes under some assumptions, and what is known there.
-        condition: Whether it is a condition, which the table is then not decided without.
+        stating: Of a condition the lines that state it, and in which column; the table is then not decided without it.
     """
 
     run: Callable[[list[Node]], tuple[Run, Known]]
     where: str
     span: Span
-    condition: bool
+    stating: tuple[tuple[Line, int], ...] = ()
 
 
 @dataclass(slots=True)
@@ -208,15 +209,17 @@ class Obligations:
 
     def _tests(self, table: Table) -> Iterator[_Owing]:
         """Every condition of the table is evaluated in every cycle, whatever the others say."""
-        seen: dict[int, tuple[Expr, Span]] = {}
+        seen: dict[int, tuple[Expr, list[tuple[Line, int]]]] = {}
         for line in table.lines:
             for at, test in enumerate(line.tests):
-                if test is not None and id(test) not in seen:
-                    seen[id(test)] = test.condition, line.cell_span(at)
+                if test is not None:
+                    seen.setdefault(id(test), (test.condition, []))[1].append((line, at))
         where = f"in a condition of table `{table.name}`"
-        for condition, span in seen.values():
+        for condition, stating in seen.values():
             if may_be_undefined(condition):
-                yield _Owing(partial(self._test, condition, span), where, span, condition=True)
+                line, at = stating[0]
+                span = line.cell_span(at)
+                yield _Owing(partial(self._test, condition, span), where, span, tuple(stating))
 
     def _test(self, condition: Expr, span: Span, assumed: list[Node]) -> tuple[Run, Known]:
         base = [*assumed, *self._invariants()]
@@ -236,9 +239,9 @@ class Obligations:
                 if assumptions and not self._asker.all_hold(run.obligations, known):
                     needing.append(owing)
                     run, known = owing.run(self._known(assumption.condition for assumption in assumptions))
-                if not self._settle(run, known, owing.where, table.name):
+                if not self._settle(run, known, owing.where, table.name, owing.stating):
                     self.unsafe.add(table.name)
-                    self.undefined.update([table.name] if owing.condition else [])
+                    self.undefined.update([table.name] if owing.stating else [])
             except (TooLongError, RecursionError):
                 self.unsafe.add(table.name)
                 self._give_up(owing.where, owing.span)
@@ -383,7 +386,7 @@ class Obligations:
         for line in (*table.lines, *((table.default,) if table.default else ())):
             if not self._plain(line.actions):
                 where = f"in line `{line.name}` of table `{table.name}`"
-                yield _Owing(partial(self._line, table, line), where, _name_of(line), condition=False)
+                yield _Owing(partial(self._line, table, line), where, _name_of(line))
 
     def _line(self, table: Table, line: Line | Default, assumed: list[Node]) -> tuple[Run, Known]:
         base = [*assumed, *self._invariants()]
@@ -440,7 +443,14 @@ class Obligations:
                 good = after.evaluate(invariant.condition)
                 run.owe(Code.INVARIANT_BROKEN, f"{who} can break invariant `{invariant.name}`", span, good)
 
-    def _settle(self, run: Run, base: Callable[[], list[Node]], where: str, table: str) -> bool:
+    def _settle(
+        self,
+        run: Run,
+        base: Callable[[], list[Node]],
+        where: str,
+        table: str,
+        stating: Sequence[tuple[Line, int]] = (),
+    ) -> bool:
         """Ask what bounds did not settle; return whether all is shown."""
         self.tally.by_intervals += run.settled
         failures = self._asker.unshown(run.obligations, base, self._shown)
@@ -449,6 +459,8 @@ class Obligations:
             cause = self._causes.setdefault((owed.code, owed.span, owed.message), Cause())
             cause.failures.append(failure)
             cause.where.append((where, table))
+            if len(stating) > 1 and cause.there is None:
+                cause.there = _told_at(owed.span, failure, stating)
         return not failures
 
     def _shown(self, owed: Obligation) -> bool:
@@ -461,6 +473,23 @@ class Obligations:
         self._too_long.append(
             Diagnostic(Code.UNDECIDED, message, Label(span), help=("make its loops shorter",))
         )
+
+
+def _told_at(span: Span, failure: Failure, stating: Sequence[tuple[Line, int]]) -> Span:
+    """The place in the first of the lines that state a condition which the witness does not keep from matching."""
+    witness = {str(variable.name): value for variable, value in failure.witness}
+
+    def can_match(line: Line, column: int) -> bool:
+        others = (test for at, test in enumerate(line.tests) if test is not None and at != column)
+        return all(fold(test.condition, witness) is not False for test in others)
+
+    first, line = stating[0], next((each for each in stating if can_match(*each)), stating[0])
+    cell, there = (each.cell_span(column) for each, column in (first, line))
+    if not (span.file == cell.file and cell.start <= span.start <= span.end <= cell.end):
+        return span  # of the heading
+    if cell.end - cell.start != there.end - there.start:
+        return there  # written in other words
+    return Span(span.file, there.start + span.start - cell.start, there.start + span.end - cell.start)
 
 
 def _name_of(line: Line | Default) -> Span:

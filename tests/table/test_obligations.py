@@ -592,3 +592,36 @@ def test_what_may_be_undefined_is_told_in_the_line_where_it_can_be(
         return number, text[span.start : span.end]
 
     assert told(head, *rows, "| else | DEFAULT || 0 |", "}") == told(VAST, *procedures)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.lists(st.sampled_from(["small", "large", "off"]), min_size=1, max_size=2, unique=True),
+    st.permutations(["small", "large", "off"]),
+    st.lists(st.sampled_from(["a * a > 5", "a * a > 7"]), min_size=3, max_size=3),
+)
+def test_a_condition_of_several_lines_is_told_in_one_that_its_witness_lets_match(
+    safe: list[str], modes: list[str], cells: list[str]
+) -> None:
+    text = f"""enum mode {{ small, large, off }}
+input m : mode
+input a : int 0 .. 9_000_000_000
+assume fits assumed : m in {{ {", ".join(safe)} }} implies a < 10
+table t assuming fits {{
+| line | m | when ||
+|------|---|------||
+"""
+    text += (
+        "".join(f"| {mode} | {mode} | {cell} ||\n" for mode, cell in zip(modes, cells, strict=True)) + "}\n"
+    )
+    program = program_of(text)
+    found = Obligations(program, BOXES).prove(program.tables)
+    assert found
+    for finding in found:
+        span = finding.primary.span
+        row = text[text.rindex("\n", 0, span.start) + 1 : text.index("\n", span.end)]
+        _, told, _, condition, *_ = (cell.strip() for cell in row.split("|"))
+        [witness] = finding.witnesses
+        runs = dict(zip(witness.variables, witness.values, strict=True))["m"]
+        assert told == runs or cells[modes.index(runs)] != condition
+        assert text[span.start : span.end] == "a * a"
