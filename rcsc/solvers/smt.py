@@ -248,6 +248,7 @@ class Solver:
     Attributes:
         queries: How often it was asked.
         refuted: If it remembers: for each unsatisfiable answer, the assertions that are not permanent.
+        names: How many constants stand for terms.
     """
 
     def __init__(self, limits: Limits = Limits(), *, remembers: bool = False) -> None:
@@ -263,6 +264,15 @@ class Solver:
         self.refuted: list[Term] = []
         self._remembers = remembers
         self._added: list[list[Term]] = []
+        self.names = 0
+
+    def named(self, term: Term) -> Term:
+        """Return a constant that stands for the term: quicker to read from a model, and to ask of. Call outside `push`."""
+        defined: Any = term
+        self.names += 1
+        constant: Any = _z3().Const(f"named!{self.names}", defined.sort())
+        self._solver.add(constant == term)
+        return Term(constant)
 
     def add(self, *terms: Term) -> None:
         """Asserts the terms."""

@@ -4,6 +4,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -148,6 +149,29 @@ def test_as_few_inputs_stand_still_as_will_do(tmp_path: Path, monkeypatch: pytes
     assert [one.still for one in looked] == [(), ("command", "there"), ("there",), ()]
     assert (found.still, found.endless) == (("there",), ())
     assert asked.rested_on == [(), ("there",)]
+
+
+def test_the_steps_of_a_table_are_read_line_by_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a model says of each line before and after, not of each pair of lines."""
+    counts = {"read": 0, "allowed": 0}
+    value, steps = Solver.value, ranking._Ranking._steps
+
+    def reads(solver: Solver, *of: object) -> object:
+        counts["read"] += 1
+        return value(solver, *of)  # type: ignore[arg-type]  # handed on as it comes
+
+    def looked(of: Any, *of_what: Any) -> set[tuple[int, int]]:
+        read, asked = counts["read"], of.solver.queries
+        found = steps(of, *of_what)
+        counts["allowed"] += 2 * len(of.now) * (of.solver.queries - asked)
+        assert counts["read"] - read <= 2 * len(of.now) * (of.solver.queries - asked)
+        return found
+
+    monkeypatch.setattr(Solver, "value", reads)
+    monkeypatch.setattr(ranking._Ranking, "_steps", looked)
+    _, proof = proved_level(tmp_path, "lower", lower=lower_level(*TURNS, **TICK))
+    assert proof.open == ()
+    assert counts["allowed"] > 0
 
 
 # --- another solver -----------------------------------------------------------------------------

@@ -167,8 +167,10 @@ def _repeated(
     ]
     gives = keyed.term(gives_an_order(ts, cycle))
     solver = start.solver
+    solver.add(*keyed.ranges)
+    changed = {leaf: solver.named(term) for leaf, term in changed.items()}
     solver.push()
-    solver.add(*keyed.ranges, gives)
+    solver.add(gives)
     for line, twice in lines:
         solver.push()
         solver.add(twice)

@@ -8,6 +8,7 @@ Sipma, "Linear ranking with reachability", 2005).
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TypeAlias
 
 from rcsc.compose.contract.transition import Leaves, TableAt
@@ -152,7 +153,7 @@ class _Ranking:
         stay = [term(turn.stays) for turn in turns]
         self.orders, self.quiet = term(self.turn.orders), smt.all_of([term(turn.quiet) for turn in turns])
         waits = term(self.turn.unanswered)
-        self.last, self.now, self.next = ([term(match) for _, match in turn.at.lines] for turn in turns)
+        matches = [[term(match) for _, match in turn.at.lines] for turn in turns]
         self.numbers = [
             KeptNumber(name, kind, term(self.turn.before[name]), term(self.turn.after[name]))
             for name, kind in owned(program)
@@ -160,6 +161,8 @@ class _Ranking:
         ]
         self.solver = asked.known(clauses)
         self.solver.add(*asked.keyed.ranges, *stay)
+        self.last, self.now, self.next = (list(map(self.solver.named, each)) for each in matches)
+        self.rises = [self.solver.named(smt.below(each.before, each.after, KEY)) for each in self.numbers]
         self.counted: list[RisingLine] = []
         always, self.always = smt.truth(True), set(_every_step(len(self.now)))
         self.open = set(range(len(self.now))) if weaker is None else weaker.endless
@@ -194,20 +197,24 @@ class _Ranking:
 
     def _steps(self, when: Term, among: set[LinePair]) -> set[LinePair]:
         """Return the steps among these that may be taken."""
-        possible: set[LinePair] = set()
-        terms = {step: smt.all_of([self.now[step[0]], self.next[step[1]]]) for step in among}
-        while left := [step for step in sorted(among) if step not in possible]:
-            self.solver.push()
-            self.solver.add(when, smt.any_of([terms[step] for step in left]))
-            answer = self.solver.check()
-            if answer is Answer.SATISFIABLE:
-                possible |= {step for step in left if self.solver.value(terms[step], Bool())}
-            self.solver.pop()
-            if answer is Answer.UNKNOWN:
-                return among
-            if answer is Answer.UNSATISFIABLE:
-                return possible
-        return possible
+        if not among:
+            return among
+        lines, possible = range(len(self.now)), set[LinePair]()
+        self.solver.push()
+        self.solver.add(when, smt.any_of([self._step(step) for step in sorted(among)]))
+        while (answer := self.solver.check()) is Answer.SATISFIABLE:
+            here, there = (
+                [line for line in lines if self.solver.value(runs[line], Bool())]
+                for runs in (self.now, self.next)
+            )
+            seen = sorted((among & set(product(here, there))) - possible)
+            possible.update(seen)
+            self.solver.add(*(smt.negation(self._step(step)) for step in seen))
+        self.solver.pop()
+        return among if answer is Answer.UNKNOWN else possible
+
+    def _step(self, step: LinePair) -> Term:
+        return smt.all_of([self.now[step[0]], self.next[step[1]]])
 
     def _uncounted(self, steps: set[LinePair], when: Term) -> set[LinePair]:
         """Drop the steps of lines that stop because a counter rises."""
@@ -242,9 +249,8 @@ class _Ranking:
         answer = self.solver.check()
         seen = [
             number
-            for number in self.numbers
-            if answer is not Answer.SATISFIABLE
-            or self.solver.value(smt.below(number.before, number.after, KEY), Bool())
+            for number, rises in zip(self.numbers, self.rises, strict=True)
+            if answer is not Answer.SATISFIABLE or self.solver.value(rises, Bool())
         ]
         self.solver.pop()
         return None if answer is Answer.UNSATISFIABLE else seen

@@ -269,6 +269,7 @@ class Flow:
         terms = [keyed.term(node) for node in nodes]
         solver = self.asked.known(self.clauses)
         solver.add(*keyed.ranges, moves)
+        terms = [solver.named(term) for term in terms]
         steps: set[Way] = set()
         while len(steps) < MOST_STEPS:
             answer = solver.check()
