@@ -42,7 +42,7 @@ class Sat:
     """
 
     def __init__(self, clauses: Iterable[list[int]]) -> None:
-        self._solver: Any = _pysat().Glucose4(bootstrap_with=clauses)
+        self._solver: Any = _pysat().Minisat22(bootstrap_with=clauses)
         self._model: list[int] = []
         self.queries = 0
 
@@ -62,7 +62,7 @@ class Sat:
             raise GaveUpError
         self._solver.conf_budget(min(BUDGET, left))
         try:
-            # each once: Glucose gives each a decision level, and writes beyond its memory where they are more than its variables
+            # each once: solvers give each a decision level, and may write beyond their memory where they are more than the variables
             answer = self._solver.solve_limited(assumptions=list(dict.fromkeys(assuming)))
         except _interrupted() as error:  # it takes Ctrl-C for itself
             raise KeyboardInterrupt from error

@@ -77,7 +77,7 @@ def test_no_state_that_the_interpreter_reaches_breaks_the_invariant(
     for seed in range(1000, 1012):  # other walks than those that the search began with
         walk = Walk(ts, Random(seed))  # noqa: S311  # repeatable on purpose
         for state in walk.states(80):
-            here = Reached.of([point(ts, proof.predicates, state)], len(proof.predicates))
+            here = Reached.of([point(ts, proof.predicates, state)])
             assert not any(here.shows(clause) for clause in proof.clauses)
 
 

@@ -1,12 +1,16 @@
 """The search under the composed proof: nodes as bits, frames, and what is asked in the context of an invariant."""
 
 import json
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
+from random import Random
+from typing import Any
+from unittest.mock import patch
 
 import pytest
 import z3
@@ -21,11 +25,17 @@ from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
 from rcsc.compose.invariant.search import Effort, FoundInvariant, search
 from rcsc.compose.proof import context as context_
 from rcsc.compose.proof import level as level_proof
+from rcsc.compose.proof.candidates import candidates, keep_candidates
 from rcsc.compose.proof.context import RepeatedLine
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.ranking import parts
-from rcsc.compose.proof.system import _proved, prove_transition_systems, transition_systems
+from rcsc.compose.proof.system import (
+    NoProgramError,
+    _without_nodes,
+    prove_transition_systems,
+    transition_systems,
+)
 from rcsc.compose.proof.termination import Phase, longest
 from rcsc.host import children
 from rcsc.host.cache import Cache
@@ -256,7 +266,7 @@ def test_a_variable_that_no_clause_speaks_of_has_a_value() -> None:
 
 
 def test_the_solver_is_given_each_assumption_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Glucose writes beyond its memory, and ends the process, where more are given than it has variables."""
+    """Some solvers write beyond their memory, and end the process, where more are given than they have variables."""
     sat, given_to_solver = Sat([[1, 2], [-1, 3]]), list[int]()
     solve = sat._solver.solve_limited
 
@@ -271,7 +281,7 @@ def test_the_solver_is_given_each_assumption_once(monkeypatch: pytest.MonkeyPatc
 
 
 def test_known_states_answer_for_cubes() -> None:
-    reached = Reached.of([(0, 1, 2), (1, 1, 0)], 3)
+    reached = Reached.of([(0, 1, 2), (1, 1, 0)])
     assert reached.shows(((0, 0), (2, 2)))
     assert not reached.shows(((0, 0), (2, 0)))
     assert reached.values(((1, 1),), 2) == {0, 2}
@@ -285,6 +295,24 @@ def test_known_states_answer_for_cubes() -> None:
 
 SIZES = (2, 3, 70)
 PAIRS = st.one_of(*(st.tuples(st.just(at), st.integers(-size, size - 1)) for at, size in enumerate(SIZES)))
+POINTS = st.tuples(*(st.sampled_from(sorted({0, 1, size - 1})) for size in SIZES))
+
+
+@given(st.lists(POINTS, max_size=6), st.lists(POINTS, max_size=2), st.sets(PAIRS, max_size=3))
+def test_known_states_lie_in_a_cube_if_one_of_them_does(
+    first: list[tuple[int, int, int]], later: list[tuple[int, int, int]], pairs: set[Pair]
+) -> None:
+    reached = Reached.of(first)
+    for state in later:
+        reached.add(state)
+    inside = [
+        state
+        for state in (*first, *later)
+        if all(state[at] == value if value >= 0 else state[at] != ~value for at, value in pairs)
+    ]
+    cube = tuple(sorted(pairs))
+    assert reached.shows(cube) is bool(inside)
+    assert [reached.values(cube, at) for at in range(3)] == [{one[at] for one in inside} for at in range(3)]
 
 
 @given(st.sets(PAIRS, max_size=5), st.sets(PAIRS, max_size=5))
@@ -336,7 +364,9 @@ def test_lines_of_the_small_levels_are_all_reached_and_say_the_same_again(tmp_pa
         endings[level] = {ending.table: (ending.changes, ending.endless) for ending in found.endings}
     # `go` of the lower level waits for its input: nothing there makes that come
     assert endings["lower"] == {"pause": (1, ()), "go": (1, ("2",))}
-    assert {table: changes for table, (changes, _) in endings["upper"].items()} == {"rest": 2, "work": 3}
+    changes = {table: many for table, (many, _) in endings["upper"].items()}
+    assert changes["rest"] == 2
+    assert changes["work"] in {3, 4}  # it is a bound: how close depends on which invariant was found
 
 
 def test_a_line_that_is_dead_in_its_context_is_named(tmp_path: Path) -> None:
@@ -511,7 +541,7 @@ def test_levels_that_are_proved_in_processes_come_back_with_what_they_owe(
     made = transition_systems(SYSTEM)
     owed = {name: obligations(ts, ts.cycle(ts.havoc())) for name, ts in made.items()}
 
-    def proof(ts: TransitionSystem, effort: Effort) -> LevelProof:
+    def proof(ts: TransitionSystem, effort: Effort, _: Cache | None) -> LevelProof:
         assert (ts, effort) == (made[ts.level.name], LITTLE)
         told = (Verdict.UNDECIDED, *[Verdict.PROVED] * len(owed[ts.level.name]))
         found = tuple(zip(owed[ts.level.name], told, strict=False))
@@ -525,7 +555,7 @@ def test_levels_that_are_proved_in_processes_come_back_with_what_they_owe(
         assert [obligation.key for obligation, _ in one.verdicts] == [owing.key for owing in owed[one.level]]
         assert [verdict for _, verdict in one.verdicts].index(Verdict.UNDECIDED) == 0
         assert any(obligation.holds is not values.TRUE for obligation, _ in one.verdicts)
-        sent = _proved(made[one.level], LITTLE)
+        sent = _without_nodes(made[one.level], LITTLE, None)
         assert {obligation.holds for obligation, _ in sent.verdicts} == {values.TRUE}
 
 
@@ -535,7 +565,7 @@ def test_levels_are_said_as_they_are_done_where_it_is_asked_for(
     """Each before the next one is begun, and nothing of it among what was found."""
     said: list[str] = []
 
-    def proving(ts: TransitionSystem, _: Effort) -> LevelProof:
+    def proving(ts: TransitionSystem, *_: object) -> LevelProof:
         said.append(capsys.readouterr().err)
         return LevelProof(ts.level.name, (), (), (), 0, 0, 0.0)
 
@@ -559,6 +589,7 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
         cycle: Cycle,
         wanted: Sequence[Obligation],
         effort: Effort,
+        _: object,
     ) -> FoundInvariant:
         found = search(ts, firsts, cycle, wanted, effort)
         names = [predicate.name for predicate in found.predicates]
@@ -568,3 +599,107 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setattr("rcsc.compose.proof.level.search", lying)
     proof = prove_level(transition_systems(SYSTEM)["upper"], LITTLE)
     assert {verdict for _, verdict in proof.verdicts} == {Verdict.UNDECIDED}
+
+
+# --- after an earlier proof ---------------------------------------------------------------------
+
+CELL = re.compile(r"(?<=\|) *[a-z_]+ *(?=\|)")
+EDITS = 3
+"""Drawn versions of a level; some are broken, and some are not."""
+
+
+def concluded(proof: LevelProof) -> tuple[object, ...]:
+    """Return all that is concluded of a level, without how."""
+    verdicts = {obligation.key: verdict for obligation, verdict in proof.verdicts}
+    seen = proof.context
+    lines = None if seen is None else (seen.unreached, seen.repeated, seen.restless)
+    return verdicts, lines, [(ending.table, ending.proved, ending.still) for ending in proof.endings]
+
+
+def with_another_cell(random: Random, folder: Path) -> Iterator[TransitionSystem]:
+    """Yield the upper level with the content of one cell of its tables in place of another's, where that is a level."""
+    text = small_text("upper")
+    cells = [cell for cell in CELL.finditer(text, text.index("table work")) if cell.group().strip() != "line"]
+    for at in range(100):
+        old, new = random.sample(cells, 2)
+        other = f"{text[: old.start()]} {new.group().strip()} {text[old.end() :]}"
+        if other == text or new.group().strip() == old.group().strip():
+            continue
+        with suppress(NoProgramError):
+            yield small_level(folder / str(at), "upper", upper=other)
+
+
+def test_after_one_cell_has_changed_the_same_is_concluded_as_from_nothing(
+    tmp_path: Path, cache: Cache
+) -> None:
+    before = prove_level(transition_systems(SYSTEM)["upper"], LITTLE)
+    broken = 0
+    for ts in islice(with_another_cell(Random(2), tmp_path), EDITS):  # noqa: S311  # repeatable on purpose
+        keep_candidates(cache, ts, FoundInvariant(before.predicates, before.clauses))
+        assert len(candidates(cache, ts)) == len(before.clauses) > 0
+        proof = prove_level(ts, LITTLE, cache)
+        assert concluded(proof) == concluded(prove_level(ts, LITTLE))
+        broken += bool(proof.open)
+    assert 0 < broken < EDITS
+
+
+def test_a_proof_goes_on_where_another_was_ended(monkeypatch: pytest.MonkeyPatch, cache: Cache) -> None:
+    """When its search was done; the next one is asked for each clause that was found whether it still holds, and for little else."""
+    ts = transition_systems(SYSTEM)["upper"]
+
+    def ended(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(level_proof, "_confirm", ended)
+        with counted() as first, pytest.raises(KeyboardInterrupt):
+            prove_level(ts, LITTLE, cache)
+    known = candidates(cache, ts)
+    with counted() as again, monkeypatch.context() as patched:
+        patched.setattr(level_proof, "_confirm", ended)
+        with pytest.raises(KeyboardInterrupt):
+            prove_level(ts, LITTLE, cache)
+    assert again["search"] < 5 * len(known) < 0.6 * first["search"]
+    assert prove_level(ts, LITTLE, cache).open == ()
+
+
+@contextmanager
+def counted() -> Iterator[dict[str, int]]:
+    """Count the questions to the SAT solver meanwhile."""
+    many, holds = {"search": 0}, Sat.holds
+
+    def counting(sat: Sat, assuming: Iterable[int]) -> bool:
+        many["search"] += 1
+        return holds(sat, assuming)
+
+    with patch.object(Sat, "holds", counting):
+        yield many
+
+
+@pytest.mark.parametrize("value", [0, ~0])
+def test_nothing_is_believed_of_candidates(value: int, cache: Cache) -> None:
+    """Each forbids a value of one predicate; with all of them no state would be left. Some are about predicates that there are not."""
+    ts = transition_systems(SYSTEM)["upper"]
+    proof = prove_level(ts, LITTLE)
+    wrong = tuple(((at, value),) for at in range(len(proof.predicates)))
+    more = (*proof.predicates, Predicate("gone", Bool()))
+    keep_candidates(cache, ts, FoundInvariant(more, (*wrong, ((len(more) - 1, value),), ((0, 99),), ())))
+    again = prove_level(ts, LITTLE, cache)
+    assert concluded(again) == concluded(proof)
+    assert len(set(again.clauses) & set(wrong)) < len(wrong) / 2
+
+
+def test_a_level_is_kept_before_the_next_one_is_begun(cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = transition_systems(SYSTEM)
+    first, second = made
+
+    def ended(ts: TransitionSystem, *more: Any) -> LevelProof:
+        if ts.level.name == second:
+            raise KeyboardInterrupt
+        return prove_level(ts, *more)
+
+    monkeypatch.setattr("rcsc.compose.proof.system.prove_level", ended)
+    with pytest.raises(KeyboardInterrupt):
+        prove_transition_systems(made, LITTLE, 1, (first, second), None, cache)
+    assert recall(cache, made[first], LITTLE) is not None
+    assert recall(cache, made[second], LITTLE) is None

@@ -8,9 +8,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
-import numpy as np
-import numpy.typing as npt
-
 from rcsc.compose.contract.predicates import Predicate
 
 Valuation = tuple[int, ...]
@@ -75,35 +72,47 @@ class Masks:
 
 @dataclass(slots=True)
 class Reached:
-    """States known to be reached: a cube that contains one cannot be excluded."""
+    """States known to be reached: a cube that contains one cannot be excluded.
 
-    _points: npt.NDArray[np.int32]
+    Attributes:
+        many: How many states there are.
+    """
+
+    many: int = 0
+    _with: dict[Pair, int] = field(
+        default_factory=dict
+    )  # for each pair the states that have it, a bit for each
 
     @classmethod
-    def of(cls, points: Iterable[Valuation], width: int) -> "Reached":
-        """Hold these states, of `width` predicates each."""
-        every = list(points)
-        return cls(np.array(every, dtype=np.int32).reshape(len(every), width))
-
-    @property
-    def many(self) -> int:
-        """How many states there are."""
-        return len(self._points)
+    def of(cls, points: Iterable[Valuation]) -> "Reached":
+        """Hold these states."""
+        reached, rows = cls(), list(points)
+        reached.many = len(rows)
+        for at, column in enumerate(zip(*rows, strict=True)):
+            for value in set(column):
+                digits = "".join("1" if other == value else "0" for other in reversed(column))
+                reached._with[at, value] = int(digits, 2)
+        return reached
 
     def add(self, point: Valuation) -> None:
         """Add a state."""
-        self._points = np.vstack([self._points, np.array([point], dtype=np.int32)])
+        for pair in enumerate(point):
+            self._with[pair] = self._with.get(pair, 0) | 1 << self.many
+        self.many += 1
 
     def shows(self, cube: Cube) -> bool:
         """Return whether a known state lies in the cube."""
-        return bool(self._inside(cube).any())
+        return self._inside(cube) != 0
 
     def values(self, cube: Cube, at: int) -> set[int]:
         """Return the values of a predicate in the known states of the cube."""
-        return set(map(int, self._points[self._inside(cube), at]))
+        inside = self._inside(cube)
+        return {value for (other, value), states in self._with.items() if other == at and inside & states}
 
-    def _inside(self, cube: Cube) -> npt.NDArray[np.bool_]:
-        inside = np.ones(len(self._points), dtype=bool)
+    def _inside(self, cube: Cube) -> int:
+        inside = (1 << self.many) - 1
         for at, value in cube:
-            inside &= self._points[:, at] == value if value >= 0 else self._points[:, at] != ~value
+            inside &= self._with.get((at, value), 0) if value >= 0 else ~self._with.get((at, ~value), 0)
+            if not inside:
+                break
         return inside

@@ -101,6 +101,7 @@ class PDR:
         step: Any later one.
         weights: The predicates' weights; a clause leaves out those of small weight first.
         known: Clauses that are an invariant already.
+        candidates: Clauses that may be one, and are tried before others are looked for.
     """
 
     firsts: Sequence[Posed]
@@ -108,6 +109,7 @@ class PDR:
     reached: Reached
     weights: Sequence[int]
     known: Sequence[Clause] = ()
+    candidates: Sequence[Clause] = ()
     _frames: list[list[Cube]] = field(default_factory=lambda: [[]])
     _held: list[Literal] = field(default_factory=lambda: [0])
     _open: set[int] = field(default_factory=set)
@@ -132,6 +134,7 @@ class PDR:
             self.step.sat.add([-self.step.before[pair] for pair in clause])
         self._begin(obligations)
         self._deepen()
+        self._try_candidates()
         while True:
             self._exclude(obligations)
             self._deepen()
@@ -149,6 +152,12 @@ class PDR:
         for at in sorted(obligations):
             if any(first.sat.holds([-first.holds[at]]) for first in self.firsts):
                 self._leave(obligations, [at])
+
+    def _try_candidates(self) -> None:
+        """Add the candidates that every first cycle keeps to the first frame; they rise from it like other clauses."""
+        for cube in self.candidates:
+            if not self.reached.shows(cube) and self._not_first(cube) is not None:
+                self._add(cube, 1)
 
     def _leave(self, obligations: set[int], broken: Iterable[int]) -> None:
         for at in broken:

@@ -29,6 +29,10 @@ LONGER = 4
 """There are at most so many times more walks than asked, while they still reach new lines."""
 
 
+NamedClause = tuple[tuple[str, int], ...]
+"""A clause that names its predicates: it may be about another version of the level."""
+
+
 @dataclass(frozen=True, slots=True)
 class Effort:
     """How much is spent on a search.
@@ -65,11 +69,26 @@ class FoundInvariant:
     ran: frozenset[tuple[str, str]] = frozenset()
     states: tuple[Mapping[str, Value], ...] = field(default=(), repr=False)
 
+    @property
+    def named(self) -> tuple[NamedClause, ...]:
+        """The clauses with the names of their predicates."""
+        return tuple(
+            tuple((self.predicates[at].name, value) for at, value in clause) for clause in self.clauses
+        )
+
 
 def search(
-    ts: TransitionSystem, firsts: Sequence[Cycle], cycle: Cycle, wanted: Sequence[Obligation], effort: Effort
+    ts: TransitionSystem,
+    firsts: Sequence[Cycle],
+    cycle: Cycle,
+    wanted: Sequence[Obligation],
+    effort: Effort,
+    candidates: Sequence[NamedClause] = (),
 ) -> FoundInvariant:
     """Find an invariant from which as many obligations follow as possible.
+
+    Candidates, from wherever they come, are clauses to begin with. What is proved does not depend on them: the search decides which
+    obligations follow from some invariant over its predicates.
 
     Raises:
         GaveUpError: The solver did.
@@ -78,12 +97,23 @@ def search(
     reads = read(ts, cycle, wanted)
     states, ran = _walked(ts, effort)
     invariant = FoundInvariant(open=frozenset(matter), states=states, ran=ran)
-    for closely in range(CLOSELY + 1):
-        chosen = every_predicate(ts, cycle, reads, closely)
-        if closely and len(chosen) == len(invariant.predicates):
-            break
+    owed = [*(obligations(ts, first) for first in firsts), wanted]
+    by_size = {
+        len(chosen): chosen for chosen in (every_predicate(ts, cycle, reads, at) for at in range(CLOSELY + 1))
+    }
+    rounds = list(by_size.values())
+    tried = [_placed(candidates, chosen) for chosen in rounds]
+    needed = max(map(len, tried))  # what the candidates were found with is there from the start
+    for chosen, clauses in zip(rounds, tried, strict=True):
+        if len(clauses) < needed:
+            continue
         left = sorted(invariant.open)
-        invariant = _searched_with(chosen, ts, firsts, cycle, invariant, left)
+        posed = [
+            Posed(chosen, each, {at: every[at].holds for at in left})
+            for each, every in zip((*firsts, cycle), owed, strict=True)
+        ]
+        invariant, left_open = _searched(ts, chosen, posed, invariant, left, clauses)
+        invariant = replace(invariant, open=frozenset(left_open))
         if not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open):
             break
     return invariant
@@ -108,18 +138,15 @@ def strengthened(
     return replace(stronger, open=invariant.open, walked=invariant.walked)
 
 
-def _searched_with(
-    chosen: tuple[Predicate, ...],
-    ts: TransitionSystem,
-    firsts: Sequence[Cycle],
-    cycle: Cycle,
-    before: FoundInvariant,
-    left: Sequence[int],
-) -> FoundInvariant:
-    """Search once more, from the invariant known so far, for the obligations that are left."""
-    posed = [Posed(chosen, each, _conditions(ts, each, left)) for each in (*firsts, cycle)]
-    invariant, left_open = _searched(ts, chosen, posed, before, left)
-    return replace(invariant, open=frozenset(left_open))
+def _placed(candidates: Iterable[NamedClause], chosen: Sequence[Predicate]) -> list[Clause]:
+    """Return the candidates of which every predicate is chosen and has such a value."""
+    places = {predicate.name: (at, predicate.size) for at, predicate in enumerate(chosen)}
+    clauses = []
+    for candidate in candidates:
+        found = [(*places.get(name, (0, 0)), value) for name, value in candidate]
+        if found and all(-size <= value < size for _, size, value in found):
+            clauses.append(tuple(sorted((at, value) for at, _, value in found)))
+    return clauses
 
 
 def _searched(
@@ -128,11 +155,13 @@ def _searched(
     posed: Sequence[Posed],
     before: FoundInvariant,
     left: Iterable[int],
+    candidates: Sequence[Clause] = (),
 ) -> tuple[FoundInvariant, set[int]]:
     walked = dict.fromkeys(point(ts, chosen, state) for state in before.states)
-    reached = Reached.of(walked, len(chosen))
+    reached = Reached.of(walked)
     weights = [2 if predicate.parts else int(predicate.size > 2) for predicate in chosen]
-    clauses, left_open = PDR(posed[:-1], posed[-1], reached, weights, before.clauses).search(left)
+    tried = [clause for clause in candidates if clause not in before.clauses]
+    clauses, left_open = PDR(posed[:-1], posed[-1], reached, weights, before.clauses, tried).search(left)
     for cycle in posed:
         cycle.sat.close()
     learnt = before.learnt + reached.many - len(walked)
@@ -143,12 +172,6 @@ def _searched(
 def read(ts: TransitionSystem, cycle: Cycle, wanted: Sequence[Obligation]) -> list[Node]:
     """Collect the obligations searched for and the contract; predicates are chosen from their cone."""
     return [*(obligation.holds for obligation in wanted if _matters(ts, obligation)), cycle.contract]
-
-
-def _conditions(ts: TransitionSystem, cycle: Cycle, left: Iterable[int]) -> dict[int, Node]:
-    """Return these obligations' conditions in this cycle."""
-    every = obligations(ts, cycle)
-    return {at: every[at].holds for at in left}
 
 
 def _matters(ts: TransitionSystem, obligation: Obligation) -> bool:

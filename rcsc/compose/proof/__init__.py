@@ -14,8 +14,10 @@ Trusted: the arguments in `compose.__doc__` and in `termination`; that questions
 `termination`, `assume_guarantee`); Z3, or cvc5 with `--certify`, which answers the same questions from their text.
 
 Cost: linear in the number of levels, which are proved one by one; termination asks about three cycles in a row.
-A proof is kept under a digest of all that it depends on, and only read the next time.
+A proof is kept under a digest of all that it depends on, and only read the next time. After a change the clauses of the last search are
+the first that the next one tries.
 
-Modules, in the order the data flows: `context` (lines), `ranking` (what stops), `termination` (commands), `level` (all of one level),
+Modules, in the order the data flows: `context` (lines), `ranking` (what stops), `termination` (commands), `candidates` (clauses of the
+last search), `level` (all of one level),
 `assume_guarantee` (promises, claims), `kept` and `standing` (the cache), `system`.
 """

@@ -17,9 +17,11 @@ from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation, answer
 from rcsc.compose.invariant.pdr import Clause
-from rcsc.compose.invariant.search import LIMITS, Effort, FoundInvariant, search, strengthened
+from rcsc.compose.invariant.search import LIMITS, Effort, FoundInvariant, NamedClause, search, strengthened
+from rcsc.compose.proof.candidates import candidates, keep_candidates
 from rcsc.compose.proof.context import Context, context, never_run
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
+from rcsc.host.cache import Cache
 from rcsc.solvers import smt
 from rcsc.solvers.options import Limits
 from rcsc.solvers.sat import GaveUpError
@@ -95,9 +97,31 @@ def besides(proof: LevelProof) -> tuple[Obligation, ...]:
     )
 
 
-def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProof:
-    """Prove a level: find an invariant, confirm it, decide each obligation, and analyse the lines in context."""
+def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache | None = None) -> LevelProof:
+    """Prove a level: find an invariant, confirm it, decide each obligation, and analyse the lines in context.
+
+    The search begins with the clauses that the last one left in the cache. Lines and endings may depend on which invariant it finds: where
+    something is missing of them, all is proved once more without those clauses.
+    """
     effort = effort or Effort()
+    known = candidates(cache, ts)
+    proof = _proved(ts, effort, cache, known)
+    return proof if not known or _complete(proof) else _proved(ts, effort, cache, ())
+
+
+def _complete(proof: LevelProof) -> bool:
+    """Return whether nothing is undecided, and nothing left to be shown of lines and endings."""
+    seen = proof.context
+    return (
+        all(verdict is not Verdict.UNDECIDED for _, verdict in proof.verdicts)
+        and all(ending.proved for ending in proof.endings)
+        and (seen is None or not (seen.repeated or seen.restless))
+    )
+
+
+def _proved(
+    ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Sequence[NamedClause]
+) -> LevelProof:
     begun, cut_before = time.perf_counter(), smt.cut_short()
     cycle, firsts = ts.cycle(ts.havoc()), tuple(_firsts(ts).values())
     wanted = obligations(ts, cycle)
@@ -105,7 +129,8 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProo
     ends: tuple[Ending, ...] = ()
     try:
         with smt.together(TOGETHER * effort.limits.steps):
-            invariant = search(ts, firsts, cycle, wanted, effort)
+            invariant = search(ts, firsts, cycle, wanted, effort, known)
+            keep_candidates(cache, ts, invariant)
             asked = _asked_anew(invariant.predicates, firsts, cycle, effort.limits)
             looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open)
             flow = Flow(ts, asked, invariant.clauses)
@@ -113,6 +138,7 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProo
                 others := [*flow.no_loop_steps(), *never_run(asked, invariant.clauses, invariant.ran)]
             ):
                 invariant = strengthened(ts, firsts, cycle, invariant, others)
+                keep_candidates(cache, ts, invariant)
                 flow = Flow(ts, asked, invariant.clauses)
             _confirm(asked, invariant.clauses)
             verdicts = list(_verdicts(ts, asked, invariant, wanted))

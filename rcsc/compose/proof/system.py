@@ -236,36 +236,48 @@ def _each_unless_kept(
 ) -> Iterator[tuple[str, LevelProof]]:
     """Yield each level's proof, in order."""
     known = {name: recall(cache, systems[name], effort) for name in only} if cache is not None else {}
-    new = _each(systems, effort, jobs, tuple(name for name in only if known.get(name) is None))
+    new = _each(systems, effort, jobs, tuple(name for name in only if known.get(name) is None), cache)
     for name in only:
         kept = known.get(name)
-        if kept is not None:
-            yield name, kept
-            continue
-        _, proof = next(new)
-        if cache is not None:
-            keep(cache, systems[name], effort, proof)
-        yield name, proof
+        yield next(new) if kept is None else (name, kept)
 
 
 def _each(
-    systems: Mapping[str, TransitionSystem], effort: Effort, jobs: int, only: tuple[str, ...]
+    systems: Mapping[str, TransitionSystem],
+    effort: Effort,
+    jobs: int,
+    only: tuple[str, ...],
+    cache: Cache | None,
 ) -> Iterator[tuple[str, LevelProof]]:
-    """Yield each level's proof; several jobs prove in processes of their own."""
+    """Yield each level's proof; several jobs prove in processes of their own, the largest levels first."""
     if jobs == 1 or len(only) <= 1:
         for name in only:
-            yield name, prove_level(systems[name], effort)
+            yield name, _proved(systems[name], effort, cache)
         return
     with children.pool(min(jobs, len(only))) as pool:
-        waiting = {name: pool.submit(_proved, systems[name], effort) for name in only}
-        for name, future in waiting.items():
-            proof = children.answer(future)
+        largest = sorted(only, key=lambda name: -_lines(systems[name]))
+        waiting = {name: pool.submit(_without_nodes, systems[name], effort, cache) for name in largest}
+        for name in only:
+            proof = children.answer(waiting[name])
             yield name, replace(proof, verdicts=_again(systems[name], proof))
 
 
-def _proved(ts: TransitionSystem, effort: Effort) -> LevelProof:
+def _lines(ts: TransitionSystem) -> int:
+    """Count the lines of the level's tables."""
+    return sum(len(table.lines) for table in ts.program.tables)
+
+
+def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None) -> LevelProof:
+    """Prove a level, and keep the proof at once: another level may take long."""
+    proof = prove_level(ts, effort, cache)
+    if cache is not None:
+        keep(cache, ts, effort, proof)
+    return proof
+
+
+def _without_nodes(ts: TransitionSystem, effort: Effort, cache: Cache | None) -> LevelProof:
     """Prove a level in a process of its own; return obligations without their many nodes, which are made anew."""
-    proof = prove_level(ts, effort)
+    proof = _proved(ts, effort, cache)
     return replace(
         proof,
         verdicts=tuple((replace(obligation, holds=TRUE), verdict) for obligation, verdict in proof.verdicts),
