@@ -8,6 +8,10 @@ from rcsc.lang.operator_table import MIRRORED, Comparison, Op
 
 def meet(left: Box, right: Box) -> Box:
     """The keys in both."""
+    if len(left) == len(right) == 1:  # nearly always, and very often: hence no call
+        (a, b), (c, d) = left[0], right[0]
+        low, high = (a if a > c else c), (b if b < d else d)  # noqa: FURB136  # as above
+        return ((low, high),) if low <= high else ()
     parts = ((max(a, c), min(b, d)) for a, b in left for c, d in right)
     return tuple(sorted(part for part in parts if part[0] <= part[1]))
 

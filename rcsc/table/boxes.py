@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import prod
 
 from rcsc.lang.interval_sets import meet
-from rcsc.lang.model import Box, Program, Table, Test, Value, key_bounds, value_of_key
+from rcsc.lang.model import Box, Program, Scalar, Table, Test, Value, key_bounds, value_of_key
 from rcsc.table.regions.partition import Boxes, BudgetError, Gaps, common
 from rcsc.table.regions.word_bits import Part, Words, boxes_of
 from rcsc.table.verdict import Gap, Overlap, Region, Witness
@@ -57,22 +57,30 @@ class TableBoxes(Boxes[str]):
     """One table as boxes of its test variables' keys, in declared order; of a word that is taken apart, of its parts.
 
     Attributes:
+        kinds: Of every variable of the program.
+        least: The least input, in declared order.
         words: The words that are taken apart.
     """
 
-    program: Program = field(kw_only=True)
+    kinds: Mapping[str, Scalar] = field(kw_only=True)
+    least: Witness = field(kw_only=True)
     words: Words = field(default_factory=dict, kw_only=True)
 
     @classmethod
     def of(cls, program: Program, table: Table, words: Words | None = None) -> "TableBoxes":
         """The table's boxes; all its tests must be boxes, those of the words boxes of their parts."""
         split = words or {}
-        kinds = {v.name: v.type for v in program.variables}
+        kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
         extents: dict[str, tuple[int, int]] = {}
         for leaf in table.variables:
             parts = {part.name: key_bounds(part.kind) for part in split.get(leaf, ())}
             extents |= parts or {leaf: key_bounds(kinds[leaf])}
-        return cls(extents, list(lines_of(table, split)), program=program, words=split)
+        least = {
+            leaf: 0 if leaf in split else value_of_key(kind, extents[leaf][0])
+            for leaf, kind in kinds.items()
+            if leaf in split or leaf in extents
+        }
+        return cls(extents, list(lines_of(table, split)), kinds=kinds, least=least, words=split)
 
     def both(self, first: int, second: int) -> Overlap:
         """The overlap of two lines: its least witness, and the whole region where both match."""
@@ -84,13 +92,9 @@ class TableBoxes(Boxes[str]):
 
     def witness(self, keys: Mapping[str, int]) -> Witness:
         """The values of these keys; the least of every other variable."""
-        kinds = {str(v.name): v.type for v in self.program.variables}
-        apart = {part.name for parts in self.words.values() for part in parts}
         values: dict[str, Value] = {leaf: self._word(parts, keys) for leaf, parts in self.words.items()}
-        values |= {
-            n: value_of_key(kinds[n], keys.get(n, self.extents[n][0])) for n in self.names if n not in apart
-        }
-        return {leaf: values[leaf] for leaf in kinds if leaf in values}
+        values |= {n: value_of_key(self.kinds[n], key) for n, key in keys.items() if n in self.least}
+        return {**self.least, **values}
 
     @staticmethod
     def _word(parts: Sequence[Part], keys: Mapping[str, int]) -> int:

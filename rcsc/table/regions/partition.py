@@ -104,12 +104,17 @@ class Boxes(Generic[Axis]):
         if all(len(box) == 1 for box in stated):
             yield from _intervals_meeting(stated, idle)
             return
-        inside = {
-            low: _any(mask for box, mask in stated.items() if holds(box, low))
-            for low, _ in slices(self.extents[name], stated)
-        }
+        axis = Sliced.of(self.extents[name], stated, idle)
         for box in stated:
-            yield box, idle | _any(mask for low, mask in inside.items() if holds(box, low))
+            yield box, idle | axis.meeting(box)
+
+    def sliced(self) -> dict[Axis, "Sliced"]:
+        """Each axis in slices, with the lines that hold in each."""
+        everyone = (1 << len(self.lines)) - 1
+        return {
+            name: Sliced.of(self.extents[name], stated, everyone & ~_any(stated.values()))
+            for name, stated in self._by_box().items()
+        }
 
     def piece(self, sign: int, box: BoxLine[Axis]) -> "Piece[Axis]":
         """A box as it is counted."""
@@ -123,6 +128,65 @@ class Boxes(Generic[Axis]):
     def volume(self) -> int:
         """How many inputs there are."""
         return prod(high - low + 1 for low, high in self.extents.values())
+
+
+@dataclass(frozen=True, slots=True)
+class Sliced:
+    """An axis that is cut wherever a box begins or ends.
+
+    For boxes 0 .. 4 of line 0 and 3 .. 9 of line 1 the slices are 0 .. 2, 3 .. 4 and 5 .. 9, with masks 1, 3 and 2.
+
+    Attributes:
+        lows: Where each slice begins.
+        cuts: The slices.
+        masks: For each slice the lines that hold all over it.
+        idle: The lines that state no box here.
+    """
+
+    lows: Sequence[int]
+    cuts: Sequence[Bounds]
+    masks: Sequence[int]
+    idle: int
+
+    @classmethod
+    def of(cls, extent: Bounds, stated: Mapping[Box, int], idle: int) -> "Sliced":
+        """An axis with the boxes that lines state on it; `idle` are those that state none."""
+        changes: dict[int, int] = {}
+        for box, mask in stated.items():
+            for low, high in box:
+                changes[low] = changes.get(low, 0) ^ mask
+                changes[high + 1] = changes.get(high + 1, 0) ^ mask
+        cuts, masks, holding = slices(extent, stated), list[int](), idle
+        for low, _ in cuts:
+            holding ^= changes.get(low, 0)
+            masks.append(holding)
+        return cls([low for low, _ in cuts], cuts, masks, idle)
+
+    def among(self, box: Box) -> Iterator[int]:
+        """Yield the number of each slice that meets the box."""
+        for low, high in box:
+            yield from range(max(bisect_right(self.lows, low) - 1, 0), bisect_right(self.lows, high))
+
+    def meeting(self, box: Box) -> int:
+        """The lines that hold somewhere in the box."""
+        return _any(self.masks[at] for at in self.among(box))
+
+    def also(self, bit: int, box: Box | None) -> "Sliced":
+        """The same with one line more, by its bit; without a box it holds everywhere."""
+        masks = list(self.masks)
+        for at in range(len(masks)) if box is None else self.among(box):
+            masks[at] |= bit
+        return Sliced(self.lows, self.cuts, masks, self.idle | bit if box is None else self.idle)
+
+    def runs(self, alive: int) -> Iterator[tuple[Bounds, int]]:
+        """Slices joined where the same of these lines hold, with those lines."""
+        begun, before = self.lows[0], self.masks[0] & alive
+        for (low, _), mask in zip(self.cuts, self.masks, strict=True):
+            holding = mask & alive
+            if holding != before:
+                yield (begun, low - 1), before
+                begun, before = low, holding
+        yield (begun, self.cuts[-1][1]), before
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +222,8 @@ class Gaps(Generic[Axis]):
     table: Boxes[Axis]
     pieces: Sequence[Piece[Axis]]
     exact: bool
-    _without: set[tuple[int, frozenset[int]]] = field(default_factory=set)
+    _without: set[tuple[int, int]] = field(default_factory=set)
+    _sliced: "dict[Axis, Sliced] | None" = None
     _looked_at: int = 0
 
     @classmethod
@@ -180,40 +245,54 @@ class Gaps(Generic[Axis]):
         Raises:
             BudgetError: It was not found within `BUDGET`. Where the count is exact nothing is looked at in vain, and this never happens.
         """
-        lines = [*self.table.lines, *shown]
+        axes = self._axes(shown)
         self._without = set()
-        alive = [at for at, boxes in enumerate(lines) if all(boxes.values())]
+        alive = _any(1 << at for at, boxes in enumerate([*self.table.lines, *shown]) if all(boxes.values()))
         regions = [self.table.piece(1, region) for region in shown]  # they meet no line and not each other
-        return self._search(0, alive, lines, [*self.pieces, *regions])
+        below, idle = list[tuple[Sliced, int]](), -1
+        for axis in reversed(axes.values()):
+            idle &= axis.idle
+            below.append((axis, idle))
+        return self._search(0, alive, below[::-1], [*self.pieces, *regions])
+
+    def _axes(self, shown: Sequence[BoxLine[Axis]]) -> dict[Axis, "Sliced"]:
+        """The axes in slices, with the lines and after them the regions shown."""
+        if self._sliced is None:
+            self._sliced = self.table.sliced()
+        axes = self._sliced
+        for at, region in enumerate(shown, len(self.table.lines)):
+            axes = {name: axis.also(1 << at, region.get(name)) for name, axis in axes.items()}
+        return axes
 
     def _search(
-        self, depth: int, alive: list[int], lines: Sequence[BoxLine[Axis]], pieces: Sequence[Piece[Axis]]
+        self,
+        depth: int,
+        alive: int,
+        axes: Sequence[tuple["Sliced", int]],
+        pieces: Sequence[Piece[Axis]],
     ) -> Cell[Axis] | None:
+        """The least cell from an axis on; each axis comes with the lines that look at none from there on."""
         names = self.table.names[depth:]
         if not alive:
             return {name: self.table.extents[name] for name in names}
-        if not names or any(not any(name in lines[at] for name in names) for at in alive):
-            return None
-        memory = (depth, frozenset(alive))
-        if memory in self._without:
+        if not names or alive & axes[depth][1] or (depth, alive) in self._without:
             return None
         name = names[0]
-        for low, high in self._short(depth, [lines[at] for at in alive], pieces):
-            self._looked_at += len(alive) + len(pieces)
+        for (low, high), inside in self._short(depth, alive, axes[depth][0], pieces):
+            self._looked_at += alive.bit_count() + len(pieces)
             if self._looked_at > BUDGET and not self.exact:
                 raise BudgetError
-            inside = [at for at in alive if name not in lines[at] or holds(lines[at][name], low)]
             counted = [piece for piece in pieces if name not in piece.box or holds(piece.box[name], low)]
-            rest = self._search(depth + 1, inside, lines, counted)
+            rest = self._search(depth + 1, inside, axes, counted)
             if rest is not None:
                 return {name: (low, high), **rest}
-        self._without.add(memory)
+        self._without.add((depth, alive))
         return None
 
     def _short(
-        self, depth: int, lines: Sequence[BoxLine[Axis]], pieces: Sequence[Piece[Axis]]
-    ) -> Iterator[Bounds]:
-        """Slices of the axis at `depth`, between edges of the lines, that the pieces do not fill; counted in one sweep."""
+        self, depth: int, alive: int, axis: "Sliced", pieces: Sequence[Piece[Axis]]
+    ) -> Iterator[tuple[Bounds, int]]:
+        """Parts of the axis at `depth` that the pieces do not fill, with the lines that hold in each; counted in one sweep."""
         name = self.table.names[depth]
         extents = [self.table.extents[other] for other in self.table.names[depth + 1 :]]
         whole = prod(high - low + 1 for low, high in extents)
@@ -225,34 +304,24 @@ class Gaps(Generic[Axis]):
             for low, high in piece.box.get(name, ()):
                 change[low] = change.get(low, 0) + inside
                 change[high + 1] = change.get(high + 1, 0) - inside
-        cuts = slices(self.table.extents[name], (line[name] for line in lines if name in line))
-        self._looked_at += len(cuts)
-        for low, high in cuts:
-            everywhere += change.get(low, 0)
+        for bounds, holding in axis.runs(alive):  # where the same lines hold, so do the same pieces
+            self._looked_at += 1
+            everywhere += change.get(bounds[0], 0)
             if everywhere != whole:
-                yield low, high
+                yield bounds, holding
 
     def grown(self, cell: Cell[Axis], shown: Sequence[BoxLine[Axis]]) -> dict[Axis, Box]:
         """A maximal region around the cell that no line and no region shown touches, grown in the order of axes."""
-        lines = [*self.table.lines, *shown]
-        cuts = {
-            name: slices(extent, (line[name] for line in self.table.lines if name in line))
-            for name, extent in self.table.extents.items()
-        }
+        axes = self._axes(shown)
+        near = {name: axis.meeting(((cell[name][0],) * 2,)) for name, axis in axes.items()}
         region: dict[Axis, Box] = {}
-        for name, every in cuts.items():
-            region[name] = tuple(
-                interval for interval in every if interval[0] <= cell[name][0] <= interval[1]
-            )
-        for name, every in cuts.items():
-            close = [
-                boxes for boxes in lines if all(meet(box, region[n]) for n, box in boxes.items() if n != name)
-            ]
-            region[name] = joined(
-                interval
-                for interval in every
-                if not any(name not in boxes or holds(boxes[name], interval[0]) for boxes in close)
-            )
+        for name, axis in axes.items():
+            close = -1
+            for other, mask in near.items():
+                close &= -1 if other == name else mask
+            free = [at for at, mask in enumerate(axis.masks) if not mask & close]
+            region[name] = joined(axis.cuts[at] for at in free)
+            near[name] = _any(axis.masks[at] for at in free)
         return region
 
 
