@@ -12,7 +12,7 @@ True
 Trusted: the tools that a kind names, in the versions that its files state. No verdict of `rcsc check` rests on
 anything here. What it costs: seconds to minutes a program, by kind.
 
-Rooms: `misra` (MISRA C:2012, guideline by guideline).
+Rooms: `misra` (MISRA C:2012, guideline by guideline), `whole` (the C that links a system).
 
 Modules: `kind` (what a kind takes and gives), `kinds` (their names), `collect` (all that was asked for, on one screen).
 Kinds: `coverage` (vectors of the whole C, measured in `llvm`; why the rest is `out_of_reach`), `runtime` (Frama-C's EVA),

@@ -11,7 +11,7 @@ states and inputs, some of them outside their ranges.
 import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,8 +25,12 @@ from rcsc.lang.model import Program, Real, Scalar
 from rcsc.testing.executors.symbols import Symbols, symbols_of
 
 TIMEOUT_S = 900.0
+LOOK_S = 300.0
+"""How long a tool may look at one text; what takes longer is told, and is no evidence."""
 CALLS = 200_000
 """How many calls are drawn under each sanitizer."""
+BOUND = ("--param", "analyzer-bb-explosion-factor=20", "-Wanalyzer-too-complex")
+"""How far gcc's analyser goes: four times as far as by itself; where it goes no further, it says so, and that is a finding."""
 WARNINGS = (
     "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wcast-qual", "-Wshadow",
     "-Wundef", "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wvla", "-Wswitch-enum", "-Wnull-dereference",
@@ -77,6 +81,8 @@ LINE = re.compile(
     r"^(?:.*/)?(?P<file>[\w.]+):(?P<line>\d+)(?::\d+)?: (?:warning|error|runtime error): (?P<text>.*)$"
 )
 NAMED = re.compile(r"^(?P<what>.*?) \[(?P<check>[-\w.,+=]+)\]$")
+DONE = re.compile(r"^\d+ calls$", re.MULTILINE)
+"""What the drawn calls say at their end."""
 WRAPS = ("unsigned integer overflow", "left shift of")
 
 
@@ -105,75 +111,88 @@ class Report:
     failure: str = ""
 
 
+TOOLS = ("gcc", "clang-19", "clang-tidy-19")
+
+
 def collect(subject: Subject) -> Evidence:
     """Run every tool that is here on every text of the C of a program."""
-    here = {name for name in ("gcc", "clang-19", "clang-tidy-19") if shutil.which(name)}
+
+    def texts() -> Iterator[Text]:
+        for title, each in (("", subject), ("defensive, ", subject.defensive())):
+            symbols = symbols_of(subject.program, each.files)
+            main = drawn(subject.program, symbols, defensive=each.plan.defensive)
+            yield Text(title, each.files, symbols.source, main)
+
+    return looked_at(texts(), subject.progress)
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """What is looked at.
+
+    Attributes:
+        title: What its runs are called with.
+        files: The C and what it includes, text by path.
+        source: Name of the file that is looked at; the others are built where it is run.
+        main: C that calls it; see `player`.
+    """
+
+    title: str
+    files: Mapping[str, str]
+    source: str
+    main: str
+
+
+def looked_at(texts: Iterable[Text], progress: Callable[[str], None]) -> Evidence:
+    """Run every tool that is here on each of some texts, and say what is found."""
+    here = {name for name in TOOLS if shutil.which(name)}
     if not here:
         return Evidence(
-            (),
-            missing="none of gcc, clang-19 and clang-tidy-19 is installed (Debian's packages of these names)",
+            (), missing=f"none of {', '.join(TOOLS)} is installed (Debian's packages of these names)"
         )
-    reports = [*_deaf(here)]
-    reports += [
-        report
-        for title, files, defensive in _texts(subject)
-        for report in _reports(subject, title, files, here, defensive=defensive)
-    ]
+    reports = [*_deaf(here), *(report for text in texts for report in _reports(text, here, progress))]
     shortfalls = [*_shortfalls(reports)]
-    absent = sorted({"gcc", "clang-19", "clang-tidy-19"} - here)
+    absent = sorted(set(TOOLS) - here)
     shortfalls += [Shortfall(name, "not installed, so it was not asked") for name in absent]
     return Evidence(tuple(_figures(reports)), _kept(reports), tuple(shortfalls))
 
 
-def _texts(subject: Subject) -> Iterator[tuple[str, Mapping[str, str], bool]]:
-    yield "", subject.files, False
-    yield "defensive, ", subject.defensive().files, True
-
-
-def _reports(
-    subject: Subject, title: str, files: Mapping[str, str], here: set[str], *, defensive: bool
-) -> Iterator[Report]:
-    symbols = symbols_of(subject.program, files)
+def _reports(text: Text, here: set[str], progress: Callable[[str], None]) -> Iterator[Report]:
     with scratch("analysers") as place:
-        write_c(files, place)
-        (place / "drawn.c").write_text(drawn(subject.program, symbols, defensive=defensive), "utf-8")
-        for name, command in _static(symbols.source):
+        sources = write_c(text.files, place)
+        (place / "drawn.c").write_text(text.main, "utf-8")
+        for name, command in _static(text.source):
             if command[0] in here:
-                subject.progress(f"{symbols.source}: {title}{name}")
-                yield _asked(f"{title}{name}", command, place)
-        for name, command in _sanitized(symbols.source):
+                progress(f"{text.source}: {text.title}{name}")
+                yield _asked(f"{text.title}{name}", command, place)
+        for name, command in _sanitized(*sources):
             if command[0] in here:
-                subject.progress(f"{symbols.source}: {title}{name}")
-                yield _ran(f"{title}{name}", command, place)
+                progress(f"{text.source}: {text.title}{name}")
+                yield _ran(f"{text.title}{name}", command, place)
 
 
 def _static(source: str) -> Iterator[tuple[str, list[str]]]:
     """Commands that look at the text, and do not run it."""
-    yield "gcc -fanalyzer", ["gcc", "-std=c99", "-O2", "-fanalyzer", *WARNINGS, "-c", "-o", "text.o", source]
+    compiled = ["-c", "-o", "text.o", source]
+    yield "gcc -fanalyzer", ["gcc", "-std=c99", "-O2", "-fanalyzer", *BOUND, *WARNINGS, *compiled]
     for text, portable in PORTABLE.items():
-        command = ["clang-19", "-std=c99", "-O1", "-Weverything", *portable, "-c", "-o", "text.o", source]
-        yield f"clang -Weverything{text}", command
+        yield (
+            f"clang -Weverything{text}",
+            ["clang-19", "-std=c99", "-O1", "-Weverything", *portable, *compiled],
+        )
     yield "clang-tidy", ["clang-tidy-19", "--quiet", f"--checks={','.join(CHECKS)}", source, "--", "-std=c99"]
 
 
-def _sanitized(source: str) -> Iterator[tuple[str, list[str]]]:
+def _sanitized(*sources: str) -> Iterator[tuple[str, list[str]]]:
     """Commands that build the drawn calls with sanitizers."""
     for compiler, flags in SANITIZERS.items():
         for text, portable in PORTABLE.items():
             if compiler == "clang-19" or not portable:
-                command = [
-                    compiler,
-                    "-std=c99",
-                    "-O1",
-                    "-g",
-                    *flags,
-                    *portable,
-                    "-o",
-                    "drawn",
-                    source,
-                    "drawn.c",
-                ]
-                yield f"sanitizers of {compiler}{text}", command
+                built = ["-o", "drawn", *sources, "drawn.c"]
+                yield (
+                    f"sanitizers of {compiler}{text}",
+                    [compiler, "-std=c99", "-O1", "-g", *flags, *portable, *built],
+                )
 
 
 def _deaf(here: set[str]) -> Iterator[Report]:
@@ -189,9 +208,9 @@ def _deaf(here: set[str]) -> Iterator[Report]:
 
 
 def _asked(name: str, command: list[str], place: Path) -> Report:
-    ran = run_command(command, place, TIMEOUT_S)
+    ran = run_command(command, place, LOOK_S)
     found = tuple(_findings(name, ran.out + ran.err))
-    return Report(name, found, ending(ran, TIMEOUT_S) if ran.status != 0 else "")
+    return Report(name, found, ending(ran, LOOK_S) if ran.status != 0 else "")
 
 
 def _ran(name: str, command: list[str], place: Path) -> Report:
@@ -206,7 +225,7 @@ def _ran(name: str, command: list[str], place: Path) -> Report:
         return Report(name, (), f"it tells nothing of a planted fault: {ending(planted, TIMEOUT_S)}")
     ran = run_command([str(program)], place, TIMEOUT_S)
     found = tuple(_findings(name, ran.err))
-    done = f"{CALLS} calls" in ran.out and ran.status == 0
+    done = ran.status == 0 and DONE.search(ran.out) is not None
     stopped = ran.err.strip()[:400] if ran.status is not None else ""
     return Report(name, found, "" if done else f"stopped: {stopped or ending(ran, TIMEOUT_S)}")
 
@@ -234,33 +253,37 @@ def _overflow(told: str) -> str:
 
 def drawn(program: Program, symbols: Symbols, *, defensive: bool) -> str:
     """C that calls every function with drawn states: within their ranges and at their ends, and some inputs outside."""
-    lines = ["#include <stdio.h>", "#include <string.h>", f'#include "{symbols.header}"']
-    lines += [f"static {symbols.struct} s;", "static uint64_t drawn = UINT64_C(0x1984);"]
-    lines += ["static uint64_t next(void) {"]
-    lines += [
-        "    drawn ^= drawn << 13; drawn ^= drawn >> 7; drawn ^= drawn << 17; /* Marsaglia's xorshift64 */"
-    ]
-    lines += ["    return drawn >> 11;", "}"]
-    lines += ["static double real(double low, double high) {"]
-    lines += ["    const uint64_t at = next() % 6u;"]
-    lines += [
-        "    return (at == 0u) ? low : (at == 1u) ? high : low + ((high - low) * ((double)(next() % 1000001u) / 1e6));",
-        "}",
-    ]
-    lines += stand_ins(program, symbols, _drawn)
+    lines = [f"static {symbols.struct} s;", *stand_ins(program, symbols, drawn_value)]
     for name, strange in (("any", True), ("admitted", False)):
         state = [*_state(program, symbols, strange=strange), *(_bytes() if strange and defensive else ())]
         lines += [f"static void {name}(void) {{", *state, "}"]
-    lines += ["static volatile int32_t room[4];", "int main(int argc, char **argv) {", "    (void)argv;"]
-    lines += ["    if (argc > 1) { /* faults that must be told */"]
-    lines += ["        volatile int32_t most = INT32_MAX;", "        room[0] = most + argc;"]
-    lines += ["        ((volatile int32_t *)room)[argc + 2] = room[0];", "        return 0;", "    }"]
-    lines += [f"    for (uint32_t n = 0u; n < {CALLS}u; n = n + 1u) {{"]
     bodies = [*calls(symbols, defensive=defensive)]
-    lines += [f"        switch (next() % {len(bodies)}u) {{"]
-    lines += [f"        case {number}: {body} break;" for number, body in enumerate(bodies)]
-    lines += ["        default: break;", "        }", "    }"]
-    return "\n".join([*lines, f'    (void)puts("{CALLS} calls");', "    return 0;", "}", ""])
+    cases = [f"        case {number}: {body} break;" for number, body in enumerate(bodies)]
+    body = [f"        switch (next() % {len(bodies)}u) {{", *cases, "        default: break;", "        }"]
+    return player(symbols.header, lines, body, CALLS)
+
+
+def player(header: str, lines: Sequence[str], body: Sequence[str], calls: int) -> str:
+    """C with a `main` that does something drawn many times; given an argument, it makes the faults that must be told.
+
+    Args:
+        header: What it includes.
+        lines: What stands before `main`; `next()` and `real(low, high)` draw.
+        body: Statements of a loop over `n`.
+        calls: How often they run.
+    """
+    return "\n".join([
+        "#include <stdio.h>", "#include <string.h>", f'#include "{header}"',
+        "static uint64_t drawn = UINT64_C(0x1984);", "static uint64_t next(void) {",
+        "    drawn ^= drawn << 13; drawn ^= drawn >> 7; drawn ^= drawn << 17; /* Marsaglia's xorshift64 */",
+        "    return drawn >> 11;", "}", "static double real(double low, double high) {", "    const uint64_t at = next() % 6u;",
+        "    return (at == 0u) ? low : (at == 1u) ? high : low + ((high - low) * ((double)(next() % 1000001u) / 1e6));", "}",
+        *lines, "static volatile int32_t room[4];", "int main(int argc, char **argv) {", "    (void)argv; (void)real;",
+        "    if (argc > 1) { /* faults that must be told */", "        volatile int32_t most = INT32_MAX;",
+        "        room[0] = most + argc;", "        ((volatile int32_t *)room)[argc + 2] = room[0];", "        return 0;", "    }",
+        f"    for (uint32_t n = 0u; n < {calls}u; n = n + 1u) {{", *body, "    }",
+        f'    (void)puts("{calls} calls");', "    return 0;", "}", "",
+    ])  # fmt: skip
 
 
 def _state(program: Program, symbols: Symbols, *, strange: bool) -> Iterator[str]:
@@ -270,14 +293,14 @@ def _state(program: Program, symbols: Symbols, *, strange: bool) -> Iterator[str
     yield "    if (next() % 2u == 0u) {"
     for variable in states:
         c_type = symbols.c_type(variable.name)
-        yield f"    s.{symbols.path(variable.name)} = {_drawn(c_type, variable.type, False)};"
+        yield f"    s.{symbols.path(variable.name)} = {drawn_value(c_type, variable.type, False)};"
     yield "    } }"
     for variable in program.variables:
         if variable.kind is Role.INPUT:
             place, c_type = symbols.path(variable.name), symbols.c_type(variable.name)
-            yield f"    s.{place} = {_drawn(c_type, variable.type, False)};"
+            yield f"    s.{place} = {drawn_value(c_type, variable.type, False)};"
             if strange:
-                yield f"    if (next() % 256u == 0u) {{ s.{place} = {_drawn(c_type, variable.type, True)}; }}"
+                yield f"    if (next() % 256u == 0u) {{ s.{place} = {drawn_value(c_type, variable.type, True)}; }}"
 
 
 def _bytes() -> Iterator[str]:
@@ -288,7 +311,7 @@ def _bytes() -> Iterator[str]:
     yield "    }"
 
 
-def _drawn(c_type: str, kind: Scalar, whole: bool) -> str:
+def drawn_value(c_type: str, kind: Scalar, whole: bool) -> str:
     """A drawn value of a kind, or of its whole C type; half of the whole numbers are at an end."""
     if isinstance(kind, Real):
         low, high = ("-1e30", "1e30") if whole else (float(kind.low).hex(), float(kind.high).hex())

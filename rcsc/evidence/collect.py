@@ -1,18 +1,21 @@
 """All the evidence that was asked for: proved programs to files in a folder, an index and findings."""
 
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
-from rcsc.driver.compile import planned, systems_in, tables_in
-from rcsc.driver.pipeline import proved
+from rcsc.driver.compile import Generated, planned, systems_in, tables_in
+from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import Conclusion, Settings
 from rcsc.emit import emitted
 from rcsc.evidence.kind import Evidence, Subject
 from rcsc.evidence.kinds import KINDS
+from rcsc.evidence.whole import kinds as whole
+from rcsc.evidence.whole.kinds import Whole
 from rcsc.host.files import write_atomically
 from rcsc.lang.model import ProvedProgram
 
@@ -36,17 +39,44 @@ def collect(settings: Settings, kinds: Collection[str], folder: Path) -> Conclus
         return Conclusion(report, "no evidence was made: not everything is proved")
     made: dict[str, dict[str, Evidence]] = {}
     diagnostics: list[Diagnostic] = []
-    for root, program in project.executable:
-        subject = _subject(program, settings)
-        made[program.program.name] = {}
-        for name in (name for name in KINDS if name in kinds):
+    names = [name for name in KINDS if name in kinds]
+    for root, looks in _subjects(settings, project, diagnostics):
+        of_one = made[looks.name] = {}
+        for name in names:
             settings.progress(f"{root}: {name}")
-            evidence = KINDS[name].collect(subject)
-            made[program.program.name][name] = evidence
-            diagnostics += _findings(root, name, evidence)
+            of_one[name] = looks.at(name)
+            diagnostics += _findings(root, name, of_one[name])
     settings.progress("")
     diagnostics += _written(folder, made)
     return Conclusion(project.report(tuple(diagnostics)), _closing(folder, made))
+
+
+@dataclass(frozen=True, slots=True)
+class _Looks:
+    """What evidence is made of: its name, and evidence of it by kind."""
+
+    name: str
+    at: Callable[[str], Evidence]
+
+
+def _subjects(settings: Settings, project: Proved, clashes: list[Diagnostic]) -> Iterator[tuple[str, _Looks]]:
+    """Every program by its root, then every system by its description; systems whose C cannot be made are put among `clashes`."""
+    for root, program in project.executable:
+        subject = _subject(program, settings)
+        yield root, _Looks(program.program.name, partial(_looked, subject))
+    for path in systems_in(settings.paths):
+        generated = Generated(("c",), defensive=False)
+        for root, program in project.executable:
+            generated.add_program(root, program)
+        generated.add_system(path)
+        clashes += generated.clashes
+        if not generated.clashes:
+            system = Whole(generated.systems[path], generated.files, settings.progress)
+            yield str(path), _Looks(system.system.word, partial(whole.collect, system))
+
+
+def _looked(subject: Subject, kind: str) -> Evidence:
+    return KINDS[kind].collect(subject)
 
 
 def _of_tables(settings: Settings) -> Settings:

@@ -114,15 +114,26 @@ def measured(llvm: Tools, files: Mapping[str, str], source: str, vectors: str) -
     Args:
         llvm: The tools.
         files: The emitted files, text by path.
-        source: File name of the C that is measured.
+        source: File name of the C that is measured; other C is built as it is.
         vectors: A C file that plays vectors of it.
     """
     profile = ["-instr-profile", "vectors.profdata", "play"]
     with scratch("coverage") as place:
-        write_c(files, place)
+        others = [name for name in write_c(files, place) if name != source]
         (place / "vectors.c").write_text(vectors, "utf-8")
         shutil.copyfile(PROFILE, place / "profile.c")
-        play = [llvm.clang, "-std=gnu11", "-O1", "-w", "-o", "play", "vectors.c", "profile.c", "measured.o"]
+        play = [
+            llvm.clang,
+            "-std=gnu11",
+            "-O1",
+            "-w",
+            "-o",
+            "play",
+            "measured.o",
+            "profile.c",
+            "vectors.c",
+            *others,
+        ]
         said = list[Ran]()
         for command, made in (
             (

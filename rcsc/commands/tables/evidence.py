@@ -22,7 +22,7 @@ Kinds:
 \b
 Examples:
   rcsc evidence tables/task                       every kind, in evidence/
-  rcsc evidence robot/system.toml --out dossier   of every level of a system""",
+  rcsc evidence robot/system.toml --out dossier   of every level of a system, and of the C that links them""",
 )
 @PATHS
 @click.option(

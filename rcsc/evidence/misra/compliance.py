@@ -136,20 +136,25 @@ def _plain(files: Mapping[str, str]) -> bool:
 
 def collect(subject: Subject) -> Evidence:
     """Make the compliance table of one program."""
+    return evidence_of(subject.files)
+
+
+def evidence_of(files: Mapping[str, str]) -> Evidence:
+    """Make the compliance table of C and its headers."""
     if not installed():
         return Evidence((), missing=MISSING)
-    made = summary(subject.files)
+    made = summary(files)
     if made.checked.failure:
         return Evidence((), missing=made.checked.failure)
     counts = Counter(made.of(one)[0] for one in guidelines())
     words = ", ".join(f"{counts[kind]} {kind}" for kind in Compliance)
     figure = f"MISRA C:2012, {sum(counts.values())} guidelines: {words}; by {made.checked.tool}"
-    files = {
+    tables = {
         "compliance.csv": _table(made),
         "places.csv": _places(made),
         "suppressions.txt": _suppressions(made),
     }
-    return Evidence((figure,), files, tuple(_shortfalls(made)))
+    return Evidence((figure,), tables, tuple(_shortfalls(made)))
 
 
 KIND = Kind("compliance with MISRA C:2012, guideline by guideline, each deviation with its place", collect)
