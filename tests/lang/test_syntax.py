@@ -532,6 +532,43 @@ def test_conditions_joined_by_and_are_what_the_whole_cell_says(parts: list[tree.
         assert moved == [(span.start, span.end) if span.file else (begin + start,) * 2 for span in there]
 
 
+PARTS = [
+    "a",
+    "(a or b)",
+    "x = 1",
+    "y = 1.5",
+    "w = 0bx1",
+    "0x1F = w",
+    "x in {1, 2}",
+    "f[1]",
+    "a for 2 [s]",
+    "a.and_",
+    "or_1 = 1",
+]
+JOINTS = [
+    f"{before}{word}{after}"
+    for word in ("and", "and", "or", "xor", "implies")
+    for before in ("", " ")
+    for after in ("", " ")
+]
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(JOINTS), st.sampled_from(PARTS)), min_size=2, max_size=4))
+def test_a_cell_says_what_an_assumption_of_the_same_words_does(pieces: list[tuple[str, str]]) -> None:
+    cell = "b" + "".join(f"{joint}{part}" for joint, part in pieces)
+    table = parse(Source("a.rcs", f"table t {{\n| line | when ||\n|---|---||\n| 1 | {cell} ||\n}}\n"))
+    assumed = parse(Source("b.rcs", f"assume a : {cell}\n"))
+    assert isinstance(table, tree.File) == isinstance(assumed, tree.File)
+    if isinstance(table, tree.File) and isinstance(assumed, tree.File):
+        [declared], [claim] = table.declarations, assumed.declarations
+        assert isinstance(declared, tree.TableDecl)
+        assert isinstance(claim, tree.AssumeDecl)
+        [condition] = declared.rows[0].conditions
+        assert isinstance(condition, tree.Comparison)
+        assert condition.value == claim.condition
+
+
 def joined(condition: tree.Expr, many: int) -> list[tree.Expr]:
     """So many conditions that `and` joins."""
     if many == 1:

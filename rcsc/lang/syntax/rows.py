@@ -139,7 +139,11 @@ def stub_of(cell: Cell) -> Stub:
     return Stub(cell.part(*stub.span("name")), tuple(lines["above"]), tuple(lines["same"]))
 
 
-_JOINTS = re.compile(r"[\[({]|[\])}]|(?<![\w.@])(?:and|or|xor|implies|when)(?!\w)", re.ASCII)
+_JOINTS = re.compile(
+    r"[\[({]|[\])}]|(?<![\w.@])(?:and|or|xor|implies|when)(?!\w)|(?<!\w)\d\w*(?:and|or|xor|implies|when)",
+    re.ASCII,
+)
+"""Brackets, what joins conditions, and a number with such a word at its end, without a blank: `1or`."""
 
 
 def conjuncts(text: str) -> list[tuple[int, int]]:
@@ -148,8 +152,8 @@ def conjuncts(text: str) -> list[tuple[int, int]]:
     >>> text = "a = 1 and (b or c)"
     >>> [text[start:end] for start, end in conjuncts(text)]
     ['a = 1', '(b or c)']
-    >>> conjuncts("a and b or c"), conjuncts("a")
-    ([], [])
+    >>> conjuncts("a and b or c"), conjuncts("a and b = 1or c"), conjuncts("a")
+    ([], [], [])
     """
     depth, cuts = 0, [(0, 0)]
     for joint in _JOINTS.finditer(text):
