@@ -210,8 +210,8 @@ static void primitive_do_within(primitive_t *s, uint32_t v_at, double v_value)
 static void primitive_do_measure_length(primitive_t *s)
 {
     double v_square = 0.0;
-    double v_most = 0.0;
-    double v_root = 0.0;
+    double v_most = 1.0;
+    double v_root = 1.0;
     v_square = 0.0 + 0.0;
     v_most = 1.0 + 0.0;
     v_root = 1.0 + 0.0;

@@ -9,10 +9,12 @@ for each variable and no relation between two, and that knows nothing of the lin
 >>> Ranges().of(less), Ranges().where(Apply(Op.GT, (n, Literal(0, Int(0, 0))), Bool())).of(less)
 ((-1, 98), (0, 98))
 
-What is learned here must be no more than an analyser learns: too little costs a call that changes nothing.
+What is learned inside a procedure must be no more than an analyser learns: too little costs a call that changes nothing.
+What lines state (`at_procedures`) an analyser does not see: the C keeps an operand there where nothing else shows that an
+operation can be done.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
@@ -22,15 +24,20 @@ from rcsc.lang.model import (
     Apply,
     Assign,
     Call,
+    Default,
     Expr,
     Int,
+    Line,
     Literal,
     Local,
     Op,
+    ProcedureName,
+    Program,
     Read,
     ReadLocal,
     Real,
     Statement,
+    Table,
     ToLeaf,
     ToLocal,
 )
@@ -117,17 +124,62 @@ class Ranges:
     def without(self, body: Iterable[Statement]) -> "Ranges":
         """The ranges of what no statement of a body writes; a call may write any leaf."""
         inside = [*everything(body)]
-        calls = any(isinstance(statement, Call) for statement in inside)
         written = {str(name) for statement in inside for name in written_by(statement)}
         written |= {_LOCAL + name for statement in inside for name in _locals(statement)}
-        kept = (key for key in self.known if key.startswith(_LOCAL) or not calls)
-        return Ranges({key: self.known[key] for key in kept if key not in written})
+        if any(isinstance(statement, Call) for statement in inside):
+            written |= {key for key in self.known if not key.startswith(_LOCAL)}
+        return self.forgetting(written)
+
+    def forgetting(self, names: Collection[str]) -> "Ranges":
+        """The ranges of other variables."""
+        return Ranges({key: ends for key, ends in self.known.items() if key not in names})
 
     def joined(self, other: "Ranges") -> "Ranges":
         """The ranges where two ways meet."""
         both = self.known.keys() & other.known.keys()
         hulls = {key: (self.known[key], other.known[key]) for key in sorted(both)}
         return Ranges({key: (min(a, c), max(b, d)) for key, ((a, b), (c, d)) in hulls.items()})
+
+    def met(self, other: "Ranges") -> "Ranges":
+        """The ranges where both hold."""
+        both = {key: _met(ends, other.known.get(key, ends)) for key, ends in self.known.items()}
+        return Ranges({**other.known, **both})
+
+
+def at_line(table: Table, line: Line | Default, program: Program) -> Ranges:
+    """What a line states, before its actions."""
+    ranges = Ranges()
+    for test in line.tests if isinstance(line, Line) else ():
+        ranges = ranges.where(test.condition) if test is not None else ranges
+    leaf = program.line_leaves.get(table.name)
+    return ranges.forgetting({str(leaf)})
+
+
+def at_procedures(program: Program) -> Mapping[str, Ranges]:
+    """By procedure, what every line that calls it states of leaves that neither it nor an action before it writes."""
+    writes = {procedure.name: set(map(str, procedure.writes)) for procedure in program.procedures}
+    found: dict[str, Ranges] = {}
+
+    def called(name: str, ranges: Ranges) -> None:
+        own = ranges.forgetting(writes[ProcedureName(name)])
+        found[name] = found[name].joined(own) if name in found else own
+
+    for table in program.tables:
+        for line in (*table.lines, *((table.default,) if table.default else ())):
+            ranges = at_line(table, line, program)
+            for action in line.actions:
+                if isinstance(action.statement, Call):
+                    name = action.statement.procedure
+                    called(name, ranges)
+                    ranges = ranges.forgetting(writes[name])
+                else:
+                    ranges = ranges.without((action.statement,))
+    inside = [statement for procedure in program.procedures for statement in everything(procedure.body)]
+    others = [str(statement.procedure) for statement in inside if isinstance(statement, Call)]
+    others += [name for level in program.levels for name in (*level.preprocess, *level.postprocess)]
+    for other in others:
+        called(other, Ranges())
+    return found
 
 
 def _key(expr: Expr) -> str:

@@ -9,7 +9,7 @@ import re
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rcsc.emit.c.ctext import SHORT, c_type
+from rcsc.emit.c.ctext import DIVIDED, SHORT, c_type
 from rcsc.emit.c.helpers import HELD
 from rcsc.emit.identifiers import Names
 from rcsc.emit.plan import Cuts, Direct, Plan, Truth
@@ -94,6 +94,8 @@ class Reasons:
         for name, kind in SHORT.items():
             for op in ("abs", "min", "max"):
                 yield f"{p}_{op}_{name}", [Place("operator", f"{op} of {kind}")]
+            for division, called in DIVIDED.items():
+                yield f"{p}_{called}_{name}", [Place("operator", f"{division.value} of {kind}")]
 
     # --- what was missed ---
 
@@ -143,6 +145,9 @@ class Reasons:
         ):
             return MACHINE
         if function in self.held:
+            keys = self._keys(function)  # of a division: the sign of the divisor
+            if keys and point.text == "b > 0":
+                return self._reason(keys[0], truth)
             return "" if truth else PROVED
         table = self._table(function)
         if table is not None and (reason := self._of_table(table, point, truth)):

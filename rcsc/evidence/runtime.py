@@ -136,8 +136,12 @@ def _analyses(subject: Subject, title: str, *, defensive: bool) -> tuple[Analysi
         return (whole,)
     finite = _analysis(subject, f"{title}finite reals", defensive=defensive, finite=True)
     shown = {place.place for place in finite.properties if place.status in PROVED}
-    if all(place.verdict != "not shown" for place in finite.properties if place.kind == NUMBER):
-        shown |= {place.place for place in whole.properties if place.kind == NUMBER}
+    open_ = {place.place for place in finite.properties if place.verdict == "not shown"}
+    if not any(
+        kind == NUMBER for _, _, kind, _ in open_
+    ):  # then what EVA adds where it is in doubt is not asked there
+        asked = (place for place in whole.properties if place.kind in (NUMBER, "float_to_int"))
+        shown |= {place.place for place in asked} - open_
     places = tuple(
         replace(place, status=FINITE) if place.verdict == "not shown" and place.place in shown else place
         for place in whole.properties

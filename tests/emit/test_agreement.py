@@ -32,7 +32,17 @@ from rcsc.testing.executors.sessions import Seen
 from rcsc.testing.executors.symbols import symbols_of
 from rcsc.testing.executors.targets import is_matcher, targets
 from rcsc.testing.suite import SuiteOptions, run_suite
-from tests.support.programs.examples import EXTERN, FAULTED, LASTING, LOOKING_BACK, RICH, SHIPPED, STOPS
+from tests.support.programs.examples import (
+    EXTERN,
+    FAULTED,
+    LASTING,
+    LOOKING_BACK,
+    RELATED,
+    RICH,
+    SHIPPED,
+    STOPS,
+    WIDE,
+)
 from tests.support.programs.stages import emitted, program_of, proved_of, shipped, verdict_of
 
 pytestmark = pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
@@ -129,6 +139,15 @@ def test_all_executors_count_alike_how_long_conditions_hold() -> None:
     found, compared, sanitized = disagreements(program_of(LASTING))
     assert (found, sanitized) == ([], None)
     assert set(compared.lines["watch"]) >= {"long", "some", "short", "off"}
+
+
+@pytest.mark.parametrize("text", [RELATED, WIDE])
+def test_executors_agree_where_the_c_says_what_was_proved(text: str) -> None:
+    """What keeps a number where a proof has it changes none: on lines that the prover's own inputs take, too."""
+    found, compared, sanitized = disagreements(proved_of(text))
+    assert found == []
+    assert sanitized is None
+    assert compared.lines["t"]["1"] > 3
 
 
 def test_faults_of_every_kind_are_met(rich: Everything, extern: Everything) -> None:

@@ -12,7 +12,7 @@ from rcsc.evidence.kind import Subject
 from rcsc.host.tools import Absent
 from rcsc.testing.coverage.directed import Director
 from tests.evidence.subjects import EVERYTHING, subject_of
-from tests.support.programs.examples import EXTERN, LASTING, STOPS
+from tests.support.programs.examples import EXTERN, LASTING, RELATED, STOPS
 
 pytestmark = [pytest.mark.needs("clang-19", "llvm-cov-19"), pytest.mark.slow]
 
@@ -28,7 +28,7 @@ STAGED = [(GALLERY / name).read_text("utf-8") for name in ("plcopen_safety/guard
 """Tables that others follow, inputs that nothing can refuse, and invariants."""
 
 
-@pytest.mark.parametrize("text", [EVERYTHING, EXTERN, LASTING, STOPS, *STAGED])
+@pytest.mark.parametrize("text", [EVERYTHING, EXTERN, LASTING, STOPS, RELATED, *STAGED])
 def test_all_is_covered_or_out_of_reach(text: str) -> None:
     evidence = coverage.collect(subject_of(text))
     assert not evidence.missing

@@ -10,6 +10,7 @@ from rcsc.evidence import runtime
 from rcsc.evidence.kind import Evidence
 from rcsc.evidence.runtime import line_of
 from tests.evidence.subjects import EVERYTHING, subject_of
+from tests.support.programs.examples import RELATED, WIDE
 
 pytestmark = pytest.mark.needs("frama-c")
 
@@ -30,91 +31,35 @@ def test_every_access_index_and_boolean_is_shown() -> None:
     ]  # fmt: skip
 
 
-RELATIONS = """
-const most = 9223372036854775807
-input left : int 0 .. 2000
-input kept : int 1 .. 20
-input part : int 0 .. 500
-input turn : int -3 .. 3
-input load : real 0.0 .. 500.0
-input huge : int 0 .. most
-input huger : int 0 .. 18446744073709551615
-state share : int 0 .. 1000
-state at : int 0 .. 3
-state slack : real 0.0 .. 20.0
-state whole : int 0 .. 500
-state ring : array[4] of int -40 .. 40
-state sum : int 0 .. 90
-state long : int 0 .. most
-output go : bool safe false
-output seen : bool safe false
-
-procedure relate(room : int 1 .. 2000) {
-  local more : int 0 .. 500 := left - kept
-  share := 900 * more / part + room / room
-  ring[at + 1] := 40 / turn
-  slack := load - 480.0
-  whole := int(slack)
-  long := huge - 5
-  seen := huger - 1 > 5
-}
-
-procedure loop {
-  sum := 0
-  for k in 0 .. 3 {
-    local here : int -40 .. 40 := ring[k]
-    if here > 0 and sum < 50 { sum := sum + here }
-  }
-  if not (at = 0 or ring[at - 1] = 7) { at := at - 1 }
-  if at /= 3 { at := at + 1 } else { at := 0 }
-}
-
-table t {
-  | line | left - kept | left - kept - part | at  | turn | load    | huge - 5 | huger   || procedures          | go    |
-  | 1    | > 0         | <= 0              | < 3 | /= 0 | > 480.0 | >= 0     | <= most || relate(left - kept) | true  |
-  | 2    | DEFAULT     |                   |     |      |         |          |         || loop                | false |
-}
-
-level l {
-  period 10 [ms]
-  table t
-}
-"""
-"""Operations that are safe by what a line, or two variables together, say; and, in the other line, by what stands around them."""
-
-
-def test_what_a_line_or_two_variables_show_is_said_in_the_c_and_seen() -> None:
-    subject = subject_of(RELATIONS)
+@pytest.mark.parametrize(
+    ("text", "helpers"),
+    [
+        (RELATED, "atleast_u32 atmost_u32 within_i32 quotient_i32 atleast_f64 atleast_i64 atmost_u64"),
+        (WIDE, "atleast_f64 within_i64 within_f64 within_f32"),
+    ],
+)
+def test_what_a_line_or_two_variables_show_is_said_in_the_c_and_seen(text: str, helpers: str) -> None:
+    subject = subject_of(text)
     c = subject.files["c/probe.c"]
-    for helper in (
-        "atleast_u32",
-        "atmost_u32",
-        "within_i32",
-        "nonzero_i32",
-        "atleast_f64",
-        "atleast_i64",
-        "atmost_u64",
-    ):
-        assert f" probe_{helper}(" in c, helper
+    assert [helper for helper in helpers.split() if f" probe_{helper}(" not in c] == []
     evidence = runtime.collect(subject)
-    assert not evidence.shortfalls, evidence.shortfalls
-    relational = {"division_by_zero", "index_bound", "unsigned_downcast", "signed_downcast"}
-    assert relational <= classes(evidence, "shown")
-    assert "unsigned_downcast" in classes(evidence, "shown for finite reals")  # the whole part of a real
+    assert evidence.shortfalls == ()
+    assert {"division_by_zero", "unsigned_downcast"} <= classes(evidence, "shown")
+    assert "is_nan_or_infinite" in classes(evidence, "shown for finite reals")  # the whole part of a real
 
 
 def test_what_stands_around_an_operation_needs_no_word() -> None:
-    text = RELATIONS.replace("relate(left - kept) | true ", "loop | true ")
+    text = RELATED.replace("relate(left - kept) | true ", "loop | true ")
     before, _, after = text.partition("procedure relate")
     c = subject_of(before + after[after.index("procedure loop") :]).files["c/probe.c"]
     assert not [helper for helper in HELD if f"probe_{helper}_" in c]
 
 
 def test_every_word_that_is_lost_is_told() -> None:
-    c = subject_of(RELATIONS).files["c/probe.c"]
+    c = subject_of(RELATED).files["c/probe.c"]
     held = re.findall(rf"(probe_(?:{'|'.join(HELD)})_\w+\(.*\)\n{{\n    return) (.*);", c)
     evidence = runtime.collect(
-        subject_of(RELATIONS, *((f"{head} {value};", f"{head} a;") for head, value in held))
+        subject_of(RELATED, *((f"{head} {value};", f"{head} a;") for head, value in held))
     )
     told = {shortfall.what.split(": ")[1] for shortfall in evidence.shortfalls}
     assert told >= {

@@ -32,6 +32,7 @@ from rcsc.emit.c.symbols import symbols
 from rcsc.emit.code_tree import Invoke, read
 from rcsc.emit.identifiers import comment, failed_type, guard, names_in, types_header
 from rcsc.emit.plan import Plan
+from rcsc.emit.ranges import at_procedures
 from rcsc.emit.rendering import render
 
 
@@ -98,7 +99,7 @@ def _program(plan: Plan) -> CProgram:
     }
     names = names_in(plan)
     text = CText(names, parameters, failing(plan.program))
-    return CProgram(plan, names, text, digest(plan.program, names))
+    return CProgram(plan, names, text, digest(plan.program, names), at_procedures(plan.program))
 
 
 def outward(plan: Plan) -> Iterator[tuple[str, str]]:

@@ -1,6 +1,6 @@
 """What the C of one program is made with: its plan, its names, its expressions; and the pieces that several modules build."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.emit.c.ctext import CText
@@ -27,6 +27,7 @@ from rcsc.emit.code_tree import (
 )
 from rcsc.emit.identifiers import Names
 from rcsc.emit.plan import Plan
+from rcsc.emit.ranges import Ranges
 from rcsc.emit.translate import STATE
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
@@ -49,6 +50,7 @@ class CProgram:
         names: What everything is called.
         text: Expressions and statements.
         digest: What tells its states from those of other tables.
+        stated: By procedure, what the lines that run it state.
         classifiers: Functions that find the class of a value, as matching asks for them.
     """
 
@@ -56,6 +58,7 @@ class CProgram:
     names: Names
     text: CText
     digest: Digest
+    stated: Mapping[str, Ranges]
     classifiers: list[Function] = field(default_factory=list)
 
     @property

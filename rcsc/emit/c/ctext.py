@@ -10,6 +10,7 @@ stored has no -0.0.
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal, assert_never
 
 from rcsc.emit.code_tree import (
@@ -59,6 +60,8 @@ FLOATS = ("double", "float")
 LOGIC = frozenset({"&&", "||", "==", "!=", "<", "<=", ">", ">="})
 """Operators whose result is a truth value."""
 LEAVES = (model.Read, model.ReadLocal, model.Select)
+DIVIDED = {Op.DIV: "quotient", Op.MOD: "remainder"}
+"""Functions that divide by what is not 0, but negative or positive."""
 CALLED = {kind: short for short, kind in SHORT.items()}
 """The reverse."""
 
@@ -241,6 +244,25 @@ def _narrower(source: str, target: str) -> bool:
     )
 
 
+def _ends(number: Expr) -> Ends:
+    """The bounds of a number by its type."""
+    assert isinstance(number.type, Int | Real)
+    return number.type.low, number.type.high
+
+
+def _may_be_zero(ranges: Ranges, number: Expr) -> bool:
+    """Whether ranges alone leave it open that a number is 0."""
+    return all(low <= 0 <= high for low, high in (_ends(number), ranges.of(number)))
+
+
+def _within(ends: Ends, held: str) -> bool:
+    """Whether all between these ends are numbers of a type."""
+    if held in FLOATS:
+        return all(map(math.isfinite, ends))
+    low, high = type_bounds(held)
+    return low <= ends[0] and ends[1] <= high
+
+
 def _whole_ends(kind: Scalar, target: str) -> Ends:
     """The least and the greatest number of a kind that is no integer of which the whole part is of an integer type."""
     low, high = type_bounds(target)
@@ -269,6 +291,7 @@ class CText(Text):
     failing: frozenset[str] = frozenset()
     _nested: int = 0
     _ranges: Ranges = field(default_factory=Ranges)
+    _stated: Ranges = field(default_factory=Ranges)
 
     @property
     def faultless(self) -> Code:
@@ -369,7 +392,7 @@ class CText(Text):
             low, high = type_bounds(target)
             least, most = _bounds((*expr.args, expr))
             if low <= least and most <= high:
-                return self._operation(expr.op, self._arguments(expr, target), target)
+                return self._computed(expr, target)
         return self.converted(self.expr(expr), carried(expr), target)
 
     def _unseen(self, expr: Expr, ends: Ends) -> Ends | None:
@@ -388,8 +411,7 @@ class CText(Text):
 
     def _held(self, expr: Expr, held: str, ends: Ends) -> Code:
         """A number in type `held`, kept between the ends by a call that changes nothing that was proved to lie there."""
-        code = self.expr(expr) if held in FLOATS else self.in_type(expr, held)
-        unseen = self._unseen(expr, ends)
+        code, unseen = self._given(expr, held), self._unseen(expr, ends)
         if unseen is None:
             return code
         below, above = unseen[0] < ends[0], unseen[1] > ends[1]
@@ -397,21 +419,44 @@ class CText(Text):
         inside = [Constant(end, held) for end, passed in zip(ends, (below, above), strict=True) if passed]
         return self._helper(f"{name}_{CALLED[held]}", (code, *inside), held)
 
+    def _computed(self, expr: model.Apply, held: str) -> Code:
+        """An operation on numbers, in type `held`; a divisor is none that can be 0."""
+        op, args = expr.op, self._arguments(expr, held)
+        assert is_arithmetic(op)
+        if op in DIVIDED and isinstance(expr.type, Int):
+            low, high = self._proved.of(expr.args[1])
+            if low < 0 < high:
+                return self._helper(f"{DIVIDED[op]}_{CALLED[held]}", args, held)
+        return self._operation(op, args, held)
+
     def _arguments(self, expr: model.Apply, held: str) -> tuple[Code, ...]:
-        """The operands of an operation on whole numbers, in the type in which it is done; a divisor is none that can be 0."""
-        if expr.op not in (Op.DIV, Op.MOD):
-            return tuple(self.in_type(arg, held) for arg in expr.args)
-        whole, divisor = expr.args
-        low, high = self._ranges.of(divisor)
-        least, most = type_bounds(held)
-        given = self.in_type(divisor, held)
-        if low == 0 < high:
-            given = self._held(divisor, held, (1, most))
-        elif low < 0 == high:
-            given = self._held(divisor, held, (least, -1))
-        elif low < 0 < high:
-            given = self._helper(f"nonzero_{CALLED[held]}", (given,), held)
-        return self.in_type(whole, held), given
+        """The operands of an operation on numbers.
+
+        What the lines state of them is said where without it the result could be no number of the type, or the divisor 0.
+        """
+        ends: list[Ends | None] = [None for _ in expr.args]
+        proved, within = self._proved, partial(_within, held=held)
+        if not within(_ends(expr)) and not within(self._ranges.of(expr)) and within(proved.of(expr)):
+            ends = [proved.of(arg) for arg in expr.args]
+        if (
+            expr.op in (Op.DIV, Op.MOD)
+            and isinstance(expr.type, Int)
+            and _may_be_zero(self._ranges, expr.args[1])
+        ):
+            low, high = proved.of(expr.args[1])
+            ends[1] = low + (low == 0), high - (high == 0)
+        sides = zip(expr.args, ends, strict=True)
+        return tuple(
+            self._given(arg, held) if side is None else self._held(arg, held, side) for arg, side in sides
+        )
+
+    def _given(self, expr: Expr, held: str) -> Code:
+        return self.expr(expr) if held in FLOATS else self.in_type(expr, held)
+
+    @property
+    def _proved(self) -> Ranges:
+        """The ranges here, with what the lines state."""
+        return self._ranges.met(self._stated)
 
     def _element(self, leaves: Sequence[str], kind: Scalar, index: Expr | None = None) -> Place:
         """An array element by a computed index, which is left out where it can only be 0."""
@@ -448,15 +493,15 @@ class CText(Text):
             if isinstance(args[0].type, Bool):
                 return Choice(given, Constant(1, "uint32_t"), Constant(0, "uint32_t"))
             source, target = carried(args[0]), carried(expr)
-            if op is Op.TO_INT and self._unseen(expr, type_bounds(target)) is not None:
+            if op is Op.TO_INT and not _within(_ends(expr), target):
                 given = self._held(args[0], source, _whole_ends(args[0].type, target))
             return self.converted(given, source, target)
-        held = carried(expr)
-        if isinstance(expr.type, Int):
-            return self._operation(op, self._arguments(expr, held), held)
-        return self._operation(op, self._given(expr) if is_logic(op) else tuple(map(self.expr, args)), held)
+        if is_arithmetic(op):
+            return self._computed(expr, carried(expr))
+        operands = self._in_turn(expr) if is_logic(op) else tuple(map(self.expr, args))
+        return self._operation(op, operands, "")
 
-    def _given(self, expr: model.Apply) -> tuple[Code, ...]:
+    def _in_turn(self, expr: model.Apply) -> tuple[Code, ...]:
         """The operands of a truth function, of which the second is looked at where the first does not decide."""
         (first, second), before = expr.args, self._ranges
         given = self.expr(first)
@@ -536,11 +581,16 @@ class CText(Text):
 
     # --- statements ---
 
-    def body(self, body: Sequence[model.Statement]) -> Body:
-        """The statements of a procedure or a line, before which nothing is known but what is declared."""
-        self._ranges = Ranges()
+    def body(self, body: Sequence[model.Statement], stated: Ranges) -> Body:
+        """The statements of a procedure or a line.
+
+        Args:
+            body: The statements.
+            stated: What lines state of leaves that the body does not write.
+        """
+        self._ranges, self._stated = Ranges(), stated
         done = self.block(body)
-        self._ranges = Ranges()
+        self._ranges = self._stated = Ranges()
         return done
 
     def block(self, body: Sequence[model.Statement]) -> Body:
@@ -563,11 +613,17 @@ class CText(Text):
         """What must hold in a loop that it goes on."""
         return (self.faultless,) if self._may_fail(loop) else ()
 
+    def beginning(self, kind: Scalar) -> Code:
+        """What a local begins with, which nothing reads: zero, or the number of its type that is nearest to it."""
+        nearest = min(max(0, kind.low), kind.high) if isinstance(kind, Int | Real) else 0
+        return self.constant(kind, nearest, local_type(kind))
+
     def statement(self, statement: model.Statement) -> Iterator[Stmt]:
-        """A statement; a local begins as zero, and is an integer of 64 bits."""
+        """A statement; a whole number of a local is one of at least 32 bits."""
         match statement:
             case model.Local(name=name, type=kind, value=None):
-                yield Set(local(name), self.constant(kind, 0, local_type(kind)))
+                yield Set(local(name), self.beginning(kind))
+                self._ranges = self._ranges.without((statement,))
             case model.For(low=low, high=high) if low > high:
                 return
             case model.For(name=name, low=low, high=high, body=body):

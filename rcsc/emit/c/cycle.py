@@ -40,6 +40,7 @@ from rcsc.emit.code_tree import (
 )
 from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment, failed_type
 from rcsc.emit.plan import PlanTable, answering
+from rcsc.emit.ranges import at_line
 from rcsc.emit.translate import FAULT, FAULT_AT, LINE, STATE
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
@@ -111,9 +112,11 @@ def _told(c: CProgram, place: int, stops: tuple[int, ...]) -> Body:
 def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
     """Finds the line and runs its actions."""
     cases: list[Stmt] = []
-    named = zip(c.names.lines[table.table.name], table.lines, strict=True)
-    for number, (line_name, line) in enumerate(named, 1):
-        body = c.text.body([action.statement for action in line.actions])
+    rows = (*table.table.lines, *((table.table.default,) if table.table.default else ()))
+    named = zip(c.names.lines[table.table.name], table.lines, rows, strict=True)
+    for number, (line_name, line, row) in enumerate(named, 1):
+        actions = [action.statement for action in line.actions]
+        body = c.text.body(actions, at_line(table.table, row, c.program).without(actions))
         head = (f"case {line_name}: /* {comment(line.told)} */",)
         cases.append(Frame(head, (*_kept(c, table, number), *body, Line("break;"))))
     none, several = (Set(FAULT, fault_name(c, fault)) for fault in (Fault.NO_LINE, Fault.SEVERAL_LINES))

@@ -22,21 +22,25 @@ HELD: Mapping[str, str] = {
     "atleast": "A value that was proved to be no less than this: it is as it was.",
     "atmost": "A value that was proved to be no more than this: it is as it was.",
     "within": "A value that was proved to lie between these two: it is as it was.",
-    "nonzero": "A value that was proved not to be 0: it is as it was.",
+    "quotient": "The quotient by a number that was proved not to be 0.",
+    "remainder": "The remainder of a division by a number that was proved not to be 0.",
 }
-"""What is said of the functions that change nothing, and without which an analyser of ranges could not follow a proof."""
+"""What is said of functions without which an analyser of ranges could not follow a proof; they change no value that was proved."""
 
 
 def _held(program: str, op: str, short: str) -> Function:
-    """The function that keeps a number where it was proved to lie; the outcome that changes one is never taken."""
-    kind, a, one = SHORT[short], Name("a"), Constant(1, SHORT[short])
-    least, most = Name("least"), Name("most")
+    """The function that keeps a number where it was proved to lie; the last outcome would change it, and is never taken."""
+    kind = SHORT[short]
+    a, b, least, most = map(Name, ("a", "b", "least", "most"))
+    positive, negative = (infix(sign, b, Constant(0, kind)) for sign in (">", "<"))
+    below = Choice(negative, b, Constant(-1, kind))
     from_below, from_above = (infix(sign, a, end) for sign, end in ((">=", least), ("<=", most)))
     values = {
         "atleast": ((least,), Choice(from_below, a, least)),
         "atmost": ((most,), Choice(from_above, a, most)),
         "within": ((least, most), Choice(from_below, Choice(from_above, a, most), least)),
-        "nonzero": ((), Choice(infix("!=", a, Constant(0, kind)), a, one)),
+        "quotient": ((b,), Choice(positive, infix("/", a, b), infix("/", a, below))),
+        "remainder": ((b,), Choice(positive, infix("%", a, b), infix("%", a, below))),
     }
     ends, value = values[op]
     params = ", ".join(f"{kind} {name.text}" for name in (a, *ends))

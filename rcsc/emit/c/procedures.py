@@ -25,11 +25,8 @@ def procedure_function(c: CProgram, procedure: Procedure) -> Function:
 
 def _body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:
     kinds = dict(locals_of(procedure))
-    yield from (
-        Let(_held(c, kind), local_word(name), c.text.constant(kind, 0, local_type(kind)))
-        for name, kind in kinds.items()
-    )
-    body = c.text.body(procedure.body)
+    yield from (Let(_held(c, kind), local_word(name), c.text.beginning(kind)) for name, kind in kinds.items())
+    body = c.text.body(procedure.body, c.stated[procedure.name])
     used = {code.text for code in read(body) if isinstance(code, Name)}
     named = (local(name) for name in (*kinds, *(param.name for param in procedure.params)))
     yield from (

@@ -101,10 +101,9 @@ class Watched(Run):
                 self.met.setdefault(decision, []).append(self.now.pop(decision, {}))
                 return value
             case Compares(decision=decision, op=plain, test=test):
-                sides = [self.evaluate(arg) for arg in expr.args]
-                zero = values.constant(sides[0].kind, 0)
-                left, right = (sides[0], zero) if len(sides) == 1 else (sides[1], sides[0])
-                compared = values.compare(test, left, right)  # type: ignore[arg-type]  # a comparison
+                given = [self.evaluate(arg) for arg in expr.args]
+                sides = op.sides(given, values.constant(given[-1].kind, 0))
+                compared = values.compare(test, *sides)  # type: ignore[arg-type]  # a comparison
                 self.met.setdefault(decision, []).append({0: (self.path, compared)})
                 return Run.evaluate(self, replace(expr, op=plain))
         return Run.evaluate(self, expr)

@@ -6,10 +6,10 @@ it runs any other. A *decision* is a truth made of conditions, as a compiler see
 counts where it chooses what is done.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
-from typing import TypeAlias, cast
+from typing import TypeAlias, TypeVar, cast
 
 from rcsc.emit.c.ctext import carried
 from rcsc.lang.expressions.words import mask_of
@@ -24,6 +24,7 @@ from rcsc.lang.model import (
     Expr,
     For,
     If,
+    Int,
     Invariant,
     Literal,
     Local,
@@ -41,6 +42,7 @@ from rcsc.lang.model import (
 from rcsc.lang.operator_table import Arithmetic, Operator
 from rcsc.testing.inputs.condition_text import words
 
+Side = TypeVar("Side")
 MOST_WAYS = 5000
 """Ways of a decision that are listed."""
 
@@ -123,7 +125,7 @@ class End:
 
 @dataclass(eq=False, frozen=True, slots=True)
 class Compares:
-    """A mark in place of `abs`, `min` or `max`: the small function of the C compares."""
+    """A mark in place of `abs`, `min`, `max` or a division: the small function of the C compares."""
 
     decision: Decision
     op: Arithmetic
@@ -131,12 +133,15 @@ class Compares:
 
     def meaning(self, *operands: float) -> Value:
         """Note the comparison, and give the value."""
-        left, right = (operands[0], 0) if len(operands) == 1 else (operands[1], operands[0])
-        truth = bool(self.test.meaning(left, right))
+        truth = bool(self.test.meaning(*self.sides(operands, 0)))
         self.decision.now[0] = truth
         self.decision.end(truth)
         value: Value = self.op.meaning(*operands)
         return value
+
+    def sides(self, operands: Sequence[Side], zero: Side) -> tuple[Side, Side]:
+        """Return what is compared: the last operand, with the first or with 0."""
+        return operands[-1], operands[0] if self.op in (Op.MIN, Op.MAX) else zero
 
 
 Mark: TypeAlias = Condition | End | Compares
@@ -214,6 +219,9 @@ class _Marker:
                 mark = self.operator(op, expr)
                 given = tuple(map(self.expr, args))
                 return expr if mark is None else replace(expr, op=cast(Operator, mark), args=given)
+            case Apply(op=Op.DIV | Op.MOD as op, args=(whole, divisor)) if _either_sign(divisor):
+                mark, given = self.operator(op, expr), (self.expr(whole), self.expr(divisor))
+                return replace(expr, op=cast(Operator, mark), args=given)
             case Apply(op=Op.TO_INT, args=(arg,)) if isinstance(arg.type, Bool):
                 return replace(expr, args=(self.expr(arg, chooses=True),))
             case Apply(args=args) if mask_of(expr) is None:
@@ -229,8 +237,8 @@ class _Marker:
         test = {Op.ABS: Op.LE if held in ("double", "float") else Op.LT, Op.MIN: Op.LT}.get(op, Op.GT)
         name = f"{op.value} of {held}"
         if name not in self.operators:
-            sides = "operand", "0"
-            left, right = sides if op is Op.ABS else ("second", "first")
+            left = "operand" if op is Op.ABS else "second"
+            right = "first" if op in (Op.MIN, Op.MAX) else "0"
             own = Decision(Place("operator", name), 0, (f"{left} {test.value} {right}",))
             self.operators[name] = own
         return Compares(self.operators[name], op, test)
@@ -396,6 +404,11 @@ def _negations(expr: Expr, *, opposite: bool) -> Iterator[bool]:
         yield from (False for _ in _equals(expr))
     else:
         yield opposite
+
+
+def _either_sign(divisor: Expr) -> bool:
+    """Whether a divisor may be negative or positive by its type: then a small function of the C divides."""
+    return isinstance(divisor.type, Int) and divisor.type.low < 0 < divisor.type.high
 
 
 def _is_joint(expr: Apply) -> bool:

@@ -316,3 +316,107 @@ table mod {
 level whole { period 40 [ms] preprocess first table by b { true : mod_ false : mod } postprocess colours }
 """
 """All of the language, with `real` or `single` for `{real}`."""
+
+RELATED = """
+const most = 9223372036854775807
+input left : int 0 .. 600
+input kept : int 1 .. 20
+input part : int 0 .. 500
+input turn : int -3 .. 3
+input load : real 0.0 .. 500.0
+input huge : int 0 .. most
+input huger : int 0 .. 18446744073709551615
+state share : int 0 .. 1000
+state at : int 0 .. 3
+state slack : real 0.0 .. 400.0
+state whole : int 0 .. 500
+state ring : array[4] of int -40 .. 40
+state sum : int 0 .. 90
+state long : int 0 .. most
+output go : bool safe false
+output seen : bool safe false
+
+procedure relate(room : int 1 .. 600) {
+  local more : int 0 .. 500 := left - kept
+  share := 900 * more / part + room / room
+  ring[at + 1] := 40 / turn
+  slack := load - 100.0
+  whole := int(slack)
+  long := huge - 5
+  seen := huger - 1 > 5
+}
+
+procedure loop {
+  sum := 0
+  for k in 0 .. 3 {
+    local here : int -40 .. 40 := ring[k]
+    if here > 0 and sum < 50 { sum := sum + here }
+  }
+  if not (at = 0 or ring[at - 1] = 7) { at := at - 1 }
+  if at /= 3 { at := at + 1 } else { at := 0 }
+}
+
+table t {
+  | line | left - kept | left - kept - part | at  | turn | load    | huge - 5 | huger   || procedures          | go    |
+  | 1    | > 0         | <= 0              | < 3 | /= 0 | > 100.0 | >= 0     | <= most || relate(left - kept) | true  |
+  | 2    | DEFAULT     |                   |     |      |         |          |         || loop                | false |
+}
+
+level l {
+  period 10 [ms]
+  table t
+}
+"""
+"""Operations that are safe by what a line, or two variables together, say; and, in the other line, by what stands around them."""
+
+WIDE = """
+const most = 9223372036854775807
+const least = -9223372036854775808
+input a : int least .. most
+input b : int least .. most
+input d : int -5 .. 5
+input u : int 0 .. 18446744073709551615
+input x : real -1e300 .. 1e300
+input y : real 0.0 .. 10.0
+input z : single -1e30 .. 1e30
+state sum : int least .. most
+state quotient : int least .. most
+state product : int least .. most
+state size : int 0 .. most
+state negative : int least .. most
+state double : int 0 .. 18446744073709551615
+state whole : int least .. most
+state share : real 0.0 .. 20.0
+state square : single 0.0 .. 100.0
+output go : bool safe false
+
+procedure relate {
+  sum := a + b
+  product := a * d
+  quotient := a / d
+  size := abs(a)
+  negative := -a
+  double := u + u
+  whole := int(x * 2.0)
+  share := 10.0 / y
+  square := z * z
+}
+
+procedure rest {
+  local part : int 1 .. 5
+  if d > 0 { part := d }
+  if d > 0 { sum := 10 / part } else { sum := 0 }
+}
+
+table t {
+  | line | a             | b             | d   | u      | x           | y       | z             || procedures | go    |
+  | 1    | -1000 .. 1000 | -1000 .. 1000 | > 0 | < 1000 | -5.0 .. 5.0 | > 1.0   | -10.0 .. 10.0 || relate     | true  |
+  | 2    | DEFAULT       |               |     |        |             |         |               || rest       | false |
+}
+
+level l {
+  period 10 [ms]
+  table t
+}
+"""
+"""Operations on the widest numbers that are safe by what a line states of each, and a local that is read only where it was assigned."""
