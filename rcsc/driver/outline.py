@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from rcsc.compose.contract.transition import TransitionSystem
     from rcsc.lang.model import Program, Table
+    from rcsc.lang.project import Loaded
 
 
 def known(system: Path, cache: Cache) -> KnownSystem | None:
@@ -74,6 +75,49 @@ def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] |
     except (BadDescription, NoProgramError):
         return None
     return (systems, looked_at) if looked_at[str(system)] == digest_at(str(system)) else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Said:
+    """What is said of a system that is proved, and what stood at every place that was looked at for it."""
+
+    lines: tuple[str, ...]
+    looked_at: dict[str, str]
+
+
+def recall_lines(cache: Cache, system: Path, key: tuple[str, ...]) -> tuple[str, ...] | None:
+    """Return what is said of the system as its files stand, where that was kept under this key.
+
+    Raises:
+        BadDescription: The description says something that cannot be, by now.
+    """
+    kept = cache.load(_Said, *key)
+    if kept is None or as_before(kept.looked_at) is None:
+        return None
+    description(system)  # it names files that are no part of the proof, and has to be in order
+    return kept.lines
+
+
+def keep_lines(
+    cache: Cache,
+    system: Path,
+    key: tuple[str, ...],
+    lines: tuple[str, ...],
+    stood: str,
+    loaded: "Mapping[str, Loaded]",
+) -> None:
+    """Keep what is said of a system, unless one of its files has changed meanwhile.
+
+    The description stood as the digest says before it was read; the programs are by name as they were loaded.
+    """
+    looked_at = {str(system): stood}
+    for program, files in loaded.items():
+        known = digests(files)
+        if known is None:
+            return
+        looked_at |= {str(path): digest_at(str(path)) for path in places(system, program)} | known
+    if digest_at(str(system)) == stood:
+        cache.store(_Said(lines, looked_at), *key)
 
 
 def outline(systems: "Mapping[str, TransitionSystem]") -> SystemOutline:

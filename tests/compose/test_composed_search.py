@@ -55,8 +55,10 @@ from tests.support.programs.systems import (
     LITTLE,
     ORDER_AFTER_ORDER,
     SYSTEM,
+    counting,
     proved_level,
     small_level,
+    small_system,
     small_text,
 )
 from tests.support.programs.texts import edited
@@ -687,6 +689,38 @@ def test_nothing_is_believed_of_candidates(value: int, cache: Cache) -> None:
     again = prove_level(ts, LITTLE, cache)
     assert concluded(again) == concluded(proof)
     assert len(set(again.clauses) & set(wrong)) < len(wrong) / 2
+
+
+def test_what_is_known_is_said_again_while_nothing_changes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No proof is looked for. Every file of the system counts, and every option that says what is proved or printed."""
+    path = small_system(tmp_path, lower=counting(3))
+    asked = ["prove", str(path), "--trace", "0"]
+    assert run(asked) == 0
+    first = re.sub(r"[\d.]+ s\b", "", capsys.readouterr().out)
+    monkeypatch.setattr("rcsc.commands.systems.proving.proved", lambda *_: 7)
+    assert run(asked) == 0
+    again = re.sub(r"[\d.]+ s\b", "", capsys.readouterr().out)
+    assert again.replace(", by an earlier run", "") == first
+    for more in (
+        ["--level", "upper"],
+        ["--strict"],
+        ["--steps", "3"],
+        ["--json"],
+        ["--no-cache"],
+        ["--first-match"],
+    ):
+        assert run([*asked, *more]) == 7
+    for file in (path, *path.parent.glob("*.rcs")):
+        text = file.read_text(encoding="utf-8")
+        file.write_text(f"{text}\n", encoding="utf-8")
+        assert run(asked) == 7
+        file.write_text(text, encoding="utf-8")
+        assert run(asked) == 0
+    for entry in (tmp_path / ".rcsc-cache").glob("??/*.json"):
+        entry.write_bytes(entry.read_bytes().replace(b"proved", b"Proved"))
+    assert run(asked) == 7
 
 
 def test_a_level_is_kept_before_the_next_one_is_begun(cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,6 @@ import click
 
 from rcsc.commands.shared.show import Output, show
 from rcsc.diagnostics.coded import CodedError
-from rcsc.driver.compile import compile_system
 from rcsc.host.described import nearest
 from rcsc.host.files.read import MOST_TOML_BYTES, Malformed, text, toml_of
 
@@ -124,6 +123,8 @@ def _is_script(path: Path) -> bool:
 
 def compiled(path: Path, quiet: bool) -> bool:
     """Prove and compile what changed, and show findings; return whether it was in order."""
+    from rcsc.driver.compile import compile_system  # only here: what is known already is printed without
+
     conclusion = compile_system(path)
     if conclusion.report.failed:
         show(conclusion.report, "compile", Output())

@@ -82,10 +82,21 @@ def transition_systems(path: Path) -> dict[str, TransitionSystem]:
         BadDescription: The description says something that cannot be.
         NoProgramError: The tables of a level cannot be read.
     """
+    return read_systems(path)[0]
+
+
+def read_systems(path: Path) -> tuple[dict[str, TransitionSystem], dict[str, Loaded]]:
+    """Make the transition systems of `transition_systems`; with the files that each program was read from, by its name.
+
+    Raises:
+        BadDescription: The description says something that cannot be.
+        NoProgramError: The tables of a level cannot be read.
+    """
     system = description(path)
     read = {spec.name: checked(path, spec.program) for spec in system.levels}
-    systems = transition_systems_of(system, {name: program for name, (program, _) in read.items()})
-    return {name: replace_safety(ts, read[name][1]) for name, ts in systems.items()}
+    systems = transition_systems_of(system, {name: program for name, (program, _, _) in read.items()})
+    loaded = {spec.program: read[spec.name][2] for spec in system.levels}
+    return {name: replace_safety(ts, read[name][1]) for name, ts in systems.items()}, loaded
 
 
 def transition_systems_of(
@@ -143,8 +154,8 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
     return replace(mine, above=replace(above, numbered=kept))
 
 
-def checked(path: Path, name: str) -> tuple[Program, Safety]:
-    """Return the program of a level, and why a cycle as nodes is what its executors do.
+def checked(path: Path, name: str) -> tuple[Program, Safety, Loaded]:
+    """Return the program of a level, why a cycle as nodes is what its executors do, and the files that it was read from.
 
     The two are the same only if every value stays in its range and every operation is defined. That is shown of the program alone,
     if need be under its invariants, which are obligations here. An assumption needed for it stops the cycle in which it fails.
@@ -155,13 +166,13 @@ def checked(path: Path, name: str) -> tuple[Program, Safety]:
     from rcsc.procedures.obligations import Obligations
     from rcsc.solvers.options import Options
 
-    program = loaded_program(path, name)[0]
+    program, loaded = loaded_program(path, name)
     owed = Obligations(program, Options())
     diagnostics = owed.prove(program.tables)
     for diagnostic in diagnostics:
         if diagnostic.code not in SHOWN_HERE:
             raise NoProgramError(f"{diagnostic.message}: see `rcsc check {diagnostic.primary.span.file}`")
-    return with_stops(program, owed.stops), _safety(program, owed.stops, diagnostics)
+    return with_stops(program, owed.stops), _safety(program, owed.stops, diagnostics), loaded
 
 
 def _safety(
