@@ -1,6 +1,6 @@
 """The commands about systems of levels: each takes a description, or what a run of a system left.
 
-Each module has its click command under the name `command`. Without a description `system.toml` is meant, here or in
+Each module of a command has it under the name `command`. Without a description `system.toml` is meant, here or in
 `tables/`:
 
 >>> from rcsc.commands.systems.prove import command
@@ -10,7 +10,7 @@ Each module has its click command under the name `command`. Without a descriptio
 Nothing here is trusted for a verdict. What it costs: what moves a model imports MuJoCo, and what reads or writes logs
 their package; each says which extra brings it.
 
-Modules: `prove` proves the levels together, and `explained` says what it does not prove; `run` runs a system with
-its plant, `campaign` many episodes of it, `shell` puts a system under somebody's hands; `log` says what a recorded run did
-and `replay` runs it again; `db` is about the cell's database.
+Modules: `prove` says again what is known of the levels together, else `proving` proves them and `explained` says what
+it does not prove; `run` runs a system with its plant, `campaign` many episodes of it, `shell` puts a system under
+somebody's hands; `log` says what a recorded run did and `replay` runs it again; `db` is about the cell's database.
 """
