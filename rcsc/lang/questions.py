@@ -1,18 +1,16 @@
 """A region's question as conditions of the model: is there an input at which not one line holds?
 
-In: bounds on forms (by the names of their terms), and lines. Out: expressions whose conjunction
+In: bounds on forms, and lines. Out: expressions whose conjunction
 is to be refuted. The checker of certificates states the same question by itself (`certify.table`).
 
 A bound that no condition can say (a distance between two doubles, in ranks) is left out: the
 question then covers more than the region, so that a refutation still stands.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import reduce
 from itertools import combinations
 
-from rcsc.lang.leaves import parts
-from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     Among,
     Apply,
@@ -23,7 +21,6 @@ from rcsc.lang.model import (
     Literal,
     Op,
     Program,
-    Read,
     Real,
     Table,
     key_bounds,
@@ -37,7 +34,7 @@ def question(
     program: Program,
     table: Table,
     assumptions: Sequence[str],
-    bounds: Mapping[tuple[tuple[str, int], ...], tuple[int, int]],
+    bounds: Iterable[tuple[list[tuple[Expr, int]], int, int]],
     candidates: Sequence[int],
 ) -> list[Expr]:
     """Conditions that together say: in the region, under the assumptions, it goes wrong.
@@ -46,14 +43,12 @@ def question(
         program: Where the assumptions are declared.
         table: Whose lines.
         assumptions: Names of those that may be used.
-        bounds: The region.
+        bounds: The region: sums of terms with factors, each with its least and its greatest key.
         candidates: Positions of the lines that may hold there.
     """
-    terms = {spelled(term): term for condition in _conditions(program, table) for term in parts(condition)}
-    terms |= {str(v.name): Read(v.name, v.type) for v in program.variables}
     asked = [a.condition for a in program.assumptions if a.name in assumptions]
-    for form, (low, high) in bounds.items():
-        asked += _within([(terms[name], k) for name, k in form], low, high)
+    for terms, low, high in bounds:
+        asked += _within(terms, low, high)
     return [*asked, fault(table, candidates)]
 
 
@@ -83,12 +78,6 @@ def disjunction(conditions: Iterable[Expr]) -> Expr:
 def negation(condition: Expr) -> Expr:
     """Negate it."""
     return Apply(Op.NOT, (condition,), Bool())
-
-
-def _conditions(program: Program, table: Table) -> Iterator[Expr]:
-    distinct = {id(test): test for line in table.lines for test in line.tests if test is not None}
-    yield from (test.condition for test in distinct.values() if test.box is None)
-    yield from (a.condition for a in program.assumptions if a.name in table.assumptions)
 
 
 def _within(terms: list[tuple[Expr, int]], low: int, high: int) -> list[Expr]:

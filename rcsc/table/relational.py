@@ -32,8 +32,8 @@ from rcsc.symbolic import trial
 from rcsc.symbolic.encode import encode
 from rcsc.table.certificate import must_cover, tree_certificate
 from rcsc.table.confirm import TableSolver, shown
-from rcsc.table.regions.atoms import Formula, Universe, assumptions_of, lines_of, some
-from rcsc.table.regions.least import find, inside, least, negated, whole, widest
+from rcsc.table.regions.atoms import Formula, Universe, assumptions_of, every, lines_of, some
+from rcsc.table.regions.least import find, inside, least, negated, never, whole, widest
 from rcsc.table.regions.region import Bounds, NoWitness, Point, Question, Rests, Search
 from rcsc.table.regions.splitting import Tree
 from rcsc.table.verdict import (
@@ -234,10 +234,10 @@ class _Decision:
         if len(asked.candidates) > _MOST_CANDIDATES or smt.spent():
             return NoWitness.UNKNOWN
         columns, forms = self.universe.columns, self.universe.forms
-        bounds = {
-            tuple((columns[column].name, k) for column, k in forms[form]): (low, high)
+        bounds = (
+            ([(columns[column].term, k) for column, k in forms[form]], low, high)
             for form, low, high in asked.bounds
-        }
+        )
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
         for snapshot in self.tried:
             if all(fold(condition, snapshot) for condition in conditions):
@@ -360,12 +360,10 @@ class _Decision:
 
         Its ends are values that the assumptions allow: where they allow nothing, nothing holds.
         """
-        never = [list(formulas) for formulas in wrong]
+        unwanted = [every(formulas) for formulas in wrong]
 
-        def holds(box: list[Formula]) -> bool:
-            return all(
-                find(self.universe, [*box, *self.assumed, *formulas]) is NoWitness.NONE for formulas in never
-            )
+        def holds(box: Mapping[int, Bounds]) -> bool:
+            return all(self.excluded(box, formula) for formula in unwanted)
 
         box = widest(self.universe, point, self.columns, holds)
         if self.assumed:
@@ -376,14 +374,24 @@ class _Decision:
             if (bounds := box[column]) != self._extent(column)
         }
 
+    def excluded(self, box: Mapping[int, Bounds], formula: Formula) -> bool:
+        """Whether, under the assumptions, a formula holds nowhere in a box; first by the ends of its forms."""
+        told = never(self.universe, box, formula)
+        if told is None or (not told and self.assumed):
+            return self.empty(box, formula)
+        return told
+
+    def empty(self, box: Mapping[int, Bounds], *formulas: Formula) -> bool:
+        """Whether no point of a box meets the assumptions and the formulas."""
+        atoms = [self.universe.atom(self.universe.single[c], (bounds,)) for c, bounds in box.items()]
+        return find(self.universe, [*atoms, *self.assumed, *formulas]) is NoWitness.NONE
+
     def _possible(self, box: Mapping[int, Bounds], point: Point) -> dict[int, Bounds]:
         """The box without values at its ends with which no input in it meets the assumptions; the point meets them."""
         narrow = dict(box)
 
         def meets(column: int, low: int, high: int) -> bool:
-            inside_ = {**narrow, column: (low, high)}
-            atoms = [self.universe.atom(self.universe.single[c], (bounds,)) for c, bounds in inside_.items()]
-            return find(self.universe, [*atoms, *self.assumed]) is not NoWitness.NONE
+            return not self.empty({**narrow, column: (low, high)})
 
         for column, (low, high) in box.items():
             at = point[column]

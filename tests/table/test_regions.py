@@ -3,7 +3,7 @@
 import itertools
 import operator
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import reduce
 
@@ -43,11 +43,13 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
+from rcsc.table.decide import prove_table
 from rcsc.table.regions import splitting
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
-from rcsc.table.regions.least import find, least, negated, whole, widest
+from rcsc.table.regions.least import find, least, negated, never, whole, widest
 from rcsc.table.regions.linear import Simplex, integer_point
 from rcsc.table.regions.region import (
+    Bounds,
     Counted,
     Empty,
     Node,
@@ -59,8 +61,10 @@ from rcsc.table.regions.region import (
     Split,
 )
 from rcsc.table.regions.splitting import Tree
+from rcsc.table.verdict import Overlap
+from tests.bench import families
+from tests.support.programs.stages import BOXES, verdict_of
 from tests.support.programs.stages import program_of as compiled
-from tests.support.programs.stages import verdict_of
 
 BOOL = Bool()
 SMALL = Int(0, 4)
@@ -262,9 +266,14 @@ def test_least_point_is_the_first_of_brute_force(lines: list[list[Expr]], assume
         assert not isinstance(point, NoWitness)
         assert [point[c] for c in columns] == [int(v) for v in expected.values()]
         refuted = negated(universe, whole(lines_of(universe, table)[0]))
-        box = widest(
-            universe, point, columns, lambda atoms: find(universe, [*atoms, refuted]) is NoWitness.NONE
-        )
+
+        def excluded(box: Mapping[int, Bounds]) -> bool:
+            atoms = [universe.atom(universe.single[c], (bounds,)) for c, bounds in box.items()]
+            right = find(universe, [*atoms, refuted]) is NoWitness.NONE
+            assert never(universe, box, refuted) in {None, right}  # what the ends of forms tell is so
+            return right
+
+        box = widest(universe, point, columns, excluded)
         inside = [
             dict(zip(expected, values, strict=True))
             for values in itertools.product(*(range(box[c][0], box[c][1] + 1) for c in columns))
@@ -606,3 +615,22 @@ def test_a_condition_that_would_be_too_long_written_out_is_left_to_the_solver(wo
     rows = f"| line | when ||\n| l | {many} ||\n| m | not ({many}) ||"
     verdict = verdict_of(f"input a : int 0 .. 9\ninput b : int 0 .. 9\ntable t {{\n{rows}\n}}\n")
     assert [finding.code for finding in verdict.findings] == []
+
+
+def test_a_region_of_an_overlap_of_planes_is_grown_by_the_ends_of_forms(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A tree for each step of the growth would be a hundred."""
+    program = compiled(families.linear(24, 4, 3, "overlap"))
+    trees = 0
+
+    def counted(tree: Tree, run: Callable[[Tree], Search] = Tree.run) -> Search:
+        nonlocal trees
+        trees += 1
+        return run(tree)
+
+    monkeypatch.setattr(Tree, "run", counted)
+    [overlap] = prove_table(program, program.tables[0], BOXES).findings
+    assert isinstance(overlap, Overlap)
+    assert overlap.region
+    assert trees <= 4

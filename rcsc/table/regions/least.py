@@ -10,7 +10,7 @@ The least point pins each column, in the order given, to the least value that fi
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from rcsc.lang.interval_sets import complement
+from rcsc.lang.interval_sets import complement, holds, meet
 from rcsc.solvers.search import furthest, lowest
 from rcsc.table.regions.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
 from rcsc.table.regions.linear import Simplex, integer_point
@@ -129,7 +129,7 @@ def widest(
     universe: Universe,
     point: Mapping[int, int],
     columns: Sequence[int],
-    holds: Callable[[list[Formula]], bool],
+    holds: Callable[[Mapping[int, Bounds]], bool],
 ) -> dict[int, Bounds]:
     """The box around `point` that is grown in the order of `columns` as far as `holds` is true of it.
 
@@ -137,13 +137,12 @@ def widest(
         universe: Where the columns are from.
         point: Where to begin.
         columns: What to grow, in this order; others stay free.
-        holds: Whether what is looked for is true throughout a box (given as atoms).
+        holds: Whether what is looked for is true throughout a box.
     """
     box = {column: (point[column], point[column]) for column in columns}
 
     def fits(column: int, low: int, high: int) -> bool:
-        trial = {**box, column: (low, high)}
-        return holds([universe.atom(universe.single[c], (bounds,)) for c, bounds in trial.items()])
+        return holds({**box, column: (low, high)})
 
     for column in columns:
         form = universe.single[column]
@@ -156,6 +155,27 @@ def widest(
         bottom = -furthest(-at, -least_, lambda end, c=column, t=top: fits(c, -end, t))  # type: ignore[misc]  # as above
         box[column] = (bottom, top)
     return box
+
+
+def never(universe: Universe, box: Mapping[int, Bounds], formula: Formula) -> bool | None:
+    """Whether a formula holds nowhere in a box of columns; None where the ends of its forms do not tell.
+
+    Each end of a form is taken at a corner of the box: `x - y` goes from -3 to 2 for x in 0 .. 2 and y in 0 .. 3.
+    """
+    match formula:
+        case Atom(form=form, box=wanted):
+            columns = [(universe.columns[column], column, k) for column, k in universe.forms[form]]
+            ends = [sorted(k * end for end in box.get(at, (c.low, c.high))) for c, at, k in columns]
+            low, high = sum(least_ for least_, _ in ends), sum(greatest for _, greatest in ends)
+            if not meet(wanted, ((low, high),)):
+                return True
+            at_a_corner = holds(wanted, low) or holds(wanted, high)
+            return False if at_a_corner and not any(c.opaque for c, _, _ in columns) else None
+        case Every(parts):
+            return True if any(never(universe, box, part) for part in parts) else None
+        case Some(parts):
+            told = [never(universe, box, part) for part in parts]
+            return False if False in told else None if None in told else True
 
 
 def negated(universe: Universe, formula: Formula) -> Formula:
