@@ -52,6 +52,8 @@ _MOST_GROWN = 20
 """Findings of one table that are given the region around them."""
 _MOST_LINES_GROWN = 64
 """Lines of a table above which no region is grown around a gap."""
+_MOST_DOUBTFUL = 200
+"""Pairs of lines of one table that the solver is asked about once it has found something wrong."""
 _MOST_GAPS = 64
 """Regions of a gap among which linear arithmetic looks for the least input."""
 _MOST_LINES_TRIED = 200
@@ -263,11 +265,17 @@ class _Decision:
         pairs = set(search.overlaps)
         for seen in search.witnesses:
             pairs.update(combinations(self.matching(seen), 2))
+        pairs.update(filter(self.overlap_somewhere, sorted(search.doubtful - pairs)[:_MOST_DOUBTFUL]))
         findings: list[TableFinding] = []
         for first, second in sorted(pairs):
             grown = len(findings) < _MOST_GROWN
             findings.append(self.overlap(first, second, grown=grown))
         return findings
+
+    def overlap_somewhere(self, pair: tuple[int, int]) -> bool:
+        """Whether the solver finds an input that both lines match: which one it gave before depends on its mood."""
+        z3 = self.asked
+        return z3.holds(*map(z3.line, pair)) is Answer.SATISFIABLE
 
     def matching(self, snapshot: Snapshot) -> list[int]:
         """Positions of the lines that match."""
@@ -290,7 +298,7 @@ class _Decision:
     def gap(self, search: Search) -> list[TableFinding]:
         """The least input that no line matches, if there is one; also where DEFAULT takes it."""
         seen = [snapshot for snapshot in search.witnesses if not self.matching(snapshot)]
-        if must_cover(self.table) and not search.gaps and not seen:
+        if must_cover(self.table) and not search.gaps and not search.witnesses:
             return []
         if search.gaps and not seen and len(search.gaps) <= _MOST_GAPS:
             points = [
@@ -303,7 +311,7 @@ class _Decision:
                 region = self.around(point, [[line] for line in self.lines]) if few else None
                 return [Gap((self.snapshot(point),), (region,))]
         seen += [snapshot for snapshot in self.tried if not self.matching(snapshot)]
-        if not must_cover(self.table) and not seen:
+        if not search.gaps and not seen:
             z3 = self.asked
             if z3.holds(z3.none()) is Answer.UNSATISFIABLE:
                 return []

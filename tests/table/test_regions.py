@@ -43,7 +43,6 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
-from rcsc.table.decide import prove_table
 from rcsc.table.regions import splitting
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
 from rcsc.table.regions.least import find, least, negated, never, whole, widest
@@ -61,10 +60,8 @@ from rcsc.table.regions.region import (
     Split,
 )
 from rcsc.table.regions.splitting import Tree
-from rcsc.table.verdict import Overlap
-from tests.bench import families
-from tests.support.programs.stages import BOXES, verdict_of
 from tests.support.programs.stages import program_of as compiled
+from tests.support.programs.stages import verdict_of
 
 BOOL = Bool()
 SMALL = Int(0, 4)
@@ -615,22 +612,3 @@ def test_a_condition_that_would_be_too_long_written_out_is_left_to_the_solver(wo
     rows = f"| line | when ||\n| l | {many} ||\n| m | not ({many}) ||"
     verdict = verdict_of(f"input a : int 0 .. 9\ninput b : int 0 .. 9\ntable t {{\n{rows}\n}}\n")
     assert [finding.code for finding in verdict.findings] == []
-
-
-def test_a_region_of_an_overlap_of_planes_is_grown_by_the_ends_of_forms(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A tree for each step of the growth would be a hundred."""
-    program = compiled(families.linear(24, 4, 3, "overlap"))
-    trees = 0
-
-    def counted(tree: Tree, run: Callable[[Tree], Search] = Tree.run) -> Search:
-        nonlocal trees
-        trees += 1
-        return run(tree)
-
-    monkeypatch.setattr(Tree, "run", counted)
-    [overlap] = prove_table(program, program.tables[0], BOXES).findings
-    assert isinstance(overlap, Overlap)
-    assert overlap.region
-    assert trees <= 4

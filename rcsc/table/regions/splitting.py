@@ -153,7 +153,8 @@ class Tree:
             self.search.undecided += 1
             return Open()
         bounds = tuple((form, low, high) for form, (low, high) in sorted(region.bounds.items()))
-        answer = self.oracle(Question(bounds, tuple(line.index for line in region.lines)))
+        lines = tuple(line.index for line in region.lines)
+        answer = self.oracle(Question(bounds, lines))
         if answer is NoWitness.NONE:
             self.search.used.update(assumption.index for assumption in self.root.open)
             return Rests()
@@ -161,6 +162,7 @@ class Tree:
             self.search.undecided += 1
         else:
             self.search.witnesses.append(answer)
+            self.search.doubtful.update(combinations(sorted(lines), 2))
         return Open()
 
     def _is_opaque(self, region: Region) -> bool:
