@@ -4,19 +4,23 @@ import csv
 import io
 import json
 import platform
+import re
 import subprocess
 from itertools import product
 from pathlib import Path
+from random import Random
 
 import pytest
 
 from rcsc.commands import run
+from rcsc.driver.trials import proofs
 from rcsc.emit import emitted as emitted_of
 from rcsc.emit.lower import lower
 from rcsc.emit.plan import Plan
-from rcsc.host.tools import c_compiler
+from rcsc.host.tools import c_compiler, write_c
 from rcsc.lang.model import Program, ProvedProgram, Value, seal_of_proof
 from rcsc.solvers.options import Options
+from rcsc.testing.code_mutants import CodeMutant, code_mutants, variants
 from rcsc.testing.coverage import directed
 from rcsc.testing.coverage.case import MODES, Case, Entry, entries, expected
 from rcsc.testing.coverage.choose import Choice, chosen
@@ -36,6 +40,7 @@ from rcsc.testing.coverage.vector_set import vector_set, write_vectors
 from rcsc.testing.executors.symbols import symbols_of
 from rcsc.testing.inputs.snapshot import search_in
 from rcsc.testing.inputs.vectors import vectors_of
+from tests.evidence.subjects import EVERYTHING, subject_of
 from tests.support.programs.examples import EXTERN, LASTING, STOPS
 from tests.support.programs.stages import emitted, program_of, proved_of
 from tests.support.programs.texts import edited
@@ -119,6 +124,52 @@ def test_a_slip_in_the_c_fails_a_vector(right: str, wrong: str, tmp_path: Path) 
     status, told = played(tmp_path, set_of(SMALL), (right, wrong))
     assert status == 1
     assert "wrong" in told
+
+
+STATEMENT = re.compile(r"^ +((?:s->\w|probe_)[^\n{}]*;)$", re.MULTILINE)
+EQUAL = (
+    "(b < a)", "(a >= least)", "(a <= most)", "s->width > 100u", "several ? (-2)", " t0[", " t1[", "+ 0.0", "_settle(s);", "_atleast_",
+    "(m == 0x0u)", "/* proved", "assumptions_failed |",
+)  # fmt: skip
+"""Lines where a slip gives the same: of two that are equal either is the lesser; a table that is too long; nothing to settle."""
+
+
+def slips(text: str, count: int) -> list[tuple[str, str]]:
+    """C with one slip, and the line that has it: changed masks, constants and operators, and lost statements."""
+    random = Random(text)  # noqa: S311  # repeatable
+    own = text.index("/* probe.rcs procedure")
+    lost = (
+        CodeMutant("statement", "", text, found.start(1), found[1], ";")
+        for found in STATEMENT.finditer(text, own)
+    )
+    changed = [m for m in code_mutants(text, 2) if m.start > own and m.base == variants(text)[0]]
+    every = [*random.sample(changed, count), *random.sample(list(lost), count)]
+    lines = ((m.text, m.base[: m.base.find("\n", m.start)].rpartition("\n")[2]) for m in every)
+    return [(slipped, line) for slipped, line in lines if not any(word in line for word in EQUAL)]
+
+
+def test_slips_of_every_kind_fail_a_vector(tmp_path: Path) -> None:
+    """What passes is in lines that nothing leads to: a table of which several lines match, or none."""
+    subject = subject_of(EVERYTHING)
+    solver = proofs(subject.options).solver
+    document = vector_set(subject.plan, subject.files, subject.options, solver, subject.progress)
+    write_c(subject.files, tmp_path)
+    (tmp_path / "vectors.c").write_text(vectors_c(document.program, document.symbols, document.kept), "utf-8")
+    compiler = [str(c_compiler()), "-std=gnu11", "-w", "-O0"]
+    subprocess.run([*compiler, "-c", "vectors.c"], cwd=tmp_path, check=True)
+    passed = []
+    for text, line in slips(subject.files["c/probe.c"], 20):
+        (tmp_path / "slip.c").write_text(text, "utf-8")
+        built = subprocess.run([*compiler, "-o", "play", "slip.c", "vectors.o"], cwd=tmp_path, check=False)
+        ran = (
+            built.returncode
+            or subprocess.run(
+                ["./play"], cwd=tmp_path, stdout=subprocess.DEVNULL, timeout=20, check=False
+            ).returncode
+        )
+        passed += [] if ran else [line]
+    never = subject.files["c/probe.c"].partition("    default:\n")[2].partition("break;")[0]
+    assert [line for line in passed if line.strip() not in never] == []
 
 
 WHOLE = (Entry("check"), Entry("step", "t"), Entry("cycle", "l"))

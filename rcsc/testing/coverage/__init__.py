@@ -23,6 +23,10 @@ Vectors are first what every program has (each input refused beyond each end of 
 tables say; then drawn sessions, of which the cycles are kept that reach something new; then a solver is asked for the
 rest, and what it shows impossible is listed as that. Last, what can be spared is dropped.
 
+Coverage alone lets slips pass. So vectors also turn on each bit of each mask that a line's place turns on, have each variable at
+each end of its range, each comparison of numbers that are equal or one apart, and each line change each state that it can
+change. A vector needs nothing of the C but the function that it calls: where that must write first, there is rubbish.
+
 Trusted: nothing for a verdict. That nothing more can be reached rests on the symbolic run and Z3, as proofs do. What it
 costs: seconds a program.
 

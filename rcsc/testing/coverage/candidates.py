@@ -6,9 +6,10 @@ first; most lead nowhere new and are dropped (`choose`).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice, product
 from random import Random
 
-from rcsc.emit.plan import Cuts, Direct, Group, Plan
+from rcsc.emit.plan import Coded, Cuts, Direct, Group, Plan, Truth
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import (
     Apply,
@@ -20,11 +21,14 @@ from rcsc.lang.model import (
     Procedure,
     Program,
     Read,
+    Real,
+    Scalar,
     Snapshot,
     Table,
     Value,
     Variable,
     key_bounds,
+    key_of,
     value_of_key,
 )
 from rcsc.testing.coverage.case import (
@@ -33,11 +37,13 @@ from rcsc.testing.coverage.case import (
     Case,
     Entry,
     Expected,
+    ends_of,
     entries,
     outside_of,
     ran,
     refused_at,
 )
+from rcsc.testing.coverage.goals import Hit, bits_of
 from rcsc.testing.executors.externs import results
 from rcsc.testing.executors.sessions import Stimuli
 from rcsc.testing.executors.symbols import Symbols
@@ -45,6 +51,8 @@ from rcsc.testing.inputs.sampling import declarations, session
 from rcsc.testing.inputs.snapshot import InputSearch, Missing
 from rcsc.testing.inputs.vectors import Vector, Vectors
 
+MOST_ENTRIES = 256
+"""Of one table of masks, that are tried beside each line; `rcsc test` compares all that there are."""
 TRIES = 10
 """Sessions that are drawn for each that starts where `check` accepts the state."""
 
@@ -91,18 +99,51 @@ def always(program: Program, symbols: Symbols, *, reals: bool) -> Iterator[Case]
     yield Case(Entry("init"), start, origin="initial state")
     yield Case(Entry("check"), start, origin="initial state")
     yield Case(Entry("check"), start, origin="a state of other tables", foreign=True)
+    yield from _at_ends(program)
     for variable in program.variables:
         for end, value in outside_of(variable, symbols.c_type(variable.name)).items():
             if variable.kind is not Kind.INPUT or isinstance(variable.type, Bool):
                 words = f"{variable.name} {end} its range"
                 yield Case(Entry("check"), {**start, variable.name: value}, origin=words)
     cycles = [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
+    unsafe = _unsafe(program)
     for mode in MODES if reals else ():
-        yield Case(cycles[-1], start, origin=f"a machine that rounds {mode}", mode=mode)
+        yield Case(cycles[-1], unsafe, origin=f"a machine that rounds {mode}", mode=mode)
     for variable in (v for v in program.variables if v.kind is Kind.INPUT and not isinstance(v.type, Bool)):
         for end, value in outside_of(variable, symbols.c_type(variable.name)).items():
             for entry in cycles:
-                yield Case(entry, {**start, variable.name: value}, origin=f"{variable.name} {end} its range")
+                yield Case(entry, {**unsafe, variable.name: value}, origin=f"{variable.name} {end} its range")
+
+
+def _at_ends(program: Program) -> Iterator[Case]:
+    """Every variable at an end of its range, which is let pass; and reals of -0.0."""
+    start = initial(program)
+    cycles = [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
+    inputs = [v for v in program.variables if v.kind is Kind.INPUT]
+    for at, which in enumerate(("least", "greatest")):
+        ends: Snapshot = {str(v.name): ends_of(v.type)[at] for v in program.variables}
+        yield Case(Entry("check"), ends, origin=f"every variable {which}")
+        given: Snapshot = {**start, **{str(v.name): ends[v.name] for v in inputs}}
+        yield from (Case(entry, given, origin=f"every input {which}") for entry in cycles)
+    zeros = {str(v.name): -0.0 for v in inputs if _has_zero(v.type)}
+    for entry in cycles[:1] if zeros else ():
+        yield Case(entry, {**start, **zeros}, origin="inputs of -0.0, which is taken as 0.0")
+
+
+def _has_zero(kind: Scalar) -> bool:
+    return isinstance(kind, Real) and kind.low <= 0 <= kind.high
+
+
+def _unsafe(program: Program) -> Snapshot:
+    """The initial state, its outputs other than after a fault, where that is a state to go on from."""
+    start = initial(program)
+    shown = {
+        str(v.name): next((end for end in ends_of(v.type) if end != v.safe), v.safe)
+        for v in program.variables
+        if v.safe is not None
+    }
+    other = {**start, **shown}
+    return other if refused_at(program, other) < 0 else start
 
 
 def untrusted(program: Program, refused: Sequence[Case]) -> Iterator[Case]:
@@ -112,7 +153,7 @@ def untrusted(program: Program, refused: Sequence[Case]) -> Iterator[Case]:
         program: The program.
         refused: Cases of `check` that it refuses; each is given to some cycle, and each cycle some of them.
     """
-    start = initial(program)
+    start = _unsafe(program)
     cycles = [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
     for at in range(max(len(refused), len(cycles))):
         case = refused[at % len(refused)]
@@ -140,6 +181,39 @@ def of_tables(search: InputSearch, plan: Plan, tables: Sequence[Vectors]) -> Ite
                 )
                 if not isinstance(given, Missing):
                     yield Case(Entry("line", str(table.name)), given, origin=f"{leaf} looked up")
+
+
+def of_masks(plan: Plan, tables: Sequence[Vectors]) -> Iterator[tuple[Case, Sequence[Hit]]]:
+    """Every entry of every mask, beside each line: its own vector with other values of what the entry is looked up by.
+
+    Gives each with the bits that it shows, so that who has them already need not play it.
+    """
+    for planned, vectors in zip(plan.tables, tables, strict=True):
+        name = str(planned.table.name)
+        reached = {v.line: v.snapshot for v in vectors.vectors if v.purpose == "reach"}
+        for group in planned.matcher.groups:
+            leaves = {
+                str(probe.index.leaf): probe.index for probe in group if not isinstance(probe.index, Truth)
+            }
+            ways = list(islice(product(*map(_values, leaves.values())), MOST_ENTRIES))
+            for snapshot, way in product(reached.values(), ways):
+                before = {**snapshot, **dict(zip(leaves, way, strict=True))}
+                bits = [("bit", name, *bit) for bit in bits_of(planned.matcher, before)]
+                words = ", ".join(f"{leaf} {value}" for leaf, value in zip(leaves, way, strict=True))
+                yield Case(Entry("line", name), before, origin=f"mask of {words}"), bits
+
+
+def _values(index: Direct | Cuts | Coded) -> list[Value]:
+    """A value of each entry of a table that is looked up, or on each side of each comparison."""
+    match index:
+        case Cuts(type=kind, cuts=cuts):
+            low, _ = key_bounds(kind)
+            keys = sorted({low, *(key_of(kind, cut) - by for cut in cuts for by in (0, 1))})
+            return [value_of_key(kind, key) for key in keys]
+        case Direct(type=kind, low=low, count=count):
+            return [value_of_key(kind, key) for key in range(low, low + count)]
+        case Coded(type=kind, low=low, classes=classes):
+            return [value_of_key(kind, low + at) for at, _ in enumerate(classes)]
 
 
 def _distinct(vectors: Sequence[Vector]) -> Iterator[tuple[tuple[int, ...], Vector]]:

@@ -26,6 +26,7 @@ from rcsc.lang.model import (
     Kind,
     Program,
     Real,
+    Scalar,
     Snapshot,
     Table,
     Value,
@@ -204,6 +205,11 @@ def unfit(variable: Variable, value: Value) -> bool:
         return True
     low, high = key_bounds(variable.type)
     return not low <= key_of(variable.type, value) <= high
+
+
+def ends_of(kind: Scalar) -> tuple[Value, Value]:
+    """The least and the greatest value of a kind."""
+    return (kind.low, kind.high) if isinstance(kind, Real) else key_bounds(kind)
 
 
 def outside_of(variable: Variable, c_type: str) -> Mapping[str, Value]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import Program
-from rcsc.testing.coverage.candidates import Session, always, drawn, of_tables, refusals
+from rcsc.testing.coverage.candidates import Session, always, drawn, of_masks, of_tables, refusals
 from rcsc.testing.coverage.case import Case, Entry, Expected, entries, expected
 from rcsc.testing.coverage.goals import Hit, Reached
 from rcsc.testing.coverage.marks import marked
@@ -110,6 +110,9 @@ def chosen(
     choice = Choice(program, Reached(program, plan, marked(program)))
     for case in (*always(program, symbols, reals=reals), *of_tables(search, plan, tables)):
         choice.offer(case)
+    for case, bits in of_masks(plan, tables):
+        if not choice.reached.hits.issuperset(bits):
+            choice.offer(case)
     for entry in entries(program):
         if entry.kind in ("step", "cycle"):
             progress(f"drawing sessions of {entry.kind} {entry.name}")

@@ -15,6 +15,7 @@ from rcsc.lang.model import (
     Bool,
     Call,
     Expr,
+    Int,
     Level,
     Literal,
     OneTable,
@@ -40,6 +41,7 @@ from rcsc.testing.coverage.marks import (
     Decision,
     End,
     Marked,
+    Meets,
     Outcomes,
     ways_of,
 )
@@ -83,6 +85,7 @@ class Watched(Run):
 
     now: dict[Decision, dict[int, tuple[Node, Node]]] = field(default_factory=dict)
     met: dict[Decision, list[Occurrence]] = field(default_factory=dict)
+    compared: dict[Meets, list[tuple[Node, Node, Node]]] = field(default_factory=dict)
     ends: dict[tuple[str, int], Node] = field(default_factory=dict)
 
     def evaluate(self, expr: Expr) -> Node:
@@ -100,6 +103,10 @@ class Watched(Run):
                 value = self.evaluate(expr.args[0])
                 self.met.setdefault(decision, []).append(self.now.pop(decision, {}))
                 return value
+            case Meets(op=comparison):
+                one, other = (self.evaluate(arg) for arg in expr.args)
+                self.compared.setdefault(op, []).append((self.path, one, other))
+                return values.compare(comparison, one, other)
             case Compares(decision=decision, op=plain, test=test):
                 given = [self.evaluate(arg) for arg in expr.args]
                 sides = op.sides(given, values.constant(given[-1].kind, 0))
@@ -116,12 +123,14 @@ class Followed:
     Attributes:
         base: What holds whenever it is called.
         met: What each decision meets.
+        compared: What each comparison of numbers compares, and when.
         ends: Where no line of a table matches, or several: by table and `NONE` or `SEVERAL`.
     """
 
     entry: Entry
     base: tuple[Node, ...]
     met: Mapping[Decision, Sequence[Occurrence]]
+    compared: Mapping[Meets, Sequence[tuple[Node, Node, Node]]]
     ends: Mapping[tuple[str, int], Node]
 
 
@@ -143,7 +152,7 @@ def followed(program: Program, whole: Marked, entry: Entry) -> Followed | None:
             _call(run, whole.program, entry, base)
     except (TooLongError, RecursionError):
         return None
-    return Followed(entry, tuple(base), run.met, run.ends)
+    return Followed(entry, tuple(base), run.met, run.compared, run.ends)
 
 
 def _check(run: Watched, program: Program) -> None:
@@ -202,11 +211,13 @@ class Director:
 
     Attributes:
         functions: What was followed, by entry; None for what is too long.
+        left: Questions that may still be asked about bounds of comparisons, which no coverage needs.
     """
 
     choice: Choice
     asks: Asks
     functions: dict[Entry, Followed | None] = field(default_factory=dict)
+    left: int = 200
 
     def all(self) -> Iterator[Unreached]:
         """Look for everything that is open; what has no case."""
@@ -217,6 +228,32 @@ class Director:
         for goal in list(self.choice.reached.open_goals()):
             if not self._has(goal) and (left := self.look(goal)) is not None:
                 yield left
+        for at, meets in enumerate(self.choice.reached.marked.meets):
+            for apart in (0, -1, 1):
+                self._meet(at, meets, apart)
+
+    def _meet(self, at: int, meets: Meets, apart: int) -> None:
+        """Look for a case in which a comparison is of equal numbers, or of some one apart; there need be none."""
+        for entry in entries(self.choice.program):
+            if ("meets", at, apart) in self.choice.reached.hits or self.left == 0:
+                return
+            function = None if entry.kind in ("init", "lines") else self._function(entry)
+            met = () if function is None else function.compared.get(meets, ())
+            possible = values.any_of(values.both(path, _apart(one, other, apart)) for path, one, other in met)
+            if function is None or possible is values.FALSE:
+                continue
+            self.left -= 1
+            answer = self.asks([*function.base, possible])
+            if not isinstance(answer, Missing):
+                start = initial(self.choice.program)
+                state = {name: answer.get(name, value) for name, value in start.items()}
+                self.choice.offer(
+                    Case(
+                        entry,
+                        state,
+                        origin=f"solved for a bound of a comparison in {entry.kind} {entry.name}",
+                    )
+                )
 
     def _of_table(self, table: Table) -> Iterator[Unreached]:
         """Lines that no step ran, and that no line matches, or several."""
@@ -403,6 +440,16 @@ class Director:
         state = {name: point.get(name, value) for name, value in initial(program).items()}
         self.choice.offer(Case(entry, state, origin=f"solved for {decision.place}"))
         return len(self._known(decision)) > before
+
+
+def _apart(left: Node, right: Node, by: int) -> Node:
+    """That the left number is so much greater than the right one; never of reals, but for equal ones."""
+    if by == 0:
+        return values.equal(left, right)
+    if not isinstance(left.kind, Int) or not isinstance(right.kind, Int):
+        return values.FALSE
+    kind = Int(right.kind.low + by, right.kind.high + by)
+    return values.equal(left, values.arithmetic(Op.ADD, (right, values.constant(Int(by, by), by)), kind))
 
 
 MANY = "the decision can go too many ways"

@@ -8,10 +8,12 @@ the C belongs to one of these, so that a set that hits all of them covers the C;
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import reduce
 from itertools import combinations
+from operator import and_
 from typing import TypeAlias
 
-from rcsc.emit.plan import Cuts, Direct, Plan
+from rcsc.emit.plan import Coded, Cuts, Direct, Index, Matcher, Plan, Truth
 from rcsc.lang.interpret import Fault, evaluate, holds
 from rcsc.lang.model import (
     Admit,
@@ -27,8 +29,9 @@ from rcsc.lang.model import (
     Value,
     Variable,
     key_bounds,
+    key_of,
 )
-from rcsc.testing.coverage.case import Case, Expected, ran, table_of
+from rcsc.testing.coverage.case import Case, Expected, ends_of, ran, table_of
 from rcsc.testing.coverage.marks import Decision, Marked, Outcomes
 
 Hit: TypeAlias = tuple[Hashable, ...]
@@ -62,6 +65,8 @@ class Reached:
                 hits.update(self._run(case, right))
         for at, decision in enumerate(self.marked.decisions):
             hits |= {("decision", at, outcomes, truth) for outcomes, truth in decision.seen}
+        for at, meets in enumerate(self.marked.meets):
+            hits |= {("meets", at, apart) for apart in meets.seen}
         return hits
 
     def keep(self, hits: Iterable[Hit]) -> None:
@@ -82,10 +87,18 @@ class Reached:
             yield ("unfit", variable.name, side(variable, before[variable.name]))
             return
         yield ("checked", result)
+        yield from (("fits", *at) for at in self._at_ends(before))
         for at, invariant in enumerate(self.marked.program.invariants, len(variables)):
             if result in range(at):
                 return
             holds(invariant.condition, before)
+
+    def _at_ends(self, before: Snapshot, *kinds: Kind) -> Iterator[tuple[Hashable, Hashable]]:
+        """Which variables are at which end of their range."""
+        for variable in self.program.variables:
+            looked_at = not isinstance(variable.type, Bool) and (variable.kind in kinds or not kinds)
+            if looked_at and before[variable.name] in ends_of(variable.type):
+                yield variable.name, before[variable.name]
 
     def _matched(self, case: Case, right: Expected) -> Iterator[Hit]:
         table = table_of(self.marked.program, case.entry)
@@ -97,6 +110,8 @@ class Reached:
             if test.box is None:
                 holds(test.condition, case.before)
         yield from self._classes(table, case.before)
+        planned = next(one for one in self.plan.tables if one.table.name == table.name)
+        yield from (("bit", table.name, *bit) for bit in bits_of(planned.matcher, case.before))
 
     def _classes(self, table: Table, before: Snapshot) -> Iterator[Hit]:
         """The class of each leaf that the C finds by comparing."""
@@ -118,7 +133,12 @@ class Reached:
         if right.result == Fault.ADMIT:
             variable = self.program.variable(right.fault_at)
             yield ("refused", variable.name, side(variable, case.before[variable.name]))
+            yield from self._changed(case, right, after)
             return
+        yield from (("admitted", *at) for at in self._at_ends(case.before, Kind.INPUT))
+        reals = (v.name for v in self.program.variables if isinstance(v.type, Real) and v.kind is Kind.INPUT)
+        yield from (("signed", name) for name in reals if str(case.before[name]) == "-0.0")
+        yield from self._changed(case, right, after)
         yield from self._answered(case, right)
         for variable in self.program.variables:
             if variable.kind is Kind.INPUT and variable.admit is Admit.CLAMP:
@@ -132,6 +152,19 @@ class Reached:
             yield ("ran", entry.name, right.line)
         if entry.kind == "cycle":
             yield from self._chosen(next(x for x in self.program.levels if x.name == entry.name), after)
+
+    def _changed(self, case: Case, right: Expected, after: Snapshot) -> Iterator[Hit]:
+        """Which states and outputs have another value afterwards, and whether that is an end of their range.
+
+        A statement that is lost shows where it would have changed something, and a sum that wraps shows at an end.
+        """
+        way = right.result or right.line
+        for variable in self.program.variables:
+            name = variable.name
+            if variable.kind is not Kind.INPUT and after[name] != case.before[name]:
+                low, high = ends_of(variable.type)
+                end = {low: "least", high: "greatest"}.get(after[name], "")
+                yield ("became", case.entry, bool(right.result), way, name, end)
 
     def _answered(self, case: Case, right: Expected) -> Iterator[Hit]:
         """What extern procedures gave: each leaf on each side of its range, and where a refusal ended the cycle."""
@@ -200,6 +233,32 @@ class Goal:
     def wanted(self) -> str:
         """What is to be shown, in words."""
         return "decides on its own" if self.truth is None else str(self.truth).lower()
+
+
+def bits_of(matcher: Matcher, before: Snapshot) -> Iterator[tuple[int, tuple[int, ...], int]]:
+    """Bits of masks that a line's place turns on here: group, classes, and line, where all other groups leave the line."""
+    looked = [tuple(class_of(probe.index, before) for probe in group) for group in matcher.groups]
+    every = (1 << matcher.lines) - 1
+    masks = [
+        reduce(and_, (probe.masks[at] for probe, at in zip(group, classes, strict=True)), every)
+        for group, classes in zip(matcher.groups, looked, strict=True)
+    ]
+    for number, classes in enumerate(looked):
+        left = reduce(and_, (mask for other, mask in enumerate(masks) if other != number), every)
+        yield from ((number, classes, line) for line in range(matcher.lines) if left >> line & 1)
+
+
+def class_of(index: Index, before: Snapshot) -> int:
+    """The class of a value that the C looks up or finds by comparing."""
+    match index:
+        case Direct(leaf=leaf, type=kind, low=low):
+            return key_of(kind, before[leaf]) - low
+        case Coded(leaf=leaf, type=kind, low=low, classes=classes):
+            return classes[key_of(kind, before[leaf]) - low]
+        case Cuts(leaf=leaf, cuts=cuts):
+            return sum(before[leaf] >= cut for cut in cuts)
+        case Truth(condition=condition):
+            return int(holds(condition, before))
 
 
 def decides(ways: Mapping[tuple[Outcomes, bool], None], number: int) -> bool:

@@ -23,7 +23,8 @@ HEAD = """/* The test vectors of {program}, made by rcsc: {count} of them.
    On a host:      cc -I . vectors.c {source} -o vectors && ./vectors
    On a target:    compile with -DVECTORS_NO_MAIN, and call vectors_play() for each number below vectors_count().
    A vector is a state with its inputs, a function that is called on it, and what it must give: the result, the trace
-   and every leaf afterwards. Vectors do not depend on each other. */
+   and every leaf afterwards. Vectors do not depend on each other, nor on what `init` makes: what a function does not
+   write is what stands in `initial`, and where it must write first there is rubbish. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
@@ -80,11 +81,18 @@ int32_t vectors_play(uint32_t number)
     const change_t *change = &changes[v->first];
     uint16_t at;
     int32_t result;
-    {init}(&s);
-    for (at = 0u; at < v->sets; at++) {{
-        put(&s, change[at].leaf, change[at].word);
+    memset(&right, 0xa5, sizeof right);
+    for (at = 0u; at < LEAVES; at++) {{
+        put(&right, at, initial[at]);
     }}
-    memcpy(&right, &s, sizeof s);
+    put(&right, LEAVES, {digest}u);
+    for (at = 0u; at < v->sets; at++) {{
+        put(&right, change[at].leaf, change[at].word);
+    }}
+    memcpy(&s, &right, sizeof s);
+    if (v->function == 0u) {{
+        memset(&s, 0xa5, sizeof s); /* for `init` */
+    }}
     change = &change[v->sets];
     for (at = 0u; at < v->changed; at++) {{
         put(&right, change[at].leaf, change[at].word);
@@ -106,7 +114,7 @@ int32_t vectors_play(uint32_t number)
             return 3 + (int32_t)at;
         }}
     }}
-    return 0;
+    return (s.digest == right.digest) ? 0 : 3 + (int32_t)LEAVES;
 }}
 
 uint32_t vectors_count(void)
@@ -155,7 +163,7 @@ def vectors_c(program: Program, symbols: Symbols, kept: Sequence[Kept]) -> str:
     rows, changes = _data(program, kept)
     failed = symbols.trace.failed_paths
     own = (f"(s.{path} == v->failed[{at}])" for at, path in enumerate(failed))
-    trace = f"(({symbols.trace.line('s')} == v->line) && ({symbols.trace.fault_at('s')} == v->fault_at)"
+    trace = f"((s.fault == v->result) && ({symbols.trace.line('s')} == v->line) && ({symbols.trace.fault_at('s')} == v->fault_at)"
     shape = {
         "program": program.name,
         "count": len(kept),
@@ -164,10 +172,18 @@ def vectors_c(program: Program, symbols: Symbols, kept: Sequence[Kept]) -> str:
         "leaves": len(program.variables),
         "words": len(failed),
         "struct": symbols.struct,
-        "init": symbols.init,
+        "digest": symbols.digest,
         "trace": " && ".join([trace, *own]) + ")",
     }
     parts = [HEAD.format(**shape), *_access(program, symbols), *_calls(program, symbols)]
+    start = initial(program)
+    words = (word_of(v.type, start[v.name]) for v in program.variables)
+    parts += [
+        "static const uint64_t initial[LEAVES] = {",
+        *(f"    {_hex(word)}," for word in words),
+        "};",
+        "",
+    ]
     parts += ["static const change_t changes[] = {", *(f"    {change}," for change in changes), "};", ""]
     parts += ["static const vector_t vectors[] = {", *rows, "};", PLAY.format(**shape)]
     return "\n".join(parts)
@@ -213,8 +229,8 @@ def _calls(program: Program, symbols: Symbols) -> Iterator[str]:
         yield f"    case {at}: {_call(symbols, entry)} break;"
     yield "    default: break;\n    }\n    return result;\n}\n"
     numbers = [at for at, entry in enumerate(entries(program)) if entry.kind in ("step", "cycle")]
-    low = min(numbers, default=0)
-    yield f"static bool traced(uint16_t function)\n{{\n    return function >= {low}u;\n}}\n"
+    low = min(numbers, default=len(entries(program)))
+    yield f"static bool traced(uint16_t function)\n{{\n    return (function == 0u) || (function >= {low}u);\n}}\n"
 
 
 def _call(symbols: Symbols, entry: Entry) -> str:
@@ -226,9 +242,9 @@ def _call(symbols: Symbols, entry: Entry) -> str:
         case "line":
             return f"result = {symbols.lines[entry.name]}(s);"
         case "lines":
-            batch = f"{symbols.batches[entry.name]}(pair, got, 2u);"
-            pair = f"const {symbols.struct} pair[2] = {{*s, *s}}; int32_t got[2] = {{-9, -8}};"
-            return f"{{ {pair} {batch} result = (got[0] == got[1]) ? got[0] : -9; }}"
+            batch = f"{symbols.batches[entry.name]}(same, got, 2u);"
+            same = f"const {symbols.struct} same[3] = {{*s, *s, *s}}; int32_t got[3] = {{-9, -8, -7}};"
+            return f"{{ {same} {batch} result = ((got[0] == got[1]) && (got[2] == -7)) ? got[0] : -9; }}"
         case "step":
             return f"result = {symbols.steps[entry.name]}(s);"
         case _:

@@ -30,6 +30,7 @@ from rcsc.lang.model import (
     Local,
     Op,
     Program,
+    Real,
     Scalar,
     Select,
     Statement,
@@ -39,7 +40,7 @@ from rcsc.lang.model import (
     Value,
     Variable,
 )
-from rcsc.lang.operator_table import Arithmetic, Operator
+from rcsc.lang.operator_table import Arithmetic, Comparison, Operator
 from rcsc.testing.inputs.condition_text import words
 
 Side = TypeVar("Side")
@@ -144,7 +145,21 @@ class Compares:
         return operands[-1], operands[0] if self.op in (Op.MIN, Op.MAX) else zero
 
 
-Mark: TypeAlias = Condition | End | Compares
+@dataclass(eq=False, frozen=True, slots=True)
+class Meets:
+    """A mark in place of a comparison of numbers: notes where the two are equal, and of whole numbers where they are one apart."""
+
+    op: Comparison
+    seen: dict[int, None] = field(default_factory=dict)
+
+    def meaning(self, left: float, right: float) -> bool:
+        """Note how far they are apart, and compare."""
+        if left == right or (isinstance(left, int) and abs(left - right) == 1):
+            self.seen[int(left - right)] = None
+        return bool(self.op.meaning(left, right))
+
+
+Mark: TypeAlias = Condition | End | Compares | Meets
 
 
 def is_mark(op: object) -> bool:
@@ -154,13 +169,16 @@ def is_mark(op: object) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Marked:
-    """A marked program, and its decisions in order."""
+    """A marked program, its decisions in order, and its comparisons of numbers."""
 
     program: Program
     decisions: tuple[Decision, ...]
+    meets: tuple[Meets, ...] = ()
 
     def forget(self) -> None:
-        """Forget how decisions went."""
+        """Forget how decisions went, and what was compared."""
+        for meets in self.meets:
+            meets.seen.clear()
         for decision in self.decisions:
             decision.seen = {}
             decision.now = {}
@@ -172,6 +190,7 @@ class _Marker:
 
     decisions: list[Decision] = field(default_factory=list)
     operators: dict[str, Decision] = field(default_factory=dict)
+    meets: list[Meets] = field(default_factory=list)
     place: Place = Place("", "")
 
     def decision(self) -> Decision:
@@ -224,6 +243,12 @@ class _Marker:
                 return replace(expr, op=cast(Operator, mark), args=given)
             case Apply(op=Op.TO_INT, args=(arg,)) if isinstance(arg.type, Bool):
                 return replace(expr, args=(self.expr(arg, chooses=True),))
+            case Apply(op=Op.EQ | Op.NE | Op.LT | Op.LE | Op.GT | Op.GE as op, args=args) if _of_numbers(
+                expr
+            ):
+                compared = Meets(op)
+                self.meets.append(compared)
+                return replace(expr, op=cast(Operator, compared), args=tuple(map(self.expr, args)))
             case Apply(args=args) if mask_of(expr) is None:
                 return replace(expr, args=tuple(map(self.expr, args)))
             case _:
@@ -298,7 +323,7 @@ class _Marker:
             invariants=tuple(map(self.invariant, program.invariants)),
             tables=tuple(map(self.table, program.tables)),
         )
-        return Marked(marked, (*self.decisions, *self.operators.values()))
+        return Marked(marked, (*self.decisions, *self.operators.values()), tuple(self.meets))
 
     def deferred(self, variable: Variable) -> Variable:
         """A deferred variable."""
@@ -409,6 +434,11 @@ def _negations(expr: Expr, *, opposite: bool) -> Iterator[bool]:
 def _either_sign(divisor: Expr) -> bool:
     """Whether a divisor may be negative or positive by its type: then a small function of the C divides."""
     return isinstance(divisor.type, Int) and divisor.type.low < 0 < divisor.type.high
+
+
+def _of_numbers(expr: Apply) -> bool:
+    """Whether it compares numbers; a mask is one comparison."""
+    return isinstance(expr.args[0].type, Int | Real) and mask_of(expr) is None
 
 
 def _is_joint(expr: Apply) -> bool:

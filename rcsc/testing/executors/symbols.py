@@ -64,6 +64,7 @@ class Symbols:
         cycles: By level: function of one cycle.
         positions: Of each leaf; what `fault_at` says when it is refused.
         module: File name of the Python executor.
+        digest: What a state of these tables has as its `digest`.
         check: Function that says whether a state may be gone on from.
         state_class: Its class.
     """
@@ -83,6 +84,7 @@ class Symbols:
     module: str = ""
     state_class: str = ""
     check: str = ""
+    digest: int = 0
 
     def path(self, name: str) -> str:
         """Place of a leaf in the struct."""
@@ -146,5 +148,6 @@ def _symbols(document: Mapping[str, Any]) -> Symbols:
         module=document["python"]["module"],
         state_class=document["python"]["class"],
         check=document["check"],
+        digest=document["digest"]["state"],
         trace=TracePlaces(failed_paths=tuple(document.get("failed", TracePlaces().failed_paths))),
     )
