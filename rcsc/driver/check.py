@@ -5,17 +5,20 @@ from pathlib import Path
 
 from rcsc.diagnostics.report import Report
 from rcsc.driver.settings import Settings
-from rcsc.driver.together import with_levels
 from rcsc.driver.unchanged import recall, remember
 from rcsc.host.cache import Cache, open_cache
-from rcsc.lang.project import project_root
+from rcsc.lang.project import project_root, systems_above
 
 
 def check(settings: Settings) -> Report:
     """Prove every table; of those that a system's levels run, say what is known of the levels together."""
     cache = _cache(settings)
     report = _checked(settings, cache)
-    return report if cache is None else with_levels(report, cache)
+    if cache is None or not any(systems_above(table.file) for table in report.tables):
+        return report
+    from rcsc.driver.together import with_levels  # keep lazy: most files belong to no system
+
+    return with_levels(report, cache)
 
 
 def _checked(settings: Settings, cache: Cache | None) -> Report:

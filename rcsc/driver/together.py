@@ -5,8 +5,9 @@ found not to. No search is begun here. What a system is made of is kept with dig
 them changes nothing is read but these and the verdicts.
 """
 
+import functools
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,10 +19,9 @@ from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, 
 from rcsc.diagnostics.source import Source, Span
 from rcsc.driver.outline import known
 from rcsc.host.cache import Cache, cache_of
-from rcsc.lang.project import PROJECT_FILE
+from rcsc.lang.project import systems_above
 from rcsc.run.description import BadDescription, description, places
 
-SYSTEM_FILE = "system.toml"
 DECLARED_PROVED = "proved"
 """The standing of what declared ranges and invariants ensure."""
 MOST_OPEN = 5
@@ -86,6 +86,7 @@ class _Seen:
         self.levels: dict[tuple[str, str], tuple[KnownSystem, LevelOutline]] = {}
         self.idle: dict[tuple[str, str], str] = {}
         self._standings: dict[Path, KnownSystem | None] = {}
+        self._roots = functools.cache(_roots)  # a system has many tables
 
     def table(self, table: TableReport) -> TableReport:
         """The table, with what the nearest system that runs it makes of it."""
@@ -93,7 +94,7 @@ class _Seen:
             name = _shown(str(system), table.file)
             known_system = self._standing(system)
             if known_system is None:
-                if _beside(system, table.file):
+                if _beside(self._roots(system), table.file):
                     self._say(name, None, wanted=bool(_open(table)))
                     return table
                 continue
@@ -218,23 +219,18 @@ class _Seen:
 # --- which system a table belongs to ---------------------------------------------------------
 
 
-def systems_above(file: str) -> list[Path]:
-    """Descriptions beside the file and above it, up to the project's folder, or one up where there is no project."""
-    here = Path(os.path.dirname(file) or ".").resolve()
-    folders = [here, *here.parents]
-    root = next((at for at, path in enumerate(folders) if (path / PROJECT_FILE).is_file()), 1)
-    return [folder / SYSTEM_FILE for folder in folders[: root + 1] if (folder / SYSTEM_FILE).is_file()]
-
-
-def _beside(system: Path, file: str) -> bool:
-    """Whether a file is, or stands with, the root file of a level."""
-    try:
-        described = description(system)
-    except BadDescription:
-        return False
+def _beside(tried: Iterable[tuple[Path, Path]], file: str) -> bool:
+    """Whether a file is, or stands with, the root file of a level; `tried` are the two places of each."""
     real = Path(os.path.realpath(file))
-    tried = [places(system, spec.program) for spec in described.levels]
     return any(real == beside or real.parent == inside.parent for inside, beside in tried)
+
+
+def _roots(system: Path) -> list[tuple[Path, Path]]:
+    """The two places where the root file of each level may stand; none where the system is not in order."""
+    try:
+        return [places(system, spec.program) for spec in description(system).levels]
+    except BadDescription:
+        return []
 
 
 def _places(known_system: KnownSystem, table: TableReport) -> Iterator[_Place]:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # who only looks for the folder of a project, as a running le
     from rcsc.lang.syntax import tree
 
 PROJECT_FILE = "rcsc.toml"
+SYSTEM_FILE = "system.toml"
 MOST_BYTES = 16 * 1024 * 1024
 PREFIX = re.compile(r"(?:[A-Za-z][A-Za-z0-9_]{0,7})?")
 """What the C names of a project may begin with."""
@@ -104,6 +105,14 @@ def project_root(file: str) -> str:
             same = os.path.realpath(root) == str(above)
             return root if same else str(above)  # a linked folder's parents are not its name's
     return folder
+
+
+def systems_above(file: str) -> list[Path]:
+    """Descriptions beside the file and above it, up to the project's folder, or one up where there is no project."""
+    here = Path(os.path.dirname(file) or ".").resolve()
+    folders = [here, *here.parents]
+    root = next((at for at, path in enumerate(folders) if (path / PROJECT_FILE).is_file()), 1)
+    return [folder / SYSTEM_FILE for folder in folders[: root + 1] if (folder / SYSTEM_FILE).is_file()]
 
 
 def prefix(root: str) -> str:
@@ -375,13 +384,14 @@ def neighbours(root: Path) -> Neighbours:
         seen.add(file)
         raw = _bytes(str(file))
         text = raw.decode("utf-8-sig", "replace") if isinstance(raw, bytes) else ""
+        bases: tuple[Path, ...] = ()
         for word in _WORD.finditer(_ASIDE.sub("", text)):
             if word["before"]:
                 continue
             if word["role"]:
                 getattr(declared, word["role"]).setdefault(word["peer"], word["link"])
             else:
-                bases = file.parent, Path(project_root(str(file)))
+                bases = bases or (file.parent, Path(project_root(str(file))))
                 places = (base / f"{word['path']}.rcs" for base in bases)
                 waiting += [place for place in places if place.is_file()][:1]
     return declared

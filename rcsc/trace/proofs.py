@@ -8,9 +8,9 @@ from rcsc.compose.proof.standing import PROPERTY
 from rcsc.compose.proof.standing import Known as Standing
 from rcsc.diagnostics.report import TableReport
 from rcsc.driver.outline import known
-from rcsc.driver.together import systems_above
 from rcsc.host.cache import Cache, cache_of
 from rcsc.lang.model import Program
+from rcsc.lang.project import systems_above
 from rcsc.trace.matrix import TableProof
 
 _SAID = {

@@ -17,6 +17,8 @@ import pytest
 
 from rcsc import commands
 from rcsc.commands import run
+from rcsc.driver import together
+from rcsc.run.description import Description, description
 from tests.support.programs.texts import edited
 
 REPO = Path(__file__).parents[2]
@@ -354,14 +356,31 @@ def loaded(*args: str) -> tuple[str, set[str]]:
 
 def test_a_second_check_imports_nothing_heavy() -> None:
     shutil.copytree(REPO / "tables", "tables")
-    status, first = loaded("check", "tables")
+    status, first = loaded("check", "tables/gripper")
     assert {"lark", "rcsc.lang.model", "rcsc.lang.syntax.tree"} <= first
-    again, second = loaded("check", "tables")
+    again, second = loaded("check", "tables/gripper")
     assert again == status
     assert not second & HEAVY
     assert len([name for name in second if name.startswith("rcsc.")]) <= 50
     _, asked_for_help = loaded("--help")
     assert not asked_for_help & HEAVY
+    write("alone/grip.rcs", RIGHT)
+    loaded("check", "alone")
+    _, of_no_system = loaded("check", "alone")
+    assert not of_no_system & {*HEAVY, "rcsc.driver.together", "rcsc.host.described", "rcsc.compose"}
+
+
+def test_a_system_is_read_once_for_all_its_tables(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(REPO / "tables", "tables")
+    read: list[Path] = []
+
+    def counted(system: Path) -> Description:
+        read.append(system)
+        return description(system)
+
+    monkeypatch.setattr(together, "description", counted)
+    assert rcsc("check", "tables/vision", "tables/gripper", "tables/emove").status == 0
+    assert [path.name for path in read] == ["system.toml"]
 
 
 def same(first: Ran, second: Ran) -> bool:

@@ -1,11 +1,15 @@
 """How a command ends that cannot go on: the code, what is wrong, what helps, and exit status 1."""
 
+from typing import TYPE_CHECKING
+
 import click
 
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.render import full, plain
-from rcsc.host.described import BadFile
+
+if TYPE_CHECKING:
+    from rcsc.host.described import BadFile
 
 
 class Stopped(click.ClickException):  # what happened
@@ -28,7 +32,7 @@ class Stopped(click.ClickException):  # what happened
 class StoppedByFile(Stopped):
     """The faults of a description or a data file, each with its place."""
 
-    def __init__(self, error: BadFile) -> None:
+    def __init__(self, error: "BadFile") -> None:
         super().__init__(error.code, str(error))
         self.diagnostics, self.sources = error.diagnostics, error.sources
 
@@ -40,6 +44,8 @@ class StoppedByFile(Stopped):
 
 def stopped(error: CodedError) -> Stopped:
     """The end of a command that met the error."""
+    from rcsc.host.described import BadFile  # keep lazy: most commands end well
+
     if isinstance(error, BadFile) and error.diagnostics:
         return StoppedByFile(error)
     return Stopped(error.code, error.shown, *error.helps)
