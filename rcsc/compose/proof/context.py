@@ -21,6 +21,7 @@ from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.leaves import everything, written_by
 from rcsc.lang.model import Bool, Call, Default, Kind, Statement
 from rcsc.solvers import smt
+from rcsc.solvers.search import halved
 from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic import values
 from rcsc.symbolic.values import Node
@@ -73,9 +74,9 @@ def context(
     """Ask all three questions; lines that `ran` on walks are known to be reached."""
     every = list(_starts(ts, asked, clauses))
     asked.rested_on += [start.solver for start in every]
-    reached = [set(_reached(asked, start)) for start in every]
+    reached = {line for start in every for line in _reached(asked, start, ran)}
     lines = [line for line, _ in _lines(every[0].cycle)]
-    unreached = tuple(line for line in lines if not any(line in each for each in reached))
+    unreached = tuple(line for line in lines if line not in ran and line not in reached)
     return Context(
         unreached,
         tuple(_every_repeated(ts, asked, every)),
@@ -118,9 +119,9 @@ def _lines(cycle: Cycle) -> Iterator[tuple[LineName, Node]]:
                 yield (str(at.table.name), str(line.name)), values.both(at.runs, match)
 
 
-def _reached(asked: Confirmation, start: _Start) -> Iterator[LineName]:
-    """Yield the lines that are not refuted to run."""
-    runs = [(line, asked.keyed.term(when)) for line, when in _lines(start.cycle)]
+def _reached(asked: Confirmation, start: _Start, ran: Container[LineName]) -> Iterator[LineName]:
+    """Yield the lines that are not refuted to run; not those that `ran`."""
+    runs = [(line, asked.keyed.term(when)) for line, when in _lines(start.cycle) if line not in ran]
     start.solver.add(*asked.keyed.ranges)
     for line, term in runs:
         if may(start.solver, term):
@@ -169,11 +170,17 @@ def _repeated(
     solver = start.solver
     solver.add(*keyed.ranges)
     changed = {leaf: solver.named(term) for leaf, term in changed.items()}
+    twices = {line: solver.named(twice) for line, twice in lines}
+    changes = smt.any_of(list(changed.values()))
     solver.push()
-    solver.add(gives)
-    for line, twice in lines:
+    solver.add(gives, changes)
+
+    def never(several: Sequence[LineName]) -> bool:
+        return not may(solver, smt.any_of([twices[line] for line in several]))
+
+    for line in halved(list(twices), never):
         solver.push()
-        solver.add(twice)
+        solver.add(twices[line])
         leaves = tuple(_shown(solver, changed))
         solver.pop()
         if leaves:

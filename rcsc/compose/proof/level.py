@@ -137,9 +137,11 @@ def _proved(
             if looks and (
                 others := [*flow.no_loop_steps(), *never_run(asked, invariant.clauses, invariant.ran)]
             ):
+                found = invariant.clauses
                 invariant = strengthened(ts, firsts, cycle, invariant, others)
                 keep_candidates(cache, ts, invariant)
-                flow = Flow(ts, asked, invariant.clauses)
+                if invariant.clauses != found:
+                    flow = Flow(ts, asked, invariant.clauses)
             _confirm(asked, invariant.clauses)
             verdicts = list(_verdicts(ts, asked, invariant, wanted))
             if looks:
