@@ -31,7 +31,7 @@ Examples:
 @click.argument("system", required=False, type=click.Path(exists=True, path_type=Path), metavar="[SYSTEM]")
 @click.option("--level", "only", multiple=True, metavar="NAME", help="Only this level (repeatable).")
 @steps_option(80, " All questions about one level get 50 times as many together.")
-@click.option("--jobs", "-j", type=click.IntRange(min=1), default=None, show_default="2, or 1 for small levels",
+@click.option("--jobs", "-j", type=click.IntRange(min=1), default=None, show_default="as many as processors, or 1 for small levels",
               help="Levels proved at once.")  # fmt: skip
 @click.option("--trace", "cycles", type=click.IntRange(min=0, max=1000), default=None, metavar="N",
               show_default="8, or some more than a time takes that a table asks for, at most 100",

@@ -1,7 +1,6 @@
 """What `rcsc prove` does: proves the levels of a system together, and says what it found."""
 
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 
 import click
 
+from rcsc.commands.shared.options import cores
 from rcsc.commands.shared.proved import (
     as_json,
     assumptions,
@@ -152,7 +152,7 @@ def _lines(
 def _jobs(levels: Iterable[TransitionSystem]) -> int:
     """How many levels to prove at once where nobody says."""
     lines = sum(len(table.lines) for level in levels for table in level.program.tables)
-    return min(2, os.cpu_count() or 1) if lines >= _WORTH_PROCESSES else 1
+    return cores() if lines >= _WORTH_PROCESSES else 1
 
 
 class _LevelProgress:
