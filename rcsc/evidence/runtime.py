@@ -9,7 +9,8 @@ With `--defensive` a cycle is called on any bytes, without `check`. The RTE plug
 proves it by abstract interpretation, which errs on one side only. EVA keeps a range for each variable, and no relation
 between two: where a line's conditions, or two variables together, keep a value where it was proved to be, the C says so
 (`emit.ranges`). The options are the same for every program: states are kept apart in the functions that are one chain of
-comparisons or that call one (`-eva-slevel-function`).
+comparisons or that call one (`-eva-slevel-function`). That a boolean which is read is 0 or 1 EVA shows by itself, as it does not
+follow RTE's words for it where an index is computed; it then writes down only what it does not show.
 
 A second run takes the reals that come from outside as any finite ones and shows that no operation gives an infinity
 or a NaN. EVA 25 does not follow that a comparison with NaN is false: that admission refuses one is shown by tests and by
@@ -175,8 +176,8 @@ def _command(symbols: Symbols, place: Path, *, finite: bool, defensive: bool) ->
     apart += [*symbols.steps.values(), *symbols.cycles.values()]
     return [
         "frama-c", *OPTIONS, *(("non-finite", "-cpp-extra-args=-Dvolatile=") if finite else ("none",)), str(place / "harness.c"),
-        str(place / symbols.source),
-        "-then", "-eva", "-eva-slevel-function", ",".join(f"{name}:{STATES}" for name in apart),
+        str(place / symbols.source), "-no-warn-invalid-bool",
+        "-then", "-warn-invalid-bool", "-eva", "-eva-slevel-function", ",".join(f"{name}:{STATES}" for name in apart),
         "-eva-split-return", "full", "-then", "-report-csv", str(place / "properties.csv"),
     ]  # fmt: skip
 

@@ -25,7 +25,7 @@ def classes(evidence: Evidence, verdict: str) -> set[str]:
 def test_every_access_index_and_boolean_is_shown() -> None:
     evidence = runtime.collect(subject_of(EVERYTHING))
     assert not evidence.shortfalls
-    assert {"mem_access", "index_bound", "bool_value", "is_nan_or_infinite"} <= classes(evidence, "shown")
+    assert {"mem_access", "index_bound", "is_nan_or_infinite"} <= classes(evidence, "shown")
     assert [figure.partition(": ")[0].partition(", ")[2] for figure in evidence.figures] == [
         "any bytes", "finite reals", "defensive, any bytes", "defensive, finite reals",
     ]  # fmt: skip
@@ -71,15 +71,16 @@ def test_every_word_that_is_lost_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kept", "lost", "told"),
+    ("text", "kept", "lost", "told"),
     [
-        ("s->at > 3u", "s->at > 4u", "indices"),
-        ("s->wanted > PROBE_MODE_STOP", "s->wanted > 3u", "indices"),
-        ("s->smooth <= 500.0", "s->smooth <= 1e308", "reals that are numbers"),
+        (EVERYTHING, "s->at > 3u", "s->at > 4u", "indices"),
+        (EVERYTHING, "s->wanted > PROBE_MODE_STOP", "s->wanted > 3u", "indices"),
+        (EVERYTHING, "s->smooth <= 500.0", "s->smooth <= 1e308", "reals that are numbers"),
+        (RELATED, "(*(const uint8_t *)&s->flags[2]) > 1u", "false", "booleans"),
     ],
 )  # fmt: skip
-def test_a_lost_guard_is_told_with_its_place(kept: str, lost: str, told: str) -> None:
-    evidence = runtime.collect(subject_of(EVERYTHING, (kept, lost)))
+def test_a_lost_guard_is_told_with_its_place(text: str, kept: str, lost: str, told: str) -> None:
+    evidence = runtime.collect(subject_of(text, (kept, lost)))
     assert any(told in short.what and short.where.startswith("probe.c:") for short in evidence.shortfalls)
 
 

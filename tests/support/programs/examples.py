@@ -331,6 +331,7 @@ state at : int 0 .. 3
 state slack : real 0.0 .. 400.0
 state whole : int 0 .. 500
 state ring : array[4] of int -40 .. 40
+state flags : array[4] of bool
 state sum : int 0 .. 90
 state long : int 0 .. most
 output go : bool safe false
@@ -354,6 +355,7 @@ procedure loop {
   }
   if not (at = 0 or ring[at - 1] = 7) { at := at - 1 }
   if at /= 3 { at := at + 1 } else { at := 0 }
+  seen := flags[at]
 }
 
 table t {
