@@ -31,7 +31,6 @@ from rcsc.lang.model import (
     Literal,
     Local,
     Op,
-    ProcedureName,
     Program,
     Read,
     ReadLocal,
@@ -156,13 +155,12 @@ def at_line(table: Table, line: Line | Default, program: Program) -> Ranges:
 
 
 def at_procedures(program: Program) -> Mapping[str, Ranges]:
-    """By procedure, what every line that calls it states of leaves that neither it nor an action before it writes."""
+    """By procedure, what every line that calls it states of leaves that no action before it writes."""
     writes = {procedure.name: set(map(str, procedure.writes)) for procedure in program.procedures}
     found: dict[str, Ranges] = {}
 
     def called(name: str, ranges: Ranges) -> None:
-        own = ranges.forgetting(writes[ProcedureName(name)])
-        found[name] = found[name].joined(own) if name in found else own
+        found[name] = found[name].joined(ranges) if name in found else ranges
 
     for table in program.tables:
         for line in (*table.lines, *((table.default,) if table.default else ())):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rcsc.emit.ranges import Ranges, at_procedures
 from rcsc.lang.interpret import evaluate
 from rcsc.lang.model import Assign, If, Local
-from tests.support.programs.stages import drawn_program, program_of
+from tests.support.programs.stages import drawn_program, emitted, program_of
 from tests.support.strategies import conditions
 
 GRID = range(-3, 5)
@@ -84,8 +84,8 @@ level l {
 
 def test_lines_tell_what_holds_when_a_procedure_begins() -> None:
     found = at_procedures(program_of(LINES))
+    assert found["counts"].known == {"a": (2, 3), "b": (6, 9), "n": (5, 9), "m": (3, 9)}
     assert found["reads"].known == found["sets"].known == {"a": (2, 7)}
-    assert found["counts"].known == {"a": (2, 3), "b": (6, 9), "n": (5, 9)}  # `m` it writes itself
     assert (
         found["late"].known == found["outer"].known == {"a": (2, 3), "b": (6, 9)}
     )  # others have written before
@@ -104,3 +104,37 @@ def test_what_is_written_is_forgotten() -> None:
     assert known.after(call).known == {"local here": (0, 1)}
     assert known.joined(Ranges({"a": (-1, 0)})).known == {"a": (-1, 1)}
     assert known.met(Ranges({"a": (1, 3), "c": (2, 2)})).known["a"] == (1, 1)
+
+
+HELD, FREE = "share := 1.0 / ratio", "ratio := y - 0.75"
+
+
+@pytest.mark.parametrize(
+    ("body", "held"),
+    [
+        (HELD, True),
+        (f"if y > 2.0 {{ {FREE} }} else {{ {HELD} }}", True),
+        (f"case n {{ 0 {{ {FREE} }} else {{ {HELD} }} }}", True),
+        (f"for k in 0 .. 1 {{ {HELD} }}\n {FREE}", True),
+        (f"{FREE}\n {HELD}", False),
+        (f"if y > 2.0 {{ {FREE} }}\n {HELD}", False),
+        (f"case n {{ 0 {{ {FREE} }} else {{ n := 1 }} }}\n {HELD}", False),
+        (f"for k in 0 .. 1 {{ {HELD}\n {FREE} }}", False),
+        (f"free\n {HELD}", False),
+    ],
+)
+def test_the_c_says_what_a_line_states_until_it_is_written(body: str, held: bool) -> None:
+    text = f"""
+input y : real 0.0 .. 10.0
+state n : int 0 .. 9
+state ratio : real 0.0 .. 20.0
+state share : real 0.0 .. 20.0
+procedure free {{ {FREE} }}
+procedure p {{ {body} }}
+table t {{
+  | line | y     | ratio || procedures |
+  | 1    | > 1.0 | > 0.5 || p          |
+  | 2    | DEFAULT |     ||            |
+}}
+"""
+    assert ("_atleast_f64(s->ratio, 0.5)" in "".join(emitted(program_of(text)).values())) is held

@@ -455,7 +455,7 @@ class CText(Text):
 
     @property
     def _proved(self) -> Ranges:
-        """The ranges here, with what the lines state."""
+        """The ranges here, with what the lines state of what nothing has written since."""
         return self._ranges.met(self._stated)
 
     def _element(self, leaves: Sequence[str], kind: Scalar, index: Expr | None = None) -> Place:
@@ -586,7 +586,7 @@ class CText(Text):
 
         Args:
             body: The statements.
-            stated: What lines state of leaves that the body does not write.
+            stated: What lines state before it.
         """
         self._ranges, self._stated = Ranges(), stated
         done = self.block(body)
@@ -598,6 +598,7 @@ class CText(Text):
         done: list[Stmt] = []
         for at, statement in enumerate(body, 1):
             done += self.statement(statement)
+            self._stated = self._stated.without((statement,))
             if at < len(body) and self._may_fail(statement):
                 skipped = self._ranges
                 done.append(when(self.faultless, *self.block(body[at:])))
@@ -628,7 +629,7 @@ class CText(Text):
                 return
             case model.For(name=name, low=low, high=high, body=body):
                 counted, before = word_type(low, high), self._ranges.without(body)
-                self._ranges = before
+                self._ranges, self._stated = before, self._stated.without(body)
                 yield Loop(local(name).text, low, high, self.block(body), self.guard(statement), counted)
                 self._ranges = before
             case model.If(condition=condition, then=then, orelse=orelse):
@@ -643,8 +644,10 @@ class CText(Text):
 
     def _inside(self, body: Sequence[model.Statement], ranges: Ranges) -> tuple[Body, Ranges]:
         """Statements before which these ranges are known, and the ranges after them."""
-        self._ranges = ranges
-        return self.block(body), self._ranges
+        self._ranges, stated = ranges, self._stated
+        done = self.block(body)
+        self._stated = stated
+        return done, self._ranges
 
     def assigned(self, place: model.Place, value: Expr) -> Stmt:
         """An assignment."""

@@ -116,7 +116,7 @@ def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
     named = zip(c.names.lines[table.table.name], table.lines, rows, strict=True)
     for number, (line_name, line, row) in enumerate(named, 1):
         actions = [action.statement for action in line.actions]
-        body = c.text.body(actions, at_line(table.table, row, c.program).without(actions))
+        body = c.text.body(actions, at_line(table.table, row, c.program))
         head = (f"case {line_name}: /* {comment(line.told)} */",)
         cases.append(Frame(head, (*_kept(c, table, number), *body, Line("break;"))))
     none, several = (Set(FAULT, fault_name(c, fault)) for fault in (Fault.NO_LINE, Fault.SEVERAL_LINES))

@@ -389,6 +389,7 @@ state negative : int least .. most
 state double : int 0 .. 18446744073709551615
 state whole : int least .. most
 state share : real 0.0 .. 20.0
+state ratio : real 0.0 .. 20.0
 state square : single 0.0 .. 100.0
 output go : bool safe false
 
@@ -402,6 +403,7 @@ procedure relate {
   whole := int(x * 2.0)
   share := 10.0 / y
   square := z * z
+  case d { 1 { ratio := 4.0 / ratio } else { ratio := 1.0 / y } }
 }
 
 procedure rest {
@@ -411,9 +413,9 @@ procedure rest {
 }
 
 table t {
-  | line | a             | b             | d   | u      | x           | y       | z             || procedures | go    |
-  | 1    | -1000 .. 1000 | -1000 .. 1000 | > 0 | < 1000 | -5.0 .. 5.0 | > 1.0   | -10.0 .. 10.0 || relate     | true  |
-  | 2    | DEFAULT       |               |     |        |             |         |               || rest       | false |
+  | line | a             | b             | d   | u      | x           | y     | z             | ratio || procedures | go    |
+  | 1    | -1000 .. 1000 | -1000 .. 1000 | > 0 | < 1000 | -5.0 .. 5.0 | > 1.0 | -10.0 .. 10.0 | > 0.5 || relate     | true  |
+  | 2    | DEFAULT       |               |     |        |             |       |               |       || rest       | false |
 }
 
 level l {
