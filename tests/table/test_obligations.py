@@ -12,15 +12,18 @@ from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source, Span
+from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.model import Int
 from rcsc.procedures.obligations import Obligations
 from rcsc.solvers import smt
 from rcsc.solvers.options import TOGETHER, Limits, Options
 from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic.encode import within
+from rcsc.symbolic.execution import Run
 from rcsc.table.program import prove_program
 from tests.support.programs.stages import BOXES, codes, drawn_program, program_of, verdict_of
 from tests.support.programs.texts import edited
+from tests.support.strategies import INTS, REALS, Names, integers_over, reals_over
 
 VARIABLES = """
 enum colour { red, green, blue }
@@ -625,3 +628,21 @@ table t assuming fits {{
         runs = dict(zip(witness.variables, witness.values, strict=True))["m"]
         assert told == runs or cells[modes.index(runs)] != condition
         assert text[span.start : span.end] == "a * a"
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.one_of(
+        *(
+            st.tuples(st.just(names), of(names), of(names))
+            for names, of in ((INTS, integers_over), (REALS, reals_over))
+        )
+    )
+)
+def test_what_types_show_to_be_defined_owes_nothing(drawn: tuple[Names, str, str]) -> None:
+    names, left, right = drawn
+    program = drawn_program(f"{names.declared}assume e : {left} < {right}")
+    condition = program.assumptions[0].condition
+    run = Run({}, {v.name: v.type for v in program.variables}, {})
+    run.evaluate(condition)
+    assert may_be_undefined(condition) or not run.obligations

@@ -50,8 +50,10 @@ def _may_fail(applied: Apply) -> bool:
         low, high = word(numbers)
         if any(kind.low < low or kind.high > high for kind in numbers):
             return True
+    if applied.op not in (Op.DIV, Op.MOD):
+        return False
     divisor = kinds[1]
-    return applied.op in (Op.DIV, Op.MOD) and not (isinstance(divisor, Int | Real) and divisor.low > 0)
+    return not (isinstance(divisor, Int | Real) and divisor.low > 0 and math.isfinite(divisor.high))
 
 
 def _integers(op: Arithmetic, a: tuple[int, int], b: tuple[int, int] = (0, 0)) -> tuple[int, int]:
