@@ -8,6 +8,7 @@ from rcsc.diagnostics.report import Report, merged
 from rcsc.driver.proofs import prove
 from rcsc.driver.settings import Proof, Settings
 from rcsc.host.cache import Cache
+from rcsc.host.memory import uncollected
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import resolve
@@ -39,6 +40,7 @@ class Proved:
         )
 
 
+@uncollected()
 def proved(settings: Settings, cache: Cache | None = None) -> Proved:
     """Read, resolve and prove; with a cache only what it does not know."""
     loaded = read(settings)

@@ -4,6 +4,7 @@ import time
 from itertools import islice
 from typing import TYPE_CHECKING
 
+from rcsc.host.memory import uncollected
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import AssumptionName, Backing, Program, Table
 from rcsc.solvers.options import Options
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
+@uncollected()
 def prove_table(program: Program, table: Table, options: Options) -> TableVerdict:
     """Decide whether exactly one line matches every input in the declared ranges, under the assumptions."""
     begun = time.perf_counter()

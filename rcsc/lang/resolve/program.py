@@ -1,13 +1,12 @@
 """One root file and all that it uses, to a `Program`."""
 
-import gc
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
 from rcsc.diagnostics.source import Span
+from rcsc.host.memory import uncollected
 from rcsc.lang.expressions.previous import keeping, with_keeping
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean, without_before
@@ -44,7 +43,7 @@ def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
         return wrong
     declarations = [d for file in files for d in loaded.files[file].declarations]
     limits: dict[str, int] = {}
-    with _uncollected():
+    with uncollected():
         while True:
             resolver = _Resolver(root, limits)
             program = resolver.program(declarations, loaded.files[root])
@@ -52,18 +51,6 @@ def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
             if all(held.limit == limits[key] for key, held in resolver.scope.held.items()):
                 return program
             # a condition has to hold for several times, and not the longest came first: count as far from the beginning
-
-
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Suspend garbage collection: the model has no cycles, and the search doubles the time."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 def compile_text(text: str, file: str = "case.rcs") -> Program | tuple[Diagnostic, ...]:
