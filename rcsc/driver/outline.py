@@ -123,7 +123,7 @@ def keep_lines(
 def outline(systems: "Mapping[str, TransitionSystem]") -> SystemOutline:
     """The outline of all levels."""
     from rcsc.compose.proof.assume_guarantee import promises
-    from rcsc.compose.proof.kept import content
+    from rcsc.compose.proof.candidates import content
 
     levels = tuple(
         LevelOutline(

@@ -25,7 +25,7 @@ from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
 from rcsc.compose.invariant.search import Effort, FoundInvariant, search
 from rcsc.compose.proof import context as context_
 from rcsc.compose.proof import level as level_proof
-from rcsc.compose.proof.candidates import candidates, keep_candidates
+from rcsc.compose.proof.candidates import Candidates, candidates, keep_candidates
 from rcsc.compose.proof.context import RepeatedLine
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
@@ -637,8 +637,8 @@ def test_after_one_cell_has_changed_the_same_is_concluded_as_from_nothing(
     before = prove_level(transition_systems(SYSTEM)["upper"], LITTLE)
     broken = 0
     for ts in islice(with_another_cell(Random(2), tmp_path), EDITS):  # noqa: S311  # repeatable on purpose
-        keep_candidates(cache, ts, FoundInvariant(before.predicates, before.clauses))
-        assert len(candidates(cache, ts)) == len(before.clauses) > 0
+        keep_candidates(cache, ts, FoundInvariant(before.predicates, before.clauses), Candidates())
+        assert len(candidates(cache, ts).clauses) == len(before.clauses) > 0
         proof = prove_level(ts, LITTLE, cache)
         assert concluded(proof) == concluded(prove_level(ts, LITTLE))
         broken += bool(proof.open)
@@ -656,7 +656,7 @@ def test_a_proof_goes_on_where_another_was_ended(monkeypatch: pytest.MonkeyPatch
         patched.setattr(level_proof, "_confirm", ended)
         with counted() as first, pytest.raises(KeyboardInterrupt):
             prove_level(ts, LITTLE, cache)
-    known = candidates(cache, ts)
+    known = candidates(cache, ts).clauses
     with counted() as again, monkeypatch.context() as patched:
         patched.setattr(level_proof, "_confirm", ended)
         with pytest.raises(KeyboardInterrupt):
@@ -685,10 +685,38 @@ def test_nothing_is_believed_of_candidates(value: int, cache: Cache) -> None:
     proof = prove_level(ts, LITTLE)
     wrong = tuple(((at, value),) for at in range(len(proof.predicates)))
     more = (*proof.predicates, Predicate("gone", Bool()))
-    keep_candidates(cache, ts, FoundInvariant(more, (*wrong, ((len(more) - 1, value),), ((0, 99),), ())))
+    keep_candidates(
+        cache, ts, FoundInvariant(more, (*wrong, ((len(more) - 1, value),), ((0, 99),), ())), Candidates()
+    )
     again = prove_level(ts, LITTLE, cache)
     assert concluded(again) == concluded(proof)
     assert len(set(again.clauses) & set(wrong)) < len(wrong) / 2
+
+
+@pytest.mark.parametrize(
+    ("since", "missed", "proofs"), [(True, False, 2), (True, True, 1), (False, False, 1)]
+)
+def test_what_is_missing_of_another_version_as_well_is_not_looked_for_twice(
+    since: bool, missed: bool, proofs: int, cache: Cache, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`go` of the lower level waits for its input; its clauses are of another version `since`, which `missed` the same."""
+    ts = transition_systems(SYSTEM)["lower"]
+    first, done = prove_level(ts, LITTLE, cache), list[Candidates]()
+    found = candidates(cache, ts)
+    assert found.lacking == ("ending go",)
+    begun = replace(
+        found, found_of="other" if since else found.found_of, lacking=found.lacking if missed else ()
+    )
+    keep_candidates(cache, ts, FoundInvariant(first.predicates, first.clauses), begun)
+    proved = level_proof._proved
+
+    def counting_proofs(*given: Any) -> LevelProof:
+        done.append(given[-1])
+        return proved(*given)
+
+    monkeypatch.setattr(level_proof, "_proved", counting_proofs)
+    assert concluded(prove_level(ts, LITTLE, cache)) == concluded(first)
+    assert [each.clauses for each in done] == [found.clauses, ()][:proofs]
 
 
 def test_what_is_known_is_said_again_while_nothing_changes(

@@ -5,8 +5,9 @@ they are found, so that a proof that was ended half-way goes on. Nothing is beli
 finds itself, and Z3 confirms the invariant anew.
 """
 
+import hashlib
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.invariant.search import FoundInvariant, NamedClause
@@ -14,23 +15,39 @@ from rcsc.host.cache import Cache
 
 
 @dataclass(frozen=True, slots=True)
-class _Candidates:
-    """The clauses of one level."""
+class Candidates:
+    """The clauses of one level.
 
-    clauses: tuple[NamedClause, ...]
+    Attributes:
+        found_of: The digest of the level that they were found of (`content`).
+        lacking: What was not shown of lines and endings there.
+    """
+
+    clauses: tuple[NamedClause, ...] = ()
+    found_of: str = ""
+    lacking: tuple[str, ...] = ()
 
 
-def candidates(cache: Cache | None, ts: TransitionSystem) -> tuple[NamedClause, ...]:
+def candidates(cache: Cache | None, ts: TransitionSystem) -> Candidates:
     """Return the clauses that the last search for an invariant of the level found; none without a cache."""
-    kept = None if cache is None else cache.load(_Candidates, *_key(ts))
-    return () if kept is None else kept.clauses
+    kept = None if cache is None else cache.load(Candidates, *_key(ts))
+    return Candidates(found_of=content(ts)) if kept is None else kept
 
 
-def keep_candidates(cache: Cache | None, ts: TransitionSystem, invariant: FoundInvariant) -> None:
-    """Keep the clauses of an invariant that a search found, whether or not it is ever confirmed."""
+def keep_candidates(
+    cache: Cache | None, ts: TransitionSystem, invariant: FoundInvariant, begun: Candidates
+) -> None:
+    """Keep the clauses that a search found that began with others, whether or not they are ever confirmed."""
     if cache is not None and invariant.clauses:
-        cache.store(_Candidates(invariant.named), *_key(ts))
+        cache.store(replace(begun, clauses=invariant.named), *_key(ts))
 
 
 def _key(ts: TransitionSystem) -> tuple[str, ...]:
     return os.path.realpath(ts.level.span.file), ts.level.name
+
+
+def content(ts: TransitionSystem) -> str:
+    """Return the digest of all that a proof of the level depends on, wherever the files are."""
+    tables = tuple(replace(table, file="", stops=()) for table in ts.program.tables)  # they follow from it
+    program = replace(ts.program, file="", tables=tables)
+    return hashlib.sha256(repr((program, ts.level.name, ts.links)).encode()).hexdigest()

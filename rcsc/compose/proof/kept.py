@@ -6,7 +6,7 @@ kept: another run may decide it. The verdicts are kept once more, without effort
 """
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rcsc.compose.contract.claims import Key
 from rcsc.compose.contract.obligations import Obligation, Unstated, obligations
@@ -16,6 +16,7 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.assume_guarantee import of_level
+from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import Context
 from rcsc.compose.proof.level import LevelProof, Verdict, essential
 from rcsc.compose.proof.standing import Verdicts, keep_verdicts
@@ -91,10 +92,3 @@ def _with_table(obligation: Obligation) -> str:
 
 def _key(ts: TransitionSystem, effort: Effort) -> tuple[str, ...]:
     return content(ts), hashlib.sha256(repr(effort).encode()).hexdigest()
-
-
-def content(ts: TransitionSystem) -> str:
-    """Return the digest of all that a proof of the level depends on, wherever the files are."""
-    tables = tuple(replace(table, file="", stops=()) for table in ts.program.tables)  # they follow from it
-    program = replace(ts.program, file="", tables=tables)
-    return hashlib.sha256(repr((program, ts.level.name, ts.links)).encode()).hexdigest()

@@ -17,8 +17,8 @@ from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation, answer
 from rcsc.compose.invariant.pdr import Clause
-from rcsc.compose.invariant.search import LIMITS, Effort, FoundInvariant, NamedClause, search, strengthened
-from rcsc.compose.proof.candidates import candidates, keep_candidates
+from rcsc.compose.invariant.search import LIMITS, Effort, FoundInvariant, search, strengthened
+from rcsc.compose.proof.candidates import Candidates, candidates, content, keep_candidates
 from rcsc.compose.proof.context import Context, context, never_run
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
 from rcsc.host.cache import Cache
@@ -101,27 +101,34 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache
     """Prove a level: find an invariant, confirm it, decide each obligation, and analyse the lines in context.
 
     The search begins with the clauses that the last one left in the cache. Lines and endings may depend on which invariant it finds: where
-    something is missing of them, all is proved once more without those clauses.
+    more is missing of them than in the version of the level that the clauses were found of, all is proved once more without those.
     """
-    effort = effort or Effort()
-    known = candidates(cache, ts)
-    proof = _proved(ts, effort, cache, known)
-    return proof if not known or _complete(proof) else _proved(ts, effort, cache, ())
+    effort, this = effort or Effort(), content(ts)
+    begun = candidates(cache, ts)
+    proof = _proved(ts, effort, cache, begun)
+    if begun.found_of != this and not set(_lacking(proof)) <= set(begun.lacking):
+        proof = _proved(ts, effort, cache, Candidates(found_of=this))
+    found = FoundInvariant(proof.predicates, proof.clauses)
+    keep_candidates(cache, ts, found, Candidates(found_of=this, lacking=_lacking(proof)))
+    return proof
 
 
-def _complete(proof: LevelProof) -> bool:
-    """Return whether nothing is undecided, and nothing left to be shown of lines and endings."""
+def _lacking(proof: LevelProof) -> tuple[str, ...]:
+    """Name what is not shown of lines and endings, and what is undecided."""
     seen = proof.context
     return (
-        all(verdict is not Verdict.UNDECIDED for _, verdict in proof.verdicts)
-        and all(ending.proved for ending in proof.endings)
-        and (seen is None or not (seen.repeated or seen.restless))
+        *(f"undecided {owed.key}" for owed, verdict in proof.verdicts if verdict is Verdict.UNDECIDED),
+        *(f"ending {ending.table}" for ending in proof.endings if not ending.proved),
+        *(
+            f"again {line.table} {line.line} {leaf}"
+            for line in (seen.repeated if seen else ())
+            for leaf in line.leaves
+        ),
+        *(("restless",) if seen is not None and seen.restless else ()),
     )
 
 
-def _proved(
-    ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Sequence[NamedClause]
-) -> LevelProof:
+def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Candidates) -> LevelProof:
     begun, cut_before = time.perf_counter(), smt.cut_short()
     cycle, firsts = ts.cycle(ts.havoc()), tuple(_firsts(ts).values())
     wanted = obligations(ts, cycle)
@@ -129,8 +136,8 @@ def _proved(
     ends: tuple[Ending, ...] = ()
     try:
         with smt.together(TOGETHER * effort.limits.steps):
-            invariant = search(ts, firsts, cycle, wanted, effort, known)
-            keep_candidates(cache, ts, invariant)
+            invariant = search(ts, firsts, cycle, wanted, effort, known.clauses)
+            keep_candidates(cache, ts, invariant, known)
             asked = _asked_anew(invariant.predicates, firsts, cycle, effort.limits)
             looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open)
             flow = Flow(ts, asked, invariant.clauses)
@@ -139,7 +146,7 @@ def _proved(
             ):
                 found = invariant.clauses
                 invariant = strengthened(ts, firsts, cycle, invariant, others)
-                keep_candidates(cache, ts, invariant)
+                keep_candidates(cache, ts, invariant, known)
                 if invariant.clauses != found:
                     flow = Flow(ts, asked, invariant.clauses)
             _confirm(asked, invariant.clauses)
