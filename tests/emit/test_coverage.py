@@ -126,6 +126,21 @@ def test_a_slip_in_the_c_fails_a_vector(right: str, wrong: str, tmp_path: Path) 
     assert "wrong" in told
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("_do_look_up(s, 3u)", "_do_look_up(s, 4u)"),
+        ("parts_height(s->part,", "parts_height(0u,"),
+        ("(int64_t)v_times,", "-(int64_t)v_times,"),
+        ("w1 < -7", "w1 < -8"),
+    ],
+)
+def test_what_an_extern_function_is_given_is_compared(right: str, wrong: str, tmp_path: Path) -> None:
+    status, told = played(tmp_path, set_of(EXTERN), (right, wrong))
+    assert status == 1
+    assert "wrong" in told
+
+
 STATEMENT = re.compile(r"^ +((?:s->\w|probe_)[^\n{}]*;)$", re.MULTILINE)
 EQUAL = (
     "(b < a)", "(a >= least)", "(a <= most)", "s->width > 100u", "several ? (-2)", " t0[", " t1[", "+ 0.0", "_settle(s);", "_atleast_",

@@ -203,6 +203,25 @@ def of_masks(plan: Plan, tables: Sequence[Vectors]) -> Iterator[tuple[Case, Sequ
                 yield Case(Entry("line", name), before, origin=f"mask of {words}"), bits
 
 
+def of_truths(search: InputSearch, plan: Plan) -> Iterator[Case]:
+    """Every entry of masks that are looked up by conditions, by itself and where the rest of each line holds."""
+    for planned in plan.tables:
+        table = planned.table
+        rests: list[list[tuple[Expr, bool]]] = [[]]
+        rests += [
+            [(t.condition, True) for t in line.tests if t is not None and t.box is not None]
+            for line in table.lines
+        ]
+        for group in planned.matcher.groups:
+            truths = [probe.index.condition for probe in group if isinstance(probe.index, Truth)]
+            ways = product((False, True), repeat=len(truths)) if truths else ()
+            for way, rest in islice(product(ways, rests), MOST_ENTRIES):
+                wanted = [*zip(truths, way, strict=True), *rest, *_given(search.program, table)]
+                given = search.find(wanted)
+                if not isinstance(given, Missing):
+                    yield Case(Entry("line", str(table.name)), given, origin="mask of conditions")
+
+
 def _values(index: Direct | Cuts | Coded) -> list[Value]:
     """A value of each entry of a table that is looked up, or on each side of each comparison."""
     match index:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from rcsc.emit.plan import Plan
 from rcsc.lang.model import Program
-from rcsc.testing.coverage.candidates import Session, always, drawn, of_masks, of_tables, refusals
+from rcsc.testing.coverage.candidates import Session, always, drawn, of_masks, of_tables, of_truths, refusals
 from rcsc.testing.coverage.case import Case, Entry, Expected, entries, expected
 from rcsc.testing.coverage.goals import Hit, Reached
 from rcsc.testing.coverage.marks import marked
@@ -108,7 +108,11 @@ def chosen(
     """
     program = search.program
     choice = Choice(program, Reached(program, plan, marked(program)))
-    for case in (*always(program, symbols, reals=reals), *of_tables(search, plan, tables)):
+    for case in (
+        *always(program, symbols, reals=reals),
+        *of_tables(search, plan, tables),
+        *of_truths(search, plan),
+    ):
         choice.offer(case)
     for case, bits in of_masks(plan, tables):
         if not choice.reached.hits.issuperset(bits):

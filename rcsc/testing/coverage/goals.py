@@ -31,7 +31,7 @@ from rcsc.lang.model import (
     key_bounds,
     key_of,
 )
-from rcsc.testing.coverage.case import Case, Expected, ends_of, ran, table_of
+from rcsc.testing.coverage.case import Case, Expected, ends_of, outside_of, ran, table_of
 from rcsc.testing.coverage.marks import Decision, Marked, Outcomes
 
 Hit: TypeAlias = tuple[Hashable, ...]
@@ -172,7 +172,9 @@ class Reached:
         for number, answer in enumerate(case.answers, 1):
             for name, value in zip(procedures[answer.procedure].writes, answer.values, strict=True):
                 beyond = side(self.program.variable(name), value)
-                yield ("given", answer.procedure, name, beyond)
+                variable = self.program.variable(name)
+                near = (*ends_of(variable.type), *outside_of(variable, "int64_t").values())
+                yield ("given", answer.procedure, name, beyond, value in near and value)
                 if right.result == Fault.EXTERN and number == len(case.answers):
                     yield ("ended by", case.entry, number, name, beyond)
 

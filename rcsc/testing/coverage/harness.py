@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Procedure, Program, Real, Scalar, Snapshot, Value
-from rcsc.testing.coverage.case import MODES, Entry, checked, entries
+from rcsc.testing.coverage.case import MODES, Case, Entry, checked, entries, ran
 from rcsc.testing.coverage.choose import Kept
 from rcsc.testing.executors.externs import externs
 from rcsc.testing.executors.reference_file import monitored
@@ -42,7 +42,7 @@ typedef struct {{
     uint16_t function;
     uint16_t sets; /* changes of the initial state, from `first` on */
     uint16_t changed; /* changes of the state by the function, after those */
-    uint16_t answers; /* words that the extern functions give, after those */
+    uint16_t answers; /* words that the extern functions are given and give, call by call, after those */
     uint16_t mode; /* how the machine rounds: 0 as it should, else a way of `rounding` */
     uint32_t first;
     int32_t result;
@@ -54,6 +54,19 @@ typedef struct {{
 uint32_t vectors_count(void);
 int32_t vectors_play(uint32_t number);
 """
+
+TAKEN = """static uint64_t taken(void)
+{
+    uint64_t word = 0u;
+    called = called && (answer < last);
+    if (answer < last) {
+        word = answer->word;
+        answer++;
+    }
+    return word;
+}
+"""
+"""The next word of what extern functions are given and give."""
 
 PLAY = """
 /* Lets the machine round to nearest (0), upward, downward, toward zero, or subnormals to zero; false where it cannot be told to. */
@@ -98,6 +111,8 @@ int32_t vectors_play(uint32_t number)
         put(&right, change[at].leaf, change[at].word);
     }}
     answer = &change[v->changed];
+    last = &answer[v->answers];
+    called = true;
     if (!rounding(v->mode)) {{
         return 0;
     }}
@@ -106,7 +121,7 @@ int32_t vectors_play(uint32_t number)
     if (result != v->result) {{
         return 1;
     }}
-    if (traced(v->function) && !{trace}) {{
+    if (!called || (answer != last) || (traced(v->function) && !{trace})) {{
         return 2;
     }}
     for (at = 0u; at < LEAVES; at++) {{
@@ -216,7 +231,10 @@ def _access(program: Program, symbols: Symbols) -> Iterator[str]:
 
 def _calls(program: Program, symbols: Symbols) -> Iterator[str]:
     """The stand-ins of extern procedures, and the functions by number."""
-    yield "static const change_t *answer;\n"
+    yield "static const change_t *answer, *last;"
+    yield "static bool called; /* whether extern functions were given what they must be, as often as they must be */\n"
+    if externs(program):
+        yield TAKEN
     defined = set[str]()
     for procedure in externs(program):
         assert procedure.extern is not None
@@ -257,14 +275,18 @@ def _stand_in(program: Program, symbols: Symbols, procedure: Procedure, function
     given = [f"{held} a{at}" for at, held in enumerate(types)]
     outs = [f"{symbols.c_type(name)} *r{at}" for at, name in enumerate(procedure.writes)]
     yield f"void {function}({', '.join([*given, *outs]) or 'void'})\n{{"
-    yield from (f"    (void)a{at};" for at, _ in enumerate(given))
+    for at, held in enumerate(types):
+        if held in ("double", "float"):
+            yield f"    {{ const double real = (double)a{at}; uint64_t word; memcpy(&word, &real, sizeof word);"
+            yield "      called = (taken() == word) && called; }"
+        else:
+            yield f"    called = (taken() == (uint64_t)a{at}) && called;"
     for at, name in enumerate(procedure.writes):
         held = symbols.c_type(name)
         if isinstance(program.variable(name).type, Real):
-            yield f"    {{ double real; memcpy(&real, &answer->word, sizeof real); *r{at} = ({held})real; }}"
+            yield f"    {{ const uint64_t word = taken(); double real; memcpy(&real, &word, sizeof real); *r{at} = ({held})real; }}"
         else:
-            yield f"    *r{at} = ({held})answer->word;"
-        yield "    answer++;"
+            yield f"    *r{at} = ({held})taken();"
     yield "}\n"
 
 
@@ -307,12 +329,7 @@ def _data(program: Program, kept: Sequence[Kept]) -> tuple[list[str], list[str]]
         sets = [*_changed(program, start, each.case.before)]
         sets += [f"{{{len(program.variables)}u, 0u}}"] if each.case.foreign else []
         after = list(_changed(program, each.case.before, right.after or each.case.before))
-        kinds = {str(p.name): [program.variable(name).type for name in p.writes] for p in program.procedures}
-        answers = [
-            f"{{0u, {_hex(word_of(kind, value))}}}"
-            for answer in each.case.answers
-            for kind, value in zip(kinds[answer.procedure], answer.values, strict=True)
-        ]
+        answers = [f"{{0u, {_hex(word)}}}" for word in _called(program, each.case)]
         changes += [*sets, *after, *answers]
         mode = ("", *MODES).index(each.case.mode)
         words = max(1, -(-len(numbers.assumptions) // WORD_BITS))
@@ -324,6 +341,23 @@ def _data(program: Program, kept: Sequence[Kept]) -> tuple[list[str], list[str]]
             f"/* {each.case.entry.kind} {each.case.entry.name}: {_plain(each.case.origin)} */"
         )
     return rows, changes or ["{0u, 0u}"]
+
+
+def _called(program: Program, case: Case) -> list[int]:
+    """The words that extern procedures are given and give, in the order of their calls."""
+    answers, words = iter(case.answers), list[int]()
+
+    def answered(procedure: Procedure, args: list[Value]) -> tuple[Value, ...]:
+        kinds: list[Scalar] = [program.variable(name).type for name in procedure.reads]
+        kinds += [param.type for param in procedure.params]
+        kinds += [program.variable(name).type for name in procedure.writes]
+        given = next(answers).values
+        words.extend(map(word_of, kinds, (*args, *given)))
+        return given
+
+    if case.answers:
+        ran(program, case, answered)
+    return words
 
 
 def _plain(text: str) -> str:
