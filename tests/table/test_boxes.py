@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interpret import matching_lines
-from rcsc.lang.interval_sets import joined
-from rcsc.lang.model import Program, key_bounds, key_of, value_of_key
+from rcsc.lang.interval_sets import holds, joined, meet
+from rcsc.lang.model import Box, Program, key_bounds, key_of, value_of_key
 from rcsc.solvers.options import Options
 from rcsc.solvers.search import furthest, halved
 from rcsc.table import boxes
@@ -440,3 +440,26 @@ def test_a_gap_is_found_where_overlaps_are_not_counted(monkeypatch: pytest.Monke
     [found] = prove_program(program, Options(solver="boxes")).tables
     [gap] = [one for one in found.findings if isinstance(one, Gap)]
     assert gap.witnesses == ({"a": True, "b": 3},)
+
+
+INTERVALS = st.lists(
+    st.tuples(st.integers(0, 9), st.integers(0, 9)).map(lambda ends: (min(ends), max(ends))), max_size=3
+)
+
+
+@given(st.lists(INTERVALS.map(tuple), min_size=1, max_size=4), INTERVALS)
+def test_slices_say_which_lines_hold_and_meet(stated: list[Box], asked: list[tuple[int, int]]) -> None:
+    """Whatever intervals a box is written in."""
+    by_box: dict[Box, int] = {}
+    for at, box in enumerate(stated):
+        by_box[box] = by_box.get(box, 0) | 1 << at
+    axis = partition.Sliced.of((0, 9), by_box, 1 << len(stated))
+    lines = [*stated, ((0, 9),)]
+    for (low, high), mask in zip(axis.cuts, axis.masks, strict=True):
+        for key in range(low, high + 1):
+            assert mask == sum(1 << at for at, box in enumerate(lines) if holds(box, key))
+    near = axis.meeting(tuple(asked))
+    met = sum(1 << at for at, box in enumerate(lines) if meet(box, tuple(asked)))
+    assert near & met == met
+    for (low, high), holding in axis.runs(near):
+        assert holding == axis.meeting(((low, high),)) & near

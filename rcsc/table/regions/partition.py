@@ -153,7 +153,7 @@ class Sliced:
         """An axis with the boxes that lines state on it; `idle` are those that state none."""
         changes: dict[int, int] = {}
         for box, mask in stated.items():
-            for low, high in box:
+            for low, high in joined(box):  # intervals that met would undo each other
                 changes[low] = changes.get(low, 0) ^ mask
                 changes[high + 1] = changes.get(high + 1, 0) ^ mask
         cuts, masks, holding = slices(extent, stated), list[int](), idle
