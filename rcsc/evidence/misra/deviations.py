@@ -4,11 +4,12 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from rcsc.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, Finding
+from rcsc.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, HELD, Finding
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _BASIC = re.compile(r"\b(char|short|int|long|float|double|signed|unsigned)\b")
 _ENUMERATOR = re.compile(r"^\s*([A-Z][A-Z0-9_]*)\s*=\s*-?\d+", re.MULTILINE)
+_HELD = re.compile(r"^static .*\b\w+_(?:atleast|atmost|within)_\w+\(", re.ASCII)
 _COMPARED = re.compile(r"(?:==|!=|<=|>=|<|>)\s*([A-Z][A-Z0-9_]*)\b")
 
 
@@ -63,6 +64,10 @@ DEVIATIONS = (
         for check in ("redundantAssignment", "redundantInitialization", "unreadVariable")
     ),
     Deviation(
+        HELD, "2.2", r"\(",
+        "defensive code: it changes no value that was proved, and says what was, so that an analyser of ranges follows",
+    ),
+    Deviation(
         BASIC_TYPE, "Dir 4.6", r"\bdouble\b",
         "reals are IEEE binary64 as they were proved; the program tests when it runs that double is that",
     ),
@@ -99,7 +104,7 @@ def _declared(line: str, files: Mapping[str, str]) -> bool:
 
 
 def own_findings(files: Mapping[str, str]) -> Iterator[Finding]:
-    """Give the places that cppcheck does not look for: basic types, and enumerators compared with objects."""
+    """Give the places that cppcheck does not look for: basic types, enumerators compared with objects, functions that change nothing."""
     bare = {
         path.rpartition("/")[2]: _bare(text) for path, text in files.items() if path.endswith((".c", ".h"))
     }
@@ -110,6 +115,8 @@ def own_findings(files: Mapping[str, str]) -> Iterator[Finding]:
                 yield Finding(file, at, BASIC_TYPE, f"basic type {found[1]}")
             if any(name in enumerators for name in _COMPARED.findall(line)):
                 yield Finding(file, at, ENUMERATOR, "an enumerator compared with an object")
+            if _HELD.search(line):
+                yield Finding(file, at, HELD, "a function that changes no value that was proved")
 
 
 def _bare(text: str) -> str:
