@@ -6,6 +6,7 @@ In: the text of a file. Out: spans (character offsets) and, here alone, lines an
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -44,8 +45,8 @@ class Source:
     _starts: tuple[int, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        starts = [0]
-        starts.extend(i + 1 for i, c in enumerate(self.text) if c == "\n")
+        *ended, _ = self.text.split("\n")
+        starts = accumulate((len(line) + 1 for line in ended), initial=0)
         object.__setattr__(self, "_starts", tuple(starts))
 
     def position(self, offset: int) -> Position:

@@ -1,5 +1,7 @@
 """Tables: columns, lines, tests and actions."""
 
+from itertools import chain
+
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Label
 from rcsc.lang.expressions.conditions import Tests
@@ -99,7 +101,7 @@ def _subject(scope: Scope, heading: tree.Heading) -> Typed | None:
 
 def _bounds(row: tree.Row) -> tuple[int, ...]:
     """Start and end of each cell's first piece, flattened."""
-    return tuple(bound for cell in row.cells for bound in (cell.span.start, cell.span.end))
+    return tuple(chain.from_iterable(cell.ends for cell in row.cells))
 
 
 def _column(heading: tree.Heading, subject: Typed | None) -> Column:

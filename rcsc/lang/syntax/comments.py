@@ -5,7 +5,6 @@ Each is handed out once; what nobody takes is the file's.
 """
 
 import re
-from bisect import bisect_right
 
 from rcsc.diagnostics.source import Source
 
@@ -16,17 +15,19 @@ class Comments:
     """The comments of `source`, in order, each until taken."""
 
     def __init__(self, source: Source) -> None:
+        self._source = source
         self._waiting: list[tuple[int, str]] = []
-        self._starts = [0] + [at + 1 for at, char in enumerate(source.text) if char == "\n"]
         for match in _TOKEN.finditer(source.text):
             if match.group().startswith("#"):
                 self._waiting.append((match.start(), match.group().rstrip()))
 
     def _line(self, offset: int) -> int:
-        return bisect_right(self._starts, offset)
+        return self._source.position(offset).line
 
     def take(self, start: int) -> tuple[str, ...]:
         """Take comments before offset `start`, or after it on the same line."""
+        if not self._waiting:
+            return ()
         line = self._line(start)
         count = 0
         while count < len(self._waiting):

@@ -207,7 +207,7 @@ def _error(code: Code, message: str, span: Span, *helps: str) -> Diagnostic:
 
 
 def _says_default(cell: Cell) -> bool:
-    return cell.text.split() in (["DEFAULT"], ["DEFAULT", "unreachable"])
+    return cell.text.startswith("DEFAULT") and cell.text.split() in (["DEFAULT"], ["DEFAULT", "unreachable"])
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,6 +72,18 @@ class Cell:
         """The first piece, which is all of most cells."""
         return self.at(0, len(self.text))
 
+    @property
+    def ends(self) -> tuple[int, int]:
+        """Start and end of `span`: they are asked for of every cell, of which few have more than one piece.
+
+        >>> Cell("on", "a.rcs", 40).ends, Cell("in {left, right}", "a.rcs", 40, ((10, 90),)).ends
+        ((40, 42), (40, 49))
+        """
+        if not self.further:
+            return self.start, self.start + len(self.text)
+        span = self.span
+        return span.start, span.end
+
     def at(self, start: int, end: int) -> Span:
         """The place in the file of characters of the text: of those that stand in the piece of the first.
 
