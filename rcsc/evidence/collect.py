@@ -40,7 +40,11 @@ def collect(settings: Settings, kinds: Collection[str], folder: Path) -> Conclus
     made: dict[str, dict[str, Evidence]] = {}
     diagnostics: list[Diagnostic] = []
     names = [name for name in KINDS if name in kinds]
+    roots: dict[str, str] = {}
     for root, looks in _subjects(settings, project, diagnostics):
+        if (other := roots.setdefault(looks.name.casefold(), root)) != root:
+            diagnostics.append(_same_name(looks.name, root, other))
+            continue
         of_one = made[looks.name] = {}
         for name in names:
             settings.progress(f"{root}: {name}")
@@ -87,6 +91,13 @@ def _of_tables(settings: Settings) -> Settings:
 def _subject(program: ProvedProgram, settings: Settings) -> Subject:
     plan = planned(program)
     return Subject(program, plan, emitted(plan), settings.options, settings.progress)
+
+
+def _same_name(name: str, root: str, other: str) -> Diagnostic:
+    """Say that no evidence was made of a program: its files would be those of another."""
+    message = f"no evidence of `{root}`: its folder `{name}` has that of `{other}`"
+    helps = ("make the evidence of each by itself, with a folder of its own, or rename one of the files",)
+    return Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)
 
 
 def _findings(root: str, kind: str, evidence: Evidence) -> Iterator[Diagnostic]:

@@ -13,6 +13,8 @@ from rcsc.driver.compile import Generated, tables_in
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Settings
 from rcsc.evidence import analysers, runtime
+from rcsc.evidence import collect as collecting
+from rcsc.evidence.kind import Evidence, Kind
 from rcsc.evidence.whole import kinds
 from rcsc.evidence.whole.kinds import Whole
 from rcsc.solvers.options import Options
@@ -89,3 +91,20 @@ def test_what_is_not_looked_at_is_named_in_the_index(
     index = (tmp_path / "out" / "index.md").read_text("utf-8")
     assert "\n## dock\n" in index
     assert f"- dock.c is not looked at: {kinds.PASSES['runtime']}" in index
+
+
+def test_of_programs_of_one_name_none_is_lost_in_silence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [tmp_path / folder / "door.rcs" for folder in ("first", "second", "third")]
+    for file in files:
+        file.parent.mkdir()
+        file.write_text(
+            "input a : bool\ntable t {\n  | line | a ||\n  |------|---||\n  | 1    |   ||\n}\n", "utf-8"
+        )
+    monkeypatch.setattr(collecting, "KINDS", {"misra": Kind("", lambda _: Evidence(("looked at",)))})
+    assert run(["evidence", "--only", "misra", "--out", str(tmp_path / "out"), *map(str, files)]) == 1
+    said = capsys.readouterr()
+    assert said.out.count("looked at") == 1
+    for file in files[1:]:
+        assert f"no evidence of `{file}`" in " ".join((said.out + said.err).split())
