@@ -163,7 +163,7 @@ def at_procedures(program: Program) -> Mapping[str, Ranges]:
         found[name] = found[name].joined(ranges) if name in found else ranges
 
     for table in program.tables:
-        for line in (*table.lines, *((table.default,) if table.default else ())):
+        for line in table.every_line:
             ranges = at_line(table, line, program)
             for action in line.actions:
                 if isinstance(action.statement, Call):

@@ -12,12 +12,12 @@ from functools import partial
 from html import escape
 
 from rcsc.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
+from rcsc.graph.labels import split
 from rcsc.graph.layout import Arrangement, Arrow, LayoutBox, Point, place
 from rcsc.lang.operator_table import LOGIC, Op
 
 _FONT_PX, _ROW_PX, _LETTER_PX = 11, 14, 6.62  # a letter of a monospaced font is 0.602 of its size wide
 _BADGE_PX, _GAP_PX, _EDGE_PX = 9.5, 5.0, 24.0
-_OPEN, _CLOSE = frozenset("([{"), frozenset(")]}")
 MOST_LETTERS = 34
 """Letters of a label's line."""
 
@@ -175,17 +175,7 @@ def plain(guard: str) -> str:
     """A guard for the eye: `not a` for `a = false`, and commas."""
     short = re.sub(r"(?<![\w.\]])([\w.\[\]]+) = true(?![\w.])", r"\1", guard)
     short = re.sub(r"(?<![\w.\]])([\w.\[\]]+) = false(?![\w.])", r"not \1", short)
-    return short if any(f" {op} " in short for op in LOGIC - {Op.AND}) else _with_commas(short)
-
-
-def _with_commas(text: str) -> str:
-    """The text with commas for what `and` joins, but within brackets, where a comma would say something else."""
-    pieces, depth = re.split(r"([(\[{)\]}]| and )", text), 0
-    for at, piece in enumerate(pieces):
-        depth += (piece in _OPEN) - (piece in _CLOSE)
-        if piece == " and " and depth == 0:
-            pieces[at] = ", "
-    return "".join(pieces)
+    return short if any(f" {op} " in short for op in LOGIC - {Op.AND}) else ", ".join(split(short, " and "))
 
 
 def folded(text: str) -> Iterator[str]:

@@ -124,9 +124,9 @@ def split(text: str, mark: str = ",") -> list[str]:
     pieces, depth, begun = [], 0, 0
     for at, letter in enumerate(text):
         depth += (letter in _OPEN) - (letter in _CLOSE)
-        if letter == mark and depth == 0:
+        if depth == 0 and at >= begun and text.startswith(mark, at):
             pieces.append(text[begun:at])
-            begun = at + 1
+            begun = at + len(mark)
     return [piece.strip() for piece in (*pieces, text[begun:]) if piece.strip()]
 
 

@@ -724,6 +724,11 @@ class Table:
     meetings: tuple[Meeting, ...] = ()
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
+    @property
+    def every_line(self) -> tuple[Line | Default, ...]:
+        """The lines, and after them DEFAULT where the table has one."""
+        return self.lines if self.default is None else (*self.lines, self.default)
+
     def added(self, line: Line) -> str:
         """What `above` and `same` add to the conditions of one of its lines, in words; empty for nothing."""
         tests = zip(line.tests, self.columns, strict=True)

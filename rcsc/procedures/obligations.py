@@ -383,7 +383,7 @@ class Obligations:
                 return None
 
     def _lines(self, table: Table) -> Iterator[_Owing]:
-        for line in (*table.lines, *((table.default,) if table.default else ())):
+        for line in table.every_line:
             if not self._plain(line.actions):
                 where = f"in line `{line.name}` of table `{table.name}`"
                 yield _Owing(partial(self._line, table, line), where, _name_of(line))

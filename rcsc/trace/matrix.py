@@ -280,10 +280,7 @@ class _Build:
                 yield self._line(table, line, span, tested)
 
     def _row(self, table: PlanTable, line: PlanLine) -> Span:
-        spans = {
-            str(one.name): one.span for one in (*table.table.lines, table.table.default) if one is not None
-        }
-        return spans[str(line.name)]
+        return next(one.span for one in table.table.every_line if one.name == line.name)
 
     def _line(self, table: PlanTable, line: PlanLine, span: Span, tested: set[str]) -> TracedLine:
         body = [action.statement for action in line.actions]

@@ -51,7 +51,7 @@ def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
     file = named if named.endswith(".rcs") else named.rpartition(":")[0]
     if file.endswith(".rcs") and not Path(file).exists():
         raise click.UsageError(f"path `{file}` does not exist")
-    answer = tables(named, running=running, preferred=_of_system())
+    answer = tables(named, running=running, preferred=() if file else _of_system())
     if isinstance(answer, NotFound):
         raise WrongError(answer.diagnostics, answer.sources)
     return answer

@@ -40,6 +40,7 @@ from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import LevelProof, besides, certificate
 from rcsc.compose.proof.system import (
     SystemProof,
+    lines_in,
     prove_transition_systems,
     read_systems,
 )
@@ -151,8 +152,7 @@ def _lines(
 
 def _jobs(levels: Iterable[TransitionSystem]) -> int:
     """How many levels to prove at once where nobody says."""
-    lines = sum(len(table.lines) for level in levels for table in level.program.tables)
-    return cores() if lines >= _WORTH_PROCESSES else 1
+    return cores() if sum(map(lines_in, levels)) >= _WORTH_PROCESSES else 1
 
 
 class _LevelProgress:

@@ -266,14 +266,14 @@ def _each(
             yield name, _proved(systems[name], effort, cache)
         return
     with children.pool(min(jobs, len(only))) as pool:
-        largest = sorted(only, key=lambda name: -_lines(systems[name]))
+        largest = sorted(only, key=lambda name: -lines_in(systems[name]))
         waiting = {name: pool.submit(_without_nodes, systems[name], effort, cache) for name in largest}
         for name in only:
             proof = children.answer(waiting[name])
             yield name, replace(proof, verdicts=_again(systems[name], proof))
 
 
-def _lines(ts: TransitionSystem) -> int:
+def lines_in(ts: TransitionSystem) -> int:
     """Count the lines of the level's tables."""
     return sum(len(table.lines) for table in ts.program.tables)
 

@@ -112,8 +112,7 @@ def _told(c: CProgram, place: int, stops: tuple[int, ...]) -> Body:
 def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
     """Finds the line and runs its actions."""
     cases: list[Stmt] = []
-    rows = (*table.table.lines, *((table.table.default,) if table.table.default else ()))
-    named = zip(c.names.lines[table.table.name], table.lines, rows, strict=True)
+    named = zip(c.names.lines[table.table.name], table.lines, table.table.every_line, strict=True)
     for number, (line_name, line, row) in enumerate(named, 1):
         actions = [action.statement for action in line.actions]
         body = c.text.body(actions, at_line(table.table, row, c.program))
