@@ -413,6 +413,33 @@ def test_rows_are_shown_with_what_became_of_them(live: Live, browser: Browser) -
 
 
 @pytest.mark.needs("chromium")
+def test_the_list_follows_the_present_row_and_the_page_stays_where_it_is(
+    live: Live, browser: Browser
+) -> None:
+    many = 120
+    for number in range(1, many + 1):
+        live.row(number, f"MOVE {number}", "")
+    browser.open(url(live))
+    browser.wait(f"document.querySelectorAll('#rows tr').length === {many}")
+    list_, row = "document.querySelector('#rows').parentElement", "document.querySelector('#rows').rows[{}]"
+    seen = f"(row => row.top >= list.top && row.bottom <= list.bottom)({row}.getBoundingClientRect())"
+    for number in (70, many, 71, 3):
+        live.row(number - 1, f"MOVE {number - 1}", "done")
+        live.row(number, f"MOVE {number}", "running")
+        for later in range(number + 1, many + 1):
+            live.row(later, f"MOVE {later}", "")
+        browser.wait(f"(list => {seen.format(number - 1)})({list_}.getBoundingClientRect())")
+        assert browser.value("window.scrollY") == 0
+    browser.value(
+        f"{list_}.scrollTop = {list_}.scrollHeight"
+    )  # the user looks elsewhere, while the same row is under way
+    before = browser.value(f"{list_}.scrollTop")
+    live.row(1, "MOVE 1", "failed")
+    browser.wait(f"{row.format(0)}.textContent.endsWith('failed')")
+    assert browser.value(f"{list_}.scrollTop") == before > 0
+
+
+@pytest.mark.needs("chromium")
 def test_the_user_types_a_name_and_it_is_plotted(live: Live, browser: Browser) -> None:
     browser.open(url(live))
     browser.wait("document.querySelectorAll('datalist option').length === 5")

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 import sqlite3
 from pathlib import Path
@@ -15,8 +16,9 @@ from rcsc_cell.cell import reach
 from rcsc_cell.cell.mujoco_model import Body
 from rcsc_cell.cell.plant import Plant
 from rcsc_cell.cell.ready import Lying, lying, plant
-from rcsc_cell.database.ask import Database, open_database
+from rcsc_cell.database.ask import Database, open_database, tables_of
 from rcsc_cell.database.build import BadData, build
+from rcsc_cell.database.readable import NUMBERED
 from rcsc_cell.episodes.witness import placements
 from rcsc_cell.workstation.interlocks import CellState, after, refusal
 from rcsc_cell.workstation.prepared import prepare
@@ -152,8 +154,34 @@ def test_a_long_text_is_shown_short(project: Path, capfd: pytest.CaptureFixture[
     held.close()
     assert run(["db", "show", "objects", "--database", "my.sqlite"]) == 0
     shown = capfd.readouterr().out.splitlines()
-    assert max(map(len, shown)) < 2500
-    assert {line.count("\t") for line in shown} == {shown[0].count("\t")}
+    assert max(map(len, shown)) < 400
+    assert not any("\t" in line for line in shown)
+    assert "long    long" in shown[1]
+
+
+def test_a_table_is_shown_with_names_and_units_and_no_digits_that_say_nothing(
+    project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    build(project / "tables/cell.toml", project / "my.sqlite", PARTS)
+    held = tables_of(project / "my.sqlite")
+    assert run(["db", "show", "--database", "my.sqlite"]) == 0
+    assert {line.split()[0] for line in capfd.readouterr().out.splitlines()} == set(held)
+    for table, listed in held.items():
+        assert run(["db", "show", table, "--database", "my.sqlite"]) == 0
+        head, *rows = capfd.readouterr().out.splitlines()
+        assert len(rows) == len(listed.rows)
+        assert "_" not in head
+        for column, at in ((name, listed.columns.index(name)) for name in listed.columns):
+            if column in NUMBERED:
+                names = {row[0]: row[1] for row in held[NUMBERED[column]].rows}
+                for text, row in zip(rows, listed.rows, strict=True):
+                    assert ("-" if row[at] is None else names[row[at]]) in text.split()
+            if column.endswith(("_mm", "_mm_s", "_mm_s2", "_deg", "_n")):
+                place = head.index("(", head.index(column.split("_")[0]))
+                assert head[place:].startswith(
+                    ("(mm)", "(mm/s)", "(mm/s\N{SUPERSCRIPT TWO})", "(N)", "(\N{DEGREE SIGN})")
+                )
+        assert not re.search(r"\.\d{5}|\d{2,}\.\d{3}|-0 |None|[{}]", "\n".join(rows))
 
 
 def test_a_pallet_has_a_place_for_each_sector_and_others_ignore_it(tmp_path: Path) -> None:
@@ -211,7 +239,7 @@ def test_db_commands(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["db", "build", "-o", "my.sqlite"]) == 0
     assert run(["run", "make_boxt", *QUICK, "--database", "my.sqlite", "-q"]) == 0
     assert run(["db", "show", "places"]) == 0
-    assert "location\tsector" in capfd.readouterr().out
+    assert "\nlocation      sector  depart first" in capfd.readouterr().out
     assert run(["db", "show", "nothing"]) == 2
     (project / "tables/cell.toml").write_text(DATA.replace("z = 350.0", "z = 3000.0"), encoding="utf-8")
     assert run(["db", "check"]) == 1

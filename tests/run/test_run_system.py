@@ -13,11 +13,13 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.run.description import description
-from rcsc.run.orders.operator import ScriptedRun
+from rcsc.run.orders.operator import RowResult, ScriptedRun, ScriptOperator
 from rcsc.run.orders.roles import served
 from rcsc.run.orders.script import BadScript, read_script, script_path
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.system import System, assemble, signatures
+from rcsc_cell.pages.report import page
+from rcsc_cell.pages.witness import RunWitness
 from tests.support.programs.texts import edit_file, edited
 
 Said = Callable[[], str]
@@ -334,11 +336,50 @@ command = "undock"
 within = 200
 """
     assert played(here, text, end=".toml") == [
-        ("done", "failed as expected: reason no_beacon", 2),
+        ("done", "failed as expected: reason no_beacon", 3),
         ("done", "", 4),
         ("done", "", 3),
-        ("done", "", 95),
+        ("done", "", 97),
     ]
+
+
+MANY_ROWS = {
+    "answered": "command,cycles,within\ndock,,\nundock,,200\nstop,,\n",
+    "timed": "command,cycles,fault\n,4,\n,1,wheel_slips\nstop,7,wheel_slips\n,2,\n",
+    "both": "command,cycles,base.bumper\ndock,,\n,5,true\nundock,,\n,1,\n",
+    "failed": "command,within\nstop,\nundock,\ndock,2\n",
+}
+
+
+@pytest.mark.parametrize("name", list(MANY_ROWS))
+def test_the_cycles_of_all_rows_are_those_of_the_run(name: str, here: Path) -> None:
+    run_ = scripted(here, MANY_ROWS[name])
+    ends = list(run_.steps(2000))
+    at = 0
+    for end in ends:
+        assert isinstance(end, RowResult)
+        assert end.first_tick == at
+        assert end.row.cycles in (None, end.ticks)
+        at += end.ticks
+    aside = run_.system.tick - at
+    assert (aside > 0) == (name == "failed"), "the level comes to rest"
+    said = page(RunWitness(run_).story("rows", 1.0))
+    assert f"{run_.system.tick} cycles" in said
+    assert (f"({aside} of them after the last row)" in said) == (name == "failed")
+    assert sum(map(int, re.findall(r'<td class="n">(\d+)</td><td></td></tr>', said))) == at - (
+        ends[-1].ticks if name == "failed" else 0
+    )
+    assert len(re.findall(r"[0-9.]+ (?:s</b>control|</b>cycles)", said)) == 0, "said once"
+
+
+def test_a_row_has_its_fault_in_each_of_its_cycles_and_in_no_other(here: Path) -> None:
+    run_ = scripted(here, "command,cycles,fault\n,3,\n,4,wheel_slips\n,1,\n,2,wheel_slips\n,2,\n")
+    on: list[bool] = []
+    assert isinstance(run_.operator, ScriptOperator)
+    operator = run_.operator
+    run_.system.watch.append(lambda _, __: on.append(bool(operator.faults)))
+    assert [end.ticks for end in run_.steps(100)] == [3, 4, 1, 2, 2]
+    assert "".join(".X"[one] for one in on) == "...XXXX.XX.."
 
 
 def test_a_value_that_a_row_sets_is_gone_with_the_row(here: Path) -> None:

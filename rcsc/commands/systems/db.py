@@ -10,7 +10,6 @@ from rcsc.commands.shared.show import show as show_report
 from rcsc.commands.shared.systems import DATABASE, SYSTEM, system_path
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.diagnostics.printable import escape
 from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Span
 from rcsc.host.cache import open_cache
@@ -21,6 +20,7 @@ from rcsc.run.system import signatures
 from rcsc_cell.cell.reach import checked
 from rcsc_cell.database.ask import open_database, tables_of
 from rcsc_cell.database.build import build as build_database
+from rcsc_cell.database.readable import lines_of
 from rcsc_cell.workstation.prepared import database_of, database_path, limits_of, needs_data, parts_of
 
 
@@ -102,7 +102,7 @@ def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
 @DATABASE
 @click.argument("table", required=False, metavar="[TABLE]")
 def show(system: Path | None, database: Path | None, table: str | None) -> int:
-    """Show a TABLE of the database, or how many rows each has."""
+    """Show a TABLE of the database with names and units, or how many rows each has; the file has every digit."""
     described = description(system_path(system))
     database_of(described, signatures(described), database)
     held = tables_of(database or database_path(described))
@@ -112,17 +112,6 @@ def show(system: Path | None, database: Path | None, table: str | None) -> int:
         return 0
     if table not in held:
         raise click.BadParameter(f"choose from {', '.join(sorted(held))}", param_hint="TABLE")
-    click.echo("\t".join(held[table].columns))
-    for row in held[table].rows:
-        click.echo("\t".join(_shown(value) for value in row))
+    for line in lines_of(held, table):
+        click.echo(line)
     return 0
-
-
-MOST_SHOWN = 400
-"""Characters of a value that `db show` prints."""
-
-
-def _shown(value: object) -> str:
-
-    text = "" if value is None else str(value)
-    return escape(text[:MOST_SHOWN]) + ("..." if len(text) > MOST_SHOWN else "")

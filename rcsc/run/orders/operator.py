@@ -54,7 +54,7 @@ class Result(Protocol):
 
     @property
     def ticks(self) -> int:
-        """How many cycles it took."""
+        """How many cycles it took, the one in which its end was seen included: those of all rows are those of the run."""
         ...
 
 
@@ -102,7 +102,7 @@ class Operator(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RowResult:
-    """What became of a row: `state` is `done` where it ended as it was to, else `failed`."""
+    """What became of a row: `state` is `done` where it ended as it was to, else `failed`; `ticks` as of `Result`."""
 
     row: OrderRow
     state: str
@@ -126,6 +126,7 @@ class ScriptOperator:
     _lines: dict[str, Orders] = field(default_factory=dict)
     _since: int = -1  # the tick at which the row began
     _resting: int = -1  # the tick at which the level was told to rest, while that is not answered
+    _holding: OrderRow | None = None  # whose values and faults this tick has
 
     def __post_init__(self) -> None:
         """Opens a line to every level that the script orders."""
@@ -152,12 +153,12 @@ class ScriptOperator:
     @property
     def held(self) -> Mapping[str, Mapping[int, Value]]:
         """What buffers from outside hold because of the row under way."""
-        return {} if self.over or self._since < 0 else self.rows[self.at].set
+        return {} if self._holding is None else self._holding.set
 
     @property
     def faults(self) -> frozenset[str]:
         """The plant's faults that are on because of the row under way."""
-        return frozenset(() if self.over or self._since < 0 else self.rows[self.at].faults)
+        return frozenset(() if self._holding is None else self._holding.faults)
 
     def begin_at(self, row: int) -> None:
         """Goes on at another row, as if those between were done.
@@ -165,7 +166,7 @@ class ScriptOperator:
         Args:
             row: From 0.
         """
-        self.at, self._since = row, -1
+        self.at, self._since, self._holding = row, -1, None
 
     def state(self) -> dict[str, Any]:
         """What a stopped one goes on from; its orders stand in their buffers."""
@@ -180,7 +181,7 @@ class ScriptOperator:
         at = state.get("at")
         if type(at) is not int or not 0 <= at < len(self.rows) or len(state) != 1:
             raise ValueError(f"the script has {len(self.rows)} rows")
-        self.at, self._since, self._resting = at, -1, -1
+        self.at, self._since, self._resting, self._holding = at, -1, -1, None
         self.results.clear()
         for line in self._lines.values():
             line.sent = ()
@@ -189,6 +190,7 @@ class ScriptOperator:
         """One tick: begin a row, wait for its end, or rest."""
         for line in self._lines.values():
             line.catch_up(latest)
+        self._holding = None
         if self._resting >= 0:
             self._await_rest(tick, latest)
         elif not self.over:
@@ -197,19 +199,20 @@ class ScriptOperator:
 
     def _work(self, tick: int, latest: Latest) -> None:
         row = self.rows[self.at]
-        if self._since < 0:
+        begins = self._since < 0
+        if begins:
             self._since = tick
             if row.served is not None:
                 self._lines[row.served.level].send(row.order)
-            return
-        state, reason = self._now(row, tick - self._since, latest)
+        state, reason = self._now(row, tick - self._since, latest) if row.timed or not begins else ("", "")
+        self._holding = row if row.timed or not state else None
         if state:
             self._end(row, tick, state, reason)
 
     def _now(self, row: OrderRow, ticks: int, latest: Latest) -> tuple[str, str]:
-        """How a row stands, and why it failed; the first is empty while it is under way."""
-        if row.cycles is not None:
-            return (DONE, "") if ticks >= row.cycles else ("", "")
+        """How a row stands after so many cycles, and why it failed; the first is empty while it is under way."""
+        if row.cycles is not None:  # nothing is waited for: it ends in its last cycle, not in the one after
+            return (DONE, "") if ticks + 1 >= row.cycles else ("", "")
         assert row.served is not None  # a row without a command takes so many cycles
         report = self._lines[row.served.level].answer(latest)
         if report is not None:
@@ -227,7 +230,7 @@ class ScriptOperator:
         return "", ""
 
     def _end(self, row: OrderRow, tick: int, state: str, reason: str) -> None:
-        self.results.append(RowResult(row, state, reason, self._since, tick - self._since))
+        self.results.append(RowResult(row, state, reason, self._since, tick - self._since + 1))
         self._since = -1
         if state == DONE:
             self.at += 1

@@ -66,6 +66,11 @@ class OrderRow:
     expect: str = DONE
     faults: tuple[str, ...] = ()
 
+    @property
+    def timed(self) -> bool:
+        """Whether it takes so many cycles, whatever is reported."""
+        return self.cycles is not None
+
 
 @dataclass(frozen=True, slots=True)
 class OutsideBuffer:

@@ -16,7 +16,7 @@ Nothing here is trusted for a proof: the levels are proved for any answer within
 it is read once; a question is a look into memory.
 
 Modules, in the order the data flows: `pose` (rotations, points, the robot's nine numbers), `build` (data file to
-database), `ask` (the levels' questions).
+database), `ask` (the levels' questions), `readable` (a table, for people).
 
 Source: Haynes et al. 1984, sections 3 to 7. Lengths in millimetres, angles in degrees.
 """

@@ -69,12 +69,24 @@ function showPicture(kind, svg) {
 }
 
 function showRows(rows) {
+  const list = page("rows").parentElement, before = list.scrollTop;
   page("rows").replaceChildren(...rows.map(([number, text, state]) => {
     const row = document.createElement("tr");
     for (const said of [number, text, state]) row.insertCell().textContent = said;
     row.lastChild.className = state.split(" ")[0];
     return row;
   }));
+  list.scrollTop = before;
+  follow(list, rows.findLastIndex(([, , state]) => state));
+}
+
+// Scrolls the list, and never the page, to the row that is under way or ended last; whoever scrolled it is left alone until another one is.
+let present = -1;
+function follow(list, at) {
+  if (at === present) return;
+  present = at;
+  const row = page("rows").rows[at];
+  if (row) list.scrollTop += row.getBoundingClientRect().top - list.getBoundingClientRect().top - (list.clientHeight - row.offsetHeight) / 2;
 }
 
 function shownByTables(display) {

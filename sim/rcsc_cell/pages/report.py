@@ -77,7 +77,7 @@ class Story:
         placements: Of the parts.
         margins_deg: The least distance of each joint from its limits.
         tick_ms: Of the system.
-        ticks: How many there were, those before the first row and after the last too.
+        ticks: How many there were: those of all rows, and those in which nothing was ordered any more.
     """
 
     title: str
@@ -90,6 +90,11 @@ class Story:
     margins_deg: Sequence[float] = ()
     tick_ms: int = 40
     ticks: int = 0
+
+    @property
+    def aside(self) -> int:
+        """Cycles of no row: in which a level came to rest after the last."""
+        return max(0, self.ticks - sum(row.cycles for row in self.rows)) if self.rows else 0
 
 
 @dataclass(frozen=True, slots=True)

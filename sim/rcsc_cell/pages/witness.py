@@ -126,8 +126,6 @@ class RunWitness:
             self.series,
             [Matched(*line, self.matched[line]) for line in _lines(system, self.matched)],
             [
-                Figure("cycles", float(ticks), ""),
-                Figure("control time", ticks * cycle_s, "s"),
                 Figure("computing", seconds, "s"),
                 Figure("times as fast as the clock", ticks * cycle_s / max(seconds, 1e-9), ""),
                 Figure("of it pictures and figures", self.seconds, "s"),

@@ -42,7 +42,7 @@ RUNNING: Now = ("running", "")
 
 @dataclass(frozen=True, slots=True)
 class RowResult:
-    """What became of a row."""
+    """What became of a row; `ticks` has the cycle in which its end was seen."""
 
     row: ScriptRow
     state: State
@@ -204,7 +204,7 @@ class Workstation:
         return rest(row, self.progress, held, self.safe)
 
     def _end(self, row: ScriptRow, tick: int, state: State, reason: str) -> None:
-        self.results.append(RowResult(row, state, reason, self._since, tick - self._since))
+        self.results.append(RowResult(row, state, reason, self._since, tick - self._since + 1))
         if state == "done":
             self.cell = after(self._before, row)
             self.at += 1
