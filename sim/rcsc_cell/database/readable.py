@@ -3,11 +3,11 @@
 In: the tables of `ask.tables_of`. Out: rows of text. The file itself has every digit, for programs.
 """
 
-import json
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from rcsc.diagnostics.printable import escape, pad, width
+from rcsc.host.files.read import json_of
 from rcsc_cell.database.ask import Listed
 
 MOST_SHOWN = 100
@@ -105,7 +105,7 @@ def _fixture(text: str | None) -> str:
     if text is None:
         return NOTHING
     said = []
-    for key, value in json.loads(text).items():
+    for key, value in json_of(text).items():
         name, unit = _parted(key)
         numbers = value if isinstance(value, list) else [value]
         said.append(f"{name} {' x '.join(_number(float(number)) for number in numbers)} {unit}".rstrip())
