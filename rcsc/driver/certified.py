@@ -48,10 +48,11 @@ def certify(settings: Settings, how: Checking, write: Path | None, against: Path
     project = proved(settings)
     report = project.report()
     [proof] = project.proofs or (None,)
-    if report.failed or proof is None or proof.certificate is None:
+    certificate = None if report.failed or proof is None else proof.certificate()
+    if proof is None or certificate is None:
         return Conclusion(report, "nothing is certified: not everything is proved")
-    unwritten = _keep(proof.certificate, write) if write is not None else ()
-    reviewed = _reviewed(project.loaded, proof.certificate, how, proof.proved)
+    unwritten = _keep(certificate, write) if write is not None else ()
+    reviewed = _reviewed(project.loaded, certificate, how, proof.proved)
     report = project.report((*unwritten, *reviewed.report.diagnostics))
     return Conclusion(
         replace(report, tables=()), reviewed.closing

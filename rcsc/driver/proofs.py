@@ -41,7 +41,7 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
             resting(table_report(table_verdict, program), verdict.unproved, verdict.unsafe)
             for table_verdict in verdict.tables
         )
-        return Proof(root, verdict.findings, program, tables, verdict.proved, verdict.certificate)
+        return Proof(root, verdict.findings, program, tables, verdict.proved, lambda: verdict.certificate)
     memory = _Memory(program, loaded, options, cache)
     known = {table.name: kept for table in program.tables if (kept := memory.table(table)) is not None}
     missing = [table for table in program.tables if table.name not in known]

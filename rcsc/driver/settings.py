@@ -50,6 +50,7 @@ class Proof:
     Attributes:
         program: None where it does not resolve.
         proved: None where something is not proved, or was proved by an earlier run only.
+        certificate: Makes the certificate, which few ask for; gives None where something is not proved.
     """
 
     root: str
@@ -57,7 +58,7 @@ class Proof:
     program: "Program | None" = None
     tables: tuple[TableReport, ...] = ()
     proved: "ProvedProgram | None" = None
-    certificate: Mapping[str, object] | None = None
+    certificate: Callable[[], Mapping[str, object] | None] = lambda: None
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
@@ -24,6 +25,9 @@ from rcsc.lang.model import (
     Standing,
     Table,
 )
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 def spelled(term: Expr) -> str:
@@ -100,28 +104,31 @@ class _Digest:
     """Digests parts first, each object once: tests and lists of leaves are shared by many lines."""
 
     def __init__(self) -> None:
-        self._known: dict[
-            int, tuple[object, str]
-        ] = {}  # the object is kept, so that its identity is not used again
+        self._known: dict[int, str] = {}
+        self._kept: list[object] = []  # so that the identity of none is used again
+        self._compared: dict[type, tuple[str, ...]] = {}
 
     def of(self, value: object) -> str:
-        entry = self._known.get(id(value))
-        if entry is None:
-            text = self._text(value)
-            entry = self._known[id(value)] = value, hashlib.sha256(text.encode()).hexdigest()
-        return entry[1]
+        known = self._known.get(id(value))
+        if known is None:
+            known = self._known[id(value)] = hashlib.sha256(self._text(value).encode()).hexdigest()
+            self._kept.append(value)
+        return known
 
     def _text(self, value: object) -> str:
         kind = type(value).__name__
         if value is None or isinstance(value, bool | int | float | str):
             return f"{kind} {value.value if isinstance(value, StrEnum) else value!r}"
         if isinstance(value, tuple):
-            return f"{kind} {' '.join(map(self.of, value))}"
-        if is_dataclass(value):
-            parts = (
-                f"{attribute.name} {self.of(getattr(value, attribute.name))}"
-                for attribute in fields(value)
-                if attribute.compare
-            )
+            known = self._known.get
+            return f"{kind} {' '.join([known(id(part)) or self.of(part) for part in value])}"
+        if is_dataclass(value) and not isinstance(value, type):
+            parts = (f"{name} {self.of(getattr(value, name))}" for name in self._fields(type(value)))
             return f"{kind} {' '.join(parts)}"
         raise TypeError(f"{kind} is no value of the model")
+
+    def _fields(self, kind: "type[DataclassInstance]") -> tuple[str, ...]:
+        """Names of the fields that equality looks at."""
+        if kind not in self._compared:
+            self._compared[kind] = tuple(attribute.name for attribute in fields(kind) if attribute.compare)
+        return self._compared[kind]

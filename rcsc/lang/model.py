@@ -12,7 +12,7 @@ keys every leaf is a bounded integer, so that conditions on one leaf are sets of
 
 import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NewType, TypeAlias
@@ -659,7 +659,7 @@ class Line:
     tests: tuple[Test | None, ...]
     actions: tuple[Action, ...]
     span: Span = at()
-    bounds: tuple[int, ...] = field(default=(), compare=False, repr=False)
+    bounds: Sequence[int] = field(default=(), compare=False, repr=False)
     below: tuple[LineName, ...] = field(default=(), compare=False)
     same: tuple[LineName, ...] = field(default=(), compare=False)
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)

@@ -209,17 +209,20 @@ class Obligations:
 
     def _tests(self, table: Table) -> Iterator[_Owing]:
         """Every condition of the table is evaluated in every cycle, whatever the others say."""
-        seen: dict[int, tuple[Expr, list[tuple[Line, int]]]] = {}
-        for line in table.lines:
+        every = {id(test): test for line in table.lines for test in line.tests}
+        owing = {key for key, test in every.items() if test is not None and may_be_undefined(test.condition)}
+        stating: dict[int, list[tuple[Line, int]]] = {}
+        for line in table.lines if owing else ():
             for at, test in enumerate(line.tests):
-                if test is not None:
-                    seen.setdefault(id(test), (test.condition, []))[1].append((line, at))
+                if id(test) in owing:
+                    stating.setdefault(id(test), []).append((line, at))
         where = f"in a condition of table `{table.name}`"
-        for condition, stating in seen.values():
-            if may_be_undefined(condition):
-                line, at = stating[0]
-                span = line.cell_span(at)
-                yield _Owing(partial(self._test, condition, span), where, span, tuple(stating))
+        for key, places in stating.items():
+            test = every[key]
+            assert test is not None
+            line, at = places[0]
+            span = line.cell_span(at)
+            yield _Owing(partial(self._test, test.condition, span), where, span, tuple(places))
 
     def _test(self, condition: Expr, span: Span, assumed: list[Node]) -> tuple[Run, Known]:
         base = [*assumed, *self._invariants()]

@@ -42,7 +42,6 @@ class ProgramVerdict:
         findings: Errors, warnings and notes, by position.
         proved: Set only when there is no error.
         tables: One verdict a table.
-        certificate: For all tables; None where something is not proved.
         tally: How the obligations of procedures and conditions were settled.
         program: What was proved, with the stopping assumptions of the tables that were looked at.
         unproved: Invariants, and assumptions declared `proved`, that are not proved: what rests on one is not, either.
@@ -52,11 +51,18 @@ class ProgramVerdict:
     findings: tuple[Diagnostic, ...]
     proved: ProvedProgram | None
     tables: tuple[TableVerdict, ...]
-    certificate: Mapping[str, object] | None
     tally: Tally
     program: Program
     unproved: frozenset[str] = frozenset()
     unsafe: frozenset[str] = frozenset()
+
+    @property
+    def certificate(self) -> Mapping[str, object] | None:
+        """For all tables, made where it is asked for: it digests the whole program. None where something is not proved."""
+        if self.proved is None:
+            return None
+        tables = [verdict.certificate for verdict in self.tables if verdict.certificate is not None]
+        return program_certificate(self.program, tables)
 
 
 def prove_program(
@@ -93,10 +99,9 @@ def prove_program(
     wrong = any(finding.severity is Severity.ERROR for finding in reported)
     if wrong or only is not None:
         unsafe = frozenset((*owed.unsafe, *(str(name) for name, each in meetings.items() if each.wrong)))
-        return ProgramVerdict(reported, None, verdicts, None, owed.tally, program, unproved, unsafe)
+        return ProgramVerdict(reported, None, verdicts, owed.tally, program, unproved, unsafe)
     proved = ProvedProgram(program, seal_of_proof())
-    certificate = _certificate(program, verdicts)
-    return ProgramVerdict(reported, proved, verdicts, certificate, owed.tally, program)
+    return ProgramVerdict(reported, proved, verdicts, owed.tally, program)
 
 
 def _unproved(program: Program, findings: Iterable[Diagnostic]) -> frozenset[str]:
@@ -203,8 +208,3 @@ def _in_processes(program: Program, tables: list[Table], options: Options) -> li
             replace(children.answer(future), table=table)
             for future, table in zip(waiting, tables, strict=True)
         ]
-
-
-def _certificate(program: Program, verdicts: tuple[TableVerdict, ...]) -> Mapping[str, object]:
-    tables = [verdict.certificate for verdict in verdicts if verdict.certificate is not None]
-    return program_certificate(program, tables)

@@ -17,16 +17,17 @@ from hypothesis import strategies as st
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Source, Span
 from rcsc.lang.digest import Digests
+from rcsc.lang.syntax import parse as parsing
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.lalr import ParseNode, Tables, grammar_of_json
 from rcsc.lang.syntax.parse import MOST_ERRORS, made_tables, parse
-from rcsc.lang.syntax.rows import PIECES
+from rcsc.lang.syntax.rows import PIECES, Side
 from rcsc.lang.syntax.spell import spell_expr
 from rcsc.solvers.options import Options
 from tests.bench import families
 from tests.support.programs.arbitrary import expressions, files, tables
-from tests.support.programs.stages import reported, shipped
+from tests.support.programs.stages import program_of, reported, shipped
 from tests.support.programs.texts import parted_and_broken
 
 REPO = Path(__file__).parents[2]
@@ -601,3 +602,88 @@ def test_each_condition_is_parsed_once_though_many_lines_join_it(monkeypatch: py
     assert len(pieces) > 3 * len(set(pieces))
     assert sorted(piece for piece in asked if piece in set(pieces)) == sorted(set(pieces))
     assert not [cell for cell in asked if cell in set(cells) - set(pieces)]
+
+
+EDGES = [
+    "",
+    " ",
+    "-",
+    " - ",
+    "\u00a0",
+    "1",
+    " 1 ",
+    "> 1",
+    "in {1, 2}",
+    "DEFAULT",
+    "DEFAULT unreachable",
+    "= DEFAULT",
+    "0x",
+    ">",
+    "a)",
+]
+
+
+@settings(max_examples=300)
+@given(
+    st.lists(st.lists(st.sampled_from(EDGES), min_size=3, max_size=3), min_size=1, max_size=5),
+    st.sampled_from(["a | b | when", "a | when | b", "when | when | a"]),
+    st.sampled_from(["", " x |", " x | req |", " req | x |"]),
+)
+def test_a_row_read_at_once_is_the_row_read_cell_by_cell(
+    rows: list[list[str]], heading: str, actions: str
+) -> None:
+    """What texts are known is of no account: trees, places and what is wrong, in the same order."""
+    does = {"": "", " x |": " 1 |", " x | req |": ' 2 | "SR-1" |', " req | x |": ' "SR-1" | - |'}[actions]
+    lines = "".join(f"| l{at} |{'|'.join(cells)}||{does}\n" for at, cells in enumerate(rows))
+    text = f"table t {{\n| line | {heading} ||{actions}\n|---|---|---|---||---|\n{lines}}}\n"
+    read = parse.__wrapped__(Source("case.rcs", text))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(parsing._Rows, "_at_once", lambda *_: None)
+        slowly = parse.__wrapped__(Source("case.rcs", text))
+    assert read == slowly
+    if isinstance(read, tree.File) and isinstance(slowly, tree.File):
+        assert places_of(read) == places_of(slowly)
+
+
+def places_of(file: tree.File) -> list[list[Any]]:
+    """The cells of all rows."""
+    return [
+        list(row.cells)
+        for table in file.declarations
+        if isinstance(table, tree.TableDecl)
+        for row in table.rows
+    ]
+
+
+@given(st.lists(st.sampled_from([*EDGES, "  two words  "]), min_size=1, max_size=6), st.integers(0, 9))
+def test_the_cells_of_a_side_are_where_they_are_said_to_be(texts: list[str], start: int) -> None:
+    text = "#" * start + "|".join(texts)
+    side = Side(text[start:], "case.rcs", start)
+    cells = list(side)
+    assert [cell.text for cell in cells] == [piece.strip() for piece in texts]
+    assert [side[at] for at in range(len(side))] == [side[at - len(side)] for at in range(len(side))] == cells
+    assert [text[cell.span.start : cell.span.end] for cell in cells] == [cell.text for cell in cells]
+    assert side[1:] == tuple(cells)[1:]
+    for beyond in (len(side), -len(side) - 1):
+        with pytest.raises(IndexError):
+            side[beyond]
+
+
+def test_cells_are_made_for_distinct_texts_not_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counted, since time and memory to read a large table are in proportion."""
+    made = 0
+    plain = Side._cell
+
+    def counted(side: Side, piece: str, offset: int) -> Any:
+        nonlocal made
+        made += 1
+        return plain(side, piece, offset)
+
+    monkeypatch.setattr(Side, "_cell", counted)
+    lines, columns = 512, 20
+    text = families.box(lines, columns, 3)
+    assert len(program_of(text).tables[0].lines) == lines
+    rows = [row.strip("|").split("|")[1:] for row in text.splitlines() if re.match(r"\| \d", row)]
+    distinct = {(at, cell) for row in rows for at, cell in enumerate(row)}
+    assert len(distinct) + 4 * lines < lines * columns / 2
+    assert made < 2 * len(distinct) + 4 * lines

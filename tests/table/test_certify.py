@@ -188,6 +188,19 @@ def test_no_damaged_certificate_shows_a_wrong_table(text: str, data: st.DataObje
     assert check_certificate(program, signed(program, made))
 
 
+def test_a_certificate_is_made_only_where_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It digests the whole program, which takes as long as the proof of a large table."""
+
+    def unasked(*_: object) -> dict[str, object]:
+        raise LookupError
+
+    monkeypatch.setattr("rcsc.table.program.program_certificate", unasked)
+    verdict = prove_program(program_of(BOXES), Options())
+    assert verdict.proved is not None
+    with pytest.raises(LookupError):
+        verdict.certificate  # noqa: B018 - it is made there
+
+
 @given(st.randoms(use_true_random=False))
 def test_whatever_tree_is_made_up_no_wrong_table_passes(rng: random.Random) -> None:
     program = rng.choice(PROGRAMS[RELATED])

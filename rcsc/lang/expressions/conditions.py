@@ -239,13 +239,18 @@ def _box(condition: Expr, kind: Scalar, low: int, high: int) -> Box | None:
 
 
 def _logic(op: Logic, left: Box, right: Box, low: int, high: int) -> Box:
-    def signed(box: Box) -> Signed[Box]:
-        return lambda wanted: box if wanted else complement(box, low, high)
-
     whole = truth_function(
-        op, signed(left), signed(right), lambda boxes: meet(*boxes), lambda boxes: joined(boxes[0] + boxes[1])
+        op,
+        _signed(left, low, high),
+        _signed(right, low, high),
+        lambda boxes: meet(*boxes),
+        lambda boxes: joined(boxes[0] + boxes[1]),
     )
     return whole(True)
+
+
+def _signed(box: Box, low: int, high: int) -> Signed[Box]:
+    return lambda wanted: box if wanted else complement(box, low, high)
 
 
 def _compared(op: Comparison, left: Expr, right: Expr, kind: Scalar, low: int, high: int) -> Box | None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from rcsc.lang.leaves import rebuilt
 from rcsc.lang.model import (
+    Apply,
     Assign,
     Call,
     Expr,
@@ -24,6 +25,8 @@ def placed(expr: Expr, cell: Cell) -> Expr:
     if expr.span.file:
         return expr
     span = tree.absolute(expr.span, cell)
+    if isinstance(expr, Apply):  # most of them
+        return Apply(expr.op, tuple([placed(part, cell) for part in expr.args]), expr.type, span)
     return replace(rebuilt(expr, lambda part: placed(part, cell)), span=span)
 
 

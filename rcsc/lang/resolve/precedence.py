@@ -357,11 +357,11 @@ class _Lines:
     def given(self, at: int, tests: Sequence[Test | None]) -> Line:
         """The line with these tests; their place is that of the line's name."""
         line = self.lines[at]
-        split = 2 * (1 + len(line.tests))
+        split, bounds = 2 * (1 + len(line.tests)), tuple(line.bounds)
         return replace(
             line,
             tests=(*line.tests, *tests),
-            bounds=(*line.bounds[:split], *(line.bounds[:2] * len(tests)), *line.bounds[split:]),
+            bounds=(*bounds[:split], *(bounds[:2] * len(tests)), *bounds[split:]),
             below=tuple(self.lines[upper].name for upper in self._above(at)),
             same=tuple(self.lines[earlier].name for earlier in self._earlier(at)),
         )

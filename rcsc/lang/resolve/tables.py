@@ -1,7 +1,5 @@
 """Tables: columns, lines, tests and actions."""
 
-from itertools import chain
-
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Label
 from rcsc.lang.expressions.conditions import Tests
@@ -27,7 +25,7 @@ from rcsc.lang.resolve.declarations import requirements
 from rcsc.lang.resolve.precedence import with_precedence
 from rcsc.lang.resolve.statements import Statements
 from rcsc.lang.syntax import tree
-from rcsc.lang.syntax.rows import Cell
+from rcsc.lang.syntax.rows import Bounds, Cell
 
 
 def table(scope: Scope, written: tree.TableDecl) -> Table:
@@ -58,7 +56,7 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
                     cells.tests(row),
                     cells.actions(row),
                     row.span,
-                    _bounds(row),
+                    Bounds(row.cells),
                     requirements=requirements(scope, row.requirements),
                 )
             )
@@ -99,11 +97,6 @@ def _subject(scope: Scope, heading: tree.Heading) -> Typed | None:
     return None if subject is None else Typed(placed(subject.expr, heading.cell), subject.bare)
 
 
-def _bounds(row: tree.Row) -> tuple[int, ...]:
-    """Start and end of each cell's first piece, flattened."""
-    return tuple(chain.from_iterable(cell.ends for cell in row.cells))
-
-
 def _column(heading: tree.Heading, subject: Typed | None) -> Column:
     expr = None if subject is None else subject.expr
     leaf = expr.name if isinstance(expr, Read) else None
@@ -139,17 +132,15 @@ class _Cells:
     def tests(self, row: tree.Row) -> tuple[Test | None, ...]:
         """One test a condition column."""
         known = self.known.known
-        result: list[Test | None] = []
-        for column, written in enumerate(row.conditions):
-            if written is None:
-                result.append(None)
-                continue
-            key = (column, id(written))
-            if key in known:
-                result.append(known[key])
-                continue
-            result.append(self.known.test(column, written, row.cells[column + 1]))
-        return tuple(result)
+        keys = list(enumerate(map(id, row.conditions)))
+        for key in keys:
+            if key not in known:
+                column = key[0]
+                written = row.conditions[column]
+                known[key] = (
+                    written if written is None else self.known.test(column, written, row.cells[column + 1])
+                )
+        return tuple([known[key] for key in keys])
 
     def actions(self, row: tree.Row) -> tuple[Action, ...]:
         """The actions of all columns, left to right."""

@@ -4,7 +4,7 @@ In: a `Source`. Out: a `tree.File`, or every syntax error that was found. No tex
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -43,6 +43,8 @@ from rcsc.lang.syntax.rows import (
     TO_WHOM,
     Cell,
     Cells,
+    LineCells,
+    Side,
     conjuncts,
     cut,
     joined,
@@ -238,12 +240,20 @@ _NO_COMMENTS = Comments(Source("", ""))
 
 @dataclass(slots=True)
 class _Rows:
-    """Parses the rows of a table; each distinct cell text once."""
+    """Parses the rows of a table; each distinct cell text once.
+
+    Attributes:
+        memory: What was parsed, by start rule and text.
+        meant: The sound condition cells, by their text with its blanks: those under `when`, and others.
+    """
 
     source: Source
     comments: Comments
     diagnostics: list[Diagnostic]
     memory: dict[tuple[str, str], Any] = field(default_factory=dict)
+    meant: Mapping[bool, dict[str, tree.Condition | None]] = field(
+        default_factory=lambda: {True: {}, False: {}}
+    )
 
     def table(
         self, rows: list[ParseLeaf]
@@ -287,7 +297,7 @@ class _Rows:
             helps = (MARKS,) if " " in stub.text else ()
             self._report(Code.SYNTAX, "a line needs a name of letters, digits and `_`", stub, *helps)
         comments = tuple(words(text) for row in rows for text in self.comments.take(row.start_pos))
-        return _Line(rows[0].start_pos, cells.all[-1].span.end, cells, comments)
+        return _Line(rows[0].start_pos, cells.last.ends[1], cells, comments)
 
     def _whole(self, rows: list[ParseLeaf]) -> Cells | None:
         """A row, with those that go on with it."""
@@ -317,6 +327,8 @@ class _Rows:
     def _across(self, read: list[list[_Line]], heads: list[Cells]) -> list[_Line]:
         """The lines, each with its cells of all parts; none where a part names others."""
         first = read[0]
+        if len(read) == 1:
+            return first
         names = [stub_of(line.cells.conditions[0]).name.text for line in first]
         for head, part in zip(heads[1:], read[1:], strict=True):
             given = [stub_of(line.cells.conditions[0]).name.text for line in part]
@@ -340,7 +352,7 @@ class _Rows:
                     self._report(Code.GOES_ON, message, part[at].cells.conditions[0], SAME_LINES)
             if given != names:
                 return []
-        return first if len(read) == 1 else [_over(pieces) for pieces in zip(*read, strict=True)]
+        return [_over(pieces) for pieces in zip(*read, strict=True)]
 
     def _cut(self, row: ParseLeaf) -> Cells | None:
         start = row.start_pos
@@ -365,20 +377,16 @@ class _Rows:
         actions: tuple[tree.Heading, ...],
         traced: int | None,
     ) -> tree.Row:
-        first, *tests = (cell.blank() for cell in line.cells.conditions)
-        stub = stub_of(first)
-        default = bool(tests) and _says_default(tests[0])
-        for cell in tests[1:]:
-            if default and cell.text:
-                self._report(Code.DEFAULT_WITH_CONDITIONS, "a DEFAULT line has no conditions", cell)
-            elif _says_default(cell):
-                what = "DEFAULT stands in the first column of conditions, or nowhere"
-                helps = "write `= DEFAULT` for a value of that name, `(DEFAULT)` under `when`"
-                self._report(Code.DEFAULT_ELSEWHERE, what, cell, helps)
-        parsed = tuple(
-            None if default else self._condition(cell, heading)
-            for cell, heading in zip(tests, conditions, strict=True)
-        )
+        stub = stub_of(line.cells.conditions[0].blank())
+        parsed = self._at_once(line.cells.conditions, conditions)
+        default = None
+        if parsed is None:
+            tests = [cell.blank() for cell in line.cells.conditions[1:]]
+            default = self._default(tests)
+            parsed = tuple(
+                None if default is not None else self._condition(cell, heading)
+                for cell, heading in zip(tests, conditions, strict=True)
+            )
         does = [cell for at, cell in enumerate(line.cells.actions) if at != traced]
         return tree.Row(
             stub.name.text,
@@ -387,15 +395,50 @@ class _Rows:
                 self._action(cell.blank(), heading)
                 for cell, heading in zip(does, actions, strict=False)  # a second `req` is reported
             ),
-            default,
-            default and tests[0].text.endswith("unreachable"),
+            default is not None,
+            default is not None and default.text.endswith("unreachable"),
             Span(self.source.name, line.start, line.end),
-            (stub.name, *line.cells.conditions[1:], *does),
+            LineCells(stub.name, line.cells, traced),
             line.comments,
             tuple(tree.Name(lower.text, lower.span) for lower in stub.above),
             tuple(tree.Name(other.text, other.span) for other in stub.same),
             () if traced is None else self._requirements(line.cells.actions[traced].blank()),
         )
+
+    def _default(self, tests: Sequence[Cell]) -> Cell | None:
+        """The cell that makes a line the DEFAULT line; None of others. What stands wrongly with it is reported."""
+        default = tests[0] if tests and _says_default(tests[0]) else None
+        for cell in tests[1:]:
+            if default is not None and cell.text:
+                self._report(Code.DEFAULT_WITH_CONDITIONS, "a DEFAULT line has no conditions", cell)
+            elif _says_default(cell):
+                what = "DEFAULT stands in the first column of conditions, or nowhere"
+                helps = "write `= DEFAULT` for a value of that name, `(DEFAULT)` under `when`"
+                self._report(Code.DEFAULT_ELSEWHERE, what, cell, helps)
+        return default
+
+    def _at_once(
+        self, cells: Sequence[Cell], headings: Sequence[tree.Heading]
+    ) -> tuple[tree.Condition | None, ...] | None:
+        """The conditions of a single row, for which a cell is made only where its text is new.
+
+        None where a cell says DEFAULT, or goes on in another row.
+        """
+        if not isinstance(cells, Side):
+            return None
+        texts = cells.texts[1:]
+        meant = [self.meant[heading.subject is None] for heading in headings]
+        try:
+            return tuple([known[text] for known, text in zip(meant, texts, strict=True)])
+        except KeyError:
+            new = {at: cells[at + 1].blank() for at, text in enumerate(texts) if text not in meant[at]}
+        if any(map(_says_default, new.values())):
+            return None
+        found = {at: self._condition(cell, headings[at]) for at, cell in new.items()}
+        for at, cell in new.items():
+            if found[at] is not None or not cell.text:  # else it was reported, as it is in each row
+                meant[at][texts[at]] = found[at]
+        return tuple(found[at] if at in found else meant[at][text] for at, text in enumerate(texts))
 
     def _requirements(self, cell: Cell) -> tuple[tree.Name, ...]:
         names = self._parse("requirements", cell, IN_QUOTES) if cell.text else None

@@ -7,9 +7,10 @@ In: rows and their offsets. Out: `Cells`, or what is wrong with them. A table ha
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from itertools import chain
+from typing import Generic, TypeVar, overload
 
 from rcsc.diagnostics.source import Span
 
@@ -49,6 +50,7 @@ PIECES = (
 SAME_LINES = "each part of a table has a row for each line, in the same order"
 PLAIN = "how a line stands to others is said where it is named first; further parts of the table repeat its name alone"
 _Row = TypeVar("_Row", bound=str)
+_Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,8 @@ class Cell:
         Span(file='a.rcs', start=40, end=49)
         """
         begin, place, past = 0, self.start, len(self.text)
+        if not self.further:
+            return Span(self.file, place + start, place + max(start, min(end, past)))
         for offset, there in self.further:
             if offset > start:
                 past = len(self.text[:offset].rstrip())
@@ -187,17 +191,143 @@ def conjuncts(text: str) -> list[tuple[int, int]]:
     ]
 
 
+class _Made(Sequence[_Item], Generic[_Item]):
+    """Values that are made where they are asked for: most of a large table's never are."""
+
+    __slots__ = ()
+
+    def _at(self, at: int) -> _Item:
+        """Make the value of a position, 0 or more and less than the length."""
+        raise NotImplementedError
+
+    @overload
+    def __getitem__(self, at: int) -> _Item: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> tuple[_Item, ...]: ...
+
+    def __getitem__(self, at: int | slice) -> _Item | tuple[_Item, ...]:
+        """The value of a position, or several."""
+        return tuple(self)[at] if isinstance(at, slice) else self._at(range(len(self))[at])
+
+
+@dataclass(frozen=True, slots=True)
+class Side(_Made[Cell]):
+    """The cells of one side of a single row, kept as they stand there.
+
+    Attributes:
+        body: The text, without the bars around it.
+        file: Name of the file.
+        start: Offset in the file of the text.
+
+    >>> side = Side(" on | | in {left} ", "a.rcs", 40)
+    >>> [cell.text for cell in side], side[2].span
+    (['on', '', 'in {left}'], Span(file='a.rcs', start=47, end=56))
+    """
+
+    body: str
+    file: str
+    start: int
+
+    @property
+    def texts(self) -> list[str]:
+        """What stands between the bars, with its blanks."""
+        return self.body.split("|")
+
+    def __len__(self) -> int:
+        """How many cells there are."""
+        return self.body.count("|") + 1
+
+    def __iter__(self) -> Iterator[Cell]:
+        """All cells, from left to right."""
+        offset = self.start
+        for piece in self.texts:
+            yield self._cell(piece, offset)
+            offset += len(piece) + 1
+
+    def _at(self, at: int) -> Cell:
+        *before, piece = self.body.split("|", at + 1)[: at + 1]
+        return self._cell(piece, self.start + sum(map(len, before)) + at)
+
+    def _cell(self, piece: str, offset: int) -> Cell:
+        text = piece.strip()
+        lead = len(piece) - len(piece.lstrip()) if text else 0
+        return Cell(text, self.file, offset + lead)
+
+
 @dataclass(frozen=True, slots=True)
 class Cells:
     """A row: conditions before the `||` (the line's name first), actions after it."""
 
-    conditions: tuple[Cell, ...]
-    actions: tuple[Cell, ...]
+    conditions: Sequence[Cell]
+    actions: Sequence[Cell]
 
     @property
     def all(self) -> tuple[Cell, ...]:
         """Those of both sides."""
         return (*self.conditions, *self.actions)
+
+    @property
+    def last(self) -> Cell:
+        """The last of them."""
+        return (self.actions or self.conditions)[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class LineCells(_Made[Cell]):
+    """The cells of a line: its name, conditions and actions, without its requirements.
+
+    Attributes:
+        name: Its name alone, of what its first cell says.
+        cells: All of its cells.
+        traced: Which of those after `||` has the requirements; None where none has.
+
+    >>> cells = Cells(Side(" x ", "", 1), Side(" a | SR-1 | b ", "", 6))
+    >>> [cell.text for cell in LineCells(cells.conditions[0], cells, 1)], LineCells(cells.conditions[0], cells, 1)[2].text
+    (['x', 'a', 'b'], 'b')
+    """
+
+    name: Cell
+    cells: Cells
+    traced: int | None = None
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.cells.conditions) + len(self.cells.actions) - (self.traced is not None)
+
+    def __iter__(self) -> Iterator[Cell]:
+        """All of them, from left to right."""
+        yield self.name
+        yield from self.cells.conditions[1:]
+        yield from (cell for at, cell in enumerate(self.cells.actions) if at != self.traced)
+
+    def _at(self, at: int) -> Cell:
+        action = at - len(self.cells.conditions)
+        if action < 0:
+            return self.cells.conditions[at] if at else self.name
+        return self.cells.actions[action + (self.traced is not None and action >= self.traced)]
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds(_Made[int]):
+    """Start and end of each cell's first piece, flattened.
+
+    >>> list(Bounds(Side(" on | off ", "a.rcs", 40)))
+    [41, 43, 46, 49]
+    """
+
+    cells: Sequence[Cell]
+
+    def __len__(self) -> int:
+        """Two a cell."""
+        return 2 * len(self.cells)
+
+    def __iter__(self) -> Iterator[int]:
+        """Those of all cells, from left to right."""
+        return chain.from_iterable(cell.ends for cell in self.cells)
+
+    def _at(self, at: int) -> int:
+        return self.cells[at // 2].ends[at % 2]
 
 
 def is_separator(row: str) -> bool:
@@ -254,21 +384,11 @@ def cut(row: str, start: int, file: str) -> Cells | str:
         return "a row needs `||` between its conditions and its actions"
     if "||" in right:
         return f"a row has exactly one `||`, this one has {row.count('||')}"
-    return Cells(_cells(left, start, 1, file), _cells(right, start + len(left) + 2, 0, file))
+    return Cells(
+        _side(left[1:], start + 1, file), _side(right, start + len(left) + 2, file) if right.strip() else ()
+    )
 
 
-def _cells(part: str, start: int, skip: int, file: str) -> tuple[Cell, ...]:
-    """The cells of one side; `skip` leading bars; a bar at the end closes the last cell."""
-    offset = start + skip
-    body = part[skip:]
-    if body.endswith("|"):
-        body = body[:-1]
-    elif not body.strip() and not skip:
-        return ()
-    cells = []
-    for piece in body.split("|"):
-        text = piece.strip()
-        lead = len(piece) - len(piece.lstrip()) if text else 0
-        cells.append(Cell(text, file, offset + lead))
-        offset += len(piece) + 1
-    return tuple(cells)
+def _side(body: str, start: int, file: str) -> Side:
+    """The cells of one side; a bar at the end closes the last."""
+    return Side(body.removesuffix("|"), file, start)

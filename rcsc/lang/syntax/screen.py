@@ -38,14 +38,21 @@ def refuse(source: Source) -> tuple[Diagnostic, ...]:
         named = f"U+{ord(unprinted[0]):04X}"
         message = f"the text contains {unicodedata.name(unprinted[0], 'the control character')} ({named}), which a reader does not see"
         return (_error(Code.UNPRINTED, message, source, *unprinted.span()),)
-    for word in _LONG.finditer(text):
-        if word.lastgroup:
-            message = f"a name has {len(word[0])} characters, more than {MOST_NAME}"
-            return (_error(Code.LONG_NAME, message, source, *word.span()),)
+    long = _long_name(text)
+    if long is not None:
+        message = f"a name has {long[1] - long[0]} characters, more than {MOST_NAME}"
+        return (_error(Code.LONG_NAME, message, source, *long),)
     deep = _too_deep(text)
     if deep is not None:
         return (too_deep(source, deep, deep + 1),)
     return ()
+
+
+def _long_name(text: str) -> tuple[int, int] | None:
+    """Start and end of the first name that is too long; it stands in a line that is."""
+    if max(map(len, text.split("\n"))) <= MOST_NAME:
+        return None
+    return next((word.span() for word in _LONG.finditer(text) if word.lastgroup), None)
 
 
 def _too_deep(text: str) -> int | None:

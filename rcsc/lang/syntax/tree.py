@@ -3,6 +3,7 @@
 Equality means "says the same": spans and layout do not count, comments do.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -479,7 +480,7 @@ class Row:
     default: bool = False
     unreachable: bool = False
     span: Span = at()
-    cells: tuple[Cell, ...] = field(default=(), compare=False, repr=False)
+    cells: Sequence[Cell] = field(default=(), compare=False, repr=False)
     comments: tuple[str, ...] = ()
     above: tuple[Name, ...] = ()
     same: tuple[Name, ...] = ()
