@@ -33,8 +33,8 @@ from rcsc.symbolic.encode import encode
 from rcsc.table.certificate import must_cover, tree_certificate
 from rcsc.table.confirm import TableSolver, shown
 from rcsc.table.regions.atoms import Formula, Universe, assumptions_of, every, lines_of, some
-from rcsc.table.regions.least import find, inside, least, negated, never, whole, widest
-from rcsc.table.regions.region import Bounds, NoWitness, Point, Question, Rests, Search
+from rcsc.table.regions.least import find, inside, least, meeting, negated, never, whole, widest
+from rcsc.table.regions.region import Bounds, NoWitness, Only, Point, Question, Rests, Search
 from rcsc.table.regions.splitting import Tree
 from rcsc.table.verdict import (
     ContradictoryAssumptions,
@@ -106,7 +106,7 @@ class _Decision:
 
     Attributes:
         universe: Columns and forms of the lines and assumptions; every variable of a witness is a column.
-        lines, assumed: As formulas.
+        clauses, assumed: The lines, and the assumptions as formulas.
     """
 
     def __init__(self, program: Program, table: Table, options: Options) -> None:
@@ -116,7 +116,6 @@ class _Decision:
         self.columns = [self.universe.column(Read(v.name, v.type)) for v in self.variables]
         self.clauses = lines_of(self.universe, table)
         self.assumptions = assumptions_of(self.universe, program, table)
-        self.lines = [whole(line) for line in self.clauses]
         self.assumed = [whole(assumption) for assumption in self.assumptions]
         self._asked: TableSolver | None = None
         self._tried: tuple[Snapshot, ...] | None = None
@@ -162,7 +161,7 @@ class _Decision:
         search = self.search(kept)
         if search.proved:
             kept, search = self.spared(search)
-        findings = (*self.overlaps(search), *self.gap(search), *self.dead())
+        findings = (*self.overlaps(search), *self.gap(search), *self.dead(search))
         if search.undecided:
             findings = (*findings, Undecided(f"{search.undecided} regions of the input space"))
         names = tuple(self.table.assumptions[at] for at in kept)
@@ -284,7 +283,7 @@ class _Decision:
 
     def overlap(self, first: int, second: int, *, grown: bool) -> TableFinding:
         """A pair of lines that overlaps, at its least input."""
-        both = [self.lines[first], self.lines[second]]
+        both = [self.line(first), self.line(second)]
         point = least(self.universe, [*both, *self.assumed], self.columns)
         if isinstance(point, NoWitness):
             seen = [snapshot for snapshot in self.tried if {first, second} <= set(self.matching(snapshot))]
@@ -307,8 +306,9 @@ class _Decision:
             settled = [point for point in points if not isinstance(point, NoWitness)]
             if len(settled) == len(points):
                 point = min(settled, key=lambda candidate: [candidate[column] for column in self.columns])
-                few = len(self.lines) <= _MOST_LINES_GROWN
-                region = self.around(point, [[line] for line in self.lines]) if few else None
+                few = len(self.clauses) <= _MOST_LINES_GROWN
+                lines = [[whole(line)] for line in self.clauses] if few else []
+                region = self.around(point, lines) if few else None
                 return [Gap((self.snapshot(point),), (region,))]
         seen += [snapshot for snapshot in self.tried if not self.matching(snapshot)]
         if not search.gaps and not seen:
@@ -318,29 +318,53 @@ class _Decision:
         witness = self.witness(seen, lambda z3: (z3.none(),))
         return [Undecided("what no line matches")] if witness is None else [Gap((witness,), (None,))]
 
-    def dead(self) -> list[TableFinding]:
-        """Find the lines that no input matches, and whether only an assumption excludes them."""
+    def dead(self, search: Search | None = None) -> list[TableFinding]:
+        """Find the lines that no input matches, and whether only an assumption excludes them.
+
+        Where a tree is given, points are looked for in its order: regions beside each other have points beside each other.
+        """
+        seen = () if search is None else (node.line for node in search.nodes if isinstance(node, Only))
+        order = dict.fromkeys([*(at for at in seen if at >= 0), *range(len(self.clauses))])
+        findings: dict[int, TableFinding] = {}
+        near: Point = {}
+        for at in order:
+            point = self.meeting(at, near)
+            if not isinstance(point, NoWitness):
+                near = point
+            elif (finding := self.dead_line(at, point)) is not None:
+                findings[at] = finding
+        return [findings[at] for at in sorted(findings)]
+
+    def meeting(self, at: int, near: Point) -> Point | NoWitness:
+        """An input that a line matches under the assumptions, looked for near another."""
+        if self.assumed:
+            return find(self.universe, [self.line(at), *self.assumed])
+        return meeting(self.universe, self.clauses[at], near)
+
+    def dead_line(self, at: int, point: NoWitness) -> TableFinding | None:
+        """What is wrong with a line of which no input is known."""
+        answer = Answer.UNSATISFIABLE
+        if point is NoWitness.UNKNOWN and any(at in self.matching(snapshot) for snapshot in self.tried):
+            answer = Answer.SATISFIABLE
+        elif point is NoWitness.UNKNOWN:
+            answer = self.asked.holds(self.asked.line(at))
+        if answer is Answer.UNSATISFIABLE:
+            assuming = len(self.sure) < len(self.assumed)
+            assuming = assuming and find(self.universe, [self.line(at), *self.sure]) is not NoWitness.NONE
+            return DeadLine(at, assuming)
+        unknown = answer is Answer.UNKNOWN
+        return Undecided(f"whether line `{self.table.lines[at].name}` can match") if unknown else None
+
+    @property
+    def sure(self) -> list[Formula]:
+        """The assumptions that are proved."""
         standing = {assumption.name: assumption.standing for assumption in self.program.assumptions}
         names = zip(self.table.assumptions, self.assumed, strict=True)
-        sure = [formula for name, formula in names if standing[name] is Standing.PROVED]
-        findings: list[TableFinding] = []
-        for at, line in enumerate(self.lines):
-            point = find(self.universe, [line, *self.assumed])
-            if isinstance(point, NoWitness):
-                answer = Answer.UNSATISFIABLE
-                if point is NoWitness.UNKNOWN and any(
-                    at in self.matching(snapshot) for snapshot in self.tried
-                ):
-                    answer = Answer.SATISFIABLE
-                elif point is NoWitness.UNKNOWN:
-                    answer = self.asked.holds(self.asked.line(at))
-                if answer is Answer.UNSATISFIABLE:
-                    assuming = len(sure) < len(self.assumed)
-                    assuming = assuming and find(self.universe, [line, *sure]) is not NoWitness.NONE
-                    findings.append(DeadLine(at, assuming))
-                elif answer is Answer.UNKNOWN:
-                    findings.append(Undecided(f"whether line `{self.table.lines[at].name}` can match"))
-        return findings
+        return [formula for name, formula in names if standing[name] is Standing.PROVED]
+
+    def line(self, at: int) -> Formula:
+        """A line as a formula."""
+        return whole(self.clauses[at])
 
     def witness(
         self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]

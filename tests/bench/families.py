@@ -95,10 +95,11 @@ def box(lines: int, variables: int, seed: int, fault: Fault = "ok", widened: int
 Point = tuple[int, ...]
 
 
-def linear(lines: int, variables: int, seed: int, fault: Fault = "ok") -> str:
+def linear(lines: int, variables: int, seed: int, fault: Fault = "ok", widened: int = 0) -> str:
     """A table whose lines are the leaves of a tree of planes, each condition spelled in one of several ways.
 
-    Every leaf keeps some points of its own, and planes go between them, so that no leaf is empty.
+    Every leaf keeps some points of its own, and planes go between them, so that no leaf is empty. So many
+    lines leave out one of their conditions, which makes them overlap others.
     """
     rng = random.Random(seed)
     names = [f"x{at}" for at in range(variables)]
@@ -120,6 +121,8 @@ def linear(lines: int, variables: int, seed: int, fault: Fault = "ok") -> str:
         second = f"{a} * {names[one]} > {c} - {b} * {names[two]}"
         leaves += [([*said, first], below), ([*said, second], above)]
     rng.shuffle(leaves)
+    for at in rng.sample(range(lines), widened):
+        leaves[at][0].pop(rng.randrange(len(leaves[at][0])))
     conditions = [" and ".join(said) or "true" for said, _ in leaves]
     if fault == "gap":
         hole = leaves[0][1][0]

@@ -43,9 +43,11 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
+from rcsc.table.decide import prove_table
 from rcsc.table.regions import splitting
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
-from rcsc.table.regions.least import find, least, negated, never, whole, widest
+from rcsc.table.regions.ends import Ends
+from rcsc.table.regions.least import find, least, negated, never, projected, whole, widest
 from rcsc.table.regions.linear import Simplex, integer_point
 from rcsc.table.regions.region import (
     Bounds,
@@ -60,8 +62,9 @@ from rcsc.table.regions.region import (
     Split,
 )
 from rcsc.table.regions.splitting import Tree
+from tests.bench import families
+from tests.support.programs.stages import BOXES, verdict_of
 from tests.support.programs.stages import program_of as compiled
-from tests.support.programs.stages import verdict_of
 
 BOOL = Bool()
 SMALL = Int(0, 4)
@@ -336,6 +339,67 @@ def test_every_pair_is_told_where_two_lines_match_everywhere(lines: int) -> None
         conditions = [[compare(Op.EQ, read("x"), number(2))] if at in narrow else [] for at in range(lines)]
         found = searched(program_of(conditions))[1]
         assert set(found.overlaps) == set(itertools.combinations(range(lines), 2)), narrow
+
+
+def test_planes_take_a_node_for_each_line_and_its_split_and_next_to_no_simplex(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Cuts that part all lines are found by masks, and points of lines by projecting."""
+    simplexes = 0
+
+    def counted(simplex: Simplex, refute: Callable[[Simplex], object] = Simplex.refute) -> object:
+        nonlocal simplexes
+        simplexes += 1
+        return refute(simplex)
+
+    monkeypatch.setattr(Simplex, "refute", counted)
+    program = compiled(families.linear(256, 6, 1))
+    verdict = prove_table(program, program.tables[0], BOXES)
+    assert verdict.findings == ()
+    assert verdict.certificate is not None
+    assert len(verdict.certificate["tree"]) == 2 * 256 - 1  # type: ignore[arg-type]  # a list
+    assert simplexes <= 25
+
+
+SPANS = st.tuples(st.integers(0, 2), st.tuples(st.integers(0, 9), st.integers(0, 9)).map(sorted).map(tuple))
+
+
+@given(st.dictionaries(st.integers(0, 40), st.lists(SPANS, max_size=3), max_size=8))
+def test_ends_say_what_a_cut_parts(lines: dict[int, list[tuple[int, tuple[int, int]]]]) -> None:
+    single = {number: list(dict(spans).items()) for number, spans in lines.items()}
+    ends = Ends(single)
+    for form, at in itertools.product(range(3), range(-1, 11)):
+        of_form = {number: dict(spans)[form] for number, spans in single.items() if form in dict(spans)}
+        below = sum(1 << number for number, (_, high) in of_form.items() if high <= at)
+        above = sum(1 << number for number, (low, _) in of_form.items() if low > at)
+        here = sum(1 << number for number, (low, high) in of_form.items() if at in {low - 1, high})
+        assert ends.beyond(form, at) == (below, above)
+        assert [cut[2:] for cut in ends.cuts if cut[:2] == (form, at)] == [(here, below, above)] * bool(here)
+
+
+@given(
+    st.lists(
+        st.tuples(st.tuples(*[st.integers(-9, 9)] * 3), st.integers(-60, 60), st.integers(0, 20)), max_size=5
+    ),
+    st.dictionaries(st.integers(0, 2), st.integers(-99, 99)),
+    st.sampled_from([1, 10**18, 10**400]),
+)
+def test_what_projecting_returns_is_within_all_bounds(
+    rows: list[tuple[tuple[int, ...], int, int]], near: dict[int, int], scale: int
+) -> None:
+    """However it rounds, and where no double is as large."""
+    universe = Universe()
+    kind = Int(-7 * scale, 9 * scale)
+    columns = [universe.column(read(name, kind)) for name in ("x", "y", "z")]
+    bounds: dict[int, tuple[int, int]] = {universe.single[columns[0]]: (-3 * scale, 2 * scale)}
+    for ks, low, width in rows:
+        terms = tuple((c, k) for c, k in zip(columns, ks, strict=True) if k)
+        if len(terms) > 1:
+            bounds[universe.form(terms)] = (low * scale, (low + width) * scale)
+    point = projected(universe, bounds, near)
+    for form, (low, high) in bounds.items():
+        if point is not None and point.keys() >= {column for column, _ in universe.forms[form]}:
+            assert low <= sum(k * point[c] for c, k in universe.forms[form]) <= high
 
 
 def test_respelt_conditions_meet_in_one_form() -> None:

@@ -29,6 +29,6 @@ The tree is the certificate: `rcsc.certify` walks it again with arithmetic of it
 this room. What it costs: splits, which are counted and bounded; points and witnesses are found by bisection over
 keys, with the simplex as the oracle.
 
-Modules, in the order the data flows: `atoms`, `linear`, `partition`, `word_bits` (words as boxes of their bits), `region`, `splitting`,
-`least`.
+Modules, in the order the data flows: `atoms`, `ends` (which lines a cut parts), `linear`, `partition`, `word_bits` (words as boxes of
+their bits), `region`, `splitting`, `least`.
 """

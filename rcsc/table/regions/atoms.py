@@ -8,7 +8,7 @@ form and one bound. Two doubles compare as their keys do, which is linear as wel
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
@@ -101,6 +101,11 @@ class Universe:
     """The columns and forms of one table, numbered as they are met.
 
     Every column is also a form: `single[column]`.
+
+    Attributes:
+        low, high: What each form can be at all.
+        norms: Of each form half the sum of its coefficients, by which rounding may change it, and the sum of their squares.
+        opaque: Columns that are not leaves.
     """
 
     def __init__(self) -> None:
@@ -108,6 +113,8 @@ class Universe:
         self.forms: list[Form] = []
         self.low: list[int] = []
         self.high: list[int] = []
+        self.norms: list[tuple[int, int]] = []
+        self.opaque: set[int] = set()
         self.single: list[int] = []
         self._column: dict[str, int] = {}
         self._form: dict[Form, int] = {}
@@ -115,12 +122,14 @@ class Universe:
 
     def column(self, term: Expr) -> int:
         """The number of `term`, entered when new."""
-        name = spelled(term)
+        name = term.name if isinstance(term, Read) else spelled(term)
         known = self._column.get(name)
         if known is None:
             known = self._column[name] = len(self.columns)
             low, high = key_bounds(term.type)
             self.columns.append(FormColumn(name, term, low, high))
+            if self.columns[-1].opaque:
+                self.opaque.add(known)
             self.single.append(self.form(((known, 1),)))
         return known
 
@@ -130,9 +139,15 @@ class Universe:
         if known is None:
             known = self._form[form] = len(self.forms)
             self.forms.append(form)
-            ends = [sorted((k * self.columns[c].low, k * self.columns[c].high)) for c, k in form]
-            self.low.append(sum(low for low, _ in ends))
-            self.high.append(sum(high for _, high in ends))
+            low = high = total = square = 0
+            for column, k in form:
+                of = self.columns[column]
+                low += k * (of.low if k > 0 else of.high)
+                high += k * (of.high if k > 0 else of.low)
+                total, square = total + abs(k), square + k * k
+            self.low.append(low)
+            self.high.append(high)
+            self.norms.append(((total + 1) // 2, square))
         return known
 
     def atom(self, form: int, box: Iterable[tuple[int, int]]) -> Formula:
@@ -145,10 +160,17 @@ class Universe:
 
     def of_test(self, test: Test) -> Formula:
         """A cell's condition; where `resolve` found it to be a box, that box."""
+        return every(self.parts_of_test(test))
+
+    def parts_of_test(self, test: Test) -> Iterator[Formula]:
+        """Formulas whose conjunction is a cell's condition."""
         if test.box is None:
-            return self.of(test.condition)
-        reads = _reads(test.condition, test.variables[0])
-        return self.atom(self.single[self.column(reads)], test.box)
+            for part in conjuncts(test.condition):
+                known = self._known.get((id(part), True))
+                yield self.of(part) if known is None else known[1]
+        else:
+            reads = _reads(test.condition, test.variables[0])
+            yield self.atom(self.single[self.column(reads)], test.box)
 
     def of(self, condition: Expr, wanted: bool = True) -> Formula:
         """`condition = wanted` with negations pushed into the atoms."""
@@ -188,11 +210,9 @@ class Universe:
             return self._truths(op, left, right)(True)
         if not (_is_finite(left) and _is_finite(right)):
             return self._truth(whole, wanted)
-        coefficients, constant = self.linear(left)
-        others, other = self.linear(right)
-        for column, k in others.items():
-            coefficients[column] = coefficients.get(column, 0) - k
-        return self._against(coefficients, op, other - constant)
+        total: dict[int, int] = {}
+        constant = self._add(total, left, 1) + self._add(total, right, -1)
+        return self._against(total, op, -constant)
 
     def _among(self, whole: Expr, subject: Expr, keys: list[int], wanted: bool) -> Formula:
         if not _is_finite(subject):
@@ -205,30 +225,39 @@ class Universe:
 
     def _against(self, coefficients: dict[int, int], op: Comparison, bound: int) -> Formula:
         """`sum of coefficients op bound`, divided through and rounded to integers."""
-        terms = sorted((column, k) for column, k in coefficients.items() if k)
+        terms = sorted([term for term in coefficients.items() if term[1]])
         if not terms:
             return TRUE if op.meaning(0, bound) else FALSE
-        divisor = math.gcd(*(k for _, k in terms))
+        divisor = math.gcd(*[k for _, k in terms])
         divisor = -divisor if terms[0][1] < 0 else divisor
-        form = self.form(tuple((column, k // divisor) for column, k in terms))
+        form = self.form(tuple([(column, k // divisor) for column, k in terms]))
         return self.atom(form, scaled(op, divisor, bound, self.low[form], self.high[form]))
 
     def linear(self, expr: Expr) -> tuple[dict[int, int], int]:
         """Coefficients of columns, and a constant, that add up to the key of `expr`."""
-        match expr:
-            case Literal(value=value, type=kind):
-                return {}, key_of(kind, value)
-            case Apply(op=Op.NEG, args=(part,)):
-                return _scaled(self.linear(part), -1)
-            case Apply(op=Op.ADD | Op.SUB as op, args=(left, right), type=Int()):
-                sign = 1 if op is Op.ADD else -1
-                return _sum(self.linear(left), _scaled(self.linear(right), sign))
-            case Apply(op=Op.MUL, args=(left, right), type=Int()):
-                for factor, other in ((left, right), (right, left)):
-                    coefficients, constant = self.linear(factor)
+        total: dict[int, int] = {}
+        constant = self._add(total, expr, 1)
+        return total, constant
+
+    def _add(self, total: dict[int, int], expr: Expr, factor: int) -> int:
+        """Add the factor times the key of `expr` to the total; its constant part is returned."""
+        if isinstance(expr, Literal):
+            return factor * key_of(expr.type, expr.value)
+        if isinstance(expr, Apply):
+            op, args = expr.op, expr.args
+            if op is Op.NEG:
+                return self._add(total, args[0], -factor)
+            if isinstance(expr.type, Int) and op in {Op.ADD, Op.SUB}:
+                second = factor if op is Op.ADD else -factor
+                return self._add(total, args[0], factor) + self._add(total, args[1], second)
+            if isinstance(expr.type, Int) and op is Op.MUL:
+                for part, other in (args, args[::-1]):
+                    coefficients, constant = self.linear(part)
                     if not any(coefficients.values()):
-                        return _scaled(self.linear(other), constant)
-        return {self.column(expr): 1}, 0
+                        return self._add(total, other, factor * constant)
+        column = self.column(expr)
+        total[column] = total.get(column, 0) + factor
+        return 0
 
 
 def every(parts: Iterable[Formula]) -> Formula:
@@ -259,29 +288,42 @@ def some(parts: Iterable[Formula]) -> Formula:
 
 def clauses(formulas: Iterable[Formula]) -> Clauses:
     """The conjunction of `formulas`, with at most one box a form."""
-    whole = every(formulas)
     boxes: dict[int, Box] = {}
-    rest: list[Formula] = []
-    for part in whole.parts if isinstance(whole, Every) else (whole,):
+    rest: dict[Formula, None] = {}
+    impossible = False
+    for part in _parts(formulas):
         if isinstance(part, Atom):
-            boxes[part.form] = meet(boxes[part.form], part.box) if part.form in boxes else part.box
+            known = boxes.get(part.form)
+            box = boxes[part.form] = part.box if known is None else meet(known, part.box)
+            impossible = impossible or not box
+        elif part == FALSE:
+            impossible = True
         else:
-            rest.append(part)
-    impossible = whole == FALSE or any(not box for box in boxes.values())
+            rest[part] = None
     return Clauses(tuple(sorted(boxes.items())), tuple(rest), impossible)
+
+
+def _parts(formulas: Iterable[Formula]) -> Iterator[Formula]:
+    """What a conjunction consists of, without conjunctions in it."""
+    for part in formulas:
+        if isinstance(part, Every):
+            yield from _parts(part.parts)
+        else:
+            yield part
 
 
 def lines_of(universe: Universe, table: Table) -> list[Clauses]:
     """Every line of the table as clauses."""
-    known: dict[int, Formula] = {}
+    known: dict[int, list[Formula]] = {}
     lines = []
     for line in table.lines:
-        parts = []
+        parts: list[Formula] = []
         for test in line.tests:
             if test is not None:
-                if id(test) not in known:
-                    known[id(test)] = universe.of_test(test)
-                parts.append(known[id(test)])
+                of_test = known.get(id(test))
+                if of_test is None:
+                    of_test = known[id(test)] = list(universe.parts_of_test(test))
+                parts += of_test
         lines.append(clauses(parts))
     return lines
 

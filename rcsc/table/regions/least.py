@@ -9,24 +9,35 @@ The least point pins each column, in the order given, to the least value that fi
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import TypeAlias
 
 from rcsc.lang.interval_sets import complement, holds, meet
 from rcsc.solvers.search import furthest, lowest
-from rcsc.table.regions.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
+from rcsc.table.regions.atoms import Atom, Clauses, Every, Form, Formula, Some, Universe, clauses, every, some
 from rcsc.table.regions.linear import Simplex, integer_point
 from rcsc.table.regions.region import Bounds, NoWitness, Point
 from rcsc.table.regions.splitting import Tree
 
+_SWEEPS = 12
+"""How often a point is projected onto all bounds before a system is solved."""
+_BEYOND = 1.3
+"""By how much further than to the bound itself a point is moved: so that it ends."""
 _ROUNDS = 200
 """Systems looked at for an integer point before the tree of regions looks for it."""
 
 
 def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> Point | NoWitness:
     """A point at which all parts hold; `NONE` when there is none, `UNKNOWN` past the budget."""
-    wanted = clauses(parts)
+    return meeting(universe, clauses(parts), budget=budget)
+
+
+def meeting(
+    universe: Universe, wanted: Clauses, near: Mapping[int, int] | None = None, budget: int = 2_000
+) -> Point | NoWitness:
+    """A point of a conjunction as `find` has it; looked for first near another point."""
     if not wanted.rest and not wanted.impossible and all(len(box) == 1 for _, box in wanted.boxes):
         try:
-            return _corner(universe, {form: box[0] for form, box in wanted.boxes})
+            return _corner(universe, {form: box[0] for form, box in wanted.boxes}, near or {})
         except TimeoutError:
             pass  # the tree asks itself how long it goes on
     tree = Tree(
@@ -44,16 +55,19 @@ def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> P
     return NoWitness.UNKNOWN if search.undecided else NoWitness.NONE
 
 
-def _corner(universe: Universe, bounds: Mapping[int, Bounds]) -> Point | NoWitness:
+def _corner(universe: Universe, bounds: Mapping[int, Bounds], near: Mapping[int, int]) -> Point | NoWitness:
     """A point within the bounds on forms, of leaves only, all put to one system.
 
-    First each bound on several columns is drawn in by half the sum of its coefficients: a point of what is
-    left stays within the bounds when it is rounded to integers. Only where nothing is left are fractions
-    bounded one after the other.
+    First one near a given point is tried (`projected`). Then each bound on several columns is drawn in by half the
+    sum of its coefficients: a point of what is left stays within the bounds when it is rounded to integers. Only
+    where nothing is left are fractions bounded one after the other.
     """
     forms, singles = universe.forms, universe.single
-    if any(universe.columns[column].opaque for form in bounds for column, _ in forms[form]):
+    if universe.opaque and not universe.opaque.isdisjoint(c for form in bounds for c, _ in forms[form]):
         return NoWitness.UNKNOWN
+    at = projected(universe, bounds, near)
+    if at is not None:
+        return _completed(universe, bounds, at)
     used = sorted({column for form in bounds if len(forms[form]) > 1 for column, _ in forms[form]})
     system = _system(universe, bounds, used, draw_in=True)
     if system.refute() is None:
@@ -87,6 +101,59 @@ def _system(
             terms = [(singles[column], k) for column, k in forms[form]]
             system.add_form(form, terms, low + margin, high - margin)
     return system
+
+
+def projected(
+    universe: Universe, bounds: Mapping[int, Bounds], near: Mapping[int, int]
+) -> dict[int, int] | None:
+    """The columns of a point within the bounds, by projecting a point onto one bound after the other; None where that does not end soon.
+
+    Source: Agmon, The relaxation method for linear inequalities, 1954. It guesses in floating point; what it returns was checked exactly.
+    """
+    planes, drawn, ends = [], list[_Plane](), dict[int, Bounds]()
+    for form, (low, high) in bounds.items():
+        terms = universe.forms[form]
+        if len(terms) > 1:
+            planes.append((terms, low, high))
+            reach, square = universe.norms[form]
+            margin = min(reach, (high - low) // 2)
+            drawn.append((terms, low + margin, high - margin, square))
+            for column, _ in terms:
+                if column not in ends:
+                    single = universe.single[column]
+                    ends[column] = bounds.get(single, (universe.low[single], universe.high[single]))
+    try:
+        point = _relaxed(drawn, ends, near)
+    except (OverflowError, ValueError):  # no double is so large
+        return None
+    for terms, low, high in planes:
+        if not low <= sum([k * point[c] for c, k in terms]) <= high:
+            return None
+    return point
+
+
+_Plane: TypeAlias = tuple[Form, int, int, int]
+"""A form, its bounds, and the square of its normal."""
+
+
+def _relaxed(planes: Sequence[_Plane], ends: Mapping[int, Bounds], near: Mapping[int, int]) -> dict[int, int]:
+    """The point near another at which projecting comes to rest or is given up, rounded, within the bounds of columns."""
+    at = {column: float(min(max(near.get(column, 0), low), high)) for column, (low, high) in ends.items()}
+    for _ in range(_SWEEPS):
+        moved = False
+        for terms, low, high, square in planes:
+            value = 0.0
+            for column, k in terms:
+                value += k * at[column]
+            if not low <= value <= high:
+                moved = True
+                step = ((low if value < low else high) - value) * _BEYOND / square
+                for column, k in terms:
+                    least_, greatest = ends[column]
+                    at[column] = min(max(at[column] + k * step, least_), greatest)
+        if not moved:
+            break
+    return {column: min(max(round(at[column]), low), high) for column, (low, high) in ends.items()}
 
 
 def _completed(universe: Universe, bounds: Mapping[int, Bounds], at: Mapping[int, int]) -> Point:

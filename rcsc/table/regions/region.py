@@ -4,7 +4,7 @@ In: clauses over one `Universe`. Out: values that `splitting` makes and `certifi
 region is bounds on forms; a leaf of the tree says why exactly one line holds all over it.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TypeAlias
@@ -12,6 +12,7 @@ from typing import TypeAlias
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.model import Box, Snapshot
 from rcsc.table.regions.atoms import FALSE, Atom, Every, Formula, Some, every, some
+from rcsc.table.regions.ends import Cut
 from rcsc.table.regions.linear import Multipliers, Simplex
 
 Bounds: TypeAlias = tuple[int, int]
@@ -202,7 +203,9 @@ class Region:
 
     Attributes:
         bounds: Bounds by form, where narrower than the form's range.
-        lines: Lines that may hold somewhere in it.
+        plain: Lines that may hold somewhere in it and are intervals of forms, one bit each.
+        cuts: Cuts at which intervals of these may end in it.
+        lines: Other lines that may hold somewhere in it.
         open: Assumptions that are not known to hold all over it.
         simplex: The bounds of some ancestor; `stale` are the forms changed since.
         carve: A part of it that is to be cut out first, by form.
@@ -211,6 +214,8 @@ class Region:
     """
 
     bounds: dict[int, Bounds]
+    plain: int
+    cuts: Sequence[Cut]
     lines: list[Candidate]
     open: list[Candidate]
     simplex: Simplex
@@ -218,3 +223,8 @@ class Region:
     carve: tuple[tuple[int, Bounds], ...] = ()
     rounds: int = 0
     known: Node | None = None
+
+    @property
+    def many(self) -> int:
+        """How many lines may hold in it."""
+        return self.plain.bit_count() + len(self.lines)

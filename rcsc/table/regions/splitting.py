@@ -14,11 +14,13 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import combinations
 from math import prod
+from typing import NamedTuple, TypeAlias
 
 from rcsc.lang.interval_sets import meet
 from rcsc.table.regions.atoms import Clauses, Universe
+from rcsc.table.regions.ends import Cut, Ends
 from rcsc.table.regions.linear import Multipliers, Simplex
-from rcsc.table.regions.partition import Boxes, Cell, Gaps, common, parting
+from rcsc.table.regions.partition import Boxes, Cell, Gaps, bits_of, common, parting
 from rcsc.table.regions.region import (
     Bounds,
     Candidate,
@@ -43,6 +45,23 @@ _ROUNDS = 200
 """Splits in a row, made to round one vertex to integers, before a solver is asked."""
 _PATIENCE = 3
 """Regions left undecided by the solver, after which it is asked no more: each may cost its full time."""
+
+
+Score: TypeAlias = tuple[int, int, int, int]
+"""How many lines a cut leaves on one side only, how many on the lesser side; the form and the cut, less of each being better."""
+NOWHERE: Score = (-1, -1, 0, 0)
+
+
+class Survey(NamedTuple):
+    """What is seen of a region before it is split.
+
+    Attributes:
+        best: The best cut of the lines that are intervals.
+        holding: The lines that hold all over it.
+    """
+
+    best: Score
+    holding: list[int]
 
 
 class Tree:
@@ -77,9 +96,15 @@ class Tree:
         self.first_only = first_only
         self.search = Search()
         self._singles = frozenset(universe.single)
-        candidates = [Candidate(i, dict(c.boxes), c.rest) for i, c in enumerate(lines) if not c.impossible]
+        self._lines = lines
+        possible = [(i, c) for i, c in enumerate(lines) if not c.impossible]
+        plain = {i: c for i, c in possible if not c.rest and all(len(box) == 1 for _, box in c.boxes)}
+        odd = [Candidate(i, dict(c.boxes), c.rest) for i, c in possible if i not in plain]
+        self._ends = Ends({i: [(form, box[0]) for form, box in c.boxes] for i, c in plain.items()})
         given = [Candidate(i, dict(c.boxes), c.rest) for i, c in enumerate(assumptions)]
-        self.root = Region({}, candidates, [c for c in given if not c.holds], Simplex())
+        mask = sum(1 << i for i in plain)
+        cuts = [cut for cut in self._ends.cuts if universe.low[cut.form] <= cut.at < universe.high[cut.form]]
+        self.root = Region({}, mask, cuts, odd, [c for c in given if not c.holds], Simplex())
         self.root.carve = tuple(
             (form, box[0]) for c in given for form, box in c.boxes.items() if len(box) == 1
         )
@@ -105,34 +130,37 @@ class Tree:
             if isinstance(region.known, OutsideAssumption):
                 self.search.used.add(region.known.assumption)
             return region.known, []
-        if self.default and len(region.lines) <= 1:
+        many = region.many
+        if self.default and many <= 1:
             return Only(-1), []
-        if len(region.lines) == 1 and region.lines[0].holds:
-            return Only(region.lines[0].index), []
+        survey = self._survey(region)
+        if many == 1 and len(survey.holding) == 1:
+            return Only(survey.holding[0]), []
         if len(self.search.nodes) > self.budget:
             return self._ask(region), []
-        holding = [line.index for line in region.lines if line.holds]
-        fresh = [pair for pair in combinations(holding, 2) if pair not in self.search.overlaps]
-        if fresh or not region.lines:
-            return self._probe(region, fresh)
-        if len(holding) > 1 and self._all_known(region):
+        fresh = [pair for pair in combinations(survey.holding, 2) if pair not in self.search.overlaps]
+        if fresh or not many:
+            return self._probe(region, survey, fresh)
+        if len(survey.holding) > 1 and self._all_known(region):
             return Open(), []
-        return self._narrow(region)
+        return self._narrow(region, survey)
 
     # --- findings ----------------------------------------------------------------------
 
     def _all_known(self, region: Region) -> bool:
         """Whether no further split could find another pair (two lines hold, so no gap)."""
-        others = [line.index for line in region.lines]
+        others = self._numbers(region)
         return all(pair in self.search.overlaps for pair in combinations(others, 2))
 
-    def _probe(self, region: Region, pairs: list[tuple[int, int]]) -> tuple[Node, list[Region]]:
+    def _probe(
+        self, region: Region, survey: Survey, pairs: list[tuple[int, int]]
+    ) -> tuple[Node, list[Region]]:
         """Look for a point of a region that is wrong at every point."""
         multipliers = self._refute(region)
         if multipliers is not None:
             return Empty(multipliers), []
         if region.open:
-            return self._split(region, *self._best(region, region.open))
+            return self._split(region, *self._best(region, region.open, NOWHERE))
         if self._is_opaque(region):
             return self._ask(region), []
         form = self._fractional(region)
@@ -142,10 +170,10 @@ class Tree:
             return self._split(region, form, int(region.simplex.value(form) // 1), region.rounds + 1)
         point = self._point(region)
         self.search.overlaps.update(dict.fromkeys(pairs, point))
-        if not region.lines:
+        if not region.many:
             self.search.gaps.append((region.bounds, point))
-        settled = all(line.holds for line in region.lines)
-        return (Open(), []) if settled else self._narrow(region)
+        settled = region.many == len(survey.holding)
+        return (Open(), []) if settled else self._narrow(region, survey)
 
     def _ask(self, region: Region) -> Node:
         """Leave the region to the solver."""
@@ -153,7 +181,7 @@ class Tree:
             self.search.undecided += 1
             return Open()
         bounds = tuple((form, low, high) for form, (low, high) in sorted(region.bounds.items()))
-        lines = tuple(line.index for line in region.lines)
+        lines = tuple(self._numbers(region))
         answer = self.oracle(Question(bounds, lines))
         if answer is NoWitness.NONE:
             self.search.used.update(assumption.index for assumption in self.root.open)
@@ -162,7 +190,7 @@ class Tree:
             self.search.undecided += 1
         else:
             self.search.witnesses.append(answer)
-            self.search.doubtful.update(combinations(sorted(lines), 2))
+            self.search.doubtful.update(combinations(lines, 2))
         return Open()
 
     def _is_opaque(self, region: Region) -> bool:
@@ -187,37 +215,73 @@ class Tree:
 
     # --- splits ------------------------------------------------------------------------
 
-    def _narrow(self, region: Region) -> tuple[Node, list[Region]]:
+    def _numbers(self, region: Region) -> list[int]:
+        """The lines that may hold somewhere in a region."""
+        return sorted([*bits_of(region.plain), *(line.index for line in region.lines)])
+
+    def _candidates(self, region: Region) -> list[Candidate]:
+        """These lines, as far as the region leaves them open."""
+        plain = []
+        for number in bits_of(region.plain):
+            boxes = {form: meet(box, (self._range(region, form),)) for form, box in self._lines[number].boxes}
+            open_ = {form: box for form, box in boxes.items() if box != (self._range(region, form),)}
+            plain.append(Candidate(number, open_, ()))
+        return sorted([*plain, *region.lines], key=lambda line: line.index)
+
+    def _survey(self, region: Region) -> Survey:
+        """See which cuts part the lines that are intervals, and which lines hold; cuts that part none are dropped."""
+        plain, opened, kept, best = region.plain, 0, list[Cut](), NOWHERE
+        for cut in region.cuts:
+            form, at, here, below, above = cut
+            if here := here & plain:
+                kept.append(cut)
+                opened |= here
+                left, right = (below & plain).bit_count(), (above & plain).bit_count()
+                if left + right >= best[0]:
+                    best = max(best, (left + right, min(left, right), -form, -at))
+        region.cuts = kept
+        holding = [*bits_of(plain & ~opened), *(line.index for line in region.lines if line.holds)]
+        return Survey(best, sorted(holding))
+
+    def _narrow(self, region: Region, survey: Survey) -> tuple[Node, list[Region]]:
         """Count boxes where boxes are all that is left, else split."""
         if region.carve:
-            return self._carve(region)
-        if all(not line.rest and self._singles.issuperset(line.boxes) for line in region.lines):
-            extents = {form: self._range(region, form) for line in region.lines for form in line.boxes}
-            boxes = [line.boxes for line in region.lines]
+            return self._carve(region, survey)
+        if all(cut.form in self._singles for cut in region.cuts) and all(
+            not line.rest and self._singles.issuperset(line.boxes) for line in region.lines
+        ):
+            boxes = [line.boxes for line in self._candidates(region)]
+            extents = {form: self._range(region, form) for box in boxes for form in box}
             wrong = _defect(Boxes(extents, boxes), cover=not self.default)
             if wrong is None:
                 sizes = (high - low + 1 for low, high in extents.values())
                 return Counted(None if self.default else prod(sizes), parting(boxes)), []
             region.carve = tuple((form, bounds) for form, bounds in wrong.items() if bounds != extents[form])
             if region.carve:
-                return self._carve(region)
-        return self._split(region, *self._best(region, region.lines))
+                return self._carve(region, survey)
+        return self._split(region, *self._best(region, region.lines, survey.best))
 
-    def _carve(self, region: Region) -> tuple[Node, list[Region]]:
+    def _carve(self, region: Region, survey: Survey) -> tuple[Node, list[Region]]:
         """One split toward the part that is to be cut out."""
         (form, (low, high)), *later = region.carve
         least, greatest = self._range(region, form)
         if (low <= least and high >= greatest) or high < least or low > greatest:
             region.carve = tuple(later)
-            return self._narrow(region)
+            return self._narrow(region, survey)
         at_low = low > least
         node, children = self._split(region, form, low - 1 if at_low else high)
         if children:
             children[at_low].carve = region.carve
         return node, children
 
-    def _best(self, region: Region, candidates: Sequence[Candidate]) -> tuple[int, int]:
-        """The form and cut that leave fewest candidates on both sides together."""
+    def _best(self, region: Region, candidates: Sequence[Candidate], best: Score) -> tuple[int, int]:
+        """The form and cut that leave fewest lines on both sides together.
+
+        Args:
+            region: Where.
+            candidates: Lines or assumptions that are not intervals, or that are not counted in `best`.
+            best: The best cut of the lines that are intervals.
+        """
         lows: dict[int, list[int]] = {}
         highs: dict[int, list[int]] = {}
         cuts: dict[int, set[int]] = {}
@@ -231,14 +295,19 @@ class Tree:
                 for atom in atoms(part):
                     edges = (cut for low, high in atom.box for cut in (low - 1, high))
                     cuts.setdefault(atom.form, set()).update(edges)
-        best = (-1, -1, 0, 0)
+        plain = region.plain if best != NOWHERE else 0
+        for cut in region.cuts if plain and cuts.keys() | lows.keys() else ():
+            if cut.form in lows:
+                cuts.setdefault(cut.form, set()).add(cut.at)
         for form in lows.keys() | cuts.keys():
             starts, ends = sorted(lows.get(form, ())), sorted(highs.get(form, ()))
             least, greatest = self._range(region, form)
-            for cut in {low - 1 for low in starts}.union(ends, cuts.get(form, ())):
-                if least <= cut < greatest:
-                    left, right = bisect_right(ends, cut), len(starts) - bisect_right(starts, cut)
-                    best = max(best, (left + right, min(left, right), -form, -cut))
+            for at in {low - 1 for low in starts}.union(ends, cuts.get(form, ())):
+                if least <= at < greatest:
+                    below, above = self._ends.beyond(form, at)
+                    left = bisect_right(ends, at) + (plain & below).bit_count()
+                    right = len(starts) - bisect_right(starts, at) + (plain & above).bit_count()
+                    best = max(best, (left + right, min(left, right), -form, -at))
         return -best[2], -best[3]
 
     def _split(self, region: Region, form: int, cut: int, rounds: int = 0) -> tuple[Node, list[Region]]:
@@ -246,10 +315,14 @@ class Tree:
         least, greatest = self._range(region, form)
         if not least <= cut < greatest:
             return self._without_full_boxes(region)
-        sides = [self._side(region, form, least, cut), self._side(region, form, cut + 1, greatest)]
+        below, above = self._ends.beyond(form, cut)
+        sides = [
+            self._side(region, form, (least, cut), above),
+            self._side(region, form, (cut + 1, greatest), below),
+        ]
         for side in sides:
             side.rounds = rounds
-        if sum(len(side.lines) for side in sides) > len(region.lines) and self._has_arithmetic(region, form):
+        if sum(side.many for side in sides) > region.many and self._has_arithmetic(region, form):
             multipliers = self._refute(region)
             if multipliers is not None:
                 return Empty(multipliers), []
@@ -285,9 +358,14 @@ class Tree:
             else Candidate(candidate.index, boxes, candidate.rest)
         )
 
-    def _side(self, region: Region, form: int, low: int, high: int) -> Region:
+    def _side(self, region: Region, form: int, bounds: Bounds, apart: int) -> Region:
+        """A side of a split, without the lines that lie apart from it."""
+        low, high = bounds
         lines = [kept for line in region.lines if (kept := line.within(form, low, high)) is not None]
-        side = Region({**region.bounds, form: (low, high)}, lines, [], region.simplex, (*region.stale, form))
+        cuts = [cut for cut in region.cuts if cut[0] != form or low <= cut[1] < high]
+        stale = (*region.stale, form)
+        narrowed = {**region.bounds, form: bounds}
+        side = Region(narrowed, region.plain & ~apart, cuts, lines, [], region.simplex, stale)
         for assumption in region.open:
             kept = assumption.within(form, low, high)
             if kept is None:
