@@ -42,6 +42,7 @@ COMMANDS = {
     "systems.replay": "Run a recorded run again and compare.",
     "systems.run": "Run a system with its plant, by a script of orders.",
     "systems.shell": "Run, step and change a system by hand.",
+    "systems.studio": "Open tables, proof, running levels and cell in one page.",
     "tables.table": "Make a table of a state graph.",
     "tables.test": "Test the generated executors against the tables.",
     "tables.trace": "Trace lines to requirements, code, tests and proofs, and code back to lines.",

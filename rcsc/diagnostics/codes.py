@@ -1578,6 +1578,12 @@ class Code(StrEnum):
     proved` looks at them first, as `rcsc prove` does, and refuses likewise what then is not proved. `rcsc prove --level LEVEL` looks
     for the shortest run that shows it.
     """
+    STUDIO = """RCS739: the studio does not do that
+
+    A page of `rcsc studio` asked what no part of the studio answers, or with something missing, or more than may be asked at once; or
+    it asked for what is not there now: a moment that is not kept, a line of another table, a run where none is open. The message says
+    which. Nothing was changed.
+    """
     BAD_JOURNAL = """RCS741: a journal is not this campaign's
 
     `rcsc campaign` goes on from its journal only if that has the same seed, plant and executors, and was written with the same tables,

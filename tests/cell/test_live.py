@@ -18,11 +18,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcsc.host.guard import refusal
 from rcsc_cell.cell.arm import plate
 from rcsc_cell.database.pose import nine
 from rcsc_cell.live import Live
 from rcsc_cell.live.board import MOST_MOMENTS, Board, Display, History, display_names, problems
-from rcsc_cell.live.guard import refusal
 from rcsc_cell.live.server import MOST_BYTES, MOST_WATCHED, watched
 from rcsc_cell.pictures.stick import stick
 from tests.support.browser import Browser

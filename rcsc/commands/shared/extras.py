@@ -19,6 +19,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "live": ("aiohttp",),
     "parquet": ("pyarrow",),
     "plot": ("matplotlib",),
+    "studio": ("aiohttp", "mcap", "zstandard"),
 }
 """What each extra of `pyproject.toml` makes importable; of two with one package the smaller comes first.
 

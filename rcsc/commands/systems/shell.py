@@ -2,21 +2,16 @@
 
 import importlib.util
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Literal
 
 import click
 
 from rcsc.commands.shared.systems import EXECUTOR, PLANT, system_path
-from rcsc.run.description import NO_DATA, BadDescription, Description, description
-from rcsc.run.plant.load import Staged, by_hand, load
-from rcsc.run.signature import Signature
-from rcsc.run.system import Kind, assemble, signatures
-from rcsc.shell.commands import Commands
+from rcsc.shell.opening import Opening, opened
 from rcsc.shell.reload.refusal import Refused
-from rcsc.shell.reload.reload import Origin
-from rcsc.shell.session import Session, silent_queries
 from rcsc.shell.terminal import converse, follow
 
 
@@ -50,35 +45,13 @@ def command(script: Path | None, executor: str, plant: str | None, alone: bool, 
     SYSTEM is a system's description or a folder that has one; without it, system.toml here or in tables/. Generated executors
     run, as they are, with the plant that the description declares.
     """
-    commands = _commands(system_path(system), "c" if executor == "c" else "python", plant, alone)
+    kind: Literal["c", "python"] = "c" if executor == "c" else "python"
+    commands = opened(Opening(system_path(system), kind, plant or "", alone=alone))
 
     if script is None and sys.stdin.isatty() and sys.stdout.isatty() and _has_prompt():
         return converse(commands, click.echo, _complain)
     with _lines(script) as (lines, name):
         return follow(commands, lines, name, click.echo, _complain)
-
-
-def _commands(path: Path, kind: Kind, wanted: str | None, alone: bool) -> Commands:
-    system = description(path)
-    signs = signatures(system)
-    stage = Staged() if alone else _stage(system, signs, wanted)
-    queries = silent_queries(system, signs) | dict(stage.queries)
-    running = assemble(system, kind, queries, stage.outside)
-    return Commands(Session(running, Origin(path, system, kind, queries)))
-
-
-def _stage(system: Description, signs: Mapping[str, Signature], wanted: str | None) -> Staged:
-    """What stands outside; a declared plant is left out where the data is not there of which it would be made.
-
-    Raises:
-        CodedError: The plant that was named is not in order.
-    """
-    try:
-        return load(system, signs, wanted or by_hand(system))
-    except BadDescription:
-        if wanted is None and system.database.name != NO_DATA and not system.database.is_file():
-            return Staged()
-        raise
 
 
 def _has_prompt() -> bool:

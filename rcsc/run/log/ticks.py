@@ -5,10 +5,11 @@ In: a log. Out: `LoggedTick`s, in the words of the tables. Orders and reports ar
 `status_report`. A level sees a report before it orders, so a report is compared with the order that stood before the cycle.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from rcsc.lang.model import pending
+from rcsc.run.description import Wire
 from rcsc.run.log.finding import LoggedCycle
 from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.log.states import failed_of, fault_of, line_of, refused_of
@@ -141,15 +142,26 @@ class LoggedTick:
 
 def frames(log: Log) -> Iterator[LoggedTick]:
     """Every tick of a log."""
-    wires = _wires(log)
+    wires = other_ends(log.system().wires)
     for tick in log.ticks:
-        yield LoggedTick(tick, tuple(_box(log, level, tick, wires) for level in log.levels))
+        yield tick_of(log, tick, wires)
 
 
-def _wires(log: Log) -> dict[str, str]:
+def tick_of(log: Log, tick: int, wires: Mapping[str, str]) -> LoggedTick:
+    """Return one tick of a log.
+
+    Args:
+        log: Of any run.
+        tick: Any; in one that the log does not have no level had a cycle.
+        wires: The `other_ends` of its system.
+    """
+    return LoggedTick(tick, tuple(_box(log, level, tick, wires) for level in log.levels))
+
+
+def other_ends(wires: Iterable[Wire]) -> dict[str, str]:
     """Return who is at the other end of each variable, `level.variable`."""
     others: dict[str, str] = {}
-    for wire in log.system().wires:
+    for wire in wires:
         others[wire.target] = wire.source.partition(".")[0]
         others[wire.source] = wire.target.partition(".")[0]
     return others

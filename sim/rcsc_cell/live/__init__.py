@@ -7,13 +7,13 @@ went by, so that a page opened late sees the whole run, coarsely.
     rcsc run make_boxt --live
 
 prints an address with a token that cannot be guessed. The server listens on the loopback interface only, answers only
-to that token and that host name, and allows no other page to read it (`guard`): cross-site requests, framing and
+to that token and that host name, and allows no other page to read it (`rcsc.host.guard`): cross-site requests, framing and
 rebinding of names are refused.
 
 Nothing here is trusted for a proof, and the run does not wait for what the page sends. What it costs: a copy of what
 is shown, a cycle; the pictures are drawn in the browser's time.
 
-Modules, in the order the data flows: `board` (what a run publishes), `guard` (who may see it), `server`; `page.html`,
+Modules, in the order the data flows: `board` (what a run publishes), `server`; `page.html`,
 `page.css` and `page.js` are the page.
 """
 

@@ -19,8 +19,8 @@ from typing import Any, Self
 from aiohttp import WSMsgType, web
 
 from rcsc.host.files.read import Malformed, json_of
+from rcsc.host.guard import HEADERS, policy, refusal
 from rcsc_cell.live.board import Board, Latest, Moment, Value, problems
-from rcsc_cell.live.guard import HEADERS, policy, refusal
 
 ADDRESS = "127.0.0.1"
 PUSH_S = 0.1

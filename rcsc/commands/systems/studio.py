@@ -1,0 +1,63 @@
+"""`rcsc studio`: tables, proof, running levels and cell in one page."""
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from rcsc.commands.shared.extras import need
+from rcsc.commands.shared.systems import EXECUTOR, PLANT, SYSTEM, meant
+from rcsc.shell.opening import Opening
+
+
+@click.command(
+    "studio",
+    epilog="""\b
+Examples:
+  rcsc studio my_robot                the system in a folder, with its plant
+  rcsc studio make_boxt               a script of the system that is here, row by row
+  rcsc studio --plant mujoco          with another of its plants
+  rcsc studio --alone                 nothing outside the levels: what comes in is set by hand""",
+)
+@click.argument("target", metavar="[SYSTEM|SCRIPT]", required=False)
+@SYSTEM
+@click.option("--script", default=None, metavar="SCRIPT",
+              help="Who gives orders: a CSV or TOML file, or the name of one beside the system or in its scripts/.")  # fmt: skip
+@PLANT
+@EXECUTOR
+@click.option("--alone", is_flag=True,
+              help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
+              help="Of what is random in the plant.")  # fmt: skip
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Where to listen; else a free one."
+)
+@click.option("--open", "opens", is_flag=True, help="Open the page in this machine's browser.")
+def command(  # noqa: PLR0913, PLR0917  # as many as there are options
+    target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str, alone: bool, seed: int, port: int,
+    opens: bool,
+) -> int:  # fmt: skip
+    """Open one page for SYSTEM: its tables, their proof, the levels as they run, and what stands outside them.
+
+    SYSTEM is a system's description or a folder that has one; SCRIPT names a script of the system that is here. The page is for a
+    browser on this machine; its address has a token that nobody else knows. Ctrl-C ends it.
+    """
+    need("studio")
+    from rcsc.studio.project import concerns  # of an extra
+    from rcsc.studio.server import Server
+
+    path, named = meant(target, system, script)
+    kind: Literal["c", "python"] = "c" if executor == "c" else "python"
+    opening = Opening(path, kind, plant or "", named, alone, seed)
+    server = Server(port)
+
+    def told(address: str) -> None:
+        click.echo(f"the studio is at {address}")
+        if opens:
+            click.launch(address)
+
+    try:
+        server.serve(concerns(opening, server.hub), told)
+    except KeyboardInterrupt:
+        click.echo("the studio is closed")
+    return 0

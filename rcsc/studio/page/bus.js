@@ -1,0 +1,129 @@
+// What views share: questions to the server, its events, what is selected, and the keys.
+//
+//   await bus.ask("run.type", { line: "step 5" }, { progress: (how) => ..., signal })
+//   bus.on("run.state", (state) => ...)          at once with the latest, where there is one
+//   bus.select({ level: "task", line: "5" })     every view follows: bus.on("selection", (now, changed) => ...)
+//   bus.key("ctrl+s", "Write the file", () => ..., "Tables")
+
+/** The server, or the page, did not do what was asked; `code` is what `rcsc explain` knows, `helps` are sentences. */
+export class Refusal extends Error {
+  constructor({ code = "", text, helps = [] }) {
+    super(text);
+    Object.assign(this, { code, helps });
+  }
+}
+
+export class Bus {
+  #socket = null;
+  #number = 0;
+  #open = new Map(); // by number: { resolve, reject, progress }
+  #handlers = new Map(); // by kind: a set
+  #latest = new Map(); // by kind of event
+  #selection = Object.freeze({ system: "", level: "", table: "", line: "", tick: null, follow: true });
+  #retry = 500;
+  keys = []; // { keys, what, run, where }
+
+  connect() {
+    const socket = new WebSocket(`ws://${location.host}${location.pathname}socket`);
+    this.#socket = socket;
+    socket.addEventListener("open", () => {
+      this.#retry = 500;
+      this.tell("connection", true);
+    });
+    socket.addEventListener("message", (event) => this.#take(JSON.parse(event.data)));
+    socket.addEventListener("close", () => {
+      for (const [, asked] of this.#open) asked.reject(new Refusal({ text: "no connection to the studio" }));
+      this.#open.clear();
+      this.tell("connection", false);
+      setTimeout(() => this.connect(), this.#retry);
+      this.#retry = Math.min(5000, this.#retry * 2);
+    });
+  }
+
+  #take(said) {
+    if (said.event !== undefined) return this.tell(said.event, said.body);
+    const asked = this.#open.get(said.id);
+    if (!asked) return undefined;
+    if (said.progress) return asked.progress?.(said.progress);
+    this.#open.delete(said.id);
+    if (said.refused) return asked.reject(new Refusal(said.refused));
+    if (said.cancelled) return asked.reject(new Refusal({ text: "cancelled" }));
+    return asked.resolve(said.answer);
+  }
+
+  /** Ask the server; the promise is refused with a `Refusal`. `signal` cancels. */
+  ask(kind, body = {}, { progress, signal } = {}) {
+    if (this.#socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Refusal({ text: "no connection to the studio" }));
+    const id = ++this.#number;
+    const answer = new Promise((resolve, reject) => this.#open.set(id, { resolve, reject, progress }));
+    this.#socket.send(JSON.stringify({ id, kind, body }));
+    signal?.addEventListener("abort", () => {
+      if (this.#open.has(id)) this.#socket.send(JSON.stringify({ id, cancel: true }));
+    });
+    return answer;
+  }
+
+  /** Hear events of a kind, the server's and the page's; returns what ends it. */
+  on(kind, handler) {
+    if (!this.#handlers.has(kind)) this.#handlers.set(kind, new Set());
+    this.#handlers.get(kind).add(handler);
+    if (this.#latest.has(kind)) handler(...this.#latest.get(kind));
+    return () => this.#handlers.get(kind).delete(handler);
+  }
+
+  /** Tell everybody on this page. */
+  tell(kind, ...said) {
+    this.#latest.set(kind, said);
+    for (const handler of this.#handlers.get(kind) ?? []) handler(...said);
+  }
+
+  latest(kind) {
+    return this.#latest.get(kind)?.[0];
+  }
+
+  /** What everybody looks at: system, level, table, line, and the tick; `follow` means the last tick, whatever it is. */
+  get selection() {
+    return this.#selection;
+  }
+
+  select(change) {
+    const before = this.#selection;
+    const changed = Object.keys(change).filter((key) => change[key] !== before[key]);
+    if (!changed.length) return;
+    this.#selection = Object.freeze({ ...before, ...change });
+    this.tell("selection", this.#selection, new Set(changed));
+  }
+
+  /** Have keys do something everywhere: `?`, `ctrl+enter`, `g r` (one after the other). */
+  key(keys, what, run, where = "Studio") {
+    this.keys.push({ keys, what, run, where });
+  }
+
+  /** Say something in the line below; `wrong` where it went wrong. */
+  say(text, { wrong = false, helps = [] } = {}) {
+    this.tell("said", { text, wrong, helps });
+  }
+
+  /** Ask, and say it where it is refused; undefined then. */
+  async try(kind, body, options) {
+    try {
+      return await this.ask(kind, body, options);
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      this.say(error.message, { wrong: true, helps: error.helps });
+      return undefined;
+    }
+  }
+}
+
+/** Make an element: `make("button", { type: "button", class: "x", onclick: f }, "text", child)`. */
+export function make(kind, attributes = {}, ...inside) {
+  const made = document.createElement(kind);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (typeof value === "boolean") made.toggleAttribute(name, value);
+    else if (value !== undefined && value !== null) made.setAttribute(name, value);
+  }
+  made.append(...inside.flat().filter((one) => one !== undefined && one !== null));
+  return made;
+}

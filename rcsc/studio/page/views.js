@@ -1,0 +1,9 @@
+// Every view: its name, what it is called, and its module with `mount(root, bus)`, which may return { shown(), hidden() }.
+// A view is mounted when it is first shown, and stays.
+
+export const VIEWS = [
+  { name: "run", title: "Run", load: () => import("./run.js") },
+];
+
+/** What stands below the views. */
+export const BELOW = { load: () => import("./timeline.js") };

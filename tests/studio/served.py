@@ -1,0 +1,114 @@
+"""A studio that is served in a thread, and pages that are no browsers."""
+
+import asyncio
+import contextlib
+import itertools
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from typing import Any, Self
+
+import aiohttp
+
+from rcsc.shell.opening import Opening
+from rcsc.studio.hub import Concern
+from rcsc.studio.project import concerns
+from rcsc.studio.server import Server
+
+PATIENCE_S = 240.0
+"""After that something is broken; a machine under load needs some seconds."""
+
+
+@contextlib.contextmanager
+def serving(opening: Opening | None = None, others: Sequence[Concern] = ()) -> Iterator[Server]:
+    """A server with the studio's concerns for a system, or with others alone."""
+    server, opened = Server(), threading.Event()
+    given = [*others] if opening is None else [*concerns(opening, server.hub), *others]
+    thread = threading.Thread(target=server.serve, args=(given, lambda _: opened.set()), daemon=True)
+    thread.start()
+    assert opened.wait(PATIENCE_S)
+    try:
+        yield server
+    finally:
+        server.stop()
+        thread.join(PATIENCE_S)
+        assert not thread.is_alive()
+
+
+async def until(holds: Callable[[], object]) -> None:
+    """Wait until something holds."""
+    async with asyncio.timeout(PATIENCE_S):
+        while not holds():  # noqa: ASYNC110  # what it looks at is another thread's
+            await asyncio.sleep(0.01)
+
+
+class Refused(Exception):  # noqa: N818  # what the studio said
+    def __init__(self, said: dict[str, Any]) -> None:
+        super().__init__(said["text"])
+        self.code, self.helps = said["code"], said["helps"]
+
+
+class Page:
+    """A page: asks, and keeps the latest event of each kind."""
+
+    def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
+        self.socket, self.events = socket, dict[str, Any]()
+        self.progress: list[Any] = []
+        self._numbers, self._answers = itertools.count(1), dict[int, asyncio.Future[Any]]()
+        self._news = asyncio.Event()
+        self._reader = asyncio.create_task(self._read())
+
+    async def _read(self) -> None:
+        async for said in self.socket:
+            one = said.json()
+            if "event" in one:
+                self.events[one["event"]] = one["body"]
+                self._news.set()
+            elif "progress" in one:
+                self.progress.append(one["progress"])
+                self._news.set()
+            else:
+                self._answers[one["id"]].set_result(one)
+
+    async def send(self, kind: str, **body: Any) -> int:
+        number = next(self._numbers)
+        self._answers[number] = asyncio.get_running_loop().create_future()
+        await self.socket.send_json({"id": number, "kind": kind, "body": body})
+        return number
+
+    async def answer(self, number: int) -> Any:
+        said = await asyncio.wait_for(self._answers[number], PATIENCE_S)
+        if "refused" in said:
+            raise Refused(said["refused"])
+        return said.get("answer", said)
+
+    async def ask(self, kind: str, **body: Any) -> Any:
+        return await self.answer(await self.send(kind, **body))
+
+    async def heard(self, kind: str, **wanted: Any) -> Any:
+        """The latest event of a kind, once it says what is wanted."""
+        async with asyncio.timeout(PATIENCE_S):
+            while kind not in self.events or any(
+                self.events[kind].get(key) != value for key, value in wanted.items()
+            ):
+                self._news.clear()
+                await self._news.wait()
+        return self.events[kind]
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._reader.cancel()
+        await self.socket.close()
+
+
+@contextlib.asynccontextmanager
+async def page(server: Server) -> AsyncIterator[Page]:
+    """One page of a server."""
+    origin = server.address.rpartition("/")[0].rpartition("/")[0]
+    async with (
+        aiohttp.ClientSession(headers={"Origin": origin}) as session,
+        session.ws_connect(f"{server.address}socket", max_msg_size=0) as socket,
+        Page(socket) as one,
+    ):
+        yield one

@@ -1,0 +1,295 @@
+"""The studio's server: who is let in, what is refused, and that no page holds up another, or the levels."""
+
+import asyncio
+import contextlib
+import http.client
+import json
+import socket
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+from urllib.parse import urlsplit
+
+import aiohttp
+import pytest
+
+from rcsc.diagnostics.codes import Code
+from rcsc.shell.reload.refusal import Refused as Refusal
+from rcsc.studio.hub import MOST_OPEN, Ask, Client, Hub, message
+from rcsc.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
+from tests.studio.served import PATIENCE_S, Page, Refused, page, serving, until
+
+
+class Echo:
+    """A concern of the tests' own."""
+
+    name, lane = "echo", "echo"
+
+    def __init__(self) -> None:
+        self.held, self.told = threading.Event(), threading.Event()
+        self.asks: list[Ask] = []
+        self.closed = False
+
+    @property
+    def handlers(self) -> Mapping[str, Callable[[Ask], Any]]:
+        return {
+            "echo.say": self._say,
+            "echo.hold": self._hold,
+            "echo.bug": self._bug,
+            "echo.refuse": self._refuse,
+        }
+
+    def greeting(self) -> Any:
+        return {"warm": True}
+
+    def close(self) -> None:
+        self.closed = True
+
+    def _say(self, ask: Ask) -> Any:
+        return ask.body.text("text")
+
+    def _hold(self, ask: Ask) -> Any:
+        self.asks.append(ask)
+        ask.on_cancel(self.told.set)
+        for at in range(10**9):
+            ask.progress("waits", at, 10**9)
+            if self.held.wait(0.01):
+                return at
+        return None
+
+    def _bug(self, _: Ask) -> Any:
+        raise ZeroDivisionError
+
+    def _refuse(self, _: Ask) -> Any:
+        raise Refusal(Code.SHELL_NAME, "there is no such thing", "try another")
+
+
+def status(
+    server: Server, path: str, method: str = "GET", **headers: str
+) -> tuple[int, Mapping[str, str], bytes]:
+    """What a request gets; `path` after the address, or whole where it begins with a slash."""
+    at = urlsplit(server.address)
+    connection = http.client.HTTPConnection("127.0.0.1", at.port, timeout=PATIENCE_S)
+    connection.request(method, path if path.startswith("/") else at.path + path, headers=headers)
+    answer = connection.getresponse()
+    try:
+        return answer.status, dict(answer.getheaders()), answer.read()
+    finally:
+        connection.close()
+
+
+OUTSIDE = (
+    *("../server.py", "%2e%2e/server.py", "..%2fserver.py", "vendor/../../server.py", "\\..\\server.py"),
+    *("vendor", "vendor/", "x.js", "//etc/passwd"),
+)
+
+
+def test_only_its_own_page_is_let_in_and_nothing_leads_out_of_its_folder() -> None:
+    with serving(others=[Echo()]) as server:
+        port = urlsplit(server.address).port
+        code, headers, body = status(server, "")
+        assert (code, b"<title>rcsc studio" in body) == (200, True)
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert headers["Referrer-Policy"] == "no-referrer"
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        for wrong in (
+            {"Host": "attacker.example"}, {"Host": f"attacker.example:{port}"}, {"Origin": "http://attacker.example"}, {"Origin": "null"},
+            {"Sec-Fetch-Site": "cross-site"}, {"Sec-Fetch-Site": "same-site"},
+        ):  # fmt: skip
+            assert status(server, "", **wrong)[0] == 403, wrong
+            assert status(server, "socket", **wrong)[0] == 403, wrong
+        for path in ("/", "/socket", "/x" * 20, f"/{'x' * 32}/"):
+            assert status(server, path)[0] == 403, path
+        for path in OUTSIDE:
+            assert status(server, path)[0] in {400, 403, 404}, path
+        assert status(server, "", "POST")[0] == 405
+        assert status(server, "socket")[0] in {400, 403}  # without an upgrade it is no socket
+
+
+def test_every_file_of_the_page_is_served_with_its_type() -> None:
+    with serving(others=[Echo()]) as server:
+        for name, file in page_files().items():
+            code, headers, body = status(server, name)
+            assert (code, body) == (200, file.read_bytes()), name
+            assert headers["Content-Type"].partition(";")[0] in {
+                "text/html",
+                "text/javascript",
+                "text/css",
+                "application/json",
+            }
+    assert {"", "main.js", "bus.js", "views.js", "style.css", "vendor/three/three.module.js"} <= set(
+        page_files()
+    )
+
+
+def run(work: Callable[[Server, Page], Any], *, echo: Echo | None = None) -> None:
+    async def inside(server: Server) -> None:
+        async with page(server) as one:
+            await work(server, one)
+
+    with serving(others=[echo or Echo()]) as server:
+        asyncio.run(inside(server))
+
+
+REFUSED: tuple[tuple[str, dict[str, Any], Code, str], ...] = (
+    ("echo.say", {}, Code.STUDIO, "text"),
+    ("echo.say", {"text": 3}, Code.STUDIO, "no text"),
+    ("echo.nothing", {}, Code.STUDIO, "no part"),
+    ("echo.refuse", {}, Code.SHELL_NAME, "no such thing"),
+    ("echo.bug", {}, Code.INTERNAL, "ZeroDivisionError"),
+)
+
+
+def test_questions_are_answered_and_refused_by_number() -> None:
+    async def work(_: Server, one: Page) -> None:
+        assert await one.heard("echo.hello", warm=True)
+        numbers = [await one.send("echo.say", text=str(at)) for at in range(5)]
+        assert [await one.answer(number) for number in reversed(numbers)] == ["4", "3", "2", "1", "0"]
+        for kind, body, code, word in REFUSED:
+            with pytest.raises(Refused, match=word) as refused:
+                await one.ask(kind, **body)
+            assert refused.value.code == code.value
+        assert await one.ask("echo.say", text="\x07 still here") == "\x07 still here"
+
+    run(work)
+
+
+MALFORMED: tuple[str | bytes, ...] = (
+    *("", "{", "[]", "3", "null", '{"id": 1}', '{"kind": "echo.say"}', '{"id": "1", "kind": "echo.say"}'),
+    *(
+        f'{{"id": {number}, "kind": "echo.say"}}'
+        for number in ("-1", "0", "1.5", "true", "null", "9" * 30, "{}")
+    ),
+    *(
+        '{"id": 1, "kind": 7}',
+        '{"id": 1, "kind": "echo.say", "body": []}',
+        '{"id": 1, "kind": "echo.say", "body": null}',
+    ),
+    '{"id": 1, "kind": "echo.say", "body": ' + "[" * 50 + "]" * 50 + "}",
+    *("[" * 100_000, "1" * 100_000, "x" * (MOST_BYTES + 1), b"{}"),
+)
+
+
+@pytest.mark.parametrize("said", MALFORMED, ids=lambda said: str(said)[:40])
+def test_what_is_no_question_ends_the_talk_and_nothing_else(said: str | bytes) -> None:
+    async def work(server: Server, one: Page) -> None:
+        async with page(server) as other:
+            with contextlib.suppress(ConnectionError):  # it may be shut out while it still sends
+                await (one.socket.send_str(said) if isinstance(said, str) else one.socket.send_bytes(said))
+            await until(lambda: one.socket.closed)
+            assert await other.ask("echo.say", text="x") == "x"
+
+    run(work)
+
+
+def test_a_question_is_cancelled_by_its_page_and_when_the_page_goes() -> None:
+    echo = Echo()
+
+    async def work(server: Server, one: Page) -> None:
+        number = await one.send("echo.hold")
+        await until(lambda: one.progress)
+        assert one.progress[0]["text"] == "waits"
+        await one.socket.send_json({"id": number, "cancel": True})
+        assert await one.answer(number) == {"id": number, "cancelled": True}
+        assert echo.told.is_set()
+        async with page(server) as other:
+            await other.send("echo.hold")
+            await until(lambda: other.progress)
+        await until(lambda: echo.asks[1].cancelled)
+        assert await one.ask("echo.say", text="free") == "free"  # its lane, too
+
+    run(work, echo=echo)
+    assert echo.closed
+
+
+def test_no_page_has_more_open_than_allowed() -> None:
+    echo = Echo()
+
+    async def work(_: Server, one: Page) -> None:
+        held = await one.send("echo.hold")
+        several = [await one.send("echo.say", text="x") for _ in range(MOST_OPEN - 1)]
+        with pytest.raises(Refused, match="at once"):
+            await one.ask("echo.say", text="one more")
+        echo.held.set()
+        assert isinstance(await one.answer(held), int)
+        assert [await one.answer(number) for number in several] == ["x"] * (MOST_OPEN - 1)
+
+    run(work, echo=echo)
+
+
+@contextlib.contextmanager
+def hung(server: Server) -> Iterator[None]:
+    """A page that opens its socket and then reads nothing."""
+    at = urlsplit(server.address)
+    head = (
+        f"GET {at.path}socket HTTP/1.1", f"Host: {at.netloc}", f"Origin: http://{at.netloc}", "Connection: Upgrade", "Upgrade: websocket",
+        "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "", "",
+    )  # fmt: skip
+    with socket.create_connection(("127.0.0.1", at.port or 0), PATIENCE_S) as one:
+        one.sendall("\r\n".join(head).encode())
+        assert one.recv(12) == b"HTTP/1.1 101"
+        yield
+
+
+def test_a_page_that_hangs_keeps_the_latest_only_and_holds_up_nobody() -> None:
+    """Of all events to a page that reads nothing one a kind is kept; the other page hears every one."""
+
+    async def work(server: Server, one: Page) -> None:
+        with hung(server):
+            for at in range(200):  # twenty megabytes, more than the system holds for a socket
+                server.hub.tell("echo.news", {"at": at, "much": "x" * 100_000})
+                assert (await one.heard("echo.news", at=at))["at"] == at
+            waiting = [client._events for client in server.hub._clients]
+            assert sorted(map(len, waiting)) == [0, 1]
+
+    run(work)
+
+
+def test_pages_are_counted() -> None:
+    async def work(server: Server, _: Page) -> None:
+        async with Pages(server, MOST_PAGES - 1):
+            with pytest.raises(aiohttp.WSServerHandshakeError):
+                async with page(server):
+                    pass
+
+    run(work)
+
+
+class Pages:
+    """Several at once."""
+
+    def __init__(self, server: Server, count: int) -> None:
+        self._open = [page(server) for _ in range(count)]
+
+    async def __aenter__(self) -> list[Page]:
+        return [await one.__aenter__() for one in self._open]
+
+    async def __aexit__(self, *_: object) -> None:
+        for one in self._open:
+            await one.__aexit__(None, None, None)
+
+
+def test_two_concerns_do_not_answer_one_kind() -> None:
+    hub = Hub(lambda work: work())
+    hub.add([Echo()])
+    with pytest.raises(ValueError, match="second"):
+        hub.add([Echo()])
+
+
+def test_the_latest_event_of_a_kind_takes_the_place_of_those_before() -> None:
+    client = Client(lambda: None)
+    for at in range(3):
+        client.event("a", f"a{at}")
+        client.event("b", f"b{at}")
+        client.answer(f"answer {at}")
+    said = []
+    while (text := client.next()) is not None:
+        said.append(text)
+    assert said == ["a2", "b2", "answer 0", "answer 1", "answer 2"]
+
+
+def test_what_is_not_finite_is_sent_as_text() -> None:
+    said = json.loads(message(answer={"x": float("nan"), "y": [float("inf"), 1.5, {"z": -float("inf")}]}))
+    assert said == {"answer": {"x": "nan", "y": ["inf", 1.5, {"z": "-inf"}]}}
