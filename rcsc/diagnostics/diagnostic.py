@@ -32,6 +32,48 @@ class MatchedLine:
     span: Span | None = None
 
 
+class Place(StrEnum):
+    """What of a table a change writes."""
+
+    CELL = "cell"  # a condition of a line
+    SAME = "same"  # after the name of a line: that it does the same as others
+    LINE = "line"  # a line more
+    NO_LINE = "no line"  # a line less
+    UNREACHABLE = "unreachable"  # DEFAULT, declared so
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One change of a table's text, by names, so that it is true wherever the table stands.
+
+    Attributes:
+        line: The line that is changed; empty for a new one.
+        column: Position of the cell among the conditions as written.
+        texts: Of a cell its text, of a new line the text of each condition, of `same` the other lines.
+    """
+
+    place: Place
+    line: str = ""
+    column: int = 0
+    texts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """What would mend a finding: `help` says it for people.
+
+    Attributes:
+        title: What to do, in the imperative.
+        proved: What is proved of it; empty where nothing is.
+        changes: To be made together.
+    """
+
+    title: str
+    table: str
+    proved: str
+    changes: tuple[Change, ...]
+
+
 MOST_SHOWN = 3
 """Witnesses of one finding in a text."""
 
@@ -102,6 +144,7 @@ class Diagnostic:
     effects: Effects | None = None  # of an overlap; `notes` say it, too
     only_listed: bool = False  # witnesses stand in the JSON form alone
     told_with: bool = False  # a note of another one tells it in a text
+    proposals: tuple[Proposal, ...] = ()  # `help` says them, too
 
     @property
     def shown(self) -> tuple[WitnessColumn, ...]:

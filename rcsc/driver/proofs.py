@@ -108,7 +108,7 @@ class _Memory:
         if kept is None:
             return None
         place = self._place(table)
-        notes = tuple(_moved(note, place.start, place.file) for note in kept.notes)
+        notes = tuple(moved(note, place.start, place.file) for note in kept.notes)
         return _Kept(replace(kept.report, file=table.file, cached=True), notes)
 
     def keep(self, findings: Sequence[Diagnostic], verdicts: Sequence[TableVerdict]) -> None:
@@ -129,7 +129,7 @@ class _Memory:
             rest -= set(notes)
             report = table_report(verdict, self.program)
             if report.verdict is Verdict.PROVED and touching == notes:
-                moved = tuple(_moved(note, -place.start, "") for note in notes)
+                moved = tuple(moved(note, -place.start, "") for note in notes)
                 self.cache.store(_Kept(report, moved), *self._key(verdict.table))
         if not rest:
             self.cache.store(_Rest(), self.common)
@@ -159,7 +159,7 @@ def _spans(diagnostic: Diagnostic) -> list[Span]:
     return [label.span for label in labels] + shown
 
 
-def _moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
+def moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
     """The diagnostic for a text that starts elsewhere."""
 
     def span(old: Span) -> Span:

@@ -48,9 +48,21 @@ class Loaded:
     diagnostics: tuple[Diagnostic, ...]
 
 
-def load(paths: Sequence[str], stdin: str | bytes | None = None, stdin_name: str = "-") -> Loaded:
-    """Reads and parses files, folders and (`-`) the text `stdin`, and all that they use."""
-    loader = _Loader(stdin, stdin_name)
+def load(
+    paths: Sequence[str],
+    stdin: str | bytes | None = None,
+    stdin_name: str = "-",
+    overlay: Mapping[str, str] | None = None,
+) -> Loaded:
+    """Reads and parses files, folders and (`-`) the text `stdin`, and all that they use.
+
+    Args:
+        paths: As the user gave them.
+        stdin: What `-` stands for.
+        stdin_name: What it is called in messages.
+        overlay: Texts that stand for what is on disk, by real path: an editor's, saved or not.
+    """
+    loader = _Loader(stdin, stdin_name, overlay or {})
     roots = tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
     for file in roots:
         loader.reach(file)
@@ -150,6 +162,7 @@ class _Loader:
 
     stdin: str | bytes | None
     stdin_name: str
+    overlay: Mapping[str, str] = field(default_factory=dict)
     files: "dict[str, tree.File]" = field(default_factory=dict)
     uses: dict[str, list[str]] = field(default_factory=dict)
     sources: dict[str, Source] = field(default_factory=dict)
@@ -175,15 +188,30 @@ class _Loader:
                 helps = f"give a folder with `*.rcs` files; `{PROJECT_FILE}` may exclude some"
                 self.report(Code.NO_TABLES, "there is no `.rcs` file here to check", Span(path, 0, 0), helps)
             yield from inside
-        elif os.path.lexists(path):
+        elif self._stands(path):
             self._exclude(self._root(os.path.dirname(path)))
             yield self._name(path)
         else:
             self.report(Code.UNREADABLE, "there is no such file or folder", Span(path, 0, 0))
 
+    def _stands(self, path: str) -> bool:
+        """Whether anything stands at a place, be it on disk or in the overlay."""
+        return os.path.lexists(path) or os.path.realpath(path) in self.overlay
+
+    def _unsaved(self, folder: str) -> dict[str, list[str]]:
+        """The names of files below a folder that only the overlay has, by the real path of the folder that they are in."""
+        real = os.path.join(os.path.realpath(folder), "")
+        found: dict[str, list[str]] = {}
+        for path in self.overlay:
+            if path.startswith(real) and not os.path.lexists(path):
+                here, name = os.path.split(path)
+                found.setdefault(here, []).append(name)
+        return found
+
     def _inside(self, folder: str) -> Iterator[str]:
         """Files of a folder and the folders in it, each folder once whatever links lead to it."""
         seen: set[str] = set()
+        unsaved = self._unsaved(folder)
         for here, folders, names in os.walk(folder, followlinks=True):
             real = os.path.realpath(here)
             if real in seen:
@@ -193,7 +221,7 @@ class _Loader:
             folders[:] = sorted(name for name in folders if not name.startswith("."))
             root = self._root(here)
             exclude = self._exclude(root)
-            for name in sorted(names):
+            for name in sorted((*names, *unsaved.get(real, ()))):
                 path = os.path.normpath(os.path.join(here, name))
                 relative = os.path.relpath(path, root).replace(os.sep, "/")
                 if name.endswith(".rcs") and not any(fnmatch(relative, pattern) for pattern in exclude):
@@ -299,7 +327,7 @@ class _Loader:
         bases = (folder, self._root(folder))
         tried = dict.fromkeys(os.path.normpath(os.path.join(base, use.path + ".rcs")) for base in bases)
         for place in tried:
-            if os.path.lexists(place):
+            if self._stands(place):
                 return self._name(place)
         places = " and ".join(f"`{place}`" for place in tried)
         message = f"no file `{use.path}.rcs` is found"
@@ -307,9 +335,17 @@ class _Loader:
         return None
 
     def _text(self, file: str) -> str | _Unread:
-        raw: str | bytes | _Unread
+        raw: str | bytes | _Unread | None
         piped = file == self.stdin_name and self.stdin is not None
-        raw = (self.stdin or "") if piped else _bytes(file)
+        raw = (
+            (self.stdin or "")
+            if piped
+            else self.overlay.get(os.path.realpath(file))
+            if self.overlay
+            else None
+        )
+        if raw is None:
+            raw = _bytes(file)
         if isinstance(raw, str | _Unread):
             return raw
         if len(raw) > MOST_BYTES:

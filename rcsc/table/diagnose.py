@@ -7,10 +7,13 @@ from itertools import zip_longest
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import (
+    Change,
     Diagnostic,
     Effects,
     Label,
     MatchedLine,
+    Place,
+    Proposal,
     Severity,
     WitnessColumn,
     sort_key,
@@ -34,7 +37,7 @@ from rcsc.table.certificate import must_cover
 from rcsc.table.findings.groups import grouped, names_of
 from rcsc.table.findings.likely import likely
 from rcsc.table.regions import partition
-from rcsc.table.repair import PartingCell, closing_line, left_by, parting, parting_cells
+from rcsc.table.repair import NewLine, PartingCell, left_by, new_line, parting, parting_cells
 from rcsc.table.verdict import (
     ContradictoryAssumptions,
     DeadLine,
@@ -126,6 +129,8 @@ def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) 
         message = f"the DEFAULT line of table `{table.name}` is never reached"
         helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
         label = Label(table.default.span)
+        title = f"declare the DEFAULT line of table `{table.name}` unreachable"
+        change = Change(Place.UNREACHABLE, str(table.default.name))
         yield Diagnostic(
             Code.DEFAULT_DEAD,
             message,
@@ -133,6 +138,7 @@ def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) 
             notes=_under(table, unproved),
             help=helps,
             severity=Severity.WARNING,
+            proposals=(Proposal(title, str(table.name), "no input falls to it", (change,)),),
         )
 
 
@@ -182,7 +188,10 @@ def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Di
             if uppers
             else ()
         )
-        return Diagnostic(Code.DEAD_LINE, f"{name} can never match", label, notes=notes, help=helps)
+        without = Change(Place.NO_LINE, str(table.lines[line].name))
+        gone = Proposal(f"delete {name}", str(table.name), "no input matches it", (without,))
+        message = f"{name} can never match"
+        return Diagnostic(Code.DEAD_LINE, message, label, notes=notes, help=helps, proposals=(gone,))
     message = f"{name} matches only where an assumption fails"
     return Diagnostic(Code.DEAD_LINE, message, label, notes=under, severity=Severity.WARNING)
 
@@ -213,7 +222,24 @@ def _overlap(program: Program, table: Table, overlap: Overlap, options: Options)
         help=(*(() if repair is None else (repair.shown(table),)), *_as_same(first, second, effects)),
         witnesses=(column,),
         effects=effects,
+        proposals=_proposals(table, (first, second), repair, effects),
     )
+
+
+def _proposals(
+    table: Table, lines: tuple[Line, Line], repair: PartingCell | None, effects: Effects
+) -> tuple[Proposal, ...]:
+    """What would mend an overlap: a cell that parts the lines, or that they do the same."""
+    first, second = lines
+    proposals = []
+    if repair is not None:
+        proved = f"it parts the two lines, and line `{table.lines[repair.other].name}` takes what `{table.lines[repair.line].name}` loses"
+        proposals.append(Proposal(repair.write(table), str(table.name), proved, (repair.change(table),)))
+    if effects.same:
+        title = f"say that line `{second.name}` does the same as `{first.name}`"
+        change = Change(Place.SAME, str(second.name), texts=(str(first.name),))
+        proposals.append(Proposal(title, str(table.name), "both do the same wherever both match", (change,)))
+    return tuple(proposals)
 
 
 def _far(table: Table, lines: Sequence[Line], repair: PartingCell | None) -> tuple[Label, ...]:
@@ -261,16 +287,17 @@ def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
     notes = (*_patterns(gap), *_by_member(program, gap))
     share = f"{_share(*gap.count)} of the inputs" if gap.count else "some inputs"
     if must_cover(table) and table.default is None:
-        repair = closing_line(program, table, gap)
+        repair = new_line(program, table, gap)
         message = f"no line of table `{table.name}` matches {share}"
         return Diagnostic(
             Code.GAP,
             message,
             Label(table.span),
             notes=notes,
-            help=(repair,) if repair else (),
+            help=(str(repair),) if repair else (),
             witnesses=columns,
             more=_more(program, gap),
+            proposals=() if repair is None else (_adding(table, repair),),
         )
     assert table.default is not None
     label = Label(table.default.span)
@@ -289,6 +316,15 @@ def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
         more=_more(program, gap),
         severity=Severity.NOTE,
     )
+
+
+def _adding(table: Table, row: NewLine) -> Proposal:
+    """Propose a line for a gap; what it does is left to be written."""
+    which = "all" if row.closes else "some"
+    title = f"add a line to table `{table.name}` for {which} of the inputs that no line matches"
+    proved = "it closes the gap" if row.closes else "it closes this part of the gap"
+    change = Change(Place.LINE, texts=row.cells)
+    return Proposal(title, str(table.name), f"{proved} and overlaps no other line", (change,))
 
 
 def _patterns(gap: Gap) -> tuple[str, ...]:

@@ -3,8 +3,10 @@
 The only place where a `ProvedProgram` is made, and only when nothing is wrong and nothing undecided.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Protocol
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity, sort_key
 from rcsc.host import children
@@ -65,13 +67,43 @@ class ProgramVerdict:
         return program_certificate(self.program, tables)
 
 
+class Known(Protocol):
+    """What an earlier proof in the same process leaves, for who proves one text after another."""
+
+    def verdict(self, program: Program, table: Table, make: Callable[[], TableVerdict]) -> TableVerdict:
+        """Return the verdict on a table of an equal program but for the other tables, else a new one."""
+
+    def told(
+        self, verdict: TableVerdict, unproved: frozenset[str], make: Callable[[], list[Diagnostic]]
+    ) -> list[Diagnostic]:
+        """Return the diagnostics of that verdict, else new ones."""
+
+
+class Nothing:
+    """Nothing is known: all is made anew."""
+
+    def verdict(self, _program: Program, _table: Table, make: Callable[[], TableVerdict]) -> TableVerdict:
+        """Make it."""
+        return make()
+
+    def told(
+        self, _verdict: TableVerdict, _unproved: frozenset[str], make: Callable[[], list[Diagnostic]]
+    ) -> list[Diagnostic]:
+        """Make them."""
+        return make()
+
+
 def prove_program(
-    program: Program, options: Options, only: Collection[TableName] | None = None
+    program: Program,
+    options: Options,
+    only: Collection[TableName] | None = None,
+    known: Known | None = None,
 ) -> ProgramVerdict:
     """Prove the program's tables (or `only` these) and everything that its procedures owe.
 
     Tables may rely on the invariants: they are shown in the same step, by induction over cycles.
     """
+    before = known or Nothing()
     findings = [*at_first(program), *properties_elsewhere(program)]
     owed = Obligations(program, options)
     wanted = [table for table in program.tables if only is None or table.name in only]
@@ -79,9 +111,9 @@ def prove_program(
     unproved = _unproved(program, findings)
     program = with_stops(program, owed.stops)
     assuming = relying(program)
-    known = {table.name for table in wanted}
-    tables = [table for table in assuming.tables if table.name in known]
-    decided = _verdicts(assuming, tables, options, owed.undefined)
+    names = {table.name for table in wanted}
+    tables = [table for table in assuming.tables if table.name in names]
+    decided = _verdicts(assuming, tables, options, owed.undefined, before)
     meetings = {
         table.name: met(assuming, table, options)
         for table in tables
@@ -93,7 +125,9 @@ def prove_program(
     )
     for verdict in verdicts:
         if verdict.table.name not in owed.undefined:
-            findings += diagnostics(assuming, verdict, options, unproved)
+            findings += before.told(
+                verdict, unproved, partial(diagnostics, assuming, verdict, options, unproved)
+            )
     findings += [finding for each in meetings.values() for finding in each.findings]
     reported = tuple(sorted(dict.fromkeys(findings), key=sort_key))
     wrong = any(finding.severity is Severity.ERROR for finding in reported)
@@ -145,14 +179,16 @@ def _with_assumptions(
 
 
 def _verdicts(
-    program: Program, tables: list[Table], options: Options, undefined: Collection[str]
+    program: Program, tables: list[Table], options: Options, undefined: Collection[str], known: Known
 ) -> tuple[TableVerdict, ...]:
     """Each table's verdict, in order; in processes where there are several tables and jobs."""
     defined = [table for table in tables if table.name not in undefined]
     if options.jobs > 1 and len(defined) > 1:
         verdicts = _in_processes(program, defined, options)
     else:
-        verdicts = [_verdict(program, table, options) for table in defined]
+        verdicts = [
+            known.verdict(program, table, partial(_verdict, program, table, options)) for table in defined
+        ]
     by_name = {table_verdict.table.name: table_verdict for table_verdict in verdicts}
     why = Undecided("a condition is not defined for every input")
     return tuple(by_name.get(table.name) or _left_open(table, why) for table in tables)

@@ -1,6 +1,6 @@
 """Repairs worth proposing: each is proved before it is shown, or not shown.
 
-In: a finding of a table. Out: a sentence, or nothing.
+In: a finding of a table. Out: a cell or a line to write, and the sentence that proposes it; or nothing.
 """
 
 import re
@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import reduce
 from math import gcd
 
+from rcsc.diagnostics.diagnostic import Change, Place
 from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interval_sets import complement, holds, joined, meet, size
@@ -87,9 +88,16 @@ class PartingCell:
         ]
         beside = f" ({'; '.join(instead)})" if instead else ""
         rest = "; DEFAULT takes what else it loses" if self.falls else ""
+        return f"{self.write(table)}: proved to part the two lines; line `{other.name}` then runs where both match{beside}{rest}"
+
+    def write(self, table: Table) -> str:
+        """Say what to write."""
         heading = table.columns[self.column].heading
-        write = f"in line `{line.name}` write `{self.text}` under `{heading}`: proved to part the two lines"
-        return f"{write}; line `{other.name}` then runs where both match{beside}{rest}"
+        return f"in line `{table.lines[self.line].name}` write `{self.text}` under `{heading}`"
+
+    def change(self, table: Table) -> Change:
+        """The change of the table's text."""
+        return Change(Place.CELL, str(table.lines[self.line].name), self.column, (self.text,))
 
 
 def parting_cell(program: Program, table: Table, overlap: Overlap) -> str | None:
@@ -218,8 +226,31 @@ def _within(inner: Box, outer: Box) -> bool:
     return meet(inner, outer) == inner
 
 
+@dataclass(frozen=True, slots=True)
+class NewLine:
+    """A line that matches inputs which no line matches, and none that another does.
+
+    Attributes:
+        cells: Those of its conditions, one for each column that is written.
+        closes: Whether it is proved that no input is left.
+    """
+
+    cells: tuple[str, ...]
+    closes: bool
+
+    def __str__(self) -> str:
+        what = "closes the gap" if self.closes else "closes this part of the gap"
+        return f"a line `| {' | '.join(('new', *self.cells))} || ... |` {what} and overlaps no other: proved"
+
+
 def closing_line(program: Program, table: Table, gap: Gap) -> str | None:
-    """Propose a line for the gap's first region; it overlaps none, and whether it closes the gap is counted, or proved."""
+    """Propose a line for the gap's first region, in words."""
+    row = new_line(program, table, gap)
+    return None if row is None else str(row)
+
+
+def new_line(program: Program, table: Table, gap: Gap) -> NewLine | None:
+    """Return a line for the gap's first region; it overlaps none, and whether it closes the gap is counted, or proved."""
     region, witness = gap.regions[0], gap.witnesses[0]
     row = None
     words = words_of(program, table)
@@ -228,12 +259,7 @@ def closing_line(program: Program, table: Table, gap: Gap) -> str | None:
     return row or _line_across(program, table, witness, region or {})
 
 
-def _said(row: str, closes: bool) -> str:
-    what = "closes the gap" if closes else "closes this part of the gap"
-    return f"a line `| {row} || ... |` {what} and overlaps no other: proved"
-
-
-def _line_of_boxes(program: Program, table: Table, region: Region, words: Words) -> str | None:
+def _line_of_boxes(program: Program, table: Table, region: Region, words: Words) -> NewLine | None:
     """The line of a table of boxes whose cells say the region."""
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
     told = [cells.cell_under(column, kinds, region) for column in _written(table)]
@@ -248,12 +274,11 @@ def _line_of_boxes(program: Program, table: Table, region: Region, words: Words)
     pairs = list(decided.overlaps())
     if any(len(decided.lines) - 1 in pair for pair in pairs):
         return None
-    row = " | ".join(["new", *texts])
     try:
         closes = not Gaps.of(decided, disjoint=not pairs).missing()
     except BudgetError:
         closes = False
-    return _said(row, closes)
+    return NewLine(tuple(texts), closes)
 
 
 # --- across variables ------------------------------------------------------------------
@@ -425,10 +450,10 @@ class _Row:
         )  # fmt: skip
         return tree.run().proved
 
-    def text(self) -> str:
-        """The row, up to the `||`."""
+    def texts(self) -> tuple[str, ...]:
+        """The cells of the row, up to the `||`."""
         found: Mapping[int, str] = {at: cell.text for at, cell in self.cells.items()}
-        return " | ".join(["new", *(found.get(at, "") for at in range(len(_written(self.table))))])
+        return tuple(found.get(at, "") for at in range(len(_written(self.table))))
 
 
 def _box_on(form: int, formula: Formula) -> Box | None:
@@ -478,13 +503,13 @@ def _parting_across(program: Program, table: Table, overlap: Overlap) -> Iterato
                 yield PartingCell(line, other, at, "", text, left, less, falls=False)
 
 
-def _line_across(program: Program, table: Table, witness: Witness, region: Region) -> str | None:
+def _line_across(program: Program, table: Table, witness: Witness, region: Region) -> NewLine | None:
     """The line of a table with conditions across variables, or under assumptions; proved by exact arithmetic alone."""
     tests = sum(len({line.tests[at] for line in table.lines}) for at in range(len(table.columns)))
     if tests * len(table.lines) > MOST_ASKED:
         return None
     row = _Row(program, table, witness, region)
-    return _said(row.text(), row.closes()) if row.choose() else None
+    return NewLine(row.texts(), row.closes()) if row.choose() else None
 
 
 def _opposite(text: str, condition: Expr) -> str:

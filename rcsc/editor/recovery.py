@@ -1,0 +1,168 @@
+"""What can be said of a text that is not in order: what is broken is left out, and the rest is checked.
+
+In: files as read, with what is wrong with them. Out: a program of what is left, and what was left out. Left out are whole
+declarations, made blank where they stand, so that all places stay true: first those that do not parse, then, as long as names do
+not resolve, those with an error. A declaration is a piece of text from the word that begins it to the next.
+
+What is found in the rest is true of the rest. So that it is no nuisance either, nothing is told of a declaration that uses a name
+which what was left out may declare: of a broken table only its name, of anything else every word in it, and of a file that is
+not found any name.
+"""
+
+import os
+import re
+from bisect import bisect_right
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.source import Source, Span
+from rcsc.lang.model import Program
+from rcsc.lang.project import Loaded, load
+from rcsc.lang.resolve import resolve
+from rcsc.lang.resolve.program import closure
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.parse import parse
+
+MOST_ROUNDS = 12
+"""Times that something is left out; a text with more layers of errors is not looked at further."""
+_BEGINS = re.compile(
+    r"^[ \t]*(?P<word>use|unit|const|set|enum|type|record|input|state|output|assume|invariant|property|procedure|module|extern"
+    r"|owner|table|link|serves|commands|adopt|level)\b(?:[ \t]+(?P<name>\w+))?",
+    re.MULTILINE | re.ASCII,
+)
+_WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_COMMENT = re.compile(r"#[^\r\n]*")
+_NOT_END = re.compile(r"[^\r\n]")
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """What is left of a program.
+
+    Attributes:
+        program: None where nothing that resolves is left.
+        left_out: What was left out.
+        wrong: What was found wrong in the rest on the way, beside what `rcsc check` says.
+    """
+
+    program: Program | None
+    loaded: Loaded
+    left_out: tuple[Span, ...]
+    wrong: tuple[Diagnostic, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Pieces:
+    """A text cut into declarations.
+
+    Attributes:
+        starts: Where each begins, first 0: what stands before the first.
+    """
+
+    source: Source
+    starts: Sequence[int]
+
+    @classmethod
+    def of(cls, source: Source) -> "_Pieces":
+        return cls(source, (0, *(found.start() for found in _BEGINS.finditer(source.text))))
+
+    def around(self, offset: int) -> Span:
+        """The declaration in which an offset lies."""
+        at = bisect_right(self.starts, offset) - 1
+        past = self.starts[at + 1] if at + 1 < len(self.starts) else len(self.source.text)
+        return Span(self.source.name, self.starts[at], past)
+
+    def words(self, span: Span) -> frozenset[str]:
+        """The words of a declaration, comments left out."""
+        return frozenset(_WORD.findall(_COMMENT.sub("", self.source.slice(span))))
+
+    def parses(self, span: Span) -> bool:
+        """Whether a declaration parses by itself."""
+        return isinstance(parse(Source(span.file, self.source.slice(span))), tree.File)
+
+    def uses(self, span: Span) -> bool:
+        """Whether it uses a file, which may declare anything."""
+        begins = _BEGINS.match(self.source.text, span.start)
+        return begins is not None and begins["word"] == "use"
+
+    def declares(self, span: Span) -> frozenset[str]:
+        """The names that a declaration may declare."""
+        begins = _BEGINS.match(self.source.text, span.start)
+        if begins is not None and begins["word"] == "table" and begins["name"]:
+            return frozenset({begins["name"]})
+        return self.words(span)
+
+
+def rest_of(root: str, loaded: Loaded, overlay: Mapping[str, str]) -> Rest:
+    """What is left of the program of a file when what is broken is left out.
+
+    Args:
+        root: The file.
+        loaded: As it was read.
+        overlay: Texts that stand for what is on disk, by real path.
+    """
+    pieces: dict[str, _Pieces] = {}
+    out: dict[Span, None] = {}
+    wrong: dict[Diagnostic, None] = {}
+    current, told = loaded, _errors(root, loaded)
+    for _ in range(MOST_ROUNDS):
+        pieces |= {name: _Pieces.of(source) for name, source in current.sources.items() if name not in pieces}
+        wrong.update(dict.fromkeys(_of_the_rest(told, pieces, out)))
+        new = [span for each in told if (span := _piece(each, pieces, out)) is not None and span not in out]
+        if not new:
+            break
+        out.update(dict.fromkeys(new))
+        current = load([root], overlay={**overlay, **_blanked(pieces, out)})
+        told = _errors(root, current)
+        if not told and root in current.files:
+            program = resolve(root, current)
+            if isinstance(program, Program):
+                return Rest(program, current, tuple(out), tuple(wrong))
+    return Rest(None, current, tuple(out), tuple(wrong))
+
+
+def _errors(root: str, loaded: Loaded) -> tuple[Diagnostic, ...]:
+    """What was found wrong in reading the file and what it uses; else in resolving it."""
+    files = set(closure(root, loaded))
+    wrong = tuple(each for each in loaded.diagnostics if each.primary.span.file in files)
+    if wrong or root not in loaded.files:
+        return wrong
+    resolved = resolve(root, loaded)
+    return () if isinstance(resolved, Program) else resolved
+
+
+def _piece(diagnostic: Diagnostic, pieces: Mapping[str, _Pieces], out: Collection[Span] = ()) -> Span | None:
+    """The declaration that an error is in: the one before where it parses by itself, and is only where that is noticed."""
+    span = diagnostic.primary.span
+    if span.file not in pieces:
+        return None
+    cut = pieces[span.file]
+    found = cut.around(span.start)
+    if not (found.start and diagnostic.code.value.startswith("RCS1") and cut.parses(found)):
+        return found
+    before = cut.around(found.start - 1)
+    return found if before in out else before
+
+
+def _of_the_rest(
+    told: Iterable[Diagnostic], pieces: Mapping[str, _Pieces], out: Mapping[Span, None]
+) -> Iterator[Diagnostic]:
+    """Yield the errors that do not come of what was left out; none before anything was: `rcsc check` says those."""
+    if not out or any(pieces[span.file].uses(span) for span in out):
+        return
+    missing = frozenset[str]().union(*(pieces[span.file].declares(span) for span in out))
+    for each in told:
+        piece = _piece(each, pieces, out)
+        if piece is not None and piece not in out and not pieces[piece.file].words(piece) & missing:
+            yield each
+
+
+def _blanked(pieces: Mapping[str, _Pieces], out: Iterable[Span]) -> dict[str, str]:
+    """The texts with these declarations made blank, by real path."""
+    texts: dict[str, str] = {}
+    for span in out:
+        text = texts.get(span.file, pieces[span.file].source.text)
+        blank = _NOT_END.sub(" ", text[span.start : span.end])
+        texts[span.file] = text[: span.start] + blank + text[span.end :]
+    return {os.path.realpath(name): text for name, text in texts.items()}

@@ -1,0 +1,154 @@
+"""Proposals as edits: the text that each makes, laid out as the file was.
+
+In: a text and a proposal. Out: the text with it. Nothing is trusted of what comes out: who offers it checks it first (`workspace`).
+"""
+
+import re
+from collections.abc import Collection, Sequence
+from itertools import chain, count
+
+from rcsc.diagnostics.diagnostic import Change, Diagnostic, Place, Proposal
+from rcsc.diagnostics.source import Source
+from rcsc.editor.grid import pieces
+from rcsc.editor.written import RowText, WrittenTable, cells_of, joined_cells, table_of
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
+from rcsc.lang.syntax.rows import Cell, stub_of
+
+NEW_LINE = "new"
+_MEANT = re.compile(r"did you mean `([^`]+)`\?$")
+_Splice = tuple[int, int, str]
+
+
+def with_proposal(source: Source, proposal: Proposal) -> str | None:
+    """The text in which a proposal's changes are made; None where it cannot be said."""
+    text = source.text
+    for change in proposal.changes:
+        table = table_of(text, proposal.table)
+        splices = None if table is None else _splices(text, table, change)
+        if splices is None:
+            return None
+        text = spliced(text, splices)
+    return laid_out(source, text)
+
+
+def with_spelling(source: Source, diagnostic: Diagnostic) -> tuple[str, str] | None:
+    """The text in which a name is spelt as the finding's help has it, and that name; None where it has none."""
+    meant = next((found[1] for each in diagnostic.help if (found := _MEANT.search(each))), None)
+    span = diagnostic.primary.span
+    if meant is None or span.file != source.name or span.start == span.end:
+        return None
+    return laid_out(source, spliced(source.text, [(span.start, span.end, meant)])), meant
+
+
+def laid_out(source: Source, text: str) -> str:
+    """A changed text, laid out if the one before was."""
+    end = "\r\n" if "\r\n" in source.text else "\n"
+    if formatted(source) != source.text:
+        return text
+    return formatted(Source(source.name, text), end) or text
+
+
+def formatted(source: Source, end: str = "") -> str | None:
+    """A text as `rcsc fmt` lays it out, its lines ended as they were or as asked for; None where it does not parse."""
+    end = end or ("\r\n" if "\r\n" in source.text else "\n")
+    parsed = parse(source)
+    if not isinstance(parsed, tree.File):
+        return None
+    text = format_file(parsed)
+    return text if end == "\n" else text.replace("\n", end)
+
+
+def spliced(text: str, splices: Sequence[_Splice]) -> str:
+    """The text with parts of it, from start to end, replaced."""
+    for start, end, new in sorted(splices, reverse=True):
+        text = text[:start] + new + text[end:]
+    return text
+
+
+def _splices(text: str, table: WrittenTable, change: Change) -> list[_Splice] | None:
+    if change.place is Place.LINE:
+        return _new_line(text, table, change)
+    at, rows = _line(table, change.line)
+    if not rows:
+        return None
+    match change.place:
+        case Place.CELL:
+            return _cell(text, table, at, change.column, change.texts[0])
+        case Place.SAME:
+            stub = joined_cells(rows).conditions[0]
+            same = [cell.text for cell in stub_of(stub).same]
+            word = f"{stub.text}, {change.texts[0]}" if same and stub.text.endswith(same[-1]) else ""
+            return _over(text, stub, word or f"{stub.text} same {', '.join(change.texts)}", rows)
+        case Place.UNREACHABLE:
+            return _over(text, joined_cells(rows).conditions[1], "DEFAULT unreachable", rows)
+        case _:
+            every = [row for part in table.parts for row in part.lines[at]]
+            return [(*_whole_line(text, row), "") for row in every]
+
+
+def _line(table: WrittenTable, name: str) -> tuple[int, tuple[RowText, ...]]:
+    """The position of a line, and its rows in the first part; none where there is no such line."""
+    for at, rows in enumerate(table.parts[0].lines if table.parts else ()):
+        cells = joined_cells(rows)
+        if cells.conditions and stub_of(cells.conditions[0]).name.text == name:
+            return at, rows
+    return 0, ()
+
+
+def _cell(text: str, table: WrittenTable, line: int, column: int, new: str) -> list[_Splice] | None:
+    """Write a condition, in the part of the table that has its column."""
+    for part in table.parts:
+        many = len(joined_cells(part.heading).conditions) - 1
+        if column < many and line < len(part.lines):
+            rows = part.lines[line]
+            cells = joined_cells(rows).conditions
+            return _over(text, cells[column + 1], new, rows) if column + 1 < len(cells) else None
+        column -= many
+    return None
+
+
+def _over(text: str, cell: Cell, new: str, rows: Sequence[RowText]) -> list[_Splice]:
+    """Write a cell into the first of its rows, and leave out rows that have nothing else."""
+    first, *more = pieces(cell)
+    splices: list[_Splice] = [(*first, new if first[0] != first[1] else f" {new} ")]
+    for start, end in more:
+        row = next(row for row in rows if row.start <= start < row.past)
+        alone = not any(each.text for each in cells_of(row).all if each.start != start)
+        splices.append((*_whole_line(text, row), "") if alone else (start, end, ""))
+    return splices
+
+
+def _whole_line(text: str, row: RowText) -> tuple[int, int]:
+    """From the beginning of a row's line of text to that of the next."""
+    start = text.rfind("\n", 0, row.start) + 1
+    end = text.find("\n", row.past)
+    return start, len(text) if end < 0 else end + 1
+
+
+def _new_line(text: str, table: WrittenTable, change: Change) -> list[_Splice] | None:
+    """Write a line after the last, in each part of the table."""
+    names = {stub_of(joined_cells(rows).conditions[0]).name.text for rows in table.parts[0].lines}
+    name = _fresh(names)
+    waiting, splices = list(change.texts), []
+    end = "\r\n" if "\r\n" in text else "\n"
+    for part in table.parts:
+        if not part.lines:
+            return None
+        heading = joined_cells(part.heading)
+        many = len(heading.conditions) - 1
+        mine, waiting = waiting[:many], waiting[many:]
+        last = part.lines[-1][-1]
+        indent = text[_whole_line(text, last)[0] : last.start]
+        actions = "".join("  |" for _ in heading.actions)
+        row = f"{indent}| {' | '.join((name, *mine))} ||{actions}"
+        past = last.past
+        splices.append((past, past, f"{end}{row}"))
+    return splices
+
+
+def _fresh(names: Collection[str]) -> str:
+    """A name for a line that no other has."""
+    others = (f"{NEW_LINE}_{number}" for number in count(2))
+    return next(name for name in chain((NEW_LINE,), others) if name not in names)

@@ -1,0 +1,313 @@
+"""Texts that are open over the files on disk, and what is known of them.
+
+In: texts as they are typed. Out: answers. One thread at a time asks: solvers are not shared. Nothing is kept on disk, and the
+cache of earlier runs is not asked: what is typed is mostly new.
+"""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Severity, WitnessColumn, sort_key
+from rcsc.diagnostics.report import TableReport, resting
+from rcsc.diagnostics.source import Source, Span
+from rcsc.driver.proofs import table_report
+from rcsc.editor.grid import grids
+from rcsc.editor.memo import Memo
+from rcsc.editor.places import Area, Lines, difference
+from rcsc.editor.recovery import Rest, rest_of
+from rcsc.editor.repairs import with_proposal, with_spelling
+from rcsc.editor.standing import standing
+from rcsc.editor.values import Answer, Finding, Repair, Standing, Witness, WitnessLine
+from rcsc.editor.written import WrittenTable, tables_of
+from rcsc.host.memory import uncollected
+from rcsc.lang.model import Program
+from rcsc.lang.project import Loaded, load
+from rcsc.lang.resolve import resolve
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
+
+BOM = "\ufeff"
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A file checked as the texts were.
+
+    Attributes:
+        loaded: What was read.
+        program: None where the text is not in order.
+        rest: What was looked at instead.
+        diagnostics: What `rcsc check` says of the file.
+        meanwhile: What else was found in the rest.
+        reports: Of each table, by file and name.
+    """
+
+    loaded: Loaded
+    program: Program | None
+    rest: Rest | None
+    diagnostics: tuple[Diagnostic, ...]
+    meanwhile: tuple[Diagnostic, ...]
+    reports: Mapping[tuple[str, str], TableReport]
+
+    @property
+    def nearest(self) -> Program | None:
+        """The program, or what is left of it."""
+        return self.program if self.program is not None else None if self.rest is None else self.rest.program
+
+
+class Workspace:
+    """Open texts over the disk.
+
+    Attributes:
+        options: How proofs are made.
+        memo: What was proved of earlier texts.
+    """
+
+    def __init__(self, options: Options | None = None) -> None:
+        self.options = options or Options()
+        self.memo = Memo()
+        self._overlay: dict[str, str] = {}
+        self._checked: dict[str, Checked] = {}
+        self._answers: dict[str, tuple[Checked, Answer]] = {}
+
+    # --- texts ---
+
+    def open(self, file: str, text: str) -> None:
+        """Let a text stand for a file, whether or not there is one on disk; again for each change.
+
+        Args:
+            file: Its path; it need not exist.
+            text: All of it. A byte order mark is no part of what it says.
+        """
+        blank = " " if text.startswith(BOM) else ""
+        self._overlay[os.path.realpath(file)] = blank + text.removeprefix(BOM)
+
+    def close(self, file: str) -> None:
+        """Go back to what is on disk."""
+        self._overlay.pop(os.path.realpath(file), None)
+
+    @property
+    def overlay(self) -> Mapping[str, str]:
+        """The texts that are open, by real path."""
+        return self._overlay
+
+    def text(self, file: str) -> str:
+        """The text of a file: as it is open, else as it is on disk; empty where there is none that can be read."""
+        open_text = self._overlay.get(os.path.realpath(file))
+        if open_text is not None:
+            return open_text
+        loaded = load([file], overlay=self._overlay)
+        return loaded.sources[file].text if file in loaded.sources else ""
+
+    # --- answers ---
+
+    def check(self, file: str, go_on: Callable[[], bool] = lambda: True) -> Answer:
+        """What is known of a file and of all that it uses, as the texts are now.
+
+        Args:
+            file: Its path; answers name files by absolute paths.
+            go_on: Asked from time to time; where it says no the answer is given up.
+
+        Raises:
+            OutdatedError: Nobody waits for the answer.
+        """
+        path = os.path.normpath(os.path.abspath(file))
+        self.memo.go_on = go_on
+        checked = self.checked(path)
+        known = self._answers.get(path)
+        if known is None or known[0] is not checked:
+            self._answers[path] = known = (checked, _answer(path, checked))
+        return known[1]
+
+    @uncollected()
+    def checked(self, path: str) -> Checked:
+        """A file checked, from memory where no text that it depends on has changed."""
+        loaded = load([path], overlay=self._overlay)
+        before = self._checked.get(path)
+        if before is not None and _alike(before.loaded, loaded):
+            return before
+        checked = self._check(path, loaded)
+        self._checked[path] = checked
+        return checked
+
+    def _check(self, path: str, loaded: Loaded) -> Checked:
+        resolved = resolve(path, loaded) if path in loaded.files else ()
+        if isinstance(resolved, Program):
+            found, reports = self._proved(resolved)
+            every = tuple(sorted({*loaded.diagnostics, *found}, key=sort_key))
+            return Checked(loaded, resolved, None, every, (), reports)
+        every = tuple(sorted({*loaded.diagnostics, *resolved}, key=sort_key))
+        rest = rest_of(path, loaded, self._overlay)
+        found = () if rest.program is None else self._proved(rest.program)[0]
+        more = tuple(sorted({*rest.wrong, *_serious(found)} - set(every), key=sort_key))
+        return Checked(loaded, None, rest, every, more, {})
+
+    def _proved(self, program: Program) -> tuple[tuple[Diagnostic, ...], dict[tuple[str, str], TableReport]]:
+        names = [table.name for table in program.tables]
+        verdict = prove_program(program, self.options, only=names, known=self.memo)
+        reports = {}
+        for each in verdict.tables:
+            report = resting(table_report(each, program), verdict.unproved, verdict.unsafe)
+            reports[report.file, report.table] = report
+        return verdict.findings, reports
+
+    # --- repairs ---
+
+    def repairs(self, finding: Finding) -> tuple[Repair, ...]:
+        """Repairs of a finding, each made and checked: with it the finding is gone, and no other has come."""
+        checked = next(
+            (c for c in self._checked.values() if finding.told in (*c.diagnostics, *c.meanwhile)), None
+        )
+        if checked is None or not finding.mendable:
+            return ()
+        return tuple(self._repairs(checked, finding.told))
+
+    def _repairs(self, checked: Checked, told: Diagnostic) -> Iterator[Repair]:
+        source = checked.loaded.sources.get(told.primary.span.file)
+        if source is None:
+            return
+        for proposal in told.proposals:
+            text = with_proposal(source, proposal)
+            outcome = None if text is None else self._outcome(checked, source, told, text)
+            if text is not None and outcome is not None:
+                edits = difference(source.name, Lines(source.text), text)
+                yield Repair(proposal.title, proposal.proved, edits, outcome, certain=True)
+        spelt = with_spelling(source, told)
+        if spelt is not None:
+            text, meant = spelt
+            edits = difference(source.name, Lines(source.text), text)
+            yield Repair(f"write `{meant}`", "", edits, clears=False, certain=False)
+
+    def _outcome(self, checked: Checked, source: Source, told: Diagnostic, text: str) -> bool | None:
+        """Whether nothing is wrong with the table in a text; None where the finding is still there, or another has come."""
+        trial = Workspace(self.options)
+        trial.memo = self.memo
+        trial._overlay = {**self._overlay, os.path.realpath(source.name): text}
+        after = trial.checked(checked.loaded.given[0])
+        before = {_key(each) for each in _serious(checked.diagnostics)}
+        now = {_key(each) for each in _serious(after.diagnostics)}
+        gone = _key(told) not in now or (told.code in _COUNTED and told.message not in _messages(after))
+        if after.program is None or not gone or now - before:
+            return None
+        table = told.proposals[0].table
+        wrong = any(table in _names_in(after.loaded, each) for each in _serious(after.diagnostics))
+        return not wrong
+
+
+_COUNTED = {Code.GAP, Code.DEFAULT_REACHED}
+"""Findings whose message counts inputs: of a table there is one."""
+
+
+def _key(diagnostic: Diagnostic) -> tuple[str, str]:
+    """What a finding is about, whatever it counts."""
+    counts = diagnostic.code in _COUNTED or diagnostic.only_listed
+    table = next((witness.table for witness in diagnostic.witnesses), "")
+    return diagnostic.code.value, table if counts else diagnostic.message
+
+
+def _messages(checked: Checked) -> set[str]:
+    return {each.message for each in checked.diagnostics}
+
+
+def _serious(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    return [each for each in diagnostics if each.severity is not Severity.NOTE]
+
+
+def _alike(before: Loaded, now: Loaded) -> bool:
+    """Whether the same was read."""
+    return (before.roots, before.sources, before.diagnostics, before.uses) == (
+        now.roots,
+        now.sources,
+        now.diagnostics,
+        now.uses,
+    )
+
+
+def _names_in(loaded: Loaded, diagnostic: Diagnostic) -> set[str]:
+    """The table in whose text a finding stands."""
+    span = diagnostic.primary.span
+    text = loaded.sources[span.file].text if span.file in loaded.sources else ""
+    return {table.name for table in tables_of(text) if table.start <= span.start <= table.end}
+
+
+# --- answers ---------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class _Files:
+    """The texts that an answer points into, by lines, and their tables."""
+
+    sources: Mapping[str, Source]
+    lines: dict[str, Lines] = field(default_factory=dict)
+    tables: dict[str, tuple[WrittenTable, ...]] = field(default_factory=dict)
+
+    def area(self, span: Span) -> Area:
+        """The area of a span; the beginning of a file that was not read."""
+        return self.of(span.file).area(span.file, span.start, span.end)
+
+    def of(self, file: str) -> Lines:
+        """A text by lines."""
+        if file not in self.lines:
+            self.lines[file] = Lines(self.sources[file].text if file in self.sources else "")
+        return self.lines[file]
+
+    def table(self, span: Span) -> str:
+        """The table in whose text a span begins; empty for none."""
+        if span.file not in self.tables:
+            self.tables[span.file] = tuple(tables_of(self.of(span.file).text))
+        return next(
+            (each.name for each in self.tables[span.file] if each.start <= span.start <= each.end), ""
+        )
+
+
+def _answer(path: str, checked: Checked) -> Answer:
+    sources = {**(checked.rest.loaded.sources if checked.rest else {}), **checked.loaded.sources}
+    files = _Files(sources)
+    told = [(each, False) for each in checked.diagnostics] + [(each, True) for each in checked.meanwhile]
+    told.sort(key=lambda each: sort_key(each[0]))
+    findings = tuple(_finding(files, each, meanwhile) for each, meanwhile in told)
+    errors = [each for each in findings if each.severity == Severity.ERROR]
+    broken = "" if checked.program is not None or not errors else _first(errors[0])
+
+    def standing_of(table: WrittenTable) -> Standing:
+        inside = [each.message for each in errors if (each.area.file, each.table) == (path, table.name)]
+        return standing(checked.reports.get((path, table.name)), inside, broken)
+
+    tables = tuple(grids(path, files.of(path), checked.nearest, standing_of))
+    return Answer(path, findings, tables, checked.program is not None)
+
+
+def _first(error: Finding) -> str:
+    """What keeps a program from being looked at."""
+    place = f"{os.path.basename(error.area.file)}:{error.area.start}"
+    return f"the program is not in order: {error.message} ({place})"
+
+
+def _finding(files: _Files, told: Diagnostic, meanwhile: bool) -> Finding:
+    spelt = any("did you mean" in each for each in told.help)
+    return Finding(
+        told.code.value,
+        told.severity.value,
+        told.message,
+        files.area(told.primary.span),
+        tuple((files.area(label.span), label.message) for label in told.related),
+        told.notes,
+        told.help,
+        tuple(_witness(files, each) for each in told.witnesses),
+        files.table(told.primary.span),
+        told.more,
+        meanwhile,
+        bool(told.proposals) or spelt,
+        told,
+    )
+
+
+def _witness(files: _Files, column: WitnessColumn) -> Witness:
+    lines = tuple(
+        WitnessLine(line.name, line.cells, None if line.span is None else files.area(line.span))
+        for line in column.lines
+    )
+    values = tuple(zip(column.variables, column.values, strict=True))
+    return Witness(column.table, values, lines, column.region, column.inputs)

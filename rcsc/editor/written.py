@@ -1,0 +1,125 @@
+"""Tables as they stand in a text, whether it parses or not: rows, their parts and cells.
+
+In: a text. Out: `WrittenTable`s. Which rows go together and where cells begin is what the parser takes
+(`rcsc.lang.syntax.rows`); a row that the parser would refuse has the cells that its bars make.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from rcsc.lang.syntax.rows import Cell, Cells, cut, is_separator, parts
+
+_HEAD = re.compile(
+    r"^[ \t]*(?P<table>table)[ \t]+(?P<name>[A-Za-z_]\w*)(?:\s+assuming\s[\w\s,]*)?(?:\s*req\s*\"[^{}|\r\n]*)?\s*\{",
+    re.MULTILINE | re.ASCII,
+)
+"""A level names its tables otherwise: without a brace, or `by` what."""
+_ROW = re.compile(r"^[ \t]*(?P<row>\|[^\r\n]*)", re.MULTILINE)
+_END = re.compile(r"^[ \t]*(?P<brace>\})|^[ \t]*(?:[A-Za-z_])", re.MULTILINE)
+
+
+class RowText(str):
+    """A row from its first bar to the end of its line, and where it begins."""
+
+    start: int
+    __slots__ = ("start",)
+
+    @classmethod
+    def at(cls, text: str, start: int) -> "RowText":
+        """The row that begins there."""
+        row = cls(text)
+        row.start = start
+        return row
+
+    @property
+    def past(self) -> int:
+        """The offset after its last character."""
+        return self.start + len(self)
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenPart:
+    """A part of a table: heading and lines, each as the rows that it takes."""
+
+    heading: tuple[RowText, ...]
+    lines: tuple[tuple[RowText, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenTable:
+    """A table as it stands.
+
+    Attributes:
+        name: What it is called; `named` is the offset of that.
+        start: The offset of the word `table`.
+        end: The offset after its brace, or where it ends without one.
+        rows: All rows, in order.
+    """
+
+    name: str
+    named: int
+    start: int
+    end: int
+    rows: tuple[RowText, ...]
+
+    @property
+    def parts(self) -> tuple[WrittenPart, ...]:
+        """Its parts; rows of dashes left out."""
+        found = parts(self.rows) if self.rows else []
+        return tuple(
+            WrittenPart(tuple(groups[0]), tuple(map(tuple, groups[1:]))) for groups in found if groups
+        )
+
+
+def tables_of(text: str) -> Iterator[WrittenTable]:
+    """Yield the tables of a text, in order."""
+    past = 0
+    for head in _HEAD.finditer(text):
+        if head.start() < past:
+            continue
+        closing = _END.search(text, head.end())
+        end = len(text) if closing is None else closing.start() if closing["brace"] is None else closing.end()
+        rows = tuple(RowText.at(row["row"], row.start("row")) for row in _ROW.finditer(text, head.end(), end))
+        past = end
+        yield WrittenTable(head["name"], head.start("name"), head.start("table"), end, rows)
+
+
+def table_of(text: str, name: str) -> WrittenTable | None:
+    """The first table of this name."""
+    return next((table for table in tables_of(text) if table.name == name), None)
+
+
+def cells_of(row: RowText, file: str = "") -> Cells:
+    """The cells of a row; one without `||` once has all of them before it."""
+    cells = cut(row, row.start, file)
+    if isinstance(cells, Cells):
+        return cells
+    body = row.partition("#")[0].rstrip()
+    offset, found = row.start + 1, []
+    for piece in body[1:].removesuffix("|").split("|"):
+        lead = len(piece) - len(piece.lstrip()) if piece.strip() else 0
+        found.append(Cell(piece.strip(), file, offset + lead))
+        offset += len(piece) + 1
+    return Cells(tuple(found), ())
+
+
+def joined_cells(rows: Sequence[RowText], file: str = "") -> Cells:
+    """The cells of a line over the rows that it takes; a row that has other cells than the first is left out."""
+    whole = cells_of(rows[0], file)
+    split = len(whole.conditions)
+    every = list(whole.all)
+    for row in rows[1:]:
+        more = cells_of(row, file)
+        if len(more.conditions) != split or len(more.all) != len(every):
+            continue
+        every = [
+            cell if not piece.text else cell.with_piece(piece) if cell.text else piece
+            for cell, piece in zip(every, more.all, strict=True)
+        ]
+    return Cells(tuple(every[:split]), tuple(every[split:]))
+
+
+def dashes(row: RowText) -> bool:
+    """Whether a row is only `|---|---|`."""
+    return is_separator(row)

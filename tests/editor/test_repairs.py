@@ -1,0 +1,188 @@
+"""A repair, applied, is a text of which a check that knows nothing of it says what the repair says."""
+
+from pathlib import Path
+
+import pytest
+
+from rcsc.diagnostics.source import Source
+from rcsc.driver.check import check
+from rcsc.driver.settings import Settings
+from rcsc.editor import Workspace
+from rcsc.editor.places import Lines
+from rcsc.editor.values import Finding, Repair
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
+from rcsc.lang.syntax.tree import File
+from rcsc.solvers.options import Options
+
+REPO = Path(__file__).parents[2]
+PUBLISHED = [
+    "examples/acquire_published.rcs", "gallery/cia402/commands_published.rcs", "gallery/tcas/published.rcs",
+    "gallery/lads_cover/published.rcs", "gallery/opcua_program/published.rcs", "gallery/lm_fsm/published.rcs",
+    "gallery/elevator/published.rcs", "examples/grip.rcs", "gallery/ros2_lifecycle/published.rcs",
+]  # fmt: skip
+HEAD = (
+    "enum mode { off, on, stuck }\ninput now : mode\ninput w : int 0 .. 9\ninput v : int 0 .. 9\n"
+    "input door : bool\noutput out : int 0 .. 3\n"
+)
+WRONG = {
+    "a gap": """
+  | line | now    | w    || out |
+  |------|--------|------||-----|
+  | a    | off    | <= 4 || 1   |
+  | b    | /= off |      || 2   |
+""",
+    "an overlap": """
+  | line | now    | w    || out |
+  |------|--------|------||-----|
+  | a    | off    |      || 1   |
+  | b    |        | >= 5 || 2   |
+  | c    | /= off | <= 4 || 0   |
+""",
+    "an overlap of lines that do the same": """
+  | line | w    || out |
+  |------|------||-----|
+  | a    | <= 5 || 1   |
+  | b    | >= 5 || 1   |
+""",
+    "a dead line": """
+  | line | w    | w    || out |
+  |------|------|------||-----|
+  | a    | <= 4 |      || 1   |
+  | b    |      | >= 5 || 2   |
+  | c    | <= 4 | >= 5 || 2   |
+""",
+    "a DEFAULT that is never reached": """
+  | line | w       || out |
+  |------|---------||-----|
+  | a    | <= 4    || 1   |
+  | b    | >= 5    || 2   |
+  | c    | DEFAULT || 2   |
+""",
+    "a gap of a table in parts": """
+  | line | now ||
+  |------|-----||
+  | a    | off ||
+  | b    | on  ||
+
+  | line | w || out |
+  |------|---||-----|
+  | a    |   || 1   |
+  | b    |   || 2   |
+""",
+    "an overlap in a further part": """
+  | line | door ||
+  |------|------||
+  | a    |      ||
+  | b    |      ||
+
+  | line | w    || out |
+  |------|------||-----|
+  | a    | <= 5 || 1   |
+  | b    | >= 5 || 2   |
+""",
+    "an overlap in cells over several rows": """
+  | line | now       | w    || out |
+  |------|-----------|------||-----|
+  | a    | in {off,  |      || 1   |
+  |      | on}       |      ||     |
+  | b    | in {on,   |      || 2   |
+  |      | stuck}    |      ||     |
+""",
+    "a gap across variables": """
+  | line | w - v || out |
+  |------|-------||-----|
+  | a    | <= 0  || 1   |
+  | b    | >= 2  || 2   |
+""",
+    "a name that is misspelt": """
+  | line | now    || out |
+  |------|--------||-----|
+  | a    | of     || 1   |
+  | b    | /= off || 2   |
+""",
+}
+
+
+def text_of(rows: str) -> str:
+    return f"{HEAD}\ntable t {{{rows}}}\n"
+
+
+def mended(workspace: Workspace, file: str, written: str) -> list[tuple[Finding, Repair, str]]:
+    workspace.open(file, written)
+    found = workspace.check(file).findings
+    return [
+        (finding, repair, Lines(written).applied(repair.edits))
+        for finding in found
+        for repair in workspace.repairs(finding)
+    ]
+
+
+def serious(file: Path, written: str) -> dict[str, int]:
+    """The findings of a check that has nothing but the file, by code."""
+    file.write_text(written, encoding="utf-8", newline="")
+    counts: dict[str, int] = {}
+    for each in check(Settings((str(file),), Options(), use_cache=False)).diagnostics:
+        if each.severity.value != "note":
+            counts[each.code.value] = counts.get(each.code.value, 0) + 1
+    return counts
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("what", WRONG)
+def test_a_repair_mends_what_it_says(what: str, end: str, tmp_path: Path) -> None:
+    file = tmp_path / "wrong.rcs"
+    written = (text_of(WRONG[what])).replace("\n", end)
+    before = serious(file, written)
+    assert before
+    repairs = mended(Workspace(), str(file), written)
+    assert repairs
+    for finding, repair, after in repairs:
+        now = serious(file, after)
+        assert now.get(finding.code, 0) < before[finding.code] or finding.code == "RCS401"
+        assert set(now) <= set(before)
+        if repair.clears:
+            assert not now
+        assert after.count("\n") == after.count(end)
+    assert any(repair.clears or not repair.certain for _, repair, _ in repairs)
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_repairs_of_published_tables_mend_one_finding_each(name: str, tmp_path: Path) -> None:
+    """Of tables as they are printed, with what they use; each is laid out as it was."""
+    import shutil
+
+    shutil.copytree(REPO / "tables", tmp_path / "tables", ignore=shutil.ignore_patterns("*.md"))
+    file = tmp_path / "tables" / name
+    written = file.read_text()
+    before = serious(file, written)
+    repairs = mended(Workspace(), str(file), written)
+    assert repairs
+    for finding, repair, after in repairs[:4]:
+        now = serious(file, after)
+        assert set(now) <= set(before), repair.title
+        assert sum(now.values()) < sum(before.values()) or finding.code == "RCS401", repair.title
+        parsed = parse(Source(name, after))
+        assert isinstance(parsed, File)
+        assert (format_file(parsed) == after) == (_laid_out(written))
+
+
+def _laid_out(written: str) -> bool:
+    parsed = parse(Source("", written))
+    return isinstance(parsed, File) and format_file(parsed) == written
+
+
+def test_a_repair_that_does_not_mend_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the text is that is made of a proposal: it is checked."""
+    from rcsc.editor import workspace as module
+
+    written = text_of(WRONG["an overlap"])
+    assert mended(Workspace(), "/nowhere/a.rcs", written)
+    for wrong in (
+        written,
+        written.replace("| b |", "| bb |"),
+        written.replace(">= 5", "<= 4"),
+        written + "input w : bool\n",
+    ):
+        monkeypatch.setattr(module, "with_proposal", lambda _source, _proposal, text=wrong: text)
+        assert mended(Workspace(), "/nowhere/a.rcs", written) == []
