@@ -1,9 +1,10 @@
 """A proved program to files in each target's language.
 
 A *plan* is the shape of the executors in no language. Each leaf that a table tests has *classes*: values that no line
-tells apart. A *mask* has one bit a line; each class of each leaf has one. Matching joins one mask a leaf by AND, and
-the one bit left is the line, so that it costs the same whatever the input. That exactly one bit is left is proved,
-and still checked in every cycle.
+tells apart. A *mask* has one bit a line; each class of each leaf has one. C joins one mask a leaf by AND, and
+the one bit left is the line, so that it costs the same whatever the input. Python asks by nested ifs for what parts the
+lines, which reads fewer leaves, and knows at each end which lines are left. That exactly one is left is proved,
+and still told in every cycle: masks and ifs are made of the table alone, and take nothing from its proof.
 
 >>> from rcsc.emit.lower import lower
 >>> from rcsc.lang.resolve import compile_text
@@ -26,11 +27,12 @@ Nothing is emitted that was not proved: `lower` takes what only the prover makes
 bytes on every machine: no time, version or absolute path is in them. Trusted: all of it, for what the executors do;
 `rcsc test` compares them with the interpreter, and with `--deep` has the C proved.
 
-Modules, in the order the data flows: `lower` makes a `plan`; `identifiers` spells every name, free in its `scope`;
-`code_tree` is a small tree of code, which C and Python share, and its spelling in each; `translate` makes it of
-expressions and statements, the room `c` and `python` of whole files, by the templates of `rendering`; `ranges` says
-what an analyser sees that keeps ranges alone: where that is too little, the C says what was proved. `generated` writes
-the files or says whether they are fresh. `TARGETS` names the languages: a new one is a module and its line here.
+Modules, in the order the data flows: `lower` makes a `plan`; `decision` parts its lines by cuts; `identifiers` spells
+every name, free in its `scope`; `code_tree` is a small tree of code, which C and Python share, and its spelling in
+each; `translate` makes it of expressions and statements, the room `c` and `python` of whole files, by the templates
+of `rendering`; `ranges` says what an analyser sees that keeps ranges alone: where that is too little, the C says what
+was proved. `generated` writes the files or says whether they are fresh. `TARGETS` names the languages: a new one is a
+module and its line here.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping

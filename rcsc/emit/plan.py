@@ -4,6 +4,7 @@ A matcher is a conjunction of look-ups: each *probe* finds the class of one leaf
 several leaves together), and the class's mask has a bit for each line that it does not exclude.
 """
 
+from bisect import bisect_left
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import prod
@@ -64,6 +65,17 @@ class Truth:
 
 
 Index: TypeAlias = Direct | Coded | Cuts | Truth
+
+
+def first_value(index: Direct | Coded | Cuts, number: int) -> int | float:
+    """The least value of a leaf whose class is at least `number`, which is not 0; of no real, its key."""
+    match index:
+        case Cuts(cuts=cuts):
+            return cuts[number - 1]
+        case Coded(low=low, classes=classes):
+            return low + bisect_left(classes, number)
+        case Direct(low=low):
+            return low + number
 
 
 @dataclass(frozen=True, slots=True)

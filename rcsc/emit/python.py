@@ -1,6 +1,6 @@
 """A plan to Python: one module, standard library only."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from math import prod
 from typing import assert_never
@@ -32,6 +32,7 @@ from rcsc.emit.code_tree import (
     read,
     when,
 )
+from rcsc.emit.decision import Cut, Decision, End, decision, depth
 from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment, names_in
 from rcsc.emit.plan import (
     WORD,
@@ -40,10 +41,13 @@ from rcsc.emit.plan import (
     Direct,
     Group,
     Index,
+    Matcher,
     Plan,
     PlanTable,
+    Probe,
     Truth,
     answering,
+    first_value,
     grouped,
     stated,
     table_position,
@@ -65,6 +69,12 @@ from rcsc.lang import model
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Bool, Procedure, Real, Single, Variable, key_bounds, pending
 
+MOST_DECIDED = 2048
+"""Up to so many lines are parted by nested ifs, which read only what they ask for."""
+MOST_ENDS = 4
+"""Up to so many ends for each line: where there would be more, the masks of all leaves are joined."""
+DEEPEST = 60
+"""Up to so many ifs stand inside each other; Python itself takes no more than a hundred."""
 MOST_KEYS = 8192
 """Up to so many combinations of classes the line of each is looked up at once."""
 MOST_GROUPED = 512
@@ -269,8 +279,43 @@ class _Maker:
 
     def _match(self, table: PlanTable, upper: str) -> Iterator[Stmt]:
         matcher = table.matcher
-        tail = f"{matcher.lines}, {matcher.default}"
         probes = [probe for group in matcher.groups for probe in group]
+        everyone = (1 << matcher.lines) - 1
+        if matcher.lines <= MOST_DECIDED:
+            decided = decision(probes, everyone, MOST_ENDS * (matcher.lines + 1))
+            if decided is not None and depth(decided) <= DEEPEST:
+                yield from self._decided(decided, matcher, probes)
+                return
+        yield from self._joined(matcher, probes, upper)
+
+    def _decided(self, decided: Decision, matcher: Matcher, probes: Sequence[Probe]) -> Iterator[Stmt]:
+        """Ifs for the cuts; each end tells how many of the lines hold there."""
+        match decided:
+            case End(lines=0):
+                yield Leave(Constant(matcher.lines if matcher.default else -1))
+            case End(lines=lines):
+                yield Leave(Constant(lines.bit_length() - 1 if lines.bit_count() == 1 else -2))
+            case Cut(below=below, above=above):
+                one, other = (tuple(self._decided(side, matcher, probes)) for side in (above, below))
+                yield Branch(((self._reaches(probes[decided.probe].index, decided.first), one),), other)
+
+    def _reaches(self, index: Index, number: int) -> Code:
+        """Whether the class is at least `number`."""
+        match index:
+            case Truth(condition=condition):
+                return self.text.expr(condition)
+            case Direct(leaf=leaf, type=Bool()):
+                return self.text.place(leaf)
+            case Direct(leaf=leaf) | Coded(leaf=leaf):
+                return infix(">=", self.text.place(leaf), Constant(int(first_value(index, number))))
+            case Cuts(leaf=leaf, type=kind):
+                return infix(">=", self.text.place(leaf), constant(kind, first_value(index, number)))
+            case _:
+                assert_never(index)
+
+    def _joined(self, matcher: Matcher, probes: Sequence[Probe], upper: str) -> Iterator[Stmt]:
+        """The masks of all leaves, joined."""
+        tail = f"{matcher.lines}, {matcher.default}"
         names = {
             id(probe): self._constant(f"{upper}_{at}", tuple(f"{mask:#x}," for mask in probe.masks))
             for at, probe in enumerate(probes)

@@ -1,0 +1,133 @@
+"""Decisions: a tree of cuts through the classes of leaves, which parts the lines of a table.
+
+In: the probes of a table, each with a mask for every class. Out: a tree whose inner nodes ask whether the class of one
+probe is at least some number, and whose ends keep the lines that may still match there.
+
+>>> from rcsc.emit.plan import Probe, Truth
+>>> from rcsc.lang.model import Bool, Literal
+>>> wide, full = (Probe(Truth(Literal(True, Bool()), name), masks) for name, masks in (("wide", (1, 6)), ("full", (3, 5))))
+>>> decided = decision((wide, full), 7, most=4)
+>>> [(end.lines, end.exact) for end in ends(decided)]
+[(1, True), (2, True), (4, True)]
+
+Nothing is taken from a proof: a line is left out only where its own masks exclude it. So an end that is exact, where each
+line that is left holds throughout, knows its answer: none, that line, or several; where it is not, masks go on from it.
+
+The cut is the one after which the squares of how many lines are left on both sides sum up to least: it halves the lines
+where it can, and does not keep many on both sides.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from operator import or_
+from typing import TypeAlias
+
+from rcsc.emit.plan import Probe
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """Where nothing more is asked.
+
+    Attributes:
+        lines: The lines that are left, a bit each.
+        exact: Whether every one of them holds for all that comes here.
+    """
+
+    lines: int
+    exact: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """A question: is the class of the probe at this position at least `first`?"""
+
+    probe: int
+    first: int
+    below: "Decision"
+    above: "Decision"
+
+
+Decision: TypeAlias = Cut | End
+Spans: TypeAlias = tuple[tuple[int, int], ...]
+"""For each probe the classes that come somewhere: from the first to before the second."""
+
+
+class _TooManyError(Exception):
+    """There would be more ends than are wanted."""
+
+
+def decision(probes: Sequence[Probe], everyone: int, most: int, few: int = 0) -> Decision | None:
+    """Return a tree of cuts; None where it would have too many ends.
+
+    Args:
+        probes: Each with its masks.
+        everyone: A mask with every line.
+        most: Ends that it may have.
+        few: Lines up to which nothing more is asked; 0 asks until all ends are exact.
+    """
+    grower = _Grower(probes, most, few)
+    try:
+        return grower.grown(everyone, tuple((0, len(probe.masks)) for probe in probes))
+    except _TooManyError:
+        return None
+
+
+def ends(decided: Decision) -> Iterator[End]:
+    """Give the ends, those below a cut before those above."""
+    if isinstance(decided, End):
+        yield decided
+    else:
+        yield from ends(decided.below)
+        yield from ends(decided.above)
+
+
+def depth(decided: Decision) -> int:
+    """Return how many questions are asked at most."""
+    return 0 if isinstance(decided, End) else 1 + max(depth(decided.below), depth(decided.above))
+
+
+@dataclass(slots=True)
+class _Grower:
+    probes: Sequence[Probe]
+    left: int
+    few: int
+
+    def grown(self, lines: int, spans: Spans) -> Decision:
+        """The tree for the lines that may match within these classes."""
+        cut = None if lines.bit_count() <= self.few else self._best(lines, spans)
+        if cut is None:
+            self.left -= 1
+            if self.left < 0:
+                raise _TooManyError
+            return End(lines, exact=not any(True for _ in self._open(lines, spans)))
+        at, first, below, above = cut
+        low, high = spans[at]
+        under, over = (
+            (*spans[:at], (low, first), *spans[at + 1 :]),
+            (*spans[:at], (first, high), *spans[at + 1 :]),
+        )
+        return Cut(at, first, self.grown(below, under), self.grown(above, over))
+
+    def _open(self, lines: int, spans: Spans) -> Iterator[tuple[int, int, list[int]]]:
+        """Each probe that still tells lines apart, with its first class and the lines left in each."""
+        for at, (probe, (low, high)) in enumerate(zip(self.probes, spans, strict=True)):
+            masks = [mask & lines for mask in probe.masks[low:high]]
+            if any(mask != lines for mask in masks):
+                yield at, low, masks
+
+    def _best(self, lines: int, spans: Spans) -> tuple[int, int, int, int] | None:
+        """The probe and the class of the best cut, and the lines left below and above; None where nothing is told apart."""
+        best: tuple[tuple[int, int, int], tuple[int, int, int, int]] | None = None
+        for at, low, masks in self._open(lines, spans):
+            below = list(accumulate(masks, or_))
+            above = list(accumulate(reversed(masks), or_))[::-1]
+            for place in range(1, len(masks)):
+                if masks[place] == masks[place - 1]:
+                    continue
+                one, two = below[place - 1], above[place]
+                rank = (one.bit_count() ** 2 + two.bit_count() ** 2, at, low + place)
+                if best is None or rank < best[0]:
+                    best = rank, (at, low + place, one, two)
+        return None if best is None else best[1]
