@@ -1,6 +1,6 @@
 """Walks over expressions and statements: their parts, the same with other parts, and the leaves that they read and write."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import assert_never
 
@@ -16,6 +16,7 @@ from rcsc.lang.model import (
     Literal,
     Local,
     Op,
+    Procedure,
     Read,
     ReadLocal,
     Select,
@@ -140,6 +141,16 @@ def everything(body: Iterable[Statement]) -> Iterator[Statement]:
         yield statement
         for block in blocks(statement):
             yield from everything(block)
+
+
+def may_write(body: Iterable[Statement], procedures: Mapping[str, Procedure]) -> frozenset[VariableName]:
+    """Leaves that the statements may write, calls included."""
+    leaves: set[VariableName] = set()
+    for statement in everything(body):
+        leaves.update(written_by(statement))
+        if isinstance(statement, Call):
+            leaves.update(procedures[statement.procedure].writes)
+    return frozenset(leaves)
 
 
 def written_by(statement: Statement) -> tuple[VariableName, ...]:

@@ -260,6 +260,7 @@ class Variable:
         line_of: Of a hidden state, the table whose line of this cycle it holds: 0 for none, else one more than the line's position.
         counts: Whether it is a hidden state that counts the cycles for which a condition has held.
         restart: What it has when the level starts anew; None where it is then as it is initially, or as `Program.restart` says.
+        given: Whether its initial value is written; else it has the least of its type, which nobody meant.
     """
 
     name: VariableName
@@ -275,6 +276,7 @@ class Variable:
     previous_of: VariableName | None = field(default=None, compare=False)
     line_of: TableName | None = field(default=None, compare=False)
     counts: bool = field(default=False, compare=False)
+    given: bool = field(default=True, compare=False, repr=False)
 
     @property
     def part(self) -> Part:

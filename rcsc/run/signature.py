@@ -160,6 +160,20 @@ class LevelSign:
 
 
 @dataclass(frozen=True, slots=True)
+class Unset:
+    """Numbers whose initial value nobody wrote, and what may set them; an input's buffer does that, or the database.
+
+    Attributes:
+        tables: By table the lines that may write them.
+        levels: Those that may write them in each of their cycles, whichever line runs.
+    """
+
+    leaves: tuple[str, ...]
+    tables: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    levels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Serves:
     """Whom a program's level serves, as it declares it.
 
@@ -183,6 +197,7 @@ class Signature:
     Attributes:
         monitored: Assumptions that the executors check.
         stops: By table, those that end the cycle where they fail.
+        unset: What has no value when a run begins, though it has that of its type; empty where a symbol file does not say.
     """
 
     program: str
@@ -198,6 +213,7 @@ class Signature:
     invariants: tuple[str, ...] = ()
     restart: Mapping[int, Adopted] = field(default_factory=dict)
     serves: Serves | None = None
+    unset: tuple[Unset, ...] = ()
 
     @property
     def check(self) -> str:
@@ -271,7 +287,7 @@ class Signature:
 
     def lines_before(self, level: LevelSign, values: Values) -> tuple[tuple[str, str], ...]:
         """Table and line of each that ran before that one in the cycle, in order."""
-        if int(values[len(self.leaves) + 1]) in _NOT_BEGUN:
+        if not self.begun(values):
             return ()
         ran = (
             (name := self._chosen(stage, values), self._kept(stage, name, values)) for stage in level.stages
@@ -279,6 +295,10 @@ class Signature:
         return tuple(
             (name, self.tables[name][at - 1]) for name, at in ran if 0 < at <= len(self.tables.get(name, ()))
         )
+
+    def begun(self, values: Values) -> bool:
+        """Return whether the cycle that left these values did anything: it did not where an input or the state was refused."""
+        return int(values[len(self.leaves) + 1]) not in _NOT_BEGUN
 
     def _chosen(self, choice: LevelSign | StageSign, values: Values) -> str:
         return choice.table or choice.tables.get(int(values[self.index[choice.by]]), "?")
@@ -408,7 +428,22 @@ def signature_of(symbols: CheckedFields) -> Signature:
         symbols.names("invariants", ()),
         {index[name]: adopted for name, adopted in _restart(symbols, leaves).items()},
         _serves(symbols, leaves),
+        _unset(symbols, index),
     )
+
+
+def _unset(symbols: CheckedFields, index: Mapping[str, int]) -> tuple[Unset, ...]:
+    """Which numbers nobody has set at first; what is said of a leaf that is not there is left out."""
+    if "unset" not in symbols.value:
+        return ()
+    return tuple(_unset_together(entry, index) for entry in symbols.each("unset", len(index)))
+
+
+def _unset_together(entry: CheckedFields, index: Mapping[str, int]) -> Unset:
+    leaves = tuple(name for name in entry.members("leaves") if name in index)
+    tables = entry.table("tables") if "tables" in entry.value else CheckedFields({})
+    lines = {identifier(name, "table"): tables.lines(name) for name in tables.value}
+    return Unset(leaves, lines, entry.names("levels", ()))
 
 
 def _serves(symbols: CheckedFields, leaves: tuple[Leaf, ...]) -> Serves | None:

@@ -275,7 +275,7 @@ def _ticks(log: Path, capsys: pytest.CaptureFixture[str]) -> list[dict[str, dict
     assert run(["log", str(log), "--csv", "out.csv"]) == 0
     capsys.readouterr()
     rows = list(csv.DictReader(Path("out.csv").read_text(encoding="utf-8").splitlines()))
-    return [{"drive": {"travelled_mm": int(row["drive.travelled_mm"])}} for row in rows]
+    return [{"drive": {"travelled_mm": int(row["drive.travelled_mm"] or 0)}} for row in rows]
 
 
 def test_the_shell_gives_orders_with_the_next_number(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

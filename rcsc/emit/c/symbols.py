@@ -1,27 +1,34 @@
 """The symbol file: what everything is called in C and in Python, and what a log or a shell shows of it."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import chain
 
 from rcsc.emit.c.ctext import c_type
 from rcsc.emit.c.layout import Digest
 from rcsc.emit.identifiers import Names
 from rcsc.emit.plan import Plan
+from rcsc.lang.leaves import may_write
 from rcsc.lang.model import (
     Admit,
     Bool,
+    Default,
     Enum,
     Int,
+    Kind,
+    Line,
     OneTable,
     Program,
     Read,
     Real,
     Role,
     Roles,
+    Table,
     TableChoice,
     Unit,
     Variable,
     VariableName,
+    pending,
 )
 from rcsc.lang.restart import Adopted, After, Fixed, SameAs
 
@@ -41,6 +48,7 @@ def symbols(plan: Plan, names: Names, digest: Digest) -> str:
         **({"defensive": True} if plan.defensive else {}),
         **({"roles": _roles(plan.program.roles)} if plan.program.roles is not None else {}),
         **({"restart": [*_adopted(plan.program.restart)]} if plan.program.restart is not None else {}),
+        **({"unset": groups} if (groups := _unset(plan.program)) else {}),
         "invariants": [invariant.name for invariant in plan.program.invariants],
         "python": {"module": f"{p}.py", "class": "State"},
         **({"failed": names.failed} if len(names.failed) > 1 else {}),
@@ -152,3 +160,77 @@ def _dispatched(choice: TableChoice) -> dict[str, object]:
         return {"table": choice.table}
     by = choice.selector.name if isinstance(choice.selector, Read) else ""
     return {"by": by, "tables": {str(int(value)): table for value, table in choice.tables}}
+
+
+_Writers = tuple[tuple[tuple[str, tuple[str, ...]], ...], tuple[str, ...]]
+
+
+def _unset(program: Program) -> list[dict[str, object]]:
+    """Return the numbers that nobody has set when the program starts, those with the same writers together.
+
+    They have no initial value of their own, but the least of their type, which means nothing until a line, a procedure of the cycle
+    or a buffer writes it. Members of enumerations and bools mean something from the start.
+
+    Returns:
+        Of each group `leaves`; `tables`: by table the lines that may write them; `levels`: those that may write them whichever line runs.
+        Inputs are written by neither.
+    """
+    lines, levels = _by_line(program), _by_level(program)
+    groups: dict[_Writers, list[VariableName]] = {}
+    for variable in program.variables:
+        if _meant_by_nobody(variable):
+            names = {variable.name, pending(variable.name)}
+            writers = (
+                tuple(
+                    (table, ran)
+                    for table, own in lines.items()
+                    if (ran := tuple(name for name, writes in own.items() if writes & names))
+                ),
+                tuple(name for name, writes in levels.items() if writes & names),
+            )
+            groups.setdefault(writers, []).append(variable.name)
+    return [
+        {
+            "leaves": leaves,
+            **({"tables": {table: list(ran) for table, ran in tables}} if tables else {}),
+            **({"levels": list(whole)} if whole else {}),
+        }
+        for (tables, whole), leaves in groups.items()
+    ]
+
+
+def _meant_by_nobody(variable: Variable) -> bool:
+    hidden = (variable.previous_of, variable.line_of)
+    return (
+        not variable.given
+        and isinstance(variable.type, Int | Real)
+        and hidden == (None, None)
+        and not (variable.kind is Kind.STATE and variable.name.endswith(pending("")))
+    )
+
+
+def _by_line(program: Program) -> Mapping[str, Mapping[str, frozenset[VariableName]]]:
+    """What each line of each table may write."""
+    procedures = {str(procedure.name): procedure for procedure in program.procedures}
+    return {
+        table.name: {
+            line.name: may_write((action.statement for action in line.actions), procedures)
+            for line in _lines(table)
+        }
+        for table in program.tables
+    }
+
+
+def _lines(table: Table) -> tuple[Line | Default, ...]:
+    return table.lines if table.default is None else (*table.lines, table.default)
+
+
+def _by_level(program: Program) -> Mapping[str, frozenset[VariableName]]:
+    """What each level may write before its tables and after them."""
+    writes = {str(procedure.name): procedure.writes for procedure in program.procedures}
+    return {
+        level.name: frozenset(
+            chain.from_iterable(writes[name] for name in (*level.preprocess, *level.postprocess))
+        )
+        for level in program.levels
+    }

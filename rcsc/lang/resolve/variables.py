@@ -119,6 +119,7 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
             written.name.span,
             safe,
             restart,
+            given=initial is not None,
         )
         scope.leaves[name] = variable
         if deferred:

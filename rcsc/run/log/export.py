@@ -1,21 +1,25 @@
 """A log as a table for other programs: CSV, JSON and Parquet; and which lines the run reached.
 
-In: a log. Out: text, bytes or a file. A row is a tick; a level that did not run in it keeps its values.
+In: a log. Out: text, bytes or a file. A row is a tick; a level that did not run in it keeps its values. A number that nobody has
+set yet (`rcsc.run.unset`) is left empty.
 """
 
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
 from rcsc.host.files import csv_text as csv_lines
 from rcsc.host.files import written_whole
+from rcsc.run.adopt import Begun
 from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.log.states import LogColumn, columns, line_of, plain
 from rcsc.run.signature import Value, Values
+from rcsc.run.unset.since import LevelSeen, Unsets
 
 Rows = Iterator[tuple[int, Mapping[str, Values]]]
 
@@ -65,12 +69,58 @@ def rows(log: Log) -> Rows:
         yield tick, held
 
 
+def unset(log: Log) -> Iterator[Mapping[str, frozenset[int]]]:
+    """Every tick with the places of the leaves that nobody has set by then, by level.
+
+    A log that begins within a run does not say what was set before: nothing is unset in it.
+    """
+    system = log.system()
+    since = Unsets(system.wires, {spec.name: spec for spec in system.levels})
+    if log.first == 0 and not (log.finding is not None and log.finding.restarted):
+        begun = (_seen(level, level.track.ticks[0]) for level in log.levels)
+        since.begin(begun, partial(_published_by, log, log.first))
+    for tick in log.ticks:
+        ran = [level for level in log.levels if level.track.ticks[max(0, level.track.place(tick))] == tick]
+        for level in ran if since.now else ():
+            restart = level.restarted(level.track.place(tick))
+            if restart is not None and restart.begun is Begun.ANEW:
+                since.restarted(_seen(level, tick, restart.values))
+        since.tick((_seen(level, tick) for level in ran), partial(_published_by, log, tick))
+        yield dict(since.now)
+
+
+def _seen(level: LoggedLevel, tick: int, values: Values | None = None) -> LevelSeen:
+    held = values if values is not None else level.track.latest(tick)
+    assert held is not None  # every level has a state from the start
+    return LevelSeen(level.name, level.sign, level.level, held)
+
+
+def _published_by(log: Log, tick: int, name: str) -> bool:
+    return name in log.buffers and log.buffers[name].place(tick) >= 0
+
+
+Known = Mapping[str, tuple[str, LogColumn]]
+"""Columns by their whole names, with their levels."""
+
+
+def valued(log: Log, known: Known) -> Iterator[tuple[int, list[Value | str | None]]]:
+    """Every tick with the value of each column; None for a number that nobody has set."""
+    for (tick, held), missing in zip(rows(log), unset(log), strict=True):
+        yield (
+            tick,
+            [
+                None if column.at in missing.get(level, ()) else column.read(held[level])
+                for level, column in known.values()
+            ],
+        )
+
+
 def csv_text(log: Log) -> str:
     """A heading, then a row a tick; enumerations in the table's words."""
     known = named_columns(log)
     cells = (
-        [tick, tick * log.tick_ms, *(_cell(column.read(held[level])) for level, column in known.values())]
-        for tick, held in rows(log)
+        [tick, tick * log.tick_ms, *("" if value is None else _cell(value) for value in values)]
+        for tick, values in valued(log, known)
     )
     return csv_lines(chain([["tick", "time_ms", *known]], cells))
 
@@ -95,19 +145,29 @@ def json_text(log: Log) -> str:
         ],
     }
     known = {level.name: columns(level.sign, level.level) for level in log.levels}
-    lines = (json.dumps(_cycle(log, known, tick, held), ensure_ascii=False) for tick, held in rows(log))
+    lines = (
+        json.dumps(_cycle(log, known, tick, held, missing), ensure_ascii=False)
+        for (tick, held), missing in zip(rows(log), unset(log), strict=True)
+    )
     head = json.dumps(about, ensure_ascii=False)[:-1]
     return head + ', "cycles": [\n' + ",\n".join(lines) + "\n]}\n"
 
 
 def _cycle(
-    log: Log, known: Mapping[str, tuple[LogColumn, ...]], tick: int, held: Mapping[str, Values]
+    log: Log,
+    known: Mapping[str, tuple[LogColumn, ...]],
+    tick: int,
+    held: Mapping[str, Values],
+    missing: Mapping[str, frozenset[int]],
 ) -> dict[str, object]:
     return {
         "tick": tick,
         "time_ms": tick * log.tick_ms,
         "levels": {
-            name: {column.name: _json(column.read(held[name])) for column in several}
+            name: {
+                column.name: None if column.at in missing.get(name, ()) else _json(column.read(held[name]))
+                for column in several
+            }
             for name, several in known.items()
         },
         "buffers": {
@@ -132,12 +192,12 @@ def write_parquet(log: Log, path: Path) -> None:
     from pyarrow import parquet
 
     known = named_columns(log)
-    cells: dict[str, list[Value | str]] = {name: [] for name in known}
+    cells: dict[str, list[Value | str | None]] = {name: [] for name in known}
     ticks = []
-    for tick, held in rows(log):
+    for tick, values in valued(log, known):
         ticks.append(tick)
-        for name, (level, column) in known.items():
-            cells[name].append(column.read(held[level]))
+        for name, value in zip(known, values, strict=True):
+            cells[name].append(value)
     arrays = {"tick": pa.array(ticks, pa.int64())}
     arrays["time_ms"] = pa.array([tick * log.tick_ms for tick in ticks], pa.int64())
     for name, (_, column) in known.items():

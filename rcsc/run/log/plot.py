@@ -1,15 +1,18 @@
 """Pictures of a log: values over time, or over another value.
 
+A number that nobody has set yet (`rcsc.run.unset`) is a gap.
+
 In: a log and names of columns. Out: an SVG or PNG file, the same bytes for the same log and version of matplotlib.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.host.files import written_whole
-from rcsc.run.log.export import rows
+from rcsc.run.log.export import valued
 from rcsc.run.log.queries import BadExpression, named_columns, nearest
 from rcsc.run.log.read import Log
 from rcsc.run.log.states import LogColumn
@@ -23,7 +26,7 @@ _WIDTH_IN, _ROW_IN = 9.0, 1.6
 
 @dataclass(frozen=True, slots=True)
 class _Series:
-    """One column over all ticks; members as their numbers."""
+    """One column over all ticks; members as their numbers, what is not set as NaN."""
 
     name: str
     column: LogColumn
@@ -31,8 +34,9 @@ class _Series:
 
     @property
     def label(self) -> str:
-        """Name and unit."""
-        return f"{self.name} ({self.column.unit})" if self.column.unit else self.name
+        """Name and unit, and whether there is nothing to be seen."""
+        said = f"{self.name} ({self.column.unit})" if self.column.unit else self.name
+        return f"{said}: never set" if all(map(isnan, self.values)) else said
 
 
 def plot(log: Log, names: Sequence[str], path: Path, against: str | None = None) -> None:
@@ -84,13 +88,16 @@ def _series(log: Log, names: Sequence[str]) -> list[_Series]:
         if not (known[name][1].members or known[name][1].c_type):
             raise BadExpression(f"`{name}` is text, which has no place on an axis")
     curves = [_Series(name, known[name][1], []) for name in names]
-    for _, held in rows(log):
+    for _, values in valued(log, {name: known[name] for name in dict.fromkeys(names)}):
+        by_name = dict(zip(dict.fromkeys(names), values, strict=True))
         for series in curves:
-            series.values.append(_number(series.column, series.column.read(held[known[series.name][0]])))
+            series.values.append(_number(series.column, by_name[series.name]))
     return curves
 
 
-def _number(column: LogColumn, value: Value | str) -> float:
+def _number(column: LogColumn, value: Value | str | None) -> float:
+    if value is None:
+        return nan
     if isinstance(value, str):
         return float(column.members.index(value)) if value in column.members else -1.0
     return float(value)

@@ -90,6 +90,8 @@ def signature_text(sign: Signature) -> str:
     del written["restart"]
     if sign.serves is None:
         del written["serves"]
+    if not sign.unset:
+        del written["unset"]
     for level in written["levels"]:
         if not level["stages"]:
             del level["stages"]

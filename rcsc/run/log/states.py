@@ -84,6 +84,7 @@ class LogColumn:
     Attributes:
         members: What it may be, in order; empty for numbers, bools and free text.
         c_type: Of a leaf; empty for text.
+        at: The leaf's place among those of its level; -1 for what is none.
     """
 
     name: str
@@ -91,6 +92,7 @@ class LogColumn:
     c_type: str
     unit: str
     read: Callable[[Values], Value | str]
+    at: int = -1
 
 
 def columns(sign: Signature, level: LevelSign) -> tuple[LogColumn, ...]:
@@ -103,8 +105,8 @@ def columns(sign: Signature, level: LevelSign) -> tuple[LogColumn, ...]:
 def _leaf(sign: Signature, at: int) -> LogColumn:
     leaf = sign.leaves[at]
     if leaf.members:
-        return LogColumn(leaf.name, leaf.members, "", leaf.unit, lambda values: leaf.shown(values[at]))
-    return LogColumn(leaf.name, (), leaf.c_type, leaf.unit, lambda values: values[at])
+        return LogColumn(leaf.name, leaf.members, "", leaf.unit, lambda values: leaf.shown(values[at]), at)
+    return LogColumn(leaf.name, (), leaf.c_type, leaf.unit, lambda values: values[at], at)
 
 
 def _trace(sign: Signature, level: LevelSign) -> tuple[LogColumn, ...]:

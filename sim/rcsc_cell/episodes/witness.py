@@ -88,6 +88,7 @@ class Witness(RunWitness):
 
     def __post_init__(self) -> None:
         """Names the pictures; a solid one is drawn where there is physics."""
+        RunWitness.__post_init__(self)
         mechanism = self.plant.mechanism
         pictures = {"stick": lambda: self.figure(self.run.system)}
         if isinstance(mechanism, Physical):

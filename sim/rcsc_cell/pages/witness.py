@@ -8,12 +8,16 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain
+from math import nan
 from typing import Protocol
 
+from rcsc.run.adopt import Begun
 from rcsc.run.levels import RunningLevel
 from rcsc.run.orders.operator import ScriptedRun
 from rcsc.run.system import System
+from rcsc.run.unset.since import LevelSeen, Unsets
 from rcsc_cell.pages.report import CellPicture, Figure, Matched, ReportRow, Story
 
 FRAMES_APART, LONG_APART = 25, 80
@@ -63,13 +67,22 @@ class RunWitness:
     frames: list[CellPicture] = field(default_factory=list)
     series: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     matched: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+    unset: Unsets = field(init=False)
     _row: int = -1
     _drawn: int = -FRAMES_APART
     _told: int = -1
 
+    def __post_init__(self) -> None:
+        """Notes what nobody has set at the beginning: nothing, where the run goes on from another."""
+        system = self.run.system
+        self.unset = Unsets(system.description.wires, {spec.name: spec for spec in system.description.levels})
+        if system.tick == 0:
+            self.unset.begin(map(_seen, system.levels), partial(_published, system))
+
     def __call__(self, system: System, due: tuple[RunningLevel, ...]) -> None:
         """After each cycle."""
         begun = time.perf_counter()
+        self._note(system, due)
         for level in due:
             self.matched.update((level.name, table, line) for table, line in level.lines)
         self.look()
@@ -87,13 +100,29 @@ class RunWitness:
         """What the report draws: `level.variable` by the name above the drawing."""
         return series_names(self.run.system)
 
+    def _number(self, level: RunningLevel, leaf: str) -> float:
+        """The value of a leaf; not a number where nobody has set it."""
+        unset = level.sign.index[leaf] in self.unset.now.get(level.name, ())
+        return nan if unset else float(level.value(leaf))
+
+    def _note(self, system: System, due: tuple[RunningLevel, ...]) -> None:
+        """What was set in the tick."""
+        for restart in system.restarts:
+            if restart.begun is Begun.ANEW and restart.level in self.unset.now:
+                level = system.level(restart.level)
+                trace = level.values[len(level.sign.leaves) :]
+                self.unset.restarted(
+                    LevelSeen(level.name, level.sign, level.level, (*restart.values, *trace))
+                )
+        self.unset.tick(map(_seen, due), partial(_published, system))
+
     # --- the report ---
 
     def _film(self, system: System) -> None:
         seconds = system.tick * 0.001 * system.description.tick_ms
         for shown, name in self.series_names.items():
             level, _, leaf = name.partition(".")
-            self.series.setdefault(shown, []).append((seconds, float(system.level(level).value(leaf))))
+            self.series.setdefault(shown, []).append((seconds, self._number(system.level(level), leaf)))
         at = 0 if self.run.operator is None else self.run.operator.at
         since = system.tick - self._drawn
         drawing = next(reversed(list(self.pictures.values())), None)
@@ -162,18 +191,33 @@ class RunWitness:
 
     def _show(self, live: LivePage, system: System) -> None:
         self._tell(live)
-        live.publish(system.tick, variables(system))
+        live.publish(system.tick, variables(system, self.unset.now))
         for kind, drawing in self.pictures.items():
             if live.frame_due(kind):
                 live.frame(kind, drawing())
 
 
-def variables(system: System) -> dict[str, float | str]:
-    """Every leaf of every level by its whole name; words for what the tables have words for."""
+def _seen(level: RunningLevel) -> LevelSeen:
+    return LevelSeen(level.name, level.sign, level.level, level.values)
+
+
+def _published(system: System, name: str) -> bool:
+    return system.buffers.latest(name) is not None
+
+
+def variables(system: System, unset: Mapping[str, frozenset[int]] | None = None) -> dict[str, float | str]:
+    """Every leaf of every level by its whole name; words for what the tables have words for.
+
+    Args:
+        system: After a tick.
+        unset: By level the places of leaves that are left out, as nobody has set them.
+    """
+    missing = unset or {}
     return {
         f"{level.name}.{leaf.name}": leaf.shown(value) if leaf.members else float(value)
         for level in system.levels
-        for leaf, value in zip(level.sign.leaves, level.values, strict=False)
+        for at, (leaf, value) in enumerate(zip(level.sign.leaves, level.values, strict=False))
+        if at not in missing.get(level.name, ())
     }
 
 

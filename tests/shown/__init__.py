@@ -1,0 +1,1 @@
+"""What is shown of a run to people: pages, pictures, exports."""
