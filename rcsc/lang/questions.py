@@ -47,9 +47,12 @@ def question(
         candidates: Positions of the lines that may hold there.
     """
     asked = [a.condition for a in program.assumptions if a.name in assumptions]
-    for terms, low, high in bounds:
-        asked += _within(terms, low, high)
-    return [*asked, fault(table, candidates)]
+    return [*asked, *located(bounds), fault(table, candidates)]
+
+
+def located(bounds: Iterable[tuple[list[tuple[Expr, int]], int, int]]) -> list[Expr]:
+    """Conditions that hold in a region, as far as conditions express it."""
+    return [condition for terms, low, high in bounds for condition in _within(terms, low, high)]
 
 
 def fault(table: Table, candidates: Sequence[int]) -> Expr:

@@ -6,6 +6,7 @@ one solver that is made when first needed; *unknown* is a finding, never a proof
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -13,6 +14,7 @@ from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interpret import UNDEFINED, matching_lines
 from rcsc.lang.model import (
     AssumptionName,
+    Expr,
     Program,
     Read,
     Real,
@@ -23,7 +25,7 @@ from rcsc.lang.model import (
     key_of,
     value_of_key,
 )
-from rcsc.lang.questions import question
+from rcsc.lang.questions import located, question
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.search import furthest
@@ -53,7 +55,7 @@ _MOST_GROWN = 20
 _MOST_LINES_GROWN = 64
 """Lines of a table above which no region is grown around a gap."""
 _MOST_DOUBTFUL = 200
-"""Pairs of lines of one table that the solver is asked about once it has found something wrong."""
+"""Pairs of lines of one region that the solver is asked for once it has found something wrong there."""
 _MOST_GAPS = 64
 """Regions of a gap among which linear arithmetic looks for the least input."""
 _MOST_LINES_TRIED = 200
@@ -202,14 +204,23 @@ class _Decision:
                 return [Gap((self.snapshot(point),), (None,))]
         return self.gap(Search())
 
-    def search(self, kept: Sequence[int], budget: int = 60_000, *, alone: bool = False) -> Search:
-        """Search under some of the assumptions; `alone`: without the solver, to the first finding."""
+    def search(
+        self, kept: Sequence[int], budget: int = 60_000, *, alone: bool = False, covering: bool = False
+    ) -> Search:
+        """Search under some of the assumptions.
+
+        Args:
+            kept: Their positions.
+            budget: How many nodes at most.
+            alone: Without the solver, to the first finding.
+            covering: Without the solver, as if there were no DEFAULT: to find what it takes.
+        """
         return Tree(
             self.universe,
             self.clauses,
             [self.assumptions[at] for at in kept],
-            (lambda _: NoWitness.UNKNOWN) if alone else self.oracle,
-            default=not must_cover(self.table),
+            (lambda _: NoWitness.UNKNOWN) if alone or covering else self.oracle,
+            default=not must_cover(self.table) and not covering,
             budget=budget,
             first_only=alone,
         ).run()
@@ -234,11 +245,7 @@ class _Decision:
         """Z3's answer about a region, as the tree asks it."""
         if len(asked.candidates) > _MOST_CANDIDATES or smt.spent():
             return NoWitness.UNKNOWN
-        columns, forms = self.universe.columns, self.universe.forms
-        bounds = (
-            ([(columns[column].term, k) for column, k in forms[form]], low, high)
-            for form, low, high in asked.bounds
-        )
+        bounds = self.spelled(asked)
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
         for snapshot in self.tried:
             if all(fold(condition, snapshot) for condition in conditions):
@@ -246,9 +253,21 @@ class _Decision:
         z3 = self.asked
         answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
         if answer is Answer.SATISFIABLE:
-            leaves = z3.frame.leaves
-            return {str(v.name): z3.solver.value(leaves[v.name], v.type) for v in self.program.variables}
+            return self.model(z3)
         return NoWitness.NONE if answer is Answer.UNSATISFIABLE else NoWitness.UNKNOWN
+
+    def model(self, z3: TableSolver) -> dict[str, Value]:
+        """The input that the solver gives."""
+        leaves = z3.frame.leaves
+        return {str(v.name): z3.solver.value(leaves[v.name], v.type) for v in self.program.variables}
+
+    def spelled(self, asked: Question) -> list[tuple[list[tuple[Expr, int]], int, int]]:
+        """The bounds of a region, their forms as sums of terms."""
+        columns, forms = self.universe.columns, self.universe.forms
+        return [
+            ([(columns[column].term, k) for column, k in forms[form]], low, high)
+            for form, low, high in asked.bounds
+        ]
 
     # --- findings ----------------------------------------------------------------------
 
@@ -264,17 +283,42 @@ class _Decision:
         pairs = set(search.overlaps)
         for seen in search.witnesses:
             pairs.update(combinations(self.matching(seen), 2))
-        pairs.update(filter(self.overlap_somewhere, sorted(search.doubtful - pairs)[:_MOST_DOUBTFUL]))
+        for asked in search.doubtful:
+            pairs.update(self.others(asked, pairs))
         findings: list[TableFinding] = []
         for first, second in sorted(pairs):
             grown = len(findings) < _MOST_GROWN
             findings.append(self.overlap(first, second, grown=grown))
         return findings
 
-    def overlap_somewhere(self, pair: tuple[int, int]) -> bool:
-        """Whether the solver finds an input that both lines match: which one it gave before depends on its mood."""
+    def others(self, asked: Question, known: AbstractSet[tuple[int, int]]) -> set[tuple[int, int]]:
+        """Pairs besides those known that overlap in a region: which input the solver gave of it depends on its mood."""
         z3 = self.asked
-        return z3.holds(*map(z3.line, pair)) is Answer.SATISFIABLE
+        region = [encode(condition, z3.frame) for condition in located(self.spelled(asked))]
+        lines = combinations(asked.candidates, 2)
+        left = {pair: smt.all_of(list(map(z3.line, pair))) for pair in lines if pair not in known}
+        found: set[tuple[int, int]] = set()
+        while left and len(found) < _MOST_DOUBTFUL and not smt.spent():
+            if z3.holds(*region, smt.any_of(list(left.values()))) is not Answer.SATISFIABLE:
+                break
+            new = left.keys() & set(combinations(self.matching(self.model(z3)), 2))
+            if not new:
+                break
+            found |= new
+            left = {pair: term for pair, term in left.items() if pair not in new}
+        return found
+
+    def covered(self, search: Search) -> bool:
+        """Whether the solver refutes that there are inputs that no line matches where the tree did not look for them."""
+        if not must_cover(self.table) and (search.undecided or len(self.clauses) <= _MOST_LINES_GROWN):
+            return self.asked.holds(self.asked.none()) is Answer.UNSATISFIABLE
+        return all(self.missed(asked) is Answer.UNSATISFIABLE for asked in search.doubtful)
+
+    def missed(self, asked: Question) -> Answer:
+        """Whether the solver finds an input in a region that no line matches."""
+        z3 = self.asked
+        region = [encode(condition, z3.frame) for condition in located(self.spelled(asked))]
+        return z3.holds(*region, smt.negation(smt.any_of(list(map(z3.line, asked.candidates)))))
 
     def matching(self, snapshot: Snapshot) -> list[int]:
         """Positions of the lines that match."""
@@ -296,25 +340,26 @@ class _Decision:
 
     def gap(self, search: Search) -> list[TableFinding]:
         """The least input that no line matches, if there is one; also where DEFAULT takes it."""
-        seen = [snapshot for snapshot in search.witnesses if not self.matching(snapshot)]
         if must_cover(self.table) and not search.gaps and not search.witnesses:
             return []
-        if search.gaps and not seen and len(search.gaps) <= _MOST_GAPS:
+        many = len(self.clauses) > _MOST_LINES_GROWN
+        if many and not must_cover(self.table):
+            search = self.search(range(len(self.assumptions)), covering=True)
+        seen = [snapshot for snapshot in search.witnesses if not self.matching(snapshot)]
+        covered = self.covered(search)
+        if search.gaps and covered and not seen and len(search.gaps) <= _MOST_GAPS:
             points = [
                 least(self.universe, inside(self.universe, part), self.columns) for part, _ in search.gaps
             ]
             settled = [point for point in points if not isinstance(point, NoWitness)]
             if len(settled) == len(points):
                 point = min(settled, key=lambda candidate: [candidate[column] for column in self.columns])
-                few = len(self.clauses) <= _MOST_LINES_GROWN
-                lines = [[whole(line)] for line in self.clauses] if few else []
-                region = self.around(point, lines) if few else None
-                return [Gap((self.snapshot(point),), (region,))]
+                lines = [] if many else [[whole(line)] for line in self.clauses]
+                return [Gap((self.snapshot(point),), (None if many else self.around(point, lines),))]
         seen += [snapshot for snapshot in self.tried if not self.matching(snapshot)]
-        if not search.gaps and not seen:
-            z3 = self.asked
-            if z3.holds(z3.none()) is Answer.UNSATISFIABLE:
-                return []
+        if covered and not search.gaps and not seen:
+            return []
+        seen += [self.snapshot(point) for _, point in search.gaps]
         witness = self.witness(seen, lambda z3: (z3.none(),))
         return [Undecided("what no line matches")] if witness is None else [Gap((witness,), (None,))]
 

@@ -8,9 +8,10 @@ from fractions import Fraction
 from functools import reduce
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsc.lang.interpret import matching_lines
 from rcsc.lang.leaves import parts
 from rcsc.lang.model import (
     Among,
@@ -43,12 +44,15 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
+from rcsc.table import relational
+from rcsc.table.confirm import TableSolver
 from rcsc.table.decide import prove_table
 from rcsc.table.regions import splitting
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
 from rcsc.table.regions.ends import Ends
-from rcsc.table.regions.least import find, least, negated, never, projected, whole, widest
+from rcsc.table.regions.least import find, least, negated, never, whole, widest
 from rcsc.table.regions.linear import Simplex, integer_point
+from rcsc.table.regions.points import projected
 from rcsc.table.regions.region import (
     Bounds,
     Counted,
@@ -62,6 +66,7 @@ from rcsc.table.regions.region import (
     Split,
 )
 from rcsc.table.regions.splitting import Tree
+from rcsc.table.verdict import Gap, Overlap
 from tests.bench import families
 from tests.support.programs.stages import BOXES, verdict_of
 from tests.support.programs.stages import program_of as compiled
@@ -330,6 +335,103 @@ def test_families_are_proved_and_each_planted_fault_is_found(lines: list[list[Ex
     wider = searched(program_of([*lines[:5], lines[5][:-1], *lines[6:]]))[1]
     assert wider.overlaps
     assert not wider.gaps
+
+
+CURVED = st.one_of(
+    st.builds("x * y {} {}".format, st.sampled_from(["<", ">", "=", "/="]), st.integers(0, 12)),
+    st.builds("(x + y) mod 3 {} {}".format, st.sampled_from(["<", ">", "="]), st.integers(0, 2)),
+    st.builds("x {} {} * y - {}".format, st.sampled_from(["<", ">", "<=", "="]), st.integers(1, 3), st.integers(0, 4)),
+    st.just("true"),
+)  # fmt: skip
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.lists(CURVED, min_size=1, max_size=2), min_size=2, max_size=5), st.booleans())
+def test_all_pairs_and_the_least_gap_are_told_where_the_solver_is_asked_of_regions(
+    lines: list[list[str]], default: bool
+) -> None:
+    """Which input it gives of a region depends on what it was asked before; what is told does not."""
+    rows = "".join(f"| l{at} | {' and '.join(line)} ||\n" for at, line in enumerate(lines))
+    tail = "| d | DEFAULT ||\n" if default else ""
+    program = compiled(
+        f"input x : int 0 .. 5\ninput y : int 0 .. 5\ntable t {{\n| line | when ||\n{rows}{tail}}}\n"
+    )
+    [table] = program.tables
+    points: list[dict[str, Value]] = [{"x": x, "y": y} for x in range(6) for y in range(6)]
+    names = [line.name for line in table.lines]
+    at = [[names.index(name) for name in matching_lines(table, point)] for point in points]
+    findings = prove_table(program, table, BOXES).findings
+    told = {(one.first, one.second): one.witness for one in findings if isinstance(one, Overlap)}
+    for pair in {pair for lines_ in at for pair in itertools.combinations(sorted(lines_), 2)} | told.keys():
+        first = next(p for p, lines_ in zip(points, at, strict=True) if {*pair} <= {*lines_})
+        assert told[pair] == {name: first[name] for name in table.variables}
+    gaps = [gap.witnesses[0] for gap in findings if isinstance(gap, Gap)]
+    missed = [p for p, lines_ in zip(points, at, strict=True) if not lines_][:1]
+    assert gaps == [{name: first[name] for name in table.variables} for first in missed]
+
+
+@pytest.mark.parametrize("given_", [{"x": 0, "y": 0}, {"x": 0, "y": 1}, {"x": 5, "y": 5}])
+def test_whatever_input_the_solver_gives_of_a_region_the_rest_is_asked_for(
+    given_: dict[str, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(relational._Decision, "oracle", lambda *_: given_)  # else it chooses
+    program = compiled(
+        "input x : int 0 .. 5\ninput y : int 0 .. 5\ntable t {\n| line | when ||\n"
+        "| a | x * y < 3 ||\n| b | x * y < 5 ||\n| c | x * y < 2 and x > 3 ||\n}\n"
+    )
+    findings = prove_table(program, program.tables[0], BOXES).findings
+    told = {(one.first, one.second): one.witness for one in findings if isinstance(one, Overlap)}
+    assert told == {(0, 1): {"x": 0, "y": 0}, (0, 2): {"x": 4, "y": 0}, (1, 2): {"x": 4, "y": 0}}
+    assert [gap.witnesses[0] for gap in findings if isinstance(gap, Gap)] == [{"x": 1, "y": 5}]
+
+
+@pytest.mark.parametrize("lines", [12, 80])
+@pytest.mark.parametrize("default", ["", "| d | DEFAULT ||\n"])
+def test_the_least_gap_of_planes_is_told_with_few_lines_and_with_many(
+    lines: int, default: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of many lines without the solver, which would have to be told all of them."""
+    if lines > 64:
+        monkeypatch.setattr(TableSolver, "holds", None)
+    text = families.linear(lines, 3, lines, "gap").replace("\n}", f"\n{default}}}")
+    program = compiled(text)
+    [table] = program.tables
+    findings = prove_table(program, table, BOXES).findings
+    [gap] = [finding for finding in findings if isinstance(finding, Gap)]
+    assert len(findings) == 1
+    assert not matching_lines(table, gap.witnesses[0])
+    hole = text.partition("and not (")[2].partition(")")[0]
+    assert hole == " and ".join(f"{name} = {value}" for name, value in gap.witnesses[0].items())
+
+
+def test_overlaps_of_planes_are_told_with_their_least_inputs_by_few_simplexes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without the solver, and with no tree but the table's: an input is minimised, a region grown by the ends of forms."""
+    monkeypatch.setattr(TableSolver, "holds", None)
+    calls: dict[str, int] = {}
+
+    def counted(of: type, name: str) -> None:
+        work = getattr(of, name)
+
+        def wrapped(*args: object) -> object:
+            calls[name] = calls.get(name, 0) + 1
+            return work(*args)
+
+        monkeypatch.setattr(of, name, wrapped)
+
+    counted(Simplex, "refute")
+    counted(Tree, "run")
+    program = compiled(families.linear(128, 4, 2, widened=4))
+    [table] = program.tables
+    findings = prove_table(program, table, BOXES).findings
+    assert len(findings) > 20
+    for overlap in findings:
+        assert isinstance(overlap, Overlap)
+        names = {table.lines[at].name for at in (overlap.first, overlap.second)}
+        assert names <= set(matching_lines(table, overlap.witness))
+    assert calls["run"] == 1
+    assert calls["refute"] <= 60 * len(findings)
 
 
 @pytest.mark.parametrize("lines", range(3, 6))
@@ -604,15 +706,14 @@ TREES: dict[str, tuple[str, tuple[str, ...], str]] = {
             "1x, 1y, 3x 2y, 1x -1y, 1x 1y\n"
             "3<=0; 2<=26; 4<=8; open; 4<=9; line 3; open; 4<=8; empty -2*2 1*3 5*4; 4<=9; "
             "empty -2*2 1*3 5*4; line 1; 2<=29; 3<=3; 4<=8; line 0; 4<=9; open; line 0; 4<=8; open; "
-            "4<=9; 0<=6; empty 2*0 -1*3 -1*4; open; open; 3<=3; 4<=8; empty -1*1 -1*2 3*4; 4<=9; line 3; "
-            "0<=6; empty 5*0 -1*2 -2*3; open; 4<=8; empty -1*1 -1*2 3*4; 4<=9; empty -1*1 -1*2 3*4; "
-            "line 2\n"
+            "4<=9; open; open; 3<=3; 4<=8; empty -1*1 -1*2 3*4; 4<=9; line 3; open; 4<=8; "
+            "empty -1*1 -1*2 3*4; 4<=9; empty -1*1 -1*2 3*4; line 2\n"
             "(0, 3): [(0, 5), (1, 4)]\n"
             "(0, 2): [(0, 4), (1, 0)]\n"
             "(2, 3): [(0, 7), (1, 2)]\n"
             "[(2, (0, 26)), (3, (-20, 0)), (4, (0, 8))]: [(0, 0), (1, 0)]\n"
             "[(2, (0, 26)), (3, (-20, 0)), (4, (10, 40))]: [(0, 5), (1, 5)]\n"
-            "[(0, (7, 20)), (2, (30, 100)), (3, (1, 3)), (4, (10, 40))]: [(0, 7), (1, 6)]\n"
+            "[(2, (30, 100)), (3, (1, 3)), (4, (10, 40))]: [(0, 8), (1, 6)]\n"
             "0 []"
         ),
     ),

@@ -26,9 +26,9 @@ regions with one line each:
 ((), 'tree')
 
 The tree is the certificate: `rcsc.certify` walks it again with arithmetic of its own. Trusted without that: all of
-this room. What it costs: splits, which are counted and bounded; points and witnesses are found by bisection over
-keys, with the simplex as the oracle.
+this room. What it costs: splits, which are counted and bounded; a least point within bounds takes a few dozen pivots, one of a
+disjunction is bisected.
 
 Modules, in the order the data flows: `atoms`, `ends` (which lines a cut parts), `linear`, `partition`, `word_bits` (words as boxes of
-their bits), `region`, `splitting`, `least`.
+their bits), `region`, `points` (within bounds), `splitting`, `least`.
 """

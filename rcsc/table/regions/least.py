@@ -4,26 +4,19 @@ In: clauses over a `Universe` whose columns are leaves. Out: the least point in 
 columns given, and the widest box around it on which a condition holds. Clauses that speak of terms
 that are not linear are for a solver (`smt`).
 
-The least point pins each column, in the order given, to the least value that fits.
+The least point pins each column, in the order given, to the least value that fits: within bounds by minimising it (`points`), else
+by bisection.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TypeAlias
 
 from rcsc.lang.interval_sets import complement, holds, meet
 from rcsc.solvers.search import furthest, lowest
-from rcsc.table.regions.atoms import Atom, Clauses, Every, Form, Formula, Some, Universe, clauses, every, some
-from rcsc.table.regions.linear import Simplex, integer_point
+from rcsc.table.regions import points
+from rcsc.table.regions.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
 from rcsc.table.regions.region import Bounds, NoWitness, Point
 from rcsc.table.regions.splitting import Tree
-
-_SWEEPS = 12
-"""How often a point is projected onto all bounds before a system is solved."""
-_BEYOND = 1.3
-"""By how much further than to the bound itself a point is moved: so that it ends."""
-_ROUNDS = 200
-"""Systems looked at for an integer point before the tree of regions looks for it."""
 
 
 def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> Point | NoWitness:
@@ -35,9 +28,9 @@ def meeting(
     universe: Universe, wanted: Clauses, near: Mapping[int, int] | None = None, budget: int = 2_000
 ) -> Point | NoWitness:
     """A point of a conjunction as `find` has it; looked for first near another point."""
-    if not wanted.rest and not wanted.impossible and all(len(box) == 1 for _, box in wanted.boxes):
+    if _is_corner(wanted):
         try:
-            return _corner(universe, {form: box[0] for form, box in wanted.boxes}, near or {})
+            return points.within(universe, {form: box[0] for form, box in wanted.boxes}, near or {})
         except TimeoutError:
             pass  # the tree asks itself how long it goes on
     tree = Tree(
@@ -55,118 +48,20 @@ def meeting(
     return NoWitness.UNKNOWN if search.undecided else NoWitness.NONE
 
 
-def _corner(universe: Universe, bounds: Mapping[int, Bounds], near: Mapping[int, int]) -> Point | NoWitness:
-    """A point within the bounds on forms, of leaves only, all put to one system.
-
-    First one near a given point is tried (`projected`). Then each bound on several columns is drawn in by half the
-    sum of its coefficients: a point of what is left stays within the bounds when it is rounded to integers. Only
-    where nothing is left are fractions bounded one after the other.
-    """
-    forms, singles = universe.forms, universe.single
-    if universe.opaque and not universe.opaque.isdisjoint(c for form in bounds for c, _ in forms[form]):
-        return NoWitness.UNKNOWN
-    at = projected(universe, bounds, near)
-    if at is not None:
-        return _completed(universe, bounds, at)
-    used = sorted({column for form in bounds if len(forms[form]) > 1 for column, _ in forms[form]})
-    system = _system(universe, bounds, used, draw_in=True)
-    if system.refute() is None:
-        at = {column: round(system.value(singles[column])) for column in used}
-        if all(
-            low <= sum(k * at[column] for column, k in forms[form]) <= high
-            for form, (low, high) in bounds.items()
-            if len(forms[form]) > 1
-        ):
-            return _completed(universe, bounds, at)
-    system = _system(universe, bounds, used, draw_in=False)
-    solved = integer_point(system, [singles[column] for column in used], _ROUNDS)
-    if solved is None:
-        return NoWitness.NONE
-    return _completed(universe, bounds, {column: int(solved.value(singles[column])) for column in used})
-
-
-def _system(
-    universe: Universe, bounds: Mapping[int, Bounds], used: Sequence[int], *, draw_in: bool
-) -> Simplex:
-    forms, singles = universe.forms, universe.single
-    system = Simplex()
-    for column in used:
-        form = singles[column]
-        system.add_column(form, *bounds.get(form, (universe.low[form], universe.high[form])))
-    for form, (low, high) in bounds.items():
-        if len(forms[form]) > 1:
-            margin = (sum(abs(k) for _, k in forms[form]) + 1) // 2 if draw_in else 0
-            if low + margin > high - margin:
-                margin = 0
-            terms = [(singles[column], k) for column, k in forms[form]]
-            system.add_form(form, terms, low + margin, high - margin)
-    return system
-
-
-def projected(
-    universe: Universe, bounds: Mapping[int, Bounds], near: Mapping[int, int]
-) -> dict[int, int] | None:
-    """The columns of a point within the bounds, by projecting a point onto one bound after the other; None where that does not end soon.
-
-    Source: Agmon, The relaxation method for linear inequalities, 1954. It guesses in floating point; what it returns was checked exactly.
-    """
-    planes, drawn, ends = [], list[_Plane](), dict[int, Bounds]()
-    for form, (low, high) in bounds.items():
-        terms = universe.forms[form]
-        if len(terms) > 1:
-            planes.append((terms, low, high))
-            reach, square = universe.norms[form]
-            margin = min(reach, (high - low) // 2)
-            drawn.append((terms, low + margin, high - margin, square))
-            for column, _ in terms:
-                if column not in ends:
-                    single = universe.single[column]
-                    ends[column] = bounds.get(single, (universe.low[single], universe.high[single]))
-    try:
-        point = _relaxed(drawn, ends, near)
-    except (OverflowError, ValueError):  # no double is so large
-        return None
-    for terms, low, high in planes:
-        if not low <= sum([k * point[c] for c, k in terms]) <= high:
-            return None
-    return point
-
-
-_Plane: TypeAlias = tuple[Form, int, int, int]
-"""A form, its bounds, and the square of its normal."""
-
-
-def _relaxed(planes: Sequence[_Plane], ends: Mapping[int, Bounds], near: Mapping[int, int]) -> dict[int, int]:
-    """The point near another at which projecting comes to rest or is given up, rounded, within the bounds of columns."""
-    at = {column: float(min(max(near.get(column, 0), low), high)) for column, (low, high) in ends.items()}
-    for _ in range(_SWEEPS):
-        moved = False
-        for terms, low, high, square in planes:
-            value = 0.0
-            for column, k in terms:
-                value += k * at[column]
-            if not low <= value <= high:
-                moved = True
-                step = ((low if value < low else high) - value) * _BEYOND / square
-                for column, k in terms:
-                    least_, greatest = ends[column]
-                    at[column] = min(max(at[column] + k * step, least_), greatest)
-        if not moved:
-            break
-    return {column: min(max(round(at[column]), low), high) for column, (low, high) in ends.items()}
-
-
-def _completed(universe: Universe, bounds: Mapping[int, Bounds], at: Mapping[int, int]) -> Point:
-    """The point with the least value of every column that no bound on several columns speaks of."""
-    return {
-        column: at[column] if column in at else bounds.get(form, (universe.low[form],))[0]
-        for column, form in enumerate(universe.single)
-    }
+def _is_corner(wanted: Clauses) -> bool:
+    """Whether the clauses are bounds on forms."""
+    return not wanted.rest and not wanted.impossible and all(len(box) == 1 for _, box in wanted.boxes)
 
 
 def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) -> Point | NoWitness:
     """The least point at which all parts hold: first in the first of `columns`, and so on."""
-    best = find(universe, parts)
+    wanted = clauses(parts)
+    if _is_corner(wanted):
+        try:
+            return points.least_within(universe, {form: box[0] for form, box in wanted.boxes}, columns)
+        except TimeoutError:
+            pass  # bisection asks the tree, too
+    best = meeting(universe, wanted)
     pinned, undecided = list(parts), False
 
     def up_to(column: int, low: int, limit: int) -> int | None:
@@ -231,18 +126,37 @@ def never(universe: Universe, box: Mapping[int, Bounds], formula: Formula) -> bo
     """
     match formula:
         case Atom(form=form, box=wanted):
-            columns = [(universe.columns[column], column, k) for column, k in universe.forms[form]]
-            ends = [sorted(k * end for end in box.get(at, (c.low, c.high))) for c, at, k in columns]
-            low, high = sum(least_ for least_, _ in ends), sum(greatest for _, greatest in ends)
-            if not meet(wanted, ((low, high),)):
+            ends = (low, high) = _ends(universe, box, form)
+            if not meet(wanted, (ends,)):
                 return True
             at_a_corner = holds(wanted, low) or holds(wanted, high)
-            return False if at_a_corner and not any(c.opaque for c, _, _ in columns) else None
+            return False if at_a_corner and universe.opaque.isdisjoint(_columns(universe, form)) else None
         case Every(parts):
             return True if any(never(universe, box, part) for part in parts) else None
         case Some(parts):
-            told = [never(universe, box, part) for part in parts]
-            return False if False in told else None if None in told else True
+            told: bool | None = True
+            for part in parts:
+                of_part = never(universe, box, part)
+                if of_part is False:
+                    return False
+                told = told and of_part
+            return told
+
+
+def _ends(universe: Universe, box: Mapping[int, Bounds], form: int) -> Bounds:
+    """The least and the greatest that a form is in a box of columns."""
+    low = high = 0
+    for column, k in universe.forms[form]:
+        ends = box.get(column)
+        if ends is None:
+            ends = universe.columns[column].low, universe.columns[column].high
+        low += k * ends[k < 0]
+        high += k * ends[k > 0]
+    return low, high
+
+
+def _columns(universe: Universe, form: int) -> list[int]:
+    return [column for column, _ in universe.forms[form]]
 
 
 def negated(universe: Universe, formula: Formula) -> Formula:

@@ -46,11 +46,11 @@ class Simplex:
         """Whether the form is part of this system."""
         return form in self.low
 
-    def add_column(self, form: int, low: int, high: int) -> None:
-        """Add a form of one column."""
+    def add_column(self, form: int, low: int, high: int, near: int = 0) -> None:
+        """Add a form of one column, with the value of its range that is nearest to one given."""
         self.low[form], self.high[form] = low, high
         self._columns.append(form)
-        self._values.append(min(max(0, low), high))
+        self._values.append(min(max(near, low), high))
         for basic, (d, row) in self._rows.items():
             self._rows[basic] = (d, [*row, 0])
 
@@ -94,6 +94,40 @@ class Simplex:
             if entering is None:
                 return self._farkas(basic, d, row, up)
             self._pivot(basic, entering, self.low[basic] if up else self.high[basic])
+
+    def minimise(self, form: int) -> Fraction:
+        """The least value of a form, where the vertex goes; it must be within all bounds (`refute`)."""
+        while True:
+            if form not in self._rows:
+                j, up = self._columns.index(form), False
+                moves = self._values[j] > self.low[form]
+            else:
+                row = self._rows[form][1]
+                entering = self._entering(row, up=False)
+                moves = entering is not None
+                j, up = (0, False) if entering is None else (entering, row[entering] < 0)
+            if not moves:
+                return self.value(form)
+            self._advance(j, up)
+
+    def _advance(self, j: int, up: bool) -> None:
+        """Move the nonbasic form at position `j` as far as all bounds let it go."""
+        form, values = self._columns[j], self._values
+        room, per = (self.high[form] - values[j] if up else values[j] - self.low[form]), 1
+        leaving: tuple[int, int] | None = None
+        for basic, (d, row) in self._rows.items():
+            if row[j]:
+                grows = (row[j] > 0) == up
+                at = sum(map(operator.mul, row, values))
+                left = d * self.high[basic] - at if grows else at - d * self.low[basic]
+                less = left * per - room * abs(row[j])
+                if less < 0 or (less == 0 and leaving is not None and basic < leaving[0]):
+                    room, per = left, abs(row[j])
+                    leaving = basic, self.high[basic] if grows else self.low[basic]
+        if leaving is None:
+            values[j] += room if up else -room
+        else:
+            self._pivot(leaving[0], j, leaving[1])
 
     def _violated(self) -> tuple[int, bool] | None:
         """The first form out of its bounds, and whether it must grow."""
@@ -174,6 +208,46 @@ def integer_point(simplex: Simplex, columns: Sequence[int], patience: int) -> Si
         above.restrict(broken, cut + 1, above.high[broken])
         waiting += [below, above]
     return None
+
+
+def least_point(simplex: Simplex, columns: Sequence[int], patience: int) -> list[int] | None:
+    """The least integers that `columns` can be together, the first compared first.
+
+    Each is put to the least integer that it can be, given those before; where a later one finds no integer, to the next. What a
+    column can be is an interval, so that past the first integer outside there is none.
+
+    Args:
+        simplex: The system; it is changed.
+        columns: Forms of it, which together fix all others.
+        patience: How many systems are looked at.
+
+    Returns:
+        None when there are none.
+
+    Raises:
+        TimeoutError: When the patience is at its end.
+    """
+    if simplex.refute() is not None:
+        return None
+    chosen: list[tuple[Simplex, int]] = []
+    here, key = simplex, None
+    while len(chosen) < len(columns):
+        if patience == 0:
+            raise TimeoutError
+        patience -= 1
+        form = columns[len(chosen)]
+        key = math.ceil(here.minimise(form)) if key is None else key
+        pinned = here.copy()
+        pinned.restrict(form, key, key)
+        if key <= here.high[form] and pinned.refute() is None:
+            chosen.append((here, key))
+            here, key = pinned, None
+        elif chosen:
+            here, key = chosen.pop()
+            key += 1
+        else:
+            return None
+    return [key for _, key in chosen]
 
 
 def _reduced(d: int, row: list[int]) -> tuple[int, list[int]]:

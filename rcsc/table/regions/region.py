@@ -103,7 +103,7 @@ class Search:
         overlaps: Each overlapping pair of lines with a point in both.
         gaps: Regions (bounds by form) that no line matches, each with a point of it.
         witnesses: Inputs a solver gave at which not exactly one line holds, not yet told apart.
-        doubtful: Pairs of lines of the regions in which it gave them: others of these may overlap there, too.
+        doubtful: What it was asked of the regions in which it gave them: other pairs may overlap there, and there may be a gap, too.
         undecided: How many regions stayed undecided.
         used: Assumptions that some leaf rests on, by position.
     """
@@ -112,7 +112,7 @@ class Search:
     overlaps: dict[tuple[int, int], Point] = field(default_factory=dict)
     gaps: list[tuple[dict[int, Bounds], Point]] = field(default_factory=list)
     witnesses: list[Snapshot] = field(default_factory=list)
-    doubtful: set[tuple[int, int]] = field(default_factory=set)
+    doubtful: list[Question] = field(default_factory=list)
     undecided: int = 0
     used: set[int] = field(default_factory=set)
 

@@ -11,12 +11,13 @@ line on both sides; a solver only where a term is not linear or rounding to inte
 """
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from math import prod
 from typing import NamedTuple, TypeAlias
 
 from rcsc.lang.interval_sets import meet
+from rcsc.table.regions import points
 from rcsc.table.regions.atoms import Clauses, Universe
 from rcsc.table.regions.ends import Cut, Ends
 from rcsc.table.regions.linear import Multipliers, Simplex
@@ -163,12 +164,12 @@ class Tree:
             return self._split(region, *self._best(region, region.open, NOWHERE))
         if self._is_opaque(region):
             return self._ask(region), []
-        form = self._fractional(region)
-        if form is not None:
+        point = self._point(region)
+        if point is None:
             if region.rounds >= _ROUNDS:
                 return self._ask(region), []
+            form = self._fractional(region)
             return self._split(region, form, int(region.simplex.value(form) // 1), region.rounds + 1)
-        point = self._point(region)
         self.search.overlaps.update(dict.fromkeys(pairs, point))
         if not region.many:
             self.search.gaps.append((region.bounds, point))
@@ -182,7 +183,8 @@ class Tree:
             return Open()
         bounds = tuple((form, low, high) for form, (low, high) in sorted(region.bounds.items()))
         lines = tuple(self._numbers(region))
-        answer = self.oracle(Question(bounds, lines))
+        asked = Question(bounds, lines)
+        answer = self.oracle(asked)
         if answer is NoWitness.NONE:
             self.search.used.update(assumption.index for assumption in self.root.open)
             return Rests()
@@ -190,7 +192,7 @@ class Tree:
             self.search.undecided += 1
         else:
             self.search.witnesses.append(answer)
-            self.search.doubtful.update(combinations(lines, 2))
+            self.search.doubtful.append(asked)
         return Open()
 
     def _is_opaque(self, region: Region) -> bool:
@@ -198,20 +200,29 @@ class Tree:
         columns, forms = self.universe.columns, self.universe.forms
         return any(columns[column].opaque for form in region.bounds for column, _ in forms[form])
 
-    def _fractional(self, region: Region) -> int | None:
-        """A column (as a form) that the vertex does not give an integer."""
-        for form in self.universe.single:
-            if region.simplex.knows(form) and region.simplex.value(form).denominator != 1:
-                return form
-        return None
+    def _fractional(self, region: Region) -> int:
+        """A column (as a form) that the vertex does not give an integer; there is one."""
+        values = ((form, region.simplex.value(form)) for form in self._known(region).values())
+        return next(form for form, value in values if value.denominator != 1)
 
-    def _point(self, region: Region) -> Point:
-        """The vertex, with the least value of every column that it leaves open."""
-        point = {}
-        for column, form in enumerate(self.universe.single):
-            known = region.simplex.knows(form)
-            point[column] = int(region.simplex.value(form)) if known else self._range(region, form)[0]
-        return point
+    def _known(self, region: Region) -> dict[int, int]:
+        """The columns that the region's simplex knows, with their forms."""
+        singles = enumerate(self.universe.single)
+        return {column: form for column, form in singles if region.simplex.knows(form)}
+
+    def _point(self, region: Region) -> Point | None:
+        """The vertex, or a point near it where it is not one of integers, with the least value of every column that is left open.
+
+        None where no point of integers is found.
+        """
+        vertex = {column: region.simplex.value(form) for column, form in self._known(region).items()}
+        at: Mapping[int, int] | None = {column: int(value) for column, value in vertex.items()}
+        if any(value.denominator != 1 for value in vertex.values()):
+            at = points.projected(self.universe, region.bounds, at or {})
+        if at is None:
+            return None
+        least = {column: self._range(region, form)[0] for column, form in enumerate(self.universe.single)}
+        return {**least, **at}
 
     # --- splits ------------------------------------------------------------------------
 
