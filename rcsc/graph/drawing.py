@@ -100,7 +100,7 @@ def svg(graph: StateGraph, everywhere: str = "") -> str:
     Raises:
         NoLayoutError: There is no layout program.
     """
-    own = [edge for edge in map(partial(_settled, graph), graph.edges) if not _never(edge)]
+    own = [edge for edge in map(partial(settled, graph), graph.edges) if not _never(edge)]
     nodes = {name: name for name in graph.states}
     if any(ANY in (edge.source, edge.target) for edge in own):
         nodes = {ANY: "any line" if graph.state == LINES else "any state", **nodes}
@@ -111,7 +111,7 @@ def svg(graph: StateGraph, everywhere: str = "") -> str:
     return drawn(Picture(graph.table, _notes(graph, everywhere), nodes, tuple(sheaves)))
 
 
-def _settled(graph: StateGraph, edge: Edge) -> Edge:
+def settled(graph: StateGraph, edge: Edge) -> Edge:
     """The edge, without deciding procedures where its line can lead nowhere else from there."""
     elsewhere = any(
         (other.line, other.source) == (edge.line, edge.source) and other.target != edge.target

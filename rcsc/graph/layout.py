@@ -6,8 +6,8 @@ extra `graph` installs, which gives the same places on every machine, else `dot`
 
 import shutil
 import sysconfig
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +37,30 @@ class LayoutBox:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """From a box to a box; a label of size 0 is none."""
+    """From a box to a box; a label of size 0 is none.
+
+    Attributes:
+        leaves: The frame at whose border it begins, around `source`; "" for the box itself.
+        enters: The frame at whose border it ends, around `target`.
+        tip: Whether it has one.
+    """
 
     source: str
     target: str
+    width_px: float = 0.0
+    height_px: float = 0.0
+    leaves: str = ""
+    enters: str = ""
+    tip: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A rectangle around boxes and other frames, with room for a heading of `width_px` by `height_px` in its upper left corner."""
+
+    name: str
+    boxes: tuple[str, ...]
+    frames: "tuple[Frame, ...]" = ()
     width_px: float = 0.0
     height_px: float = 0.0
 
@@ -53,6 +73,7 @@ class Arrangement:
         centres: Of the boxes, in order.
         curves: Of the arrows, in order: points of cubic Bezier curves, then the arrow's tip.
         labels: Centres of the arrows' labels; None where there is none.
+        frames: By name the left upper and the right lower corner.
     """
 
     width_px: float
@@ -60,22 +81,23 @@ class Arrangement:
     centres: tuple[Point, ...]
     curves: tuple[tuple[tuple[Point, ...], Point], ...]
     labels: tuple[Point | None, ...]
+    frames: Mapping[str, tuple[Point, Point]] = field(default_factory=dict)
 
 
-def place(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> Arrangement:
-    """The layout of the boxes and arrows, in ranks from top to bottom.
+def place(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow], frames: Sequence[Frame] = ()) -> Arrangement:
+    """The layout of the boxes and arrows, in ranks from top to bottom; a box is in one frame at most.
 
     Raises:
         NoLayoutError: No layout program is there, or it failed.
     """
-    layout = json_of(_run(_text(boxes, arrows)))
+    layout = json_of(_run(_text(boxes, arrows, frames)))
     left, bottom, right, top = (float(side) for side in layout["bb"].split(","))
 
     def point(text: str) -> Point:
         x, y = (float(number) for number in text.split(","))
         return round(x - left, 2), round(top - y, 2)
 
-    by_name = {node["name"]: node for node in layout["objects"]}
+    by_name = {node["name"]: node for node in layout.get("objects", [])}
     edges = sorted(layout.get("edges", []), key=lambda edge: int(edge["id"][1:]))
     return Arrangement(
         right - left,
@@ -83,7 +105,14 @@ def place(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> Arrangement:
         tuple(point(by_name[f"n{at}"]["pos"]) for at in range(len(boxes))),
         tuple(_curve(edge["pos"], point) for edge in edges),
         tuple(point(edge["lp"]) if "lp" in edge else None for edge in edges),
+        {name: _corners(by_name[word]["bb"], point) for name, word in _words(frames).items()},
     )
+
+
+def _corners(text: str, point: Callable[[str], Point]) -> tuple[Point, Point]:
+    """`left,bottom,right,top`."""
+    left, bottom, right, top = text.split(",")
+    return point(f"{left},{top}"), point(f"{right},{bottom}")
 
 
 def _curve(text: str, point: Any) -> tuple[tuple[Point, ...], Point]:
@@ -94,8 +123,21 @@ def _curve(text: str, point: Any) -> tuple[tuple[Point, ...], Point]:
     return points, point(tips[0]) if tips else points[-1]
 
 
-def _text(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> str:
-    lines = ["digraph g {", "  rankdir=TB; nodesep=0.45; ranksep=0.5; edge [arrowsize=0.9];"]
+def _words(frames: Sequence[Frame]) -> dict[str, str]:
+    """What frames are called in DOT, by name, those inside them after them."""
+    waiting, found = list(frames), list[Frame]()
+    while waiting:
+        found.append(waiting.pop(0))
+        waiting = [*found[-1].frames, *waiting]
+    return {frame.name: f"cluster_{at}" for at, frame in enumerate(found)}
+
+
+def _text(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow], frames: Sequence[Frame]) -> str:
+    ranks = 0.3 if frames else 0.5
+    lines = [
+        "digraph g {",
+        f"  compound=true; rankdir=TB; nodesep=0.45; ranksep={ranks}; edge [arrowsize=0.9];",
+    ]
     number = {box.name: at for at, box in enumerate(boxes)}
     for at, box in enumerate(boxes):
         shape = "ellipse" if box.round else "box"
@@ -103,13 +145,27 @@ def _text(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> str:
         lines.append(
             f'  n{at} [shape={shape}, fixedsize=true, label="", width={width:.4f}, height={height:.4f}];'
         )
+    words = _words(frames)
+    for frame in frames:
+        lines += _framed(frame, number, words)
     for at, arrow in enumerate(arrows):
-        label = f", label={_blank(arrow)}" if arrow.width_px else ""
-        lines.append(f'  n{number[arrow.source]} -> n{number[arrow.target]} [id="e{at}"{label}];')
+        more = f", label={_blank(arrow)}" if arrow.width_px else ""
+        more += f", ltail={words[arrow.leaves]}" if arrow.leaves else ""
+        more += f", lhead={words[arrow.enters]}" if arrow.enters else ""
+        more += "" if arrow.tip else ", arrowhead=none"
+        lines.append(f'  n{number[arrow.source]} -> n{number[arrow.target]} [id="e{at}"{more}];')
     return "\n".join([*lines, "}", ""])
 
 
-def _blank(arrow: Arrow) -> str:
+def _framed(frame: Frame, number: Mapping[str, int], words: Mapping[str, str]) -> Iterator[str]:
+    yield f"  subgraph {words[frame.name]} {{ margin=14; labelloc=t; labeljust=l; label={_blank(frame)};"
+    yield " ".join(f"n{number[name]};" for name in frame.boxes)
+    for inner in frame.frames:
+        yield from _framed(inner, number, words)
+    yield "  }"
+
+
+def _blank(arrow: Arrow | Frame) -> str:
     """A label that takes this much room and no more."""
     size = f'WIDTH="{round(arrow.width_px)}" HEIGHT="{round(arrow.height_px)}"'
     return f'<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="0" FIXEDSIZE="TRUE" {size}><TR><TD></TD></TR></TABLE>>'

@@ -1,0 +1,200 @@
+"""Graphs folded and placed: they say the same edges, and no arrow goes through a label, a state, or what is no end of its own."""
+
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rcsc.graph.chart import MOST_LETTERS, MOST_TEXTS, Sheet, SheetBox, sheet
+from rcsc.graph.composites import Chart, collapsed, folded, unfolded
+from rcsc.graph.derive import Derived, derive
+from rcsc.graph.drawing import settled
+from rcsc.graph.find import NotFound, tables
+from rcsc.graph.formats.state_graph import ANY, Edge, StateGraph
+from rcsc.graph.layout import Point
+from rcsc.solvers.options import Options
+
+REPO = Path(__file__).parents[2]
+SHIPPED = [
+    "task/acquire", "task/move", "task/transfer", "emove/locate", "examples/acquire_published", "gallery/packml/unit",
+    "gallery/linuxcnc_homing/homing", "gallery/cia402/drive", "gallery/rfc9293/tcp", "gallery/plcopen_safety/guard",
+]  # fmt: skip
+
+
+@cache
+def graphs(name: str) -> tuple[StateGraph, ...]:
+    entries = tables(str(REPO / "tables" / f"{name}.rcs"))
+    assert not isinstance(entries, NotFound)
+    found = [derive(e.program, e.table, e.loaded.files[e.table.file], Options()) for e in entries]
+    return tuple(each.graph for each in found if isinstance(each, Derived))
+
+
+def said(graph: StateGraph) -> set[Edge]:
+    return {settled(graph, edge) for edge in graph.edges if not edge.default.endswith("unreachable")}
+
+
+def points(curve: tuple[Point, ...]) -> Iterator[Point]:
+    """Points of Bezier curves, so dense that no letter lies between two."""
+    for at in range(0, len(curve) - 3, 3):
+        a, b, c, d = curve[at : at + 4]
+        for step in range(101):
+            t = step / 100
+            parts = ((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3)
+            yield (
+                sum(part * end[0] for part, end in zip(parts, (a, b, c, d), strict=True)),
+                sum(part * end[1] for part, end in zip(parts, (a, b, c, d), strict=True)),
+            )
+
+
+def crossed(placed: Sheet) -> list[tuple[str, str, str]]:
+    """Arrows that go through a label or a box."""
+    boxes = [*placed.boxes, *(arrow.label for arrow in placed.arrows if arrow.label)]
+    return [
+        (arrow.source, arrow.target, box.rows[0].whole if box.rows else box.name)
+        for arrow in placed.arrows
+        for curve in arrow.curves
+        for box in boxes
+        if any(box.holds(point, 1.0) for point in points(curve))
+    ]
+
+
+def overlapping(one: SheetBox, other: SheetBox) -> bool:
+    return all(
+        one.corner[axis] < other.corner[axis] + size and other.corner[axis] < one.corner[axis] + own
+        for axis, own, size in ((0, one.width_px, other.width_px), (1, one.height_px, other.height_px))
+    )
+
+
+def check(placed: Sheet) -> None:
+    """What makes a drawing legible."""
+    assert crossed(placed) == []
+    boxes = [*placed.boxes, *(arrow.label for arrow in placed.arrows if arrow.label)]
+    for at, box in enumerate(boxes):
+        assert not any(overlapping(box, other) for other in boxes[:at]), box
+        assert box.corner[0] >= 0
+        assert box.corner[1] >= 0
+        assert box.corner[0] + box.width_px <= placed.width_px
+        assert box.corner[1] + box.height_px <= placed.height_px
+        for row in box.rows:
+            assert row.width_px <= box.width_px
+            assert row.top_px + row.height_px <= box.height_px
+            assert all(len(text) <= MOST_LETTERS + 4 for _, text in row.texts)
+            assert len(row.texts) <= 3 * MOST_TEXTS
+    for frame in placed.frames:
+        for box in placed.boxes:
+            within = frame.holds(box.corner) and frame.holds(
+                (box.corner[0] + box.width_px, box.corner[1] + box.height_px)
+            )
+            assert within == (box.kind in ("state", "shut") and set(box.states) <= set(frame.states)), (
+                frame.name,
+                box.name,
+            )
+        for box in (*placed.boxes, *(arrow.label for arrow in placed.arrows if arrow.label)):
+            for row in frame.rows:  # the heading stands free
+                heading = SheetBox(
+                    "",
+                    "",
+                    (),
+                    (),
+                    (frame.corner[0], frame.corner[1] + row.top_px),
+                    row.width_px,
+                    row.height_px,
+                )
+                assert not overlapping(heading, box)
+
+
+def shown(placed: Sheet) -> set[str]:
+    """The lines that the drawing names."""
+    boxes = [*placed.boxes, *placed.frames, *(arrow.label for arrow in placed.arrows if arrow.label)]
+    return {row.line for box in boxes for row in box.rows if row.line}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_table_is_drawn_whole_and_legible(name: str) -> None:
+    for graph in graphs(name):
+        chart = folded(graph)
+        assert unfolded(chart) == said(graph)
+        placed = sheet(chart)
+        check(placed)
+        assert shown(placed) == {edge.line for edge in said(graph)}
+        for each in chart.composites:
+            check(sheet(collapsed(chart, [each.name]), [each.name]))
+        every = [each.name for each in chart.composites]
+        check(sheet(collapsed(chart, every), every))
+
+
+def test_the_orders_of_acquire_are_on_its_arrows() -> None:
+    [graph] = graphs("task/acquire")
+    chart = folded(graph)
+    arrows = {(arrow.source, arrow.target): arrow for arrow in sheet(chart).arrows if not arrow.dashed}
+    locate = arrows["state_2", "state_3"].label
+    assert locate is not None
+    assert ("does", "/ order locate") in locate.rows[0].texts
+    [group] = chart.composites
+    assert (group.states, [row.line for row in group.stays]) == (
+        ("state_2", "state_3", "state_4", "state_5"),
+        ["15"],
+    )
+    fan = arrows[group.name, "f_state"].label
+    assert fan is not None
+    assert [row.line for row in fan.rows] == ["10", "11", "12", "13"]
+    assert chart.doing["state_3"] == ("locate", "executing")
+    shut = collapsed(chart, [group.name])
+    assert {"state_2", "state_3"}.isdisjoint(box.name for box in sheet(shut, [group.name]).boxes)
+    assert ("d_state", ("state_5",)) in {(a.target, row.sources) for a in shut.arrows for row in a.rows}
+
+
+NAMES = st.sampled_from(
+    ["a", "b", "c", "d", "e", "f", "a_state_with_a_name_that_is_longer_than_any_label_may_be_wide"]
+)
+GUARDS = st.sampled_from(
+    [
+        "",
+        "x",
+        "x = 1 and y /= 2",
+        "not_a_word_that_could_be_broken_anywhere_however_long_it_is = 17",
+        "(x or y) and " * 9 + "z",
+    ]
+)
+EFFECTS = st.sampled_from(
+    ["", "command_out(go)", "procedures(begin, end) command_out(stop) status_out(done)", "x(1) y(2) z(3)"]
+)
+EDGES = st.builds(
+    Edge,
+    st.sampled_from("123456789"),
+    NAMES | st.just(ANY),
+    NAMES | st.just(ANY),
+    GUARDS,
+    EFFECTS,
+    st.sampled_from(["", "p"]),
+    shown=GUARDS,
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(EDGES, min_size=1, max_size=24, unique_by=lambda e: (e.line, e.source, e.target)), st.data())
+def test_any_graph_is_drawn_whole_and_legible(edges: list[Edge], data: st.DataObject) -> None:
+    states = sorted({end for edge in edges for end in (edge.source, edge.target)} - {ANY})
+    graph = StateGraph(
+        "t", "now", tuple(edges), initial=data.draw(st.sampled_from([*states, ""])), states=tuple(states)
+    )
+    chart = folded(graph)
+    assert unfolded(chart) == said(graph)
+    check(sheet(chart))
+    names = [each.name for each in chart.composites]
+    if names:
+        shut = data.draw(st.lists(st.sampled_from(names), unique=True))
+        check(sheet(collapsed(chart, shut), shut))
+        for_sources(chart)
+
+
+def for_sources(chart: Chart) -> None:
+    """A row that names no sources leaves every state of its composite."""
+    states = {each.name: set(each.states) for each in chart.composites}
+    for arrow in chart.arrows:
+        for row in arrow.rows:
+            wanted = states.get(arrow.source, {arrow.source})
+            assert {edge.source for edge in row.edges} == set(row.sources or wanted)
