@@ -74,6 +74,19 @@ def one_line(diagnostic: Diagnostic, sources: Sources) -> str:
     return f"{place}: {diagnostic.severity.value}[{diagnostic.code.value}]: {message}"
 
 
+def with_witness(diagnostic: Diagnostic, sources: Sources) -> str:
+    """The one line, and below it each witness that a text shows: its values, its region, how many more there are."""
+    lines = [one_line(diagnostic, sources)]
+    for witness in diagnostic.shown:
+        values = (f"{name} = {value}" for name, value in zip(witness.variables, witness.values, strict=True))
+        lines.append(f"  witness: {escape(', '.join(values))}")
+        if witness.region:
+            lines.append(f"  region: {escape(region(witness))}")
+    if diagnostic.left_out:
+        lines.append(f"  and {diagnostic.left_out}")
+    return "\n".join(lines)
+
+
 def plain(rows: Iterable[Row]) -> str:
     """The rows' text alone, each ended by a newline."""
     return "".join("".join(piece.text for piece in row).rstrip() + "\n" for row in rows)

@@ -187,6 +187,12 @@ class RunningLevel:
         return self.sign.table_of(self.level, self.values)
 
     @property
+    def fault_text(self) -> str:
+        """What stopped the last cycle, in words, with what its table saw where that is known."""
+        saw = self.sign.witness(self.table, self.values)
+        return self.sign.fault_text(self.values) + (f"; it saw {saw}" if saw else "")
+
+    @property
     def line(self) -> str:
         """The line that the last cycle ran; empty for none."""
         at = int(self.values[len(self.sign.leaves)])

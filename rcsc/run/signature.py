@@ -198,6 +198,7 @@ class Signature:
         monitored: Assumptions that the executors check.
         stops: By table, those that end the cycle where they fail.
         unset: What has no value when a run begins, though it has that of its type; empty where a symbol file does not say.
+        sees: By table the leaves that decide which line matches; empty likewise.
     """
 
     program: str
@@ -214,6 +215,7 @@ class Signature:
     restart: Mapping[int, Adopted] = field(default_factory=dict)
     serves: Serves | None = None
     unset: tuple[Unset, ...] = ()
+    sees: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def check(self) -> str:
@@ -328,6 +330,13 @@ class Signature:
             return f"{word}: `{about}`"
         return f"{word}: {self.unfit(at, values)}"
 
+    def witness(self, table: str, values: Values) -> str:
+        """What a table saw that ended the cycle by a fault: `width` = 9, `new` = true; empty for other faults, and where nobody knows."""
+        if int(values[len(self.leaves) + 1]) not in _ENDED_BY_A_TABLE:
+            return ""
+        seen = ((name, self.index[name]) for name in self.sees.get(table, ()) if name in self.index)
+        return ", ".join(f"`{name}` = {self.leaves[at].shown(values[at])}" for name, at in seen)
+
     def _invariant(self, at: int) -> str:
         at -= len(self.leaves)
         return self.invariants[at] if at < len(self.invariants) else f"{at}?"
@@ -429,7 +438,17 @@ def signature_of(symbols: CheckedFields) -> Signature:
         {index[name]: adopted for name, adopted in _restart(symbols, leaves).items()},
         _serves(symbols, leaves),
         _unset(symbols, index),
+        _sees(symbols),
     )
+
+
+def _sees(symbols: CheckedFields) -> dict[str, tuple[str, ...]]:
+    """What each table sees; a symbol file says it of each table, a log keeps a mapping."""
+    if isinstance(symbols.value.get("tables"), dict):
+        sees = symbols.table("sees") if "sees" in symbols.value else CheckedFields({})
+        return {identifier(name, "table"): sees.members(name) for name in sees.value}
+    several = symbols.each("tables", MOST_LEVELS)
+    return {table.name("name"): table.members("sees") for table in several if "sees" in table.value}
 
 
 def _unset(symbols: CheckedFields, index: Mapping[str, int]) -> tuple[Unset, ...]:

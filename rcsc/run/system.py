@@ -122,7 +122,7 @@ def _missing(name: str) -> RunningLevel:
 
 
 def _message(level: RunningLevel, tick: int) -> str:
-    return f"level `{level.name}`, table `{level.table}`, cycle {tick}: {level.sign.fault_text(level.values)}"
+    return f"level `{level.name}`, table `{level.table}`, cycle {tick}: {level.fault_text}"
 
 
 def signatures(system: Description, *, fitting: bool = True) -> dict[str, Signature]:

@@ -140,7 +140,9 @@ def _step(part: _Part, name: str) -> str:
     if name == "preprocess":
         admitted = admit(part.program, part.now)
         if isinstance(admitted, str):
-            raise Refused(Code.STATE_TABLE_ERROR, f"input `{admitted}` is refused: it lies outside its range")
+            now = spell(part.program.variable(admitted).type, part.now[admitted])
+            message = f"input `{admitted}` = {now} is refused: it lies outside its range"
+            raise Refused(Code.STATE_TABLE_ERROR, message)
         part.now = admitted
         settle(part.program, part.now)
         return f"preprocess: {', '.join(_in_order(part, part.level.preprocess)) or 'nothing'}"
@@ -149,6 +151,14 @@ def _step(part: _Part, name: str) -> str:
     return "; ".join(
         _match(part, chosen_table(part.program, choice, part.now)) for choice in part.level.choices
     )
+
+
+def _saw(part: _Part, table: Table) -> str:
+    """What a table sees now, as a witness."""
+    seen = (
+        f"`{name}` = {spell(part.program.variable(name).type, part.now[name])}" for name in table.variables
+    )
+    return f"; it saw {', '.join(seen)}" if table.variables else ""
 
 
 def _in_order(part: _Part, procedures: Sequence[str]) -> Sequence[str]:
@@ -172,18 +182,19 @@ def _match(part: _Part, table: Table) -> str:
     failed = failed_assumptions(part.program, table, part.now)
     stopped = [name for name in failed if name in table.stops]
     if stopped:
-        message = (
-            f"table `{table.name}`: assumption `{stopped[0]}` fails, on which the safety of its lines rests"
-        )
+        message = f"table `{table.name}`: assumption `{stopped[0]}` fails, on which the safety of its lines rests{_saw(part, table)}"
         raise Refused(Code.STATE_TABLE_ERROR, message)
     matching = matching_lines(table, part.now)
     warned = f"; assumptions that do not hold: {', '.join(failed)}" if failed else ""
     if len(matching) > 1:
         raise Refused(
-            Code.STATE_TABLE_ERROR, f"table `{table.name}`: lines {', '.join(matching)} match{warned}"
+            Code.STATE_TABLE_ERROR,
+            f"table `{table.name}`: lines {', '.join(matching)} match{warned}{_saw(part, table)}",
         )
     if not matching and table.default is None:
-        raise Refused(Code.STATE_TABLE_ERROR, f"table `{table.name}`: no line matches{warned}")
+        raise Refused(
+            Code.STATE_TABLE_ERROR, f"table `{table.name}`: no line matches{warned}{_saw(part, table)}"
+        )
     at = next((at for at, line in enumerate(table.lines) if line.name in matching), len(table.lines))
     line = table.lines[at] if matching else table.default
     assert line is not None  # it was looked at above

@@ -375,7 +375,7 @@ def _fit(level: RunningLevel) -> None:
 
 
 def _fault(level: RunningLevel) -> str:
-    return f"level `{level.name}`, table `{level.table}`: {level.sign.fault_text(level.values)}"
+    return f"level `{level.name}`, table `{level.table}`: {level.fault_text}"
 
 
 def silent_queries(system: Description, signs: Mapping[str, Signature]) -> dict[str, Query]:

@@ -18,7 +18,7 @@ from rcsc.run.log.export import coverage
 from rcsc.run.log.plot import plot as draw
 from rcsc.run.log.read import Log, LoggedLevel, read
 from rcsc.run.log.records import Seal
-from rcsc.run.log.states import begun_in_words, fault_in_words
+from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
 from rcsc.run.system import signatures
 from rcsc_cell.database.build import BadData
 from rcsc_cell.pages.finding_page import trace
@@ -154,7 +154,8 @@ def _summary(log: Log) -> None:
 def _summed(level: LoggedLevel) -> None:
     """How many cycles, how they ended, and how often the level was started again."""
     values = level.track.layout.unpack(level.track.packed[-1])
-    fault = fault_in_words(level.sign, level.level, values)
+    said = (form(level.sign, level.level, values) for form in (fault_in_words, witness_in_words))
+    fault = "; ".join(filter(None, said))
     click.echo(
         f"level {level.name}: {len(level.track.ticks) - 1} cycles{f'; the last: {fault}' if fault else ''}"
     )

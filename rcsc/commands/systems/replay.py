@@ -13,7 +13,7 @@ from rcsc.run.description import BadDescription, description
 from rcsc.run.log.queries import predicate
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.replay import Replay, ReplayedCycle, ReplayMoment, find
-from rcsc.run.log.states import TRACED, begun_in_words, fault_in_words, words
+from rcsc.run.log.states import TRACED, begun_in_words, fault_in_words, witness_in_words, words
 
 
 @click.command(
@@ -101,6 +101,8 @@ def _show_moment(again: Replay, moment: ReplayMoment, level: str | None) -> None
         logged = again.log.level(cycle.level)
         fault = fault_in_words(logged.sign, logged.level, cycle.recorded)
         click.echo(f"  {cycle.level}: {fault or cycle.line_then}")
+        if saw := witness_in_words(logged.sign, logged.level, cycle.recorded):
+            click.echo(f"    {saw}")
         if cycle.level == level:
             for name, value in words(logged.sign, logged.level, cycle.recorded).items():
                 click.echo(f"    {name} = {value}")

@@ -36,6 +36,7 @@ from rcsc.lang.restart import Adopted, After, Fixed, SameAs
 def symbols(plan: Plan, names: Names, digest: Digest) -> str:
     """The symbol file: every name, for tools."""
     p = names.program
+    safe = {v.name for v in plan.program.variables if v.safe is not None}  # not what it was after a fault
     document = {
         **({"unproved": plan.mark} if plan.mark else {}),
         "program": p,
@@ -71,6 +72,7 @@ def symbols(plan: Plan, names: Names, digest: Digest) -> str:
                 "lines_of_many": f"{p}_{names.tables[t.table.name]}_lines",
                 "step": f"{p}_{names.tables[t.table.name]}_step",
                 "lines": [line.name for line in t.lines],
+                "sees": [name for name in t.table.variables if name not in safe],
                 **({"stops": list(t.table.stops)} if t.table.stops else {}),
             }
             for t in plan.tables

@@ -90,8 +90,9 @@ def signature_text(sign: Signature) -> str:
     del written["restart"]
     if sign.serves is None:
         del written["serves"]
-    if not sign.unset:
-        del written["unset"]
+    for key in ("unset", "sees"):
+        if not written[key]:
+            del written[key]
     for level in written["levels"]:
         if not level["stages"]:
             del level["stages"]

@@ -61,6 +61,12 @@ def fault_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
     return f"table {sign.table_of(level, values)}: {fault_of(sign, values)}" + (f", `{leaf}`" if leaf else "")
 
 
+def witness_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
+    """`it saw `new` = true`: what the table saw whose fault ended the cycle; empty where it ended otherwise."""
+    saw = sign.witness(sign.table_of(level, values), values)
+    return f"it saw {saw}" if saw else ""
+
+
 def begun_in_words(begun: Begun) -> str:
     """Name the state from which a restarted level went on."""
     return _BEGUN[begun]

@@ -222,8 +222,9 @@ class Supervisor:
             return f"level `{name}`: a fault"
         sign = self._signs[name]
         level = next(level for level in sign.levels if level.name == name)
-        table = f", table `{sign.table_of(level, values)}`" if level.stages else ""
-        return f"level `{name}`{table}: {sign.fault_text(values)}"
+        ran = sign.table_of(level, values)
+        table, saw = f", table `{ran}`" if level.stages else "", sign.witness(ran, values)
+        return f"level `{name}`{table}: {sign.fault_text(values)}" + (f"; it saw {saw}" if saw else "")
 
 
 def run_processes(

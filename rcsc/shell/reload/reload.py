@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Severity
-from rcsc.diagnostics.render import one_line
+from rcsc.diagnostics.render import with_witness
 from rcsc.diagnostics.report import Report
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
@@ -148,7 +148,7 @@ def _refused(level: str, why: str, *helps: str) -> Refused:
 
 def _why(report: Report) -> str:
     errors = [diagnostic for diagnostic in report.diagnostics if diagnostic.severity is Severity.ERROR]
-    shown = [one_line(error, report.sources) for error in errors[:MOST_SHOWN]]
+    shown = [with_witness(error, report.sources) for error in errors[:MOST_SHOWN]]
     more = [f"and {len(errors) - MOST_SHOWN} more"] if len(errors) > MOST_SHOWN else []
     return "\n".join(["", *shown, *more])
 
