@@ -49,7 +49,7 @@ MODULES = tuple(
     for room, names in {
         "lang/": "interpret interval_sets operator_table",
         "certify/": "__init__ known owed execution settle table values",
-        "table/regions/": "atoms ends linear partition points region splitting",
+        "table/regions/": "atoms ends holes linear partition points region splitting",
         "table/": "boxes confirm program relational decide",
         "procedures/": "discharge invariants obligations",
         "symbolic/": "effect encode evaluation execution trial values keyed measured",

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import prod
 
 from rcsc.lang.interval_sets import meet
-from rcsc.lang.model import Box, Program, Scalar, Table, Test, Value, key_bounds, value_of_key
+from rcsc.lang.model import Box, Int, Program, Scalar, Table, Test, key_bounds, value_of_key
 from rcsc.table.regions.partition import Boxes, BudgetError, Gaps, common
 from rcsc.table.regions.word_bits import Part, Words, boxes_of
 from rcsc.table.verdict import Gap, Overlap, Region, Witness
@@ -92,9 +92,16 @@ class TableBoxes(Boxes[str]):
 
     def witness(self, keys: Mapping[str, int]) -> Witness:
         """The values of these keys; the least of every other variable."""
-        values: dict[str, Value] = {leaf: self._word(parts, keys) for leaf, parts in self.words.items()}
-        values |= {n: value_of_key(self.kinds[n], key) for n, key in keys.items() if n in self.least}
-        return {**self.least, **values}
+        values = dict(self.least)
+        for name, key in keys.items():
+            if name in values:
+                kind = self.kinds[name]
+                values[name] = (
+                    key if type(kind) is Int else value_of_key(kind, key)
+                )  # most often, and very often
+        for leaf, parts in self.words.items():
+            values[leaf] = self._word(parts, keys)
+        return values
 
     @staticmethod
     def _word(parts: Sequence[Part], keys: Mapping[str, int]) -> int:
@@ -102,7 +109,8 @@ class TableBoxes(Boxes[str]):
 
     def narrowed(self, region: Mapping[str, Box]) -> Region:
         """Leave out variables that may have any key."""
-        return {name: box for name, box in region.items() if box != (self.extents[name],)}
+        extents = self.extents
+        return {name: box for name, box in region.items() if len(box) != 1 or box[0] != extents[name]}
 
     def gap(self, disjoint: bool, most: int = MOST_GAPS) -> Gap | None:
         """Find what no line matches: up to `most` witnesses with regions, and the count if lines are disjoint.

@@ -21,7 +21,7 @@ from rcsc.table.confirm import Agreement, confirm
 from rcsc.table.decide import prove_table
 from rcsc.table.diagnose import diagnostics
 from rcsc.table.program import prove_program
-from rcsc.table.regions import partition
+from rcsc.table.regions import holes, partition
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench import families
@@ -116,13 +116,16 @@ def gaps_are_right(program: Program, right: Matched, gaps: list[Gap]) -> None:
             covered |= points
 
 
-@given(st.sampled_from(["acn", "acnn"]).flatmap(texts))
-def test_findings_are_those_of_brute_force(text: str) -> None:
-    """Where `n` has two columns a line may be dead, which must hide no other."""
+@given(st.sampled_from(["acn", "acnn"]).flatmap(texts), st.booleans())
+def test_findings_are_those_of_brute_force(text: str, counted: bool) -> None:
+    """Where `n` has two columns a line may be dead, which must hide no other; counted, too, where holes are too many."""
     program = program_of(text)
     table, right = program.tables[0], matched(program)
     assert boxes.applies(table)
-    found = prove_table(program, table, Options()).findings
+    with pytest.MonkeyPatch.context() as patched:
+        if counted:
+            patched.setattr(holes, "MOST_LOOKED_AT", 0)
+        found = prove_table(program, table, Options()).findings
     overlaps_are_right(program, right, {(f.first, f.second): f for f in found if isinstance(f, Overlap)})
     gaps_are_right(program, right, [f for f in found if isinstance(f, Gap)])
     dead = {f.line for f in found if isinstance(f, DeadLine)}
@@ -137,6 +140,7 @@ def test_findings_are_those_of_brute_force(text: str) -> None:
         (256, 20, 1, "ok"),
         (1024, 20, 1, "ok"),
         (1024, 20, 5, "gap"),
+        (2000, 24, 100, "gap"),
     ],
 )
 def test_gaps_are_found_beside_overlaps_in_large_tables(
@@ -149,6 +153,46 @@ def test_gaps_are_found_beside_overlaps_in_large_tables(
     assert (gap is not None) == (fault == "gap")
     if gap is not None:
         assert not matching_lines(program.tables[0], gap.witnesses[0])
+        assert gap.count is not None
+
+
+SPACE = {"a": (0, 5), "b": (-2, 3), "c": (0, 1)}
+BOXED = st.fixed_dictionaries(
+    {},
+    optional={
+        name: st.sets(st.integers(low, high)).map(lambda keys: joined((key, key) for key in keys))
+        for name, (low, high) in SPACE.items()
+    },
+)
+
+
+@given(st.lists(BOXED, max_size=6), st.lists(BOXED, max_size=3))
+def test_holes_are_all_that_no_box_fills_each_place_in_one(
+    lines: list[dict[str, Box]], regions: list[dict[str, Box]]
+) -> None:
+    """Also once regions are taken out of them, whether these meet lines and one another or not."""
+    found = holes.holes_between(SPACE, lines)
+    for region in [None, *regions]:
+        assert found is not None
+        if region is not None:
+            found = list(holes.without(found, region, SPACE))
+            lines = [*lines, region]
+        for point in product(*(range(low, high + 1) for low, high in SPACE.values())):
+            at = dict(zip(SPACE, point, strict=True))
+            filled = any(all(holds(box, at[name]) for name, box in line.items()) for line in lines)
+            over = [hole for hole in found if all(a <= at[name] <= b for name, (a, b) in hole.items())]
+            assert len(over) == (not filled)
+
+
+@pytest.mark.parametrize(("widened", "looks"), [(0, 20_000), (40, 60_000), (100, 150_000), (300, 900_000)])
+def test_what_crossing_lines_leave_open_is_found_by_few_looks(
+    monkeypatch: pytest.MonkeyPatch, widened: int, looks: int
+) -> None:
+    """About as many for each of the 1000 lines as the tree of cuts is deep; more, the more of them cross."""
+    monkeypatch.setattr(holes, "MOST_LOOKED_AT", looks)
+    table = program_of(families.box(1000, 24, 7, "gap", widened))
+    decided = boxes.TableBoxes.of(table, table.tables[0])
+    assert holes.holes_between(decided.extents, decided.lines) is not None
 
 
 def test_masks_say_which_lines_are_near(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,6 +221,7 @@ def test_a_search_for_gaps_is_undecided_past_its_budget_where_it_may_look_in_vai
     monkeypatch: pytest.MonkeyPatch, widened: int, exact: bool
 ) -> None:
     program = program_of(families.box(40, 9, 1, "gap", widened))
+    monkeypatch.setattr(holes, "MOST_LOOKED_AT", 0)
     monkeypatch.setattr(partition, "BUDGET", 30)
     found = prove_table(program, program.tables[0], BOXES).findings
     assert any(isinstance(wrong, Gap) for wrong in found) is exact
@@ -434,6 +479,7 @@ def test_without_the_crossing_lines_no_two_overlap(monkeypatch: pytest.MonkeyPat
 def test_a_gap_is_found_where_overlaps_are_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a part that is searched in vain: what was learnt there is of those lines alone."""
     monkeypatch.setattr(partition.Counting, "_count", lambda *_: False)
+    monkeypatch.setattr(holes, "MOST_LOOKED_AT", 0)
     rows = ("false | 0 .. 2", "false | 1 .. 3", "true | 0 .. 1", "true | 1 .. 2")
     lines = "".join(f"| l{at} | {row} ||\n" for at, row in enumerate(rows))
     program = program_of(f"input a : bool\ninput b : int 0 .. 3\ntable t {{\n| line | a | b ||\n{lines}}}\n")

@@ -29,6 +29,6 @@ The tree is the certificate: `rcsc.certify` walks it again with arithmetic of it
 this room. What it costs: splits, which are counted and bounded; a least point within bounds takes a few dozen pivots, one of a
 disjunction is bisected.
 
-Modules, in the order the data flows: `atoms`, `ends` (which lines a cut parts), `linear`, `partition`, `word_bits` (words as boxes of
-their bits), `region`, `points` (within bounds), `splitting`, `least`.
+Modules, in the order the data flows: `atoms`, `ends` (which lines a cut parts), `linear`, `holes` (of boxes that overlap), `partition`,
+`word_bits` (words as boxes of their bits), `region`, `points` (within bounds), `splitting`, `least`.
 """

@@ -7,6 +7,7 @@ a cut parts the lines that are left in a region is then told by two intersection
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping
+from operator import or_
 from typing import NamedTuple, TypeAlias
 
 
@@ -19,6 +20,7 @@ class Cut(NamedTuple):
         here: Lines whose box ends there, or begins right after it.
         below: Lines whose box ends there or before.
         above: Lines whose box begins after it.
+        apart: Both of these.
     """
 
     form: int
@@ -26,6 +28,7 @@ class Cut(NamedTuple):
     here: int
     below: int
     above: int
+    apart: int
 
 
 Span: TypeAlias = tuple[int, int]
@@ -36,14 +39,17 @@ class Ends:
 
     Attributes:
         cuts: Of every form, in the order in which forms were met.
+        everyone: All these lines.
     """
 
     def __init__(self, lines: Mapping[int, Iterable[tuple[int, Span]]]) -> None:
         """Sort the ends of the intervals of these lines, by their numbers."""
+        self.everyone = 0
         begins: dict[int, dict[int, int]] = {}
         ends: dict[int, dict[int, int]] = {}
         for number, spans in lines.items():
             bit = 1 << number
+            self.everyone |= bit
             for form, (low, high) in spans:
                 if form not in begins:
                     begins[form], ends[form] = {}, {}
@@ -76,4 +82,5 @@ def _cuts(form: int, begins: Mapping[int, int], ends: Mapping[int, int]) -> list
         over |= begins.get(at, 0)
         above.append(over)
     here = [begins.get(at, 0) | ends.get(at, 0) for at in places]
-    return list(map(Cut, [form] * len(places), places, here, below, reversed(above)))
+    apart = list(map(or_, below, reversed(above)))
+    return list(map(Cut, [form] * len(places), places, here, below, reversed(above), apart))

@@ -16,6 +16,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 from rcsc.lang.interval_sets import holds, joined, meet, size
 from rcsc.lang.model import Box
+from rcsc.table.regions.holes import Hole, holes_between, without
 
 MOST_PAIRS = 10_000
 """Overlapping pairs that are told apart; a report shows a few."""
@@ -214,14 +215,19 @@ class Gaps(Generic[Axis]):
     both add, and so on. For `a` = 0 .. 6, `b` = 5 .. 9 of 0 .. 9 that is 7 + (5 - 2) = 10, all there are. Where this takes too many
     terms, lines are left out of the count; what is counted is then too little, which only makes the search longer.
 
+    Nothing is counted where lines overlap and what they leave open is known as boxes (`holes`): the least place is then that of a hole.
+
     Attributes:
-        pieces: The terms of the count.
-        exact: Whether every line is in it.
+        pieces: The terms of the count; none where the holes are known.
+        exact: Whether every line is in it, or the holes are known.
+        holes: What is left open, if known, without the regions that were last shown.
     """
 
     table: Boxes[Axis]
     pieces: Sequence[Piece[Axis]]
     exact: bool
+    holes: list[Hole[Axis]] | None = None
+    _shown: list[BoxLine[Axis]] = field(default_factory=list)
     _without: set[tuple[int, int]] = field(default_factory=set)
     _sliced: "dict[Axis, Sliced] | None" = None
     _looked_at: int = 0
@@ -229,11 +235,18 @@ class Gaps(Generic[Axis]):
     @classmethod
     def of(cls, table: Boxes[Axis], *, disjoint: bool) -> "Gaps[Axis]":
         """The search of a table; `disjoint` where no two of its lines overlap."""
+        holes = None if disjoint else holes_between(table.extents, table.lines)
+        if holes is not None:
+            return cls(table, (), exact=True, holes=holes)
         counting = Counting(table, {} if disjoint else dict(table.meeting()))
         return cls(table, counting.pieces, counting.exact)
 
     def missing(self) -> int:
-        """Count the inputs that no line matches; an upper bound where the count is not exact."""
+        """Count the inputs that no line matches, but for the regions last shown; an upper bound where the count is not exact."""
+        if self.holes is not None:
+            extents = self.table.extents
+            every = ({**extents, **hole} for hole in self.holes)
+            return sum(prod(high - low + 1 for low, high in hole.values()) for hole in every)
         filled = sum(piece.sign * piece.sizes[0] for piece in self.pieces)
         return self.table.volume() - filled
 
@@ -245,6 +258,8 @@ class Gaps(Generic[Axis]):
         Raises:
             BudgetError: It was not found within `BUDGET`. Where the count is exact nothing is looked at in vain, and this never happens.
         """
+        if self.holes is not None:
+            return self._least_hole(self.holes, shown)
         axes = self._axes(shown)
         self._without = set()
         alive = _any(1 << at for at, boxes in enumerate([*self.table.lines, *shown]) if all(boxes.values()))
@@ -254,6 +269,20 @@ class Gaps(Generic[Axis]):
             idle &= axis.idle
             below.append((axis, idle))
         return self._search(0, alive, below[::-1], [*self.pieces, *regions])
+
+    def _least_hole(self, holes: list[Hole[Axis]], shown: Sequence[BoxLine[Axis]]) -> Cell[Axis] | None:
+        """The hole with the least place of all, once the regions shown are taken out; they are those shown before, and more."""
+        extents = self.table.extents
+        for region in shown[len(self._shown) :]:
+            holes = list(islice(without(holes, region, extents), MOST_PAIRS + 1))
+            if len(holes) > MOST_PAIRS:
+                raise BudgetError
+            self._shown.append(region)
+            self.holes = holes
+        cells: Iterator[Cell[Axis]] = (
+            {name: hole.get(name, extents[name]) for name in extents} for hole in holes
+        )
+        return min(cells, key=lambda cell: [low for low, _ in cell.values()], default=None)
 
     def _axes(self, shown: Sequence[BoxLine[Axis]]) -> dict[Axis, "Sliced"]:
         """The axes in slices, with the lines and after them the regions shown."""
@@ -389,9 +418,12 @@ def common(first: BoxLine[Axis], second: BoxLine[Axis]) -> dict[Axis, Box] | Non
     """The inputs of both; None where there are none."""
     shared = dict(first)
     for name, box in second.items():
-        shared[name] = meet(shared[name], box) if name in shared else box
-        if not shared[name]:
+        known = shared.get(name)
+        if known is not None:
+            box = meet(known, box)  # noqa: PLW2901  # what is shared of it
+        if not box:
             return None
+        shared[name] = box
     return shared
 
 

@@ -103,9 +103,8 @@ class Tree:
         odd = [Candidate(i, dict(c.boxes), c.rest) for i, c in possible if i not in plain]
         self._ends = Ends({i: [(form, box[0]) for form, box in c.boxes] for i, c in plain.items()})
         given = [Candidate(i, dict(c.boxes), c.rest) for i, c in enumerate(assumptions)]
-        mask = sum(1 << i for i in plain)
         cuts = [cut for cut in self._ends.cuts if universe.low[cut.form] <= cut.at < universe.high[cut.form]]
-        self.root = Region({}, mask, cuts, odd, [c for c in given if not c.holds], Simplex())
+        self.root = Region({}, self._ends.everyone, cuts, odd, [c for c in given if not c.holds], Simplex())
         self.root.carve = tuple(
             (form, box[0]) for c in given for form, box in c.boxes.items() if len(box) == 1
         )
@@ -243,13 +242,14 @@ class Tree:
         """See which cuts part the lines that are intervals, and which lines hold; cuts that part none are dropped."""
         plain, opened, kept, best = region.plain, 0, list[Cut](), NOWHERE
         for cut in region.cuts:
-            form, at, here, below, above = cut
-            if here := here & plain:
+            here = cut[2] & plain
+            if here:
                 kept.append(cut)
                 opened |= here
-                left, right = (below & plain).bit_count(), (above & plain).bit_count()
-                if left + right >= best[0]:
-                    best = max(best, (left + right, min(left, right), -form, -at))
+                parted = (cut[5] & plain).bit_count()
+                if parted >= best[0]:
+                    lesser = min((cut[3] & plain).bit_count(), (cut[4] & plain).bit_count())
+                    best = max(best, (parted, lesser, -cut[0], -cut[1]))
         region.cuts = kept
         holding = [*bits_of(plain & ~opened), *(line.index for line in region.lines if line.holds)]
         return Survey(best, sorted(holding))
