@@ -1,10 +1,12 @@
-"""What a user waits for, in one table: `python -m tests.bench.all`; ten minutes on two processors.
+"""What a user waits for, in one table: `python -m tests.bench.all [--svg FILE]`; ten minutes on two processors, as many more for the SVG.
 
 Each row has its cost here, and in the same run that of something known beside it: an empty Python, Z3 on the same table, nested ifs,
 a scan of all lines. Ratios hold on other machines too, seconds do not. Seconds are of the processor, so that a busy machine prints
 much the same; those of a command are of its whole process and all that it started. `-` is no answer within the limit of a row.
+With `--svg` cost by size is measured, too, and drawn (`drawn`).
 """
 
+import argparse
 import os
 import re
 import shutil
@@ -23,7 +25,7 @@ from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
-from tests.bench import executors, families, loop
+from tests.bench import drawn, executors, families, loop
 from tests.bench.families import Fault
 from tests.bench.peers import PEERS
 from tests.bench.proofs import compiled, limited
@@ -98,8 +100,11 @@ def commands(folder: Path) -> Iterator[Cost]:
     yield from proofs_of_levels(folder, rcsc, empty)
     yield Cost("rcsc test of one level", f"{rcsc('test', '--no-cache', 'tables/gripper'):.1f} s")
     rcsc("campaign", "--episodes", "1", "--plant", "kinematic")
+    begun = least(lambda: rcsc("campaign", "--episodes", "1", "--plant", "kinematic"))
     played = rcsc("campaign", "--episodes", str(EPISODES + 1), "--plant", "kinematic")
     yield Cost("rcsc campaign, kinematic, all included", f"{EPISODES / played:.1f} episodes a CPU second")
+    alone = f"{EPISODES / (played - begun):.1f} episodes a CPU second"
+    yield Cost("rcsc campaign, kinematic, the episodes alone", alone, f"to begin and end takes {begun:.1f} s")
 
 
 def proofs_of_levels(folder: Path, rcsc: Callable[..., float], empty: float) -> Iterator[Cost]:
@@ -219,12 +224,17 @@ def cell(folder: Path) -> Cost:
 
 def main() -> None:
     """Prints the table, row by row as each is measured."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--svg", help="where to draw cost by size")
+    given = arguments.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         for row in commands(Path(scratch)):
             print(row, flush=True)
         for rows in (proofs(), matches(), iter([size(4096, 50)]), iter([cell(Path(scratch))])):
             for row in rows:
                 print(row, flush=True)
+    if given.svg:
+        drawn.main([given.svg])
 
 
 if __name__ == "__main__":
