@@ -274,6 +274,16 @@ class Solver:
         self._solver.add(constant == term)
         return Term(constant)
 
+    def switch(self, term: Term) -> Term:
+        """Return a constant under which, assumed in `check`, the term holds; what is learnt meanwhile outlives the question."""
+        asked: Any = term
+        if _z3().is_const(asked):
+            return term
+        self.names += 1
+        constant = Term(_z3().Bool(f"switch!{self.names}"))
+        self.add(implication(constant, term))
+        return constant
+
     def add(self, *terms: Term) -> None:
         """Asserts the terms."""
         self._solver.add(*terms)

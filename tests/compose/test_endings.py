@@ -3,6 +3,7 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +16,7 @@ from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch
 from rcsc.compose.proof import ranking
 from rcsc.compose.proof.context import gives_an_order
 from rcsc.compose.proof.level import certificate, prove_level
-from rcsc.compose.proof.ranking import RisingLine, inputs, least_power, parts
+from rcsc.compose.proof.ranking import RisingLine, fewest, inputs, least_power, parts
 from rcsc.compose.proof.system import transition_systems
 from rcsc.compose.proof.termination import Ending, longest
 from rcsc.lang.model import Int, Op, Real
@@ -112,25 +113,33 @@ def test_a_way_on_which_a_step_may_be_lost_is_not_shown_to_end(tmp_path: Path) -
     assert ending(tmp_path / "faster", way(faster, inputs=speed)).proved
 
 
-def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
-    """The upper level gives its order again whenever an input changes, as often as that may be."""
-    upper = small_text(
+def ordering_again(more: str = "") -> str:
+    """Return an upper level that gives its order again whenever an input changes, as often as that may be; it declares more, too."""
+    return small_text(
         "upper",
-        ("state new_command", "input which : bool\nstate old_which : bool\nstate new_command"),
+        ("state new_command", f"input which : bool\n{more}state old_which : bool\nstate new_command"),
         ("module send reads to_lower, old_command writes to_lower, old_command {",
          "module send reads to_lower, old_command, which, old_which, new_command, begun writes to_lower, old_command, old_which {"),
         ("if to_lower.input_command /= old_command {",
          "if to_lower.input_command /= old_command or which /= old_which {"),
         ("  old_command := to_lower", "  old_which := which\n  old_command := to_lower"),
     )  # fmt: skip
-    _, found = proved_level(tmp_path, "upper", upper=upper)
+
+
+def work_of(folder: Path, upper: str) -> Ending:
+    """Prove this upper level; return how commands under `work` end."""
+    _, found = proved_level(folder, "upper", upper=upper)
     assert found.open == ()
-    work = next(end for end in found.endings if end.table == "work")
+    return next(end for end in found.endings if end.table == "work")
+
+
+def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
+    work = work_of(tmp_path, ordering_again())
     assert (work.proved, work.still) == (True, ("which",))
 
 
 def test_as_few_inputs_stand_still_as_will_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each is tried without, knowing what a look at all of them left."""
+    """Some are tried without, knowing what a look at all of them left; what nobody reads again is not tried."""
     ts = small_level(tmp_path, "lower")
     asked = SimpleNamespace(rested_on=[])
     looked: list[SimpleNamespace] = []
@@ -144,11 +153,54 @@ def test_as_few_inputs_stand_still_as_will_do(tmp_path: Path, monkeypatch: pytes
         return looked[-1]
 
     monkeypatch.setattr(ranking, "_Ranking", look)
+    monkeypatch.setattr(ranking, "_read_again", lambda *_: {"command", "there", "gone"})
     found = ranking.lines_that_stop(ts.program, asked, (), lambda still: still)  # type: ignore[arg-type,return-value]  # what stands for them
     assert inputs(ts.program) == ("command", "there")
-    assert [one.still for one in looked] == [(), ("command", "there"), ("there",), ()]
+    assert [one.still for one in looked] == [(), ("command", "there"), ("there",)]
     assert (found.still, found.endless) == (("there",), ())
     assert asked.rested_on == [(), ("there",)]
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_fewest_leaves_out_what_one_by_one_does_and_asks_less(seed: int) -> None:
+    """Some groups of names are enough, and whatever contains one; with few needed names, it asks as often as their logarithm has it."""
+    random = Random(seed)  # noqa: S311  # repeatable on purpose
+    names = tuple("abcdefghijklmnop"[: random.randint(1, 16)])
+    groups = [set(random.sample(names, random.randint(1, min(3, len(names))))) for _ in range(3)]
+    asked: list[tuple[str, ...]] = []
+
+    def enough(some: tuple[str, ...]) -> bool:
+        asked.append(some)
+        return any(group <= set(some) for group in groups)
+
+    one_by_one = names
+    for name in names:
+        fewer = tuple(other for other in one_by_one if other != name)
+        one_by_one = fewer if any(group <= set(fewer) for group in groups) else one_by_one
+    assert fewest(names, enough) == one_by_one
+    assert all(some for some in asked)
+    assert len(asked) <= 5 * len(one_by_one)
+    passed = [some for some in asked if any(group <= set(some) for group in groups)]
+    assert (passed or [names])[-1] == one_by_one
+
+
+def test_what_no_question_reads_is_not_asked_to_stand_still(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A level takes eight other things that it does not look at: no more is tried for them."""
+    tried, made = [0], ranking._Ranking.__init__
+
+    def counting_them(*of: Any) -> None:
+        tried[0] += 1
+        made(*of)
+
+    monkeypatch.setattr(ranking._Ranking, "__init__", counting_them)
+    counts = []
+    for at, more in enumerate(("", "".join(f"input other_{number} : bool\n" for number in range(8)))):
+        tried[0] = 0
+        counts.append((work_of(tmp_path / str(at), ordering_again(more)).still, tried[0]))
+    assert counts[0] == counts[1]
+    assert counts[0][0] == ("which",)
 
 
 def test_the_steps_of_a_table_are_read_line_by_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

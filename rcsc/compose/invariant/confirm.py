@@ -78,16 +78,20 @@ class Confirmation:
         return self._denied[clause]
 
     def known(self, clauses: Sequence[Clause]) -> Solver:
-        """Return a solver with one cycle that starts where the clauses hold."""
-        held = [self._held(clause) for clause in clauses]
-        for at in range(len(self.predicates)):
-            self.keyed.term(self.node(at, after=True))
+        """Return a solver with one cycle that starts where the clauses hold; what is asked of it may need more `ranges`."""
+        held = [self._held(clause) for clause in clauses if not self._cannot_break(clause)]
         contract = self.keyed.term(self.cycle.contract)
-        for case in self.cases:
-            self.keyed.term(case)
         solver = Solver(self.limits, remembers=True)
         solver.add(*self.keyed.ranges, contract, *held)
         return solver
+
+    def _cannot_break(self, clause: Clause) -> bool:
+        """Return whether the clause is about values that a predicate never has before the cycle, such as another command."""
+        return any(self._never(at, value) for at, value in clause)
+
+    def _never(self, at: int, value: int) -> bool:
+        node = self.node(at, after=False)
+        return node.known and (node.low != value if value >= 0 else node.low == ~value)
 
     def in_other_terms(self, keyed: Keyed) -> "Confirmation":
         """Return the same questions in other terms."""
@@ -98,8 +102,9 @@ class Confirmation:
     def step_question(self, clauses: Sequence[Clause], case: Node) -> Solver:
         """Ask whether a cycle in this case breaks a clause: unsatisfiable if the clauses are an invariant."""
         broken = smt.any_of([self.broken(clause, after=True) for clause in clauses])
+        here = self.keyed.term(case)
         solver = self.known(clauses)
-        solver.add(self.keyed.term(case), broken)
+        solver.add(here, broken)
         return solver
 
     def first_question(self, clauses: Sequence[Clause], first: Cycle) -> Solver:
@@ -136,11 +141,7 @@ class Confirmation:
 
 def answer(solver: Solver, *terms: Term) -> Answer:
     """Ask whether the terms can hold with all that the solver knows, without adding them to it."""
-    solver.push()
-    solver.add(*terms)
-    reply = solver.check()
-    solver.pop()
-    return reply
+    return solver.check(*map(solver.switch, terms))
 
 
 def may(solver: Solver, *terms: Term) -> bool:

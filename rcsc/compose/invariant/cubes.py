@@ -116,3 +116,42 @@ class Reached:
             if not inside:
                 break
         return inside
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A cycle that the solver showed: the states before it and after it, also as bits of all that they imply."""
+
+    start: Valuation
+    end: Valuation
+    starts: int
+    ends: int
+
+
+@dataclass(slots=True)
+class Ways:
+    """Cycles that the solver showed, and in which frames they begin: a clause that one of them breaks need not be asked about.
+
+    A state is in a frame if no clause of that frame or a later one excludes it.
+    """
+
+    _ways: list[Way] = field(default_factory=list)
+    _outside: list[int] = field(default_factory=list)  # the last frame that excludes the beginning of each
+
+    def add(self, way: Way, outside: int) -> None:
+        """Add a cycle whose beginning clauses exclude from this frame at most."""
+        self._ways.append(way)
+        self._outside.append(outside)
+
+    def exclude(self, mask: int, frame: int) -> None:
+        """Take note of a clause of this frame."""
+        for at, way in enumerate(self._ways):
+            if self._outside[at] < frame and mask & way.starts == mask:
+                self._outside[at] = frame
+
+    def into(self, mask: int, frame: int) -> Way | None:
+        """Return a cycle that leads from the frame outside the cube into the cube, if one is known."""
+        for outside, way in zip(self._outside, self._ways, strict=True):
+            if mask & way.ends == mask and outside < frame and mask & way.starts != mask:
+                return way
+        return None

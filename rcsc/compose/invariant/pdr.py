@@ -22,7 +22,7 @@ from heapq import heappop, heappush
 
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle
-from rcsc.compose.invariant.cubes import Cube, Masks, Pair, Reached, Valuation
+from rcsc.compose.invariant.cubes import Cube, Masks, Pair, Reached, Valuation, Way, Ways
 from rcsc.lang.model import Bool
 from rcsc.solvers.sat import Sat
 from rcsc.symbolic.bits import Bits, Literal, Word, key_of_bits
@@ -59,7 +59,9 @@ class Posed:
         self.after = self._values(bits, predicates, self._ends)
         self.holds = {at: bits.literal(node) for at, node in obligations.items()}
         contract = bits.literal(cycle.contract)
-        self.sat = Sat([*bits.clauses, [contract]])
+        values = (literal for word in (*self._starts, *self._ends) for literal in word)
+        read = (*values, *self.before.values(), *self.after.values(), *self.holds.values())
+        self.sat = Sat([*bits.clauses, [contract]], read)
         self._count = bits.count
 
     @staticmethod
@@ -115,6 +117,10 @@ class PDR:
     _open: set[int] = field(default_factory=set)
     _cores: list[list[tuple[int, Cube]]] = field(init=False)
     _masks: Masks = field(init=False)
+    _ends: dict[Cube, Literal] = field(default_factory=dict)
+    _ways: Ways = field(default_factory=Ways)
+    _bad: dict[Valuation, set[int]] = field(default_factory=dict)
+    _led: Way = field(init=False)
 
     def __post_init__(self) -> None:
         self._cores = [[] for _ in self.firsts]
@@ -167,13 +173,18 @@ class PDR:
     def _exclude(self, obligations: set[int]) -> None:
         """Exclude every state of the last frame from which a cycle breaks an obligation, or leave the obligation open."""
         last = len(self._frames) - 1
+        for point, broken in list(self._bad.items()):  # seen in frames before
+            here = broken & obligations
+            if here and not self._excluded(tuple(enumerate(point)), last) and not self._block(point, last):
+                self._leave(obligations, here)
         while True:
             switch = self.step.fresh()
             self.step.sat.add([-switch, *(-self.step.holds[at] for at in sorted(obligations))])
             if not self.step.sat.holds([*self._held[last:], switch]):
                 return
             point = self.step.start()
-            broken = [at for at in obligations if not self.step.sat.value(self.step.holds[at])]
+            broken = {at for at in obligations if not self.step.sat.value(self.step.holds[at])}
+            self._bad[point] = broken
             self.step.sat.add([-switch])
             if not self._block(point, last):
                 self._leave(obligations, broken)
@@ -195,7 +206,7 @@ class PDR:
             inductive = self._inductive(cube, level)
             if inductive is None:
                 count -= 1
-                heappush(waiting, (level - 1, count, self.step.start()))
+                heappush(waiting, (level - 1, count, self._led.start))
                 continue
             heappop(waiting)
             highest = self._add(self._general(inductive, level), level)
@@ -204,7 +215,9 @@ class PDR:
         return True
 
     def _excluded(self, cube: Cube, level: int) -> bool:
-        return not self.step.sat.holds([*self._held[level:], *(self.step.before[pair] for pair in cube)])
+        """Return whether a clause of the frame excludes the state."""
+        implied = self._masks.implied(cube)
+        return any(self._excludes(implied, at) for at in range(level, len(self._frames)))
 
     # --- generalisation ---
 
@@ -228,14 +241,32 @@ class PDR:
         """Return pairs of the cube to which no cycle leads from the frame outside the cube; None if one leads to all."""
         if level == 0:
             return set()
+        known = self._ways.into(self._masks.of_cube(cube), level)
+        if known is not None:
+            self._led = known
+            return None
         step, switch = self.step, self.step.fresh()
         step.sat.add([-switch, *(-step.before[pair] for pair in cube)])
         led = step.sat.holds([*self._held[level:], switch, *(step.after[pair] for pair in cube)])
         core = None if led else step.sat.core()
+        if led:
+            self._lead(level)
         step.sat.add([-switch])
         if core is None:
             return None
         return {pair for pair in cube if step.after[pair] in core}
+
+    def _lead(self, level: int) -> None:
+        """Keep the cycle of the last model, which begins in the frame."""
+        start, end = self.step.start(), self.step.end()
+        starts, ends = (self._masks.implied(tuple(enumerate(point))) for point in (start, end))
+        self._led = Way(start, end, starts, ends)
+        outside = (at for at in range(level - 1, 0, -1) if self._excludes(starts, at))
+        self._ways.add(self._led, next(outside, 0))
+
+    def _excludes(self, implied: int, level: int) -> bool:
+        """Return whether a clause of just this frame excludes a state that implies these pairs."""
+        return any((mask := self._masks.of_cube(cube)) & implied == mask for cube in self._frames[level])
 
     def _inductive(self, cube: Cube, level: int) -> Cube | None:
         """Return pairs of the cube with which no run of at most `level` cycles ends; None if one may end with all."""
@@ -273,7 +304,7 @@ class PDR:
                 continue
             core = self._not_next(wide, level - 1)
             if core is None:
-                allowed.add(self.step.end()[at])
+                allowed.add(self._led.end[at])
                 continue
             return self._less(wide, kept | core)
         return None
@@ -302,21 +333,39 @@ class PDR:
                 other for other in self._frames[lower] if mask & self._masks.implied(other) != mask
             ]
         self._frames[level].append(cube)
+        self._ways.exclude(mask, level)
         self.step.sat.add([-self._held[level], *(-self.step.before[pair] for pair in cube)])
         return level
 
     def _push(self) -> int | None:
         """Move clauses up; return the first frame without clauses of its own, if any."""
         for level in range(1, len(self._frames) - 1):
-            for cube in list(self._frames[level]):
-                if cube in self._frames[level] and self._kept(cube, level):
+            for cube in self._kept(level):
+                if cube in self._frames[level]:
                     self._frames[level].remove(cube)
                     self._add(cube, level + 1)
             if not self._frames[level]:
                 return level
         return None
 
-    def _kept(self, cube: Cube, level: int) -> bool:
-        """Return whether a cycle from the frame keeps the clause."""
-        step = self.step
-        return not step.sat.holds([*self._held[level:], *(step.after[pair] for pair in cube)])
+    def _kept(self, level: int) -> list[Cube]:
+        """Return the clauses of the frame that every cycle from it keeps: each model leaves out all that it breaks."""
+        step, left = self.step, list(self._frames[level])
+        while left := [cube for cube in left if self._ways.into(self._masks.of_cube(cube), level) is None]:
+            switch = step.fresh()
+            step.sat.add([-switch, *(self._broken_after(cube) for cube in left)])
+            broken = step.sat.holds([*self._held[level:], switch])
+            if broken:
+                self._lead(level)
+            step.sat.add([-switch])
+            if not broken:
+                break
+        return left
+
+    def _broken_after(self, cube: Cube) -> Literal:
+        """Return a literal that implies that a cycle ends in the cube."""
+        if cube not in self._ends:
+            self._ends[cube] = end = self.step.fresh()
+            for pair in cube:
+                self.step.sat.add([-end, self.step.after[pair]])
+        return self._ends[cube]

@@ -45,7 +45,7 @@ class Turn:
     """One cycle of a table.
 
     Attributes:
-        before: The leaves before it; `after`, after it.
+        before: The leaves before it; `taken`, its inputs; `after`, the leaves after it.
         stays: The condition that the table runs, and the command and the phase stay.
         orders: That an order is given.
         unanswered: That the command is not answered.
@@ -54,6 +54,7 @@ class Turn:
 
     at: TableAt
     before: Leaves
+    taken: Leaves
     after: Leaves
     stays: Node
     orders: Node
@@ -64,6 +65,17 @@ class Turn:
     def quiet(self) -> Node:
         """The condition that the last orders are answered, and no other is given."""
         return values.both(self.answered, values.negation(self.orders))
+
+    def nodes(self, program: Program) -> list[Node]:
+        """List all that is asked about."""
+        asked = [
+            self.stays,
+            self.orders,
+            self.unanswered,
+            self.answered,
+            *(when for _, when in self.at.lines),
+        ]
+        return asked + [leaves[name] for name, _ in owned(program) for leaves in (self.before, self.after)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,26 +101,57 @@ def lines_that_stop(
     program: Program, asked: Confirmation, clauses: Sequence[Clause], turns: Turns
 ) -> StoppingLines:
     """Show that lines stop, with as few constant inputs as possible; follow reals only if something is left without."""
-    first = ranking = _Ranking(program, asked, clauses, turns(()))
+    free = turns(())
+    first = ranking = _Ranking(program, asked, clauses, free)
     still: tuple[str, ...] = ()
     rested_on = [ranking.solver]
     if ranking.endless and any(isinstance(kind, Real) for _, kind in owned(program)):
-        first = ranking = _Ranking(program, asked.in_other_terms(Measured()), clauses, turns(()), first)
+        first = ranking = _Ranking(program, asked.in_other_terms(Measured()), clauses, free, first)
         rested_on.append(ranking.solver)
     if ranking.endless:
-        still = inputs(program)
+        read = _read_again(program, free)
+        still = tuple(name for name in inputs(program) if name in read)
         ranking = _Ranking(program, asked, clauses, turns(still), first)
-    for name in still if not ranking.endless else ():
-        fewer = tuple(other for other in still if other != name)
-        without = _Ranking(program, asked, clauses, turns(fewer), first)
-        if not without.endless:
-            ranking, still = without, fewer
+    if not ranking.endless:
+
+        def stop(names: tuple[str, ...]) -> bool:
+            nonlocal ranking
+            without = _Ranking(program, asked, clauses, turns(names), first)
+            ranking = ranking if without.endless else without
+            return not without.endless
+
+        still = fewest(still, stop)
     if still:
         rested_on.append(ranking.solver)
     asked.rested_on += rested_on
     endless = tuple(str(first.turn.at.lines[line][0].name) for line in sorted(ranking.endless))
     one_each = {counted.line: counted for counted in reversed(ranking.counted)}
     return StoppingLines(tuple(reversed(one_each.values())), () if endless else still, endless)
+
+
+def fewest(names: tuple[str, ...], enough: Callable[[tuple[str, ...]], bool]) -> tuple[str, ...]:
+    """Leave out names from the first on, as long as the others are enough; all are, and none are not.
+
+    What is asked last of those that are enough is the result, or nothing was.
+    """
+    kept: tuple[str, ...] = ()
+    while names:
+        # what is enough with fewer names is enough with more
+        many = furthest(0, len(names), lambda many: bool(others := kept + names[many:]) and enough(others))  # noqa: B023 - asked at once
+        kept, names = kept + names[many : many + 1], names[many + 1 :]
+    return kept
+
+
+def _read_again(program: Program, turns: tuple[Turn, Turn, Turn]) -> set[str]:
+    """Collect the records of which a question reads what a later cycle takes: that another one stays changes no question."""
+    nodes = [node for turn in turns for node in turn.nodes(program)]
+    read = values.variables(nodes).keys()
+    return {
+        leaf.partition(".")[0]
+        for turn in turns[1:]
+        for leaf, node in turn.taken.items()
+        if not read.isdisjoint(values.variables([node]))
+    }
 
 
 def inputs(program: Program) -> tuple[str, ...]:

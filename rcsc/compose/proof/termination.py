@@ -33,6 +33,7 @@ from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.proof.context import gives_an_order, of_lines
 from rcsc.compose.proof.ranking import RisingLine, Turn, lines_that_stop, parts
+from rcsc.compose.proof.staying import in_a_row, while_it_stays
 from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Answer
@@ -160,14 +161,20 @@ class Flow:
 
     def __init__(self, ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> None:
         self.ts, self.asked, self.clauses = ts, asked, clauses
-        self.keyed = asked.keyed
-        self.rows: dict[tuple[str, ...], list[Cycle]] = {}
         self.phases: dict[int, _Phases] = {}
+        self._staying: dict[int, Confirmation] = {}
 
     @property
     def tables(self) -> tuple[TableAt, ...]:
         """The tables that are asked about."""
         return self.asked.cycle.tables if reports(self.ts) else ()
+
+    def staying(self, number: int) -> Confirmation:
+        """Return the questions about cycles that keep the command and run this table."""
+        if number not in self._staying:
+            name = str(self.tables[number].table.name)
+            self._staying[number] = while_it_stays(self.ts, self.asked, name)
+        return self._staying[number]
 
     def endings(self) -> Iterator[Ending]:
         """Yield the ending of each table."""
@@ -178,7 +185,7 @@ class Flow:
     def _ending(self, number: int, *, loops: bool) -> Ending:
         changes = self._phases(number).changes
         stopping = lines_that_stop(
-            self.ts.program, self.asked, self.clauses, lambda still: self._turns(number, still)
+            self.ts.program, self.staying(number), self.clauses, lambda still: self._turns(number, still)
         )
         table = str(self.tables[number].table.name)
         return Ending(table, None if loops else changes, stopping.counted, stopping.still, stopping.endless)
@@ -189,7 +196,7 @@ class Flow:
         for number, at in enumerate(self.tables):
             phases = self._phases(number)
             taken = values.both(at.chosen, command_stays(self.ts, self.asked.cycle))
-            before, after = self._ends(phases.leaves)
+            before, after = _ends(self.asked.cycle, phases.leaves)
             conditions += [
                 values.negation(values.all_of((taken, *_are(before, source), *_are(after, target))))
                 for source, target in phases.waiting
@@ -201,8 +208,7 @@ class Flow:
     def _phases(self, number: int) -> _Phases:
         """Return the phases of a table, ignoring flags that toggle while the command is pending."""
         if number not in self.phases:
-            at = self.asked.cycle.tables[number]
-            phases = self._phases_by(at, self._pending_and_flags())
+            phases = self._phases_by(number, self._pending_and_flags())
             turning = {
                 leaf
                 for place, leaf in enumerate(phases.leaves)
@@ -210,7 +216,7 @@ class Flow:
                 if source[place] != target[place] and isinstance(self.ts.kinds[leaf], Bool) and leaf != FLAG
             }
             if turning:
-                phases = self._phases_by(at, tuple(leaf for leaf in phases.leaves if leaf not in turning))
+                phases = self._phases_by(number, tuple(leaf for leaf in phases.leaves if leaf not in turning))
             self.phases[number] = phases
         return self.phases[number]
 
@@ -232,49 +238,47 @@ class Flow:
         ]
         return (*pending_states, *flags)
 
-    def _ends(self, leaves: Sequence[str]) -> tuple[list[Node], list[Node]]:
-        """Return the nodes of a phase, before the cycle and after it."""
-        cycle = self.asked.cycle
-        return [cycle.before[leaf] for leaf in leaves], [cycle.after[leaf] for leaf in leaves]
-
-    def _phases_by(self, at: TableAt, leaves: tuple[str, ...]) -> _Phases:
-        steps = self._steps(at, leaves)
-        return _Phases(leaves, steps, () if steps is None else tuple(self._loops(at, leaves, steps)))
+    def _phases_by(self, number: int, leaves: tuple[str, ...]) -> _Phases:
+        steps = self._steps(number, leaves)
+        return _Phases(leaves, steps, () if steps is None else tuple(self._loops(number, leaves, steps)))
 
     def _loops(
-        self, at: TableAt, leaves: tuple[str, ...], steps: set[Way]
+        self, number: int, leaves: tuple[str, ...], steps: set[Way]
     ) -> Iterator[tuple[set[Phase], bool]]:
         phases = sorted({phase for step in steps for phase in step})
         places = {phase: place for place, phase in enumerate(phases)}
         for part in parts({(places[source], places[target]) for source, target in steps}):
             inside = {phases[place] for place in part}
-            cycle, solver = self.asked.cycle, self.asked.known(self.clauses)
+            asked = self.staying(number)
+            cycle, solver = asked.cycle, asked.known(self.clauses)
             ends = [
                 values.any_of(values.all_of(_are(nodes, phase)) for phase in sorted(inside))
-                for nodes in self._ends(leaves)
+                for nodes in _ends(cycle, leaves)
             ]
             waits = (command_stays(self.ts, cycle), unanswered(self.ts, cycle))
-            term = self.keyed.term(values.all_of((at.chosen, *waits, *ends)))
-            solver.add(*self.keyed.ranges)
-            self.asked.rested_on.append(solver)
+            term = asked.keyed.term(values.all_of((cycle.tables[number].chosen, *waits, *ends)))
+            solver.add(*asked.keyed.ranges)
+            asked.rested_on.append(solver)
             yield inside, may(solver, term)
 
-    def _steps(self, at: TableAt, leaves: tuple[str, ...]) -> set[Way] | None:
+    def _steps(self, number: int, leaves: tuple[str, ...]) -> set[Way] | None:
         """Return every change of phase in a cycle that runs the table; None if they are too many or the solver gave up."""
-        keyed, cycle = self.keyed, self.asked.cycle
-        before, after = self._ends(leaves)
+        asked = self.staying(number)
+        keyed, cycle = asked.keyed, asked.cycle
+        before, after = _ends(cycle, leaves)
         stays = values.all_of(map(values.equal, before, after))
-        moves = keyed.term(values.all_of((at.chosen, command_stays(self.ts, cycle), values.negation(stays))))
+        chosen = cycle.tables[number].chosen
+        moves = keyed.term(values.all_of((chosen, command_stays(self.ts, cycle), values.negation(stays))))
         nodes = (*before, *after)
         terms = [keyed.term(node) for node in nodes]
-        solver = self.asked.known(self.clauses)
+        solver = asked.known(self.clauses)
         solver.add(*keyed.ranges, moves)
         terms = [solver.named(term) for term in terms]
         steps: set[Way] = set()
         while len(steps) < MOST_STEPS:
             answer = solver.check()
             if answer is Answer.UNSATISFIABLE:
-                self.asked.rested_on.append(solver)
+                asked.rested_on.append(solver)
                 return steps
             if answer is Answer.UNKNOWN:
                 return None
@@ -292,22 +296,12 @@ class Flow:
     # --- three cycles in a row ---
 
     def _turns(self, number: int, still: tuple[str, ...]) -> tuple[Turn, Turn, Turn]:
-        """Return three cycles of a table in a row."""
-        first, second, third = (self._turn(cycle, number) for cycle in self._cycles(still))
-        return first, second, third
-
-    def _cycles(self, still: tuple[str, ...]) -> list[Cycle]:
-        """Return three cycles in a row, from anywhere in the invariant, in which these inputs keep their values."""
-        if still not in self.rows:
-            row = [self.asked.cycle]
-            kept = {leaf: taken for leaf, taken in row[0].taken.items() if _stands_still(leaf, still)}
-            for suffix in (" second", " third"):
-                free = {
-                    leaf: values.variable(f"{leaf}{suffix}", node.kind) for leaf, node in row[0].taken.items()
-                }
-                row.append(self.ts.cycle(row[-1].after, suffix, taken={**free, **kept}))
-            self.rows[still] = row
-        return self.rows[still]
+        """Return three cycles of a table in a row, from anywhere in the invariant, in which these inputs keep their values."""
+        first = self.staying(number).cycle
+        kept = {leaf: taken for leaf, taken in first.taken.items() if _stands_still(leaf, still)}
+        row = in_a_row(self.ts, first, self._phases(number).leaves, kept)
+        one, two, three = (self._turn(cycle, number) for cycle in row)
+        return one, two, three
 
     def _turn(self, cycle: Cycle, number: int) -> Turn:
         """Return the cycle of a table in which the command and the phase stay."""
@@ -319,6 +313,7 @@ class Flow:
         return Turn(
             at,
             cycle.before,
+            cycle.taken,
             cycle.after,
             stays,
             orders,
@@ -336,15 +331,16 @@ class Flow:
             return set()
         if isinstance(chosen.selector, Read) and chosen.selector.name in above.numbered:
             return set()  # the same under the same number: the contract
-        first, second, _ = self._cycles(())
-        term = self.keyed.term
+        first = self.asked.cycle
+        second = self.ts.cycle(first.after, " second")
+        term = self.asked.keyed.term
         goes_on = [
             term(values.both(cycle.contract, command_stays(self.ts, cycle))) for cycle in (first, second)
         ]
         runs = [[term(at.chosen) for at in cycle.tables] for cycle in (first, second)]
         solver = self.asked.known(self.clauses)
         self.asked.rested_on.append(solver)
-        solver.add(*self.keyed.ranges, *goes_on)
+        solver.add(*self.asked.keyed.ranges, *goes_on)
         steps = {
             (here, there)
             for here, now in enumerate(runs[0])
@@ -352,6 +348,11 @@ class Flow:
             if here != there and may(solver, now, then)
         }
         return {table for part in parts(steps) for table in part}
+
+
+def _ends(cycle: Cycle, leaves: Sequence[str]) -> tuple[list[Node], list[Node]]:
+    """Return the nodes of a phase, before the cycle and after it."""
+    return [cycle.before[leaf] for leaf in leaves], [cycle.after[leaf] for leaf in leaves]
 
 
 def _are(nodes: Sequence[Node], phase: Phase) -> list[Node]:
