@@ -13,11 +13,11 @@ they rest on.
 Trusted: the arguments in `compose.__doc__` and in `termination`; that questions are put as they say (`level`, `context`, `ranking`,
 `termination`, `assume_guarantee`); Z3, or cvc5 with `--certify`, which answers the same questions from their text.
 
-Cost: linear in the number of levels, which are proved one by one; termination asks about three cycles in a row.
+Cost: linear in the number of levels, which are proved one by one; termination asks about three cycles of a table in a row.
 A proof is kept under a digest of all that it depends on, and only read the next time. After a change the clauses of the last search are
 the first that the next one tries.
 
-Modules, in the order the data flows: `context` (lines), `ranking` (what stops), `termination` (commands), `candidates` (clauses of the
-last search), `level` (all of one level),
-`assume_guarantee` (promises, claims), `kept` and `standing` (the cache), `system`.
+Modules, in the order the data flows: `context` (lines), `staying` (the cycles of one table), `ranking` (what stops), `termination`
+(commands), `candidates` (clauses of the last search), `level` (all of one level), `assume_guarantee` (promises, claims), `kept` and
+`standing` (the cache), `system`.
 """
