@@ -129,8 +129,8 @@ class _Memory:
             rest -= set(notes)
             report = table_report(verdict, self.program)
             if report.verdict is Verdict.PROVED and touching == notes:
-                moved = tuple(moved(note, -place.start, "") for note in notes)
-                self.cache.store(_Kept(report, moved), *self._key(verdict.table))
+                placed = tuple(moved(note, -place.start, "") for note in notes)
+                self.cache.store(_Kept(report, placed), *self._key(verdict.table))
         if not rest:
             self.cache.store(_Rest(), self.common)
 
