@@ -1447,10 +1447,10 @@ class Code(StrEnum):
     logs, `parquet` for Parquet files, `live` for the page that follows a run, `certify` for cvc5, `graph` for drawings of tables,
     `cluster` for a campaign on a cluster. In a checkout: `pip install -e '.[cell]'`.
     """
-    NO_FINDING = """RCS706: a log keeps no finding
+    NO_CYCLE = """RCS706: a log holds no cycle
 
-    `rcsc log FILE --report PAGE` draws the run of a finding, which `rcsc prove --log DIR` keeps: a few cycles, each whole. A run in the
-    cell is drawn while it runs: `rcsc run SCRIPT --report PAGE`; of its log `--plot` draws single values.
+    `rcsc log FILE --report PAGE` draws a recorded run, and of a finding, which `rcsc prove --log DIR` keeps, each cycle whole. The log has
+    what the levels started from, and nothing more: the run was cut off before its first cycle was kept.
     """
     LOG_NOT_WHOLE = """RCS707: a log is not whole
 

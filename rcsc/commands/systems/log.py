@@ -1,6 +1,7 @@
 """`rcsc log`: what a recorded run did."""
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -22,6 +23,8 @@ from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
 from rcsc.run.system import signatures
 from rcsc_cell.database.build import BadData
 from rcsc_cell.pages.finding_page import trace
+from rcsc_cell.pages.log_page import story_of
+from rcsc_cell.pages.report import report as run_page
 from rcsc_cell.pictures.scene import DrawnCell, cell, same_system
 from rcsc_cell.workstation.prepared import database_of
 
@@ -36,6 +39,7 @@ Examples:
   rcsc log run.mcap --csv run.csv --json run.json  every cycle, in the tables' words
   rcsc log run.mcap --plot task.cur_state,primitive.travelled_mm -o run.svg
   rcsc log run.mcap --plot primitive.from_robot.plate[1] --against primitive.from_robot.plate[0] -o path.svg
+  rcsc log run.mcap --report run.html              orders, values, lines and the cell, as a page
   rcsc log found/task_waits_to_emove.mcap --report waits.html   what `rcsc prove --log found` found, cycle by cycle""",
 )
 @FILE
@@ -50,7 +54,7 @@ Examples:
 @click.option("--against", default=None, metavar="VAR", help="Draw them over VAR instead.")
 @click.option("-o", "--output", type=_TO, default=None, metavar="PICTURE", help="Where: .svg, .png or .pdf.")
 @click.option("--report", type=_TO, default=None, metavar="PAGE",
-              help="Write a page about a finding of `rcsc prove --log`: its levels and the cell, cycle by cycle.")  # fmt: skip
+              help="Write a page about the run; of a finding of `rcsc prove --log`: its levels and the cell, cycle by cycle.")  # fmt: skip
 @click.option("--system", type=click.Path(exists=True, path_type=Path), default=None, metavar="SYSTEM",
               help="For --report: the system whose cell is drawn; else system.toml here or in tables/, if it is the log's.")  # fmt: skip
 @told
@@ -66,10 +70,10 @@ def command(  # noqa: PLR0913  # as many as there are options
     if system is not None and report is None:
         raise click.UsageError("--system needs --report")
     log = read(file)
-    if report is not None and log.finding is None:
+    if report is not None and not log.ticks:
         return refuse(
-            file, Code.NO_FINDING, "the log keeps no finding of `rcsc prove`, of which a page could be made",
-            help_="`rcsc run SCRIPT --report PAGE` makes one of a run in the cell; `--plot` draws values of its log",
+            file, Code.NO_CYCLE, "the log holds no cycle of which a page could be made",
+            help_="`rcsc run SCRIPT --report PAGE` makes a log and a page",
         )  # fmt: skip
     exported = _exported(log, csv, json_, parquet)
     if plot is not None and output is not None:
@@ -121,13 +125,25 @@ def _written(path: Path, write: Callable[[], object]) -> None:
 
 
 def _report(path: Path, log: Log, system: Path | None) -> None:
-    """Draw the log's finding."""
+    """Draw the log's finding, or else its run."""
     finding = log.finding
-    assert finding is not None
     cell, why_not = _cell_of(log, system)
     if cell is None:
         click.echo(f"no cell is drawn: {why_not}")
-    _written(path, lambda: trace(path, log, finding, cell, why_not))
+    if finding is not None:
+        _written(path, lambda: trace(path, log, finding, cell, why_not))
+        return
+    displays = _displays(log, system) if cell is None else cell.system.displays
+    _written(path, lambda: run_page(path, story_of(log, cell, displays, why_not)))
+
+
+def _displays(log: Log, system: Path | None) -> Mapping[str, Sequence[str]]:
+    """What the system shows, where it is there and the log is of it; it may have no cell."""
+    with contextlib.suppress(NoSystem, BadDescription):
+        described = description(system_path(system))
+        if same_system(log, described):
+            return described.displays
+    return {}
 
 
 def _summary(log: Log) -> None:

@@ -11,5 +11,6 @@ True
 Any system has these; the paper's cell adds what is true of it alone. Nothing here is trusted for a proof. What it costs:
 a copy of what is drawn, a cycle; a report keeps a picture every 25 cycles at the least.
 
-Modules, in the order the data flows: `witness` watches a run, `report` and `finding_page` are pages (`page`).
+Modules, in the order the data flows: `witness` watches a run, `log_page` reads one, `report` and `finding_page` are
+pages (`page`).
 """

@@ -55,7 +55,7 @@ def page(log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str 
         finding=finding,
         ticks=[_tick(frame, log, finding, cell) for frame in frames(log)],
         notes=_notes(log, finding),
-        cell=_cell(cell, why_not),
+        cell=about_cell(cell, why_not),
         sign=_SIGNS,
     )
 
@@ -86,8 +86,8 @@ def _notes(log: Log, finding: LoggedFinding) -> list[str]:
     return notes
 
 
-def _cell(cell: DrawnCell | None, why_not: str) -> str:
-    """What the pictures of the cell rest on."""
+def about_cell(cell: DrawnCell | None, why_not: str) -> str:
+    """What the pictures of the cell rest on; arguments as those of `trace`."""
     if cell is None:
         return f"No cell is drawn: {why_not}"
     return (

@@ -5,6 +5,7 @@ the parts ended, which lines of the tables ran, how near the joints came to thei
 scripts and fetches nothing; it says so to the browser.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -78,6 +79,8 @@ class Story:
         margins_deg: The least distance of each joint from its limits.
         tick_ms: Of the system.
         ticks: How many there were: those of all rows, and those in which nothing was ordered any more.
+        recorded: What is said of the log that the story is of; empty for a run that was watched. Its rows are orders, which may overlap.
+        about_cell: What the pictures rest on, where that is not the plant.
     """
 
     title: str
@@ -90,11 +93,32 @@ class Story:
     margins_deg: Sequence[float] = ()
     tick_ms: int = 40
     ticks: int = 0
+    recorded: str = ""
+    about_cell: str = ""
+
+    @property
+    def counted(self) -> str:
+        """How many rows a script had, or how many orders there are in a log; empty for none."""
+        word = "order" if self.recorded else "row"
+        return f"{len(self.rows)} {word}{'s' if len(self.rows) != 1 else ''}, " if self.rows else ""
+
+    @property
+    def outcome(self) -> str:
+        """What became of them: of a script what stopped it, of a log how many there are of each; empty where all is done."""
+        bad = [row for row in self.rows if row.state != "done"]
+        if not bad:
+            return ""
+        if self.recorded:
+            states = Counter(row.state for row in self.rows)
+            return ", ".join(f"{count} {state}" for state, count in states.items())
+        first = bad[0]
+        return f"stopped in row {first.number}: {first.state}" + (f": {first.reason}" if first.reason else "")
 
     @property
     def aside(self) -> int:
         """Cycles of no row: in which a level came to rest after the last."""
-        return max(0, self.ticks - sum(row.cycles for row in self.rows)) if self.rows else 0
+        within = self.rows and not self.recorded  # orders of a log overlap
+        return max(0, self.ticks - sum(row.cycles for row in self.rows)) if within else 0
 
 
 @dataclass(frozen=True, slots=True)
