@@ -37,6 +37,7 @@ COMMANDS = {
     "tables.fmt": "Align tables.",
     "tables.graph": "Draw a table's state graph.",
     "systems.log": "Say what a recorded run did.",
+    "tables.lsp": "Serve an editor as tables are typed.",
     "new": "Make a small project.",
     "systems.prove": "Prove the levels of a system together, for any delay.",
     "systems.replay": "Run a recorded run again and compare.",

@@ -21,8 +21,8 @@ lines typed above it, comments and other tables cost nothing. Trusted: what `rcs
 `rcsc.lang.model` mean the same.
 
 Modules, in the order the data flows: `places` (lines and columns), `values` (what is answered), `written` (tables as rows of
-text, parsed or not), `memo`, `recovery`, `standing` (four states in words, told by one function), `grid` (a table as data), `repairs`,
-`workspace`.
+text, parsed or not), `memo`, `recovery`, `standing` (four states in words, told by one function), `grid` (a table as data),
+`repairs`, `workspace`, `keys` (what keys do in tables), `lenses` (what actions do); then the rooms `names` and `server`.
 """
 
 from rcsc.editor.workspace import Workspace

@@ -31,6 +31,8 @@ _BEGINS = re.compile(
     r"|owner|table|link|serves|commands|adopt|level)\b(?:[ \t]+(?P<name>\w+))?",
     re.MULTILINE | re.ASCII,
 )
+_AFTER = re.compile(r"(?:\s*^[ \t]*#[^\r\n]*)*\s*\Z", re.MULTILINE)
+"""Comments of what comes next, and blank lines."""
 _WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _COMMENT = re.compile(r"#[^\r\n]*")
 _NOT_END = re.compile(r"[^\r\n]")
@@ -92,6 +94,33 @@ class _Pieces:
         if begins is not None and begins["word"] == "table" and begins["name"]:
             return frozenset({begins["name"]})
         return self.words(span)
+
+
+def declarations(source: Source) -> Iterator[tuple[str, str, Span, Span]]:
+    """Yield the word, the name, all of it, and the place of the name, of what a text declares, whether it parses or not."""
+    pieces = _Pieces.of(source)
+    for found in _BEGINS.finditer(source.text):
+        inner = found["word"] == "table" and found["name"] in {None, "by"}
+        name = _named(source.text, found)
+        if name is not None and not inner and found["word"] != "use":
+            whole = pieces.around(found.start("word"))
+            end = found.start("word") + len(_AFTER.sub("", source.text[found.start("word") : whole.end]))
+            yield (
+                found["word"],
+                name[0],
+                Span(source.name, found.start("word"), end),
+                Span(source.name, *name[1]),
+            )
+
+
+def _named(text: str, found: re.Match[str]) -> tuple[str, tuple[int, int]] | None:
+    """The name of a declaration and where it stands: of `extern procedure name` the third word."""
+    if found["name"] is None:
+        return None
+    if found["word"] == "extern":
+        third = _WORD.search(text, found.end())
+        return None if third is None else (third[0], third.span())
+    return found["name"], found.span("name")
 
 
 def rest_of(root: str, loaded: Loaded, overlay: Mapping[str, str]) -> Rest:

@@ -1,12 +1,14 @@
 """Texts that are open over the files on disk, and what is known of them.
 
-In: texts as they are typed. Out: answers. One thread at a time asks: solvers are not shared. Nothing is kept on disk, and the
-cache of earlier runs is not asked: what is typed is mostly new.
+In: texts as they are typed. Out: answers. One thread at a time has things proved: solvers are not shared; any may open and read.
+Nothing is kept on disk, and the cache of earlier runs is not asked: what is typed is mostly new.
 """
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from threading import Lock
+from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity, WitnessColumn, sort_key
@@ -23,12 +25,51 @@ from rcsc.editor.values import Answer, Finding, Repair, Standing, Witness, Witne
 from rcsc.editor.written import WrittenTable, tables_of
 from rcsc.host.memory import uncollected
 from rcsc.lang.model import Program
-from rcsc.lang.project import Loaded, load
+from rcsc.lang.project import PROJECT_FILE, Loaded, load, project_root
 from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
 
+if TYPE_CHECKING:
+    from rcsc.lang.syntax import tree
+
 BOM = "\ufeff"
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A file read as the texts were, with all that it uses; nothing is proved of it.
+
+    Attributes:
+        path: The file.
+        loaded: What was read.
+        program: None where the text is not in order.
+        rest: What is looked at instead.
+        wrong: Why it is not in order.
+    """
+
+    path: str
+    loaded: Loaded
+    program: Program | None
+    rest: Rest | None
+    wrong: tuple[Diagnostic, ...]
+
+    @property
+    def nearest(self) -> Program | None:
+        """The program, or what is left of it."""
+        return self.program if self.rest is None else self.rest.program
+
+    @property
+    def files(self) -> "Mapping[str, tree.File]":
+        """Every file that parses; of one that does not what is left of it."""
+        return self.loaded.files if self.rest is None else {**self.loaded.files, **self.rest.loaded.files}
+
+    @property
+    def sources(self) -> Mapping[str, Source]:
+        """Every text, as it is."""
+        return (
+            self.loaded.sources if self.rest is None else {**self.rest.loaded.sources, **self.loaded.sources}
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,25 +77,15 @@ class Checked:
     """A file checked as the texts were.
 
     Attributes:
-        loaded: What was read.
-        program: None where the text is not in order.
-        rest: What was looked at instead.
         diagnostics: What `rcsc check` says of the file.
         meanwhile: What else was found in the rest.
         reports: Of each table, by file and name.
     """
 
-    loaded: Loaded
-    program: Program | None
-    rest: Rest | None
+    reading: Reading
     diagnostics: tuple[Diagnostic, ...]
     meanwhile: tuple[Diagnostic, ...]
     reports: Mapping[tuple[str, str], TableReport]
-
-    @property
-    def nearest(self) -> Program | None:
-        """The program, or what is left of it."""
-        return self.program if self.program is not None else None if self.rest is None else self.rest.program
 
 
 class Workspace:
@@ -68,7 +99,9 @@ class Workspace:
     def __init__(self, options: Options | None = None) -> None:
         self.options = options or Options()
         self.memo = Memo()
-        self._overlay: dict[str, str] = {}
+        self._overlay: Mapping[str, str] = {}
+        self._readings: dict[str, Reading] = {}
+        self._reads = Lock()
         self._checked: dict[str, Checked] = {}
         self._answers: dict[str, tuple[Checked, Answer]] = {}
 
@@ -82,11 +115,12 @@ class Workspace:
             text: All of it. A byte order mark is no part of what it says.
         """
         blank = " " if text.startswith(BOM) else ""
-        self._overlay[os.path.realpath(file)] = blank + text.removeprefix(BOM)
+        self._overlay = {**self._overlay, os.path.realpath(file): blank + text.removeprefix(BOM)}
 
     def close(self, file: str) -> None:
         """Go back to what is on disk."""
-        self._overlay.pop(os.path.realpath(file), None)
+        gone = os.path.realpath(file)
+        self._overlay = {path: text for path, text in self._overlay.items() if path != gone}
 
     @property
     def overlay(self) -> Mapping[str, str]:
@@ -101,7 +135,25 @@ class Workspace:
         loaded = load([file], overlay=self._overlay)
         return loaded.sources[file].text if file in loaded.sources else ""
 
+    def trial(self, texts: Mapping[str, str]) -> "Workspace":
+        """Another workspace of the same texts, but for some, that knows what this one has proved.
+
+        Args:
+            texts: By path.
+        """
+        other = Workspace(self.options)
+        other.memo = self.memo
+        other._overlay = {**self._overlay, **{os.path.realpath(path): text for path, text in texts.items()}}
+        return other
+
     # --- answers ---
+
+    def answered(self, path: str) -> Answer | None:
+        """The last answer to a file, if no text that it depends on has changed since; nothing is proved for it."""
+        known, checked = self._answers.get(path), self._checked.get(path)
+        if known is None or checked is None or checked.reading is not self.reading(path):
+            return None
+        return known[1]
 
     def check(self, file: str, go_on: Callable[[], bool] = lambda: True) -> Answer:
         """What is known of a file and of all that it uses, as the texts are now.
@@ -122,27 +174,39 @@ class Workspace:
         return known[1]
 
     @uncollected()
+    def reading(self, path: str) -> Reading:
+        """A file read, from memory where no text that it depends on has changed; any thread may ask.
+
+        Args:
+            path: Absolute and normal.
+        """
+        with self._reads:
+            overlay = self._overlay
+            loaded = load([path], overlay=overlay)
+            before = self._readings.get(path)
+            if before is not None and _alike(before.loaded, loaded):
+                return before
+            self._readings[path] = reading = _read(path, loaded, overlay)
+            return reading
+
+    @uncollected()
     def checked(self, path: str) -> Checked:
         """A file checked, from memory where no text that it depends on has changed."""
-        loaded = load([path], overlay=self._overlay)
+        reading = self.reading(path)
         before = self._checked.get(path)
-        if before is not None and _alike(before.loaded, loaded):
-            return before
-        checked = self._check(path, loaded)
-        self._checked[path] = checked
-        return checked
+        if before is None or before.reading is not reading:
+            self._checked[path] = before = self._check(reading)
+        return before
 
-    def _check(self, path: str, loaded: Loaded) -> Checked:
-        resolved = resolve(path, loaded) if path in loaded.files else ()
-        if isinstance(resolved, Program):
-            found, reports = self._proved(resolved)
-            every = tuple(sorted({*loaded.diagnostics, *found}, key=sort_key))
-            return Checked(loaded, resolved, None, every, (), reports)
-        every = tuple(sorted({*loaded.diagnostics, *resolved}, key=sort_key))
-        rest = rest_of(path, loaded, self._overlay)
-        found = () if rest.program is None else self._proved(rest.program)[0]
-        more = tuple(sorted({*rest.wrong, *_serious(found)} - set(every), key=sort_key))
-        return Checked(loaded, None, rest, every, more, {})
+    def _check(self, reading: Reading) -> Checked:
+        if reading.program is not None:
+            found, reports = self._proved(reading.program)
+            every = tuple(sorted({*reading.wrong, *found}, key=sort_key))
+            return Checked(reading, every, (), reports)
+        assert reading.rest is not None
+        found = () if reading.rest.program is None else self._proved(reading.rest.program)[0]
+        more = {*reading.rest.wrong, *_serious(found)} - set(reading.wrong)
+        return Checked(reading, reading.wrong, tuple(sorted(more, key=sort_key)), {})
 
     def _proved(self, program: Program) -> tuple[tuple[Diagnostic, ...], dict[tuple[str, str], TableReport]]:
         names = [table.name for table in program.tables]
@@ -152,6 +216,30 @@ class Workspace:
             report = resting(table_report(each, program), verdict.unproved, verdict.unsafe)
             reports[report.file, report.table] = report
         return verdict.findings, reports
+
+    def project(self, file: str) -> tuple[str, ...]:
+        """The files that may belong with one: those of its project; without a project file those beside it alone.
+
+        Args:
+            file: Absolute and normal.
+        """
+        root = project_root(file)
+        if os.path.isfile(os.path.join(root, PROJECT_FILE)):
+            found = load([root], overlay=self._overlay).given
+        else:
+            names = os.listdir(root) if os.path.isdir(root) else []
+            found = tuple(os.path.join(root, name) for name in sorted(names) if name.endswith(".rcs"))
+        return tuple(dict.fromkeys((file, *map(os.path.normpath, found))))
+
+    def read_all(self, files: Sequence[str], over: Mapping[str, str] | None = None) -> Loaded:
+        """Files and all that they use, as the texts are.
+
+        Args:
+            files: Absolute.
+            over: Texts that stand for what is open, by path.
+        """
+        texts = {os.path.realpath(path): text for path, text in (over or {}).items()}
+        return load(files, overlay={**self._overlay, **texts})
 
     # --- repairs ---
 
@@ -165,7 +253,7 @@ class Workspace:
         return tuple(self._repairs(checked, finding.told))
 
     def _repairs(self, checked: Checked, told: Diagnostic) -> Iterator[Repair]:
-        source = checked.loaded.sources.get(told.primary.span.file)
+        source = checked.reading.loaded.sources.get(told.primary.span.file)
         if source is None:
             return
         for proposal in told.proposals:
@@ -182,17 +270,15 @@ class Workspace:
 
     def _outcome(self, checked: Checked, source: Source, told: Diagnostic, text: str) -> bool | None:
         """Whether nothing is wrong with the table in a text; None where the finding is still there, or another has come."""
-        trial = Workspace(self.options)
-        trial.memo = self.memo
-        trial._overlay = {**self._overlay, os.path.realpath(source.name): text}
-        after = trial.checked(checked.loaded.given[0])
+        trial = self.trial({source.name: text})
+        after = trial.checked(checked.reading.path)
         before = {_key(each) for each in _serious(checked.diagnostics)}
         now = {_key(each) for each in _serious(after.diagnostics)}
         gone = _key(told) not in now or (told.code in _COUNTED and told.message not in _messages(after))
-        if after.program is None or not gone or now - before:
+        if after.reading.program is None or not gone or now - before:
             return None
         table = told.proposals[0].table
-        wrong = any(table in _names_in(after.loaded, each) for each in _serious(after.diagnostics))
+        wrong = any(table in _names_in(after.reading.loaded, each) for each in _serious(after.diagnostics))
         return not wrong
 
 
@@ -213,6 +299,14 @@ def _messages(checked: Checked) -> set[str]:
 
 def _serious(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     return [each for each in diagnostics if each.severity is not Severity.NOTE]
+
+
+def _read(path: str, loaded: Loaded, overlay: Mapping[str, str]) -> Reading:
+    resolved = resolve(path, loaded) if path in loaded.files else ()
+    if isinstance(resolved, Program):
+        return Reading(path, loaded, resolved, None, loaded.diagnostics)
+    wrong = tuple(sorted({*loaded.diagnostics, *resolved}, key=sort_key))
+    return Reading(path, loaded, None, rest_of(path, loaded, overlay), wrong)
 
 
 def _alike(before: Loaded, now: Loaded) -> bool:
@@ -263,20 +357,20 @@ class _Files:
 
 
 def _answer(path: str, checked: Checked) -> Answer:
-    sources = {**(checked.rest.loaded.sources if checked.rest else {}), **checked.loaded.sources}
-    files = _Files(sources)
+    reading = checked.reading
+    files = _Files(reading.sources)
     told = [(each, False) for each in checked.diagnostics] + [(each, True) for each in checked.meanwhile]
     told.sort(key=lambda each: sort_key(each[0]))
     findings = tuple(_finding(files, each, meanwhile) for each, meanwhile in told)
     errors = [each for each in findings if each.severity == Severity.ERROR]
-    broken = "" if checked.program is not None or not errors else _first(errors[0])
+    broken = "" if reading.program is not None or not errors else _first(errors[0])
 
     def standing_of(table: WrittenTable) -> Standing:
         inside = [each.message for each in errors if (each.area.file, each.table) == (path, table.name)]
         return standing(checked.reports.get((path, table.name)), inside, broken)
 
-    tables = tuple(grids(path, files.of(path), checked.nearest, standing_of))
-    return Answer(path, findings, tables, checked.program is not None)
+    tables = tuple(grids(path, files.of(path), reading.nearest, standing_of))
+    return Answer(path, findings, tables, reading.program is not None)
 
 
 def _first(error: Finding) -> str:

@@ -89,7 +89,7 @@ def compared(count: int, seed: int, files: Sequence[str]) -> Iterator[Compared]:
                 workspace.open(str(file), text)
                 told = workspace.check(str(file))
                 asked = workspace.checked(str(file))
-                seen = Report(asked.diagnostics, (), asked.loaded.sources)
+                seen = Report(asked.diagnostics, (), asked.reading.loaded.sources)
                 assert len(told.findings) == len(asked.diagnostics) + len(asked.meanwhile)
                 yield Compared(file.relative_to(folder), text, _found(seen), _checked(file, text, shipped))
                 count -= 1

@@ -17,6 +17,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "cluster": ("distributed",),
     "hypothesis": ("hypothesis",),
     "live": ("aiohttp",),
+    "lsp": ("pygls", "lsprotocol"),
     "parquet": ("pyarrow",),
     "plot": ("matplotlib",),
     "studio": ("aiohttp", "mcap", "zstandard"),

@@ -1,0 +1,182 @@
+"""What an editor's actions do: prove a table anew, draw its graph, run its witness, make all proved repairs of a file.
+
+In: a file as it is read, and a table's name. Out: texts for people, or the text of the file. Proving anew asks no memory.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from rcsc.diagnostics.diagnostic import Diagnostic, WitnessColumn
+from rcsc.driver.proofs import table_report
+from rcsc.editor.places import Lines
+from rcsc.editor.standing import standing
+from rcsc.editor.workspace import Checked, Reading, Workspace
+from rcsc.graph.derive import derive
+from rcsc.graph.drawing import svg
+from rcsc.graph.formats.choice import FORMS
+from rcsc.graph.layout import NoLayoutError
+from rcsc.lang.interpret import evaluate, execute, holds, initial, matching_lines
+from rcsc.lang.model import Bool, Enum, Int, Line, Program, Scalar, Table, Value, spell
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
+
+MOST = 40
+"""Repairs made at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What a lens comes to.
+
+    Attributes:
+        form: `text`, `mermaid` or `svg`.
+    """
+
+    title: str
+    form: str
+    text: str
+
+
+def table_of(reading: Reading, name: str) -> tuple[Program, Table] | str:
+    """The program and the table; why there is none."""
+    if reading.program is None:
+        return (
+            f"the program is not in order: {reading.wrong[0].message}"
+            if reading.wrong
+            else "there is no program"
+        )
+    table = next((each for each in reading.program.tables if each.name == name), None)
+    return (reading.program, table) if table is not None else f"there is no table `{name}`"
+
+
+def proved_anew(reading: Reading, name: str, options: Options) -> Shown:
+    """A table proved with nothing remembered, and what backs the verdict."""
+    found = table_of(reading, name)
+    if isinstance(found, str):
+        return Shown(f"table {name}", "text", found)
+    program, table = found
+    verdict = prove_program(program, options, only=[table.name])
+    own = next(each for each in verdict.tables if each.table.name == table.name)
+    report = table_report(own, program)
+    errors = [each.message for each in verdict.findings if each.severity == "error"]
+    told = standing(report, errors)
+    rests = [f"rests on `{assumption}` ({was})" for assumption, was in report.assumptions]
+    lines = [
+        f"table `{name}`: {told}",
+        f"{report.lines} lines, decided by {report.method or 'nothing'}"
+        + (", confirmed by Z3" if report.confirmed_by_z3 else ""),
+        *rests,
+        *(f"the executors end the cycle where `{stop}` fails" for stop in report.stops),
+        *(each.message for each in verdict.findings if each.severity != "error"),
+    ]
+    return Shown(f"table {name}", "text", "\n".join(lines))
+
+
+def drawn(reading: Reading, name: str, options: Options, form: str = "") -> Shown:
+    """The state graph of a table: a drawing, or Mermaid where nothing can lay one out."""
+    found = table_of(reading, name)
+    if isinstance(found, str):
+        return Shown(f"graph of {name}", "text", found)
+    program, table = found
+    derived = derive(program, table, reading.loaded.files[table.file], options)
+    if isinstance(derived, Diagnostic):
+        return Shown(f"graph of {name}", "text", "\n".join((derived.message, *derived.help)))
+    if form != "mermaid":
+        try:
+            return Shown(f"graph of {name}", "svg", svg(derived.graph, derived.everywhere))
+        except NoLayoutError:
+            pass
+    return Shown(f"graph of {name}", "mermaid", FORMS["mermaid"].write(derived.graph))
+
+
+def witness_run(checked: Checked, name: str, which: int = 0) -> Shown:
+    """A witness of a table's findings run by the interpreter: which lines match, what each would do, and why no other matches."""
+    title = f"witness of {name}"
+    found = table_of(checked.reading, name)
+    if isinstance(found, str):
+        return Shown(title, "text", found)
+    columns = [each for told in checked.diagnostics for each in told.witnesses if each.table == name]
+    if not columns:
+        return Shown(title, "text", f"no finding of table `{name}` has a witness")
+    program, table = found
+    return Shown(title, "text", "\n".join(_run(program, table, columns[which % len(columns)])))
+
+
+def _run(program: Program, table: Table, column: WitnessColumn) -> Iterator[str]:
+    kinds = {str(each.name): each.type for each in program.variables}
+    now = initial(program)
+    now |= {
+        name: value_of(kinds[name], text) for name, text in zip(column.variables, column.values, strict=True)
+    }
+    yield "input: " + ", ".join(
+        f"{name} = {text}" for name, text in zip(column.variables, column.values, strict=True)
+    )
+    matching = set(matching_lines(table, now))
+    yield f"{len(matching)} of {len(table.lines)} lines match" + (
+        f"; DEFAULT `{table.default.name}` runs" if not matching and table.default is not None else ""
+    )
+    for line in table.lines:
+        if line.name in matching:
+            yield f"line `{line.name}` matches, and would set: {_does(program, line, now, kinds)}"
+        else:
+            yield f"line `{line.name}` does not: {_first_that_fails(table, line, now)}"
+
+
+def _does(program: Program, line: Line, now: Mapping[str, Value], kinds: Mapping[str, Scalar]) -> str:
+    after = dict(now)
+    execute(program, [action.statement for action in line.actions], after, {})
+    changed = [
+        f"{name} := {spell(kinds[name], value)}"
+        for name, value in after.items()
+        if name in kinds and value != now[name]
+    ]
+    return ", ".join(changed) or "nothing that it does not have already"
+
+
+def _first_that_fails(table: Table, line: Line, now: Mapping[str, Value]) -> str:
+    for test, column in zip(line.tests, table.columns, strict=True):
+        if test is not None and not holds(test, now):
+            if column.subject is None:
+                return f"`{test.text}` does not hold"
+            value = spell(column.subject.type, evaluate(column.subject, now))
+            return f"under `{column.heading}` stands `{test.text}`, and it is {value}"
+    return "nothing fails"
+
+
+def value_of(kind: Scalar, text: str) -> Value:
+    """The value that `spell` gives as this text."""
+    match kind:
+        case Bool():
+            return text == "true"
+        case Enum(members=members):
+            return members.index(text)
+        case Int():
+            return int(text)
+        case _:
+            return float(text)
+
+
+def mended(workspace: Workspace, file: str) -> tuple[str, int]:
+    """The text of a file with proved repairs made until none is left, and how many; errors alone are mended.
+
+    Args:
+        workspace: What is open; it stays as it is.
+        file: Absolute and normal.
+    """
+    trial = workspace.trial({})
+    count = 0
+    while count < MOST:
+        text = trial.text(file)
+        found = (
+            repair
+            for finding in trial.check(file).findings
+            if finding.severity == "error" and not finding.meanwhile
+            for repair in trial.repairs(finding)
+            if repair.certain and all(edit.area.file == file for edit in repair.edits)
+        )
+        repair = next(found, None)
+        if repair is None:
+            return text, count
+        trial.open(file, Lines(text).applied(repair.edits))
+        count += 1
+    return trial.text(file), count

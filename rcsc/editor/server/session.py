@@ -1,0 +1,145 @@
+"""What a client has open, and when it is checked.
+
+In: texts as they change. Out: answers, given to who asks and to who listens. All but the two workers runs in one thread, that of
+the messages.
+"""
+
+import asyncio
+import contextlib
+import os
+from collections.abc import Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import ParamSpec, TypeVar
+
+from rcsc.editor.memo import OutdatedError
+from rcsc.editor.names.find import Names
+from rcsc.editor.places import Lines, Units
+from rcsc.editor.server.convert import Converter, path_of
+from rcsc.editor.values import Answer
+from rcsc.editor.workspace import Workspace
+from rcsc.solvers.options import Options
+
+RESTS_S = 0.08
+"""How long keys rest before anything is checked, in seconds."""
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class Session:
+    """Open documents of one client.
+
+    Attributes:
+        listens: Told each new answer to a file that is open.
+        units: What the client's columns count.
+        folders: Its folders.
+        uris: What it calls each open file.
+        versions: The version of each open file, as it counts them.
+        shows: Whether it wants texts of lenses shown; one that shows them itself does not.
+        turn: Rises with every change; an answer of an earlier turn is outdated.
+    """
+
+    listens: Callable[[Answer], Awaitable[None]]
+    options: Options = field(default_factory=Options)
+    units: Units = Units.UTF_16
+    folders: list[str] = field(default_factory=list)
+    uris: dict[str, str] = field(default_factory=dict)
+    versions: dict[str, int] = field(default_factory=dict)
+    turn: int = 0
+    shows: bool = True
+    workspace: Workspace = field(init=False)
+    _told: dict[str, tuple[Answer, int | None]] = field(default_factory=dict)
+    _results: dict[str, tuple[Answer, int]] = field(default_factory=dict)
+    _proves: ThreadPoolExecutor = field(init=False)
+    _reads: ThreadPoolExecutor = field(init=False)
+    _waiting: "asyncio.Task[None] | None" = None
+
+    def __post_init__(self) -> None:
+        self.workspace = Workspace(self.options)
+        self._proves = ThreadPoolExecutor(1, "proves")
+        self._reads = ThreadPoolExecutor(1, "reads")
+
+    # --- texts ---
+
+    def path(self, uri: str) -> str:
+        """The path of a document."""
+        return path_of(uri, self.folders[0] if self.folders else os.getcwd())
+
+    def open(self, uri: str, text: str, version: int) -> None:
+        """Take a text as it is now, and have it checked."""
+        path = self.path(uri)
+        self.uris[path], self.versions[path] = uri, version
+        self.workspace.open(path, text)
+        self.changed(path)
+
+    def close(self, uri: str) -> None:
+        """Go back to what is on disk."""
+        path = self.path(uri)
+        self.uris.pop(path, None)
+        self.versions.pop(path, None)
+        self._told.pop(path, None)
+        self.workspace.close(path)
+        self.changed(path)
+
+    def changed(self, path: str) -> None:
+        """Have what is open checked once keys rest, this file first."""
+        self.turn += 1
+        if self._waiting is not None:
+            self._waiting.cancel()
+        order = sorted(self.uris, key=lambda each: each != path)
+        self._waiting = asyncio.get_running_loop().create_task(self._check(order))
+
+    async def _check(self, order: list[str]) -> None:
+        await asyncio.sleep(RESTS_S)
+        for path in order:
+            with contextlib.suppress(OutdatedError):
+                await self.listens(await self.answer(path))
+
+    # --- answers ---
+
+    async def answer(self, path: str) -> Answer:
+        """The answer to a file as it is now.
+
+        Raises:
+            OutdatedError: A text has changed meanwhile.
+        """
+        turn = self.turn
+        return await self.proving(self.workspace.check, path, lambda: self.turn == turn)
+
+    async def proving(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Ask for something that may have to be proved; one after another."""
+        return await asyncio.get_running_loop().run_in_executor(self._proves, lambda: ask(*args, **kwargs))
+
+    async def reading(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Ask for something that needs no proof."""
+        return await asyncio.get_running_loop().run_in_executor(self._reads, lambda: ask(*args, **kwargs))
+
+    def is_told(self, answer: Answer) -> bool:
+        """Whether the client has this answer already, for this version; from now on it has."""
+        new = (answer, self.versions.get(answer.file))
+        before = self._told.get(answer.file)
+        self._told[answer.file] = new
+        return before is not None and before[0] is answer and before[1] == new[1]
+
+    def result_of(self, answer: Answer) -> str:
+        """What an answer is called, so that a client need not be given the same again."""
+        known = self._results.get(answer.file)
+        if known is None or known[0] is not answer:
+            self._results[answer.file] = known = (answer, 0 if known is None else known[1] + 1)
+        return str(known[1])
+
+    def converter(self, texts: Mapping[str, str]) -> Converter:
+        """Places of these texts in the client's units."""
+        return Converter({path: Lines(text) for path, text in texts.items()}, self.units, self.uris)
+
+    def names(self, path: str) -> Names:
+        """The names of a file and of all that it uses."""
+        reading = self.workspace.reading(path)
+        return Names(reading.files, reading.sources, reading.nearest)
+
+    def stop(self) -> None:
+        """Give up what is being proved, as soon as it can be."""
+        self.turn += 1
+        for worker in (self._proves, self._reads):
+            worker.shutdown(wait=False, cancel_futures=True)
