@@ -73,6 +73,41 @@ def numpy_pairs(program: Program, table: Table) -> bool:
     return sum(_volume(program, table, box) for box in boxes) == _volume(program, table, {})
 
 
+def python_bitset(program: Program, table: Table) -> bool:
+    """The reference of boxes: for each condition the lines that it can meet as one number, joined line by line; then the volumes.
+
+    Each variable is cut at the ends of its conditions into keys that are alike: at 4 and 7 for `>= 4` and `< 7`.
+    """
+    boxes = [line_boxes(program, line) for line in table.lines]
+    everyone = (1 << len(boxes)) - 1
+    near: dict[tuple[str, Box], int] = {}
+    for name in table.variables:
+        stated: dict[Box, int] = {}
+        for number, box in enumerate(boxes):
+            if name in box:
+                stated[box[name]] = stated.get(box[name], 0) | 1 << number
+        idle = everyone & ~sum(stated.values())
+        starts = sorted({end for box in stated for low, high in box for end in (low, high + 1)})
+        place = {start: at for at, start in enumerate(starts)}
+        cells = [idle] * len(place)
+        within = {
+            box: [at for low, high in box for at in range(place[low], place[high + 1])] for box in stated
+        }
+        for box, inside in within.items():
+            for at in inside:
+                cells[at] |= stated[box]
+        for box, inside in within.items():
+            for at in inside:
+                near[name, box] = near.get((name, box), idle) | cells[at]
+    for number, box in enumerate(boxes):
+        others = everyone ^ 1 << number
+        for name, keys in box.items():
+            others &= near[name, keys]
+        if others:
+            return False
+    return sum(_volume(program, table, box) for box in boxes) == _volume(program, table, {})
+
+
 def _volume(program: Program, table: Table, box: dict[str, Box]) -> int:
     leaves = {variable.name: variable for variable in program.variables}
     return prod(
@@ -219,6 +254,7 @@ def cvc5_two_queries(program: Program, table: Table) -> bool:
 
 PEERS = (
     Peer("Python, all pairs", "", False, python_pairs),
+    Peer("Python, masks", "", False, python_bitset),
     Peer("numpy, all pairs", "numpy", False, numpy_pairs),
     Peer("Z3, all pairs", "z3", True, z3_all_pairs),
     Peer("Z3, two queries", "z3", True, z3_two_queries),

@@ -184,6 +184,20 @@ def test_holes_are_all_that_no_box_fills_each_place_in_one(
             assert len(over) == (not filled)
 
 
+@given(st.lists(BOXED, max_size=8))
+def test_each_pair_of_disjoint_lines_is_parted_by_the_first_axis_that_does(
+    lines: list[dict[str, Box]],
+) -> None:
+    apart: list[dict[str, Box]] = []
+    for line in lines:
+        if all(line.values()) and all(partition.common(line, other) is None for other in apart):
+            apart.append(line)
+    assert partition.parting(apart) == tuple(
+        next(name for name, box in one.items() if name in other and not meet(box, other[name]))
+        for one, other in combinations(apart, 2)
+    )
+
+
 @pytest.mark.parametrize(("widened", "looks"), [(0, 20_000), (40, 60_000), (100, 150_000), (300, 900_000)])
 def test_what_crossing_lines_leave_open_is_found_by_few_looks(
     monkeypatch: pytest.MonkeyPatch, widened: int, looks: int

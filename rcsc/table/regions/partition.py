@@ -10,7 +10,7 @@ are alike.
 from bisect import bisect_left, bisect_right
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, islice
+from itertools import islice
 from math import prod
 from typing import Generic, TypeAlias, TypeVar
 
@@ -408,10 +408,30 @@ def parting(lines: Sequence[BoxLine[Axis]]) -> tuple[Axis, ...] | None:
     """
     if len(lines) > MANY:
         return None
-    return tuple(
-        next(name for name, box in left.items() if name in right and not meet(box, right[name]))
-        for left, right in combinations(lines, 2)
-    )
+    stated: dict[Axis, dict[Box, int]] = {}
+    for at, line in enumerate(lines):
+        for name, box in line.items():
+            of_axis = stated.setdefault(name, {})
+            of_axis[box] = of_axis.get(box, 0) | 1 << at
+    apart = {name: _apart(of_axis) for name, of_axis in stated.items()}
+    parts: list[Axis] = []
+    for at, line in enumerate(lines):
+        left = (1 << len(lines)) - (2 << at)
+        by_line: dict[int, Axis] = {}
+        for name, box in line.items():
+            new = left & apart[name][box]
+            left ^= new
+            by_line.update(dict.fromkeys(bits_of(new), name))
+        parts += [by_line[other] for other in range(at + 1, len(lines))]
+    return tuple(parts)
+
+
+def _apart(stated: Mapping[Box, int]) -> dict[Box, int]:
+    """For each box that lines state on an axis the lines that state one which it does not meet."""
+    everyone = _any(stated.values())
+    if all(len(box) == 1 for box in stated):
+        return {box: everyone & ~meeting for box, meeting in _intervals_meeting(stated, 0)}
+    return {box: _any(mask for other, mask in stated.items() if not meet(box, other)) for box in stated}
 
 
 def common(first: BoxLine[Axis], second: BoxLine[Axis]) -> dict[Axis, Box] | None:
