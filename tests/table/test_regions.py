@@ -1,6 +1,7 @@
 """Relational tables: the tree of regions against brute force, on the families, and its limits."""
 
 import itertools
+import math
 import operator
 import random
 from collections.abc import Callable, Mapping, Sequence
@@ -51,7 +52,7 @@ from rcsc.table.regions import splitting
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
 from rcsc.table.regions.ends import Ends
 from rcsc.table.regions.least import find, least, negated, never, whole, widest
-from rcsc.table.regions.linear import Simplex, integer_point
+from rcsc.table.regions.linear import Simplex, integer_point, least_point
 from rcsc.table.regions.points import projected
 from rcsc.table.regions.region import (
     Bounds,
@@ -591,6 +592,40 @@ def test_a_point_of_integers_is_found_wherever_there_is_one(
     assert (found is None) == (not there)
     if found is not None:
         assert tuple(int(found.value(form)) for form in range(2)) in there
+
+
+@given(
+    st.lists(
+        st.tuples(st.tuples(*[st.integers(-5, 5)] * 3), st.integers(-12, 12), st.integers(0, 6)), max_size=5
+    ),
+    st.permutations(range(3)),
+    st.tuples(*[st.integers(-9, 9)] * 3),
+)
+def test_the_least_point_and_the_least_value_of_each_form_are_those_of_brute_force(
+    rows: list[tuple[tuple[int, ...], int, int]], order: list[int], near: tuple[int, ...]
+) -> None:
+    """Wherever the system begins."""
+    simplex = Simplex()
+    for form in range(3):
+        simplex.add_column(form, -2, 3, near[form])
+    for form, (ks, low, width) in enumerate(rows, start=3):
+        simplex.add_form(form, [(c, k) for c, k in enumerate(ks) if k], low, low + width)
+    there = [
+        point
+        for point in itertools.product(range(-2, 4), repeat=3)
+        if all(low <= sum(map(operator.mul, ks, point)) <= low + width for ks, low, width in rows)
+    ]
+    found = least_point(simplex.copy(), order, 500)
+    assert found == min(([point[c] for c in order] for point in there), default=None)
+    if simplex.refute() is None:
+        for form, ks in enumerate([(1, 0, 0), (0, 1, 0), (0, 0, 1), *(ks for ks, _, _ in rows)]):
+            least_value = simplex.minimise(form)
+            assert simplex.refute() is None
+            assert least_value == simplex.value(form)
+            assert all(least_value <= sum(map(operator.mul, ks, point)) for point in there)
+            below = simplex.copy()
+            below.restrict(form, below.low[form], math.ceil(least_value) - 1)
+            assert below.low[form] > below.high[form] or below.refute() is not None
 
 
 def test_looking_for_a_point_of_integers_has_an_end() -> None:

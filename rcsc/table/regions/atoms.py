@@ -165,8 +165,9 @@ class Universe:
     def parts_of_test(self, test: Test) -> Iterator[Formula]:
         """Formulas whose conjunction is a cell's condition."""
         if test.box is None:
+            atoms = self._known
             for part in conjuncts(test.condition):
-                known = self._known.get((id(part), True))
+                known = atoms.get((id(part), True))
                 yield self.of(part) if known is None else known[1]
         else:
             reads = _reads(test.condition, test.variables[0])
@@ -241,16 +242,23 @@ class Universe:
 
     def _add(self, total: dict[int, int], expr: Expr, factor: int) -> int:
         """Add the factor times the key of `expr` to the total; its constant part is returned."""
+        if isinstance(expr, Read):
+            known = self._column.get(expr.name)  # most often, and very often: hence no call
+            column = self.column(expr) if known is None else known
+            total[column] = total.get(column, 0) + factor
+            return 0
         if isinstance(expr, Literal):
             return factor * key_of(expr.type, expr.value)
         if isinstance(expr, Apply):
             op, args = expr.op, expr.args
             if op is Op.NEG:
                 return self._add(total, args[0], -factor)
-            if isinstance(expr.type, Int) and op in {Op.ADD, Op.SUB}:
+            if isinstance(expr.type, Int) and (op is Op.ADD or op is Op.SUB):
                 second = factor if op is Op.ADD else -factor
                 return self._add(total, args[0], factor) + self._add(total, args[1], second)
             if isinstance(expr.type, Int) and op is Op.MUL:
+                if isinstance(args[0], Literal):
+                    return self._add(total, args[1], factor * key_of(args[0].type, args[0].value))
                 for part, other in (args, args[::-1]):
                     coefficients, constant = self.linear(part)
                     if not any(coefficients.values()):

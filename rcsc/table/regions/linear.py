@@ -6,12 +6,12 @@ which the forms add up to nothing and their bounds to less than nothing. A posit
 stands for the form's upper bound, a negative one for its lower bound.
 
 Source: Dutertre and de Moura, A Fast Linear-Arithmetic Solver for DPLL(T), CAV 2006, section 3
-(general form, Bland's rule); rows are kept as integers over a common denominator.
+(general form, Bland's rule); integers over a common denominator.
 """
 
 import math
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
@@ -22,24 +22,34 @@ Multipliers: TypeAlias = tuple[tuple[int, int], ...]
 class Simplex:
     """Bounds on forms; copied for each region, so that regions share what they share.
 
+    Columns alone are kept as sums of what is nonbasic, over one denominator: a form is a sum of a few of them, so that a pivot costs no
+    more where there are many forms. Of `x + y` and `x - y`, both nonbasic, 2 x is their sum and 2 y their difference.
+
     Attributes:
         low, high: Bounds by form.
     """
 
-    __slots__ = ("_columns", "_rows", "_values", "high", "low")
+    __slots__ = ("_at", "_basis", "_d", "_rows", "_terms", "_unsure", "_values", "high", "low")
 
     def __init__(self) -> None:
         self.low: dict[int, int] = {}
         self.high: dict[int, int] = {}
-        self._columns: list[int] = []  # forms that are nonbasic
+        self._terms: dict[int, Sequence[tuple[int, int]]] = {}  # of each form; shared by copies
+        self._basis: list[int] = []  # forms that are nonbasic
         self._values: list[int] = []  # their values, within their bounds
-        self._rows: dict[int, tuple[int, list[int]]] = {}  # d, a: d * form = sum a * nonbasic
+        self._d = 1  # d * column = sum of row * nonbasic; positive
+        self._rows: dict[int, list[int]] = {}  # of each column, never changed in place
+        self._at: dict[int, int] = {}  # d * the value of each column
+        self._unsure: list[int] | None = []  # forms that may be out of their bounds; None: any
 
     def copy(self) -> "Simplex":
-        """An independent copy; rows are never changed in place."""
+        """An independent copy."""
         new = Simplex()
         new.low, new.high = self.low.copy(), self.high.copy()
-        new._columns, new._values, new._rows = self._columns.copy(), self._values.copy(), self._rows.copy()
+        new._terms, new._d = self._terms, self._d
+        new._basis, new._values = self._basis.copy(), self._values.copy()
+        new._rows, new._at = self._rows.copy(), self._at.copy()
+        new._unsure = None if self._unsure is None else self._unsure.copy()
         return new
 
     def knows(self, form: int) -> bool:
@@ -49,60 +59,94 @@ class Simplex:
     def add_column(self, form: int, low: int, high: int, near: int = 0) -> None:
         """Add a form of one column, with the value of its range that is nearest to one given."""
         self.low[form], self.high[form] = low, high
-        self._columns.append(form)
+        self._terms[form] = ((form, 1),)
+        for column, row in self._rows.items():
+            self._rows[column] = [*row, 0]
+        self._rows[form] = [0] * len(self._basis) + [self._d]
+        self._basis.append(form)
         self._values.append(min(max(near, low), high))
-        for basic, (d, row) in self._rows.items():
-            self._rows[basic] = (d, [*row, 0])
+        self._at[form] = self._values[-1] * self._d
 
-    def add_form(self, form: int, terms: list[tuple[int, int]], low: int, high: int) -> None:
-        """Add a form given by known forms and coefficients."""
+    def add_form(self, form: int, terms: Sequence[tuple[int, int]], low: int, high: int) -> None:
+        """Add a form given by columns and coefficients."""
         self.low[form], self.high[form] = low, high
-        scale = math.lcm(*(self._rows[part][0] for part, _ in terms if part in self._rows))
-        row = [0] * len(self._columns)
-        for part, k in terms:
-            if part in self._rows:
-                d, old = self._rows[part]
-                for j, a in enumerate(old):
-                    row[j] += k * a * (scale // d)
-            else:
-                row[self._columns.index(part)] += k * scale
-        self._rows[form] = _reduced(scale, row)
+        self._terms[form] = terms
+        if self._unsure is not None:
+            self._unsure.append(form)
 
     def restrict(self, form: int, low: int, high: int) -> None:
         """Set the bounds of a known form."""
         self.low[form], self.high[form] = low, high
-        if form not in self._rows:
-            j = self._columns.index(form)
-            self._values[j] = min(max(self._values[j], low), high)
+        if form not in self._basis:
+            if self._unsure is not None:
+                self._unsure.append(form)
+            return
+        j = self._basis.index(form)
+        before, self._values[j] = self._values[j], min(max(self._values[j], low), high)
+        if before != self._values[j]:
+            self._valued()
+            self._unsure = None
 
     def value(self, form: int) -> Fraction:
         """The form's value at the present vertex."""
-        if form not in self._rows:
-            return Fraction(self._values[self._columns.index(form)])
-        d, row = self._rows[form]
-        return Fraction(sum(a * v for a, v in zip(row, self._values, strict=True)), d)
+        return Fraction(self._scaled(form), self._d)
+
+    def _scaled(self, form: int) -> int:
+        """The form's value, times the denominator."""
+        at = self._at
+        return sum([k * at[column] for column, k in self._terms[form]])
+
+    def _valued(self) -> None:
+        """Add up the values of columns."""
+        values = self._values
+        self._at = {column: sum(map(operator.mul, row, values)) for column, row in self._rows.items()}
+
+    def _row(self, form: int) -> list[int]:
+        """The form as a sum of what is nonbasic, times the denominator."""
+        row = [0] * len(self._basis)
+        for column, k in self._terms[form]:
+            row = [a + k * b for a, b in zip(row, self._rows[column], strict=True)]
+        return row
 
     def refute(self) -> Multipliers | None:
         """Multipliers that no point survives, or None: then the vertex is within all bounds."""
-        while True:
-            violated = self._violated()
-            if violated is None:
-                return None
+        if self._unsure is not None and self._violated(self._unsure) is None:
+            self._unsure = []
+            return None
+        self._unsure = None
+        while (violated := self._violated(self.low)) is not None:
             basic, up = violated
-            d, row = self._rows[basic]
+            row = self._row(basic)
             entering = self._entering(row, up)
             if entering is None:
-                return self._farkas(basic, d, row, up)
-            self._pivot(basic, entering, self.low[basic] if up else self.high[basic])
+                return self._farkas(basic, row, up)
+            self._pivot(basic, row, entering, self.low[basic] if up else self.high[basic])
+        self._unsure = []
+        return None
+
+    def _violated(self, forms: Iterable[int]) -> tuple[int, bool] | None:
+        """The first of some forms out of its bounds, and whether it must grow."""
+        d, at, terms, low, high = self._d, self._at, self._terms, self.low, self.high
+        violated: tuple[int, bool] | None = None
+        for form in forms:
+            if violated is None or form < violated[0]:
+                value = 0
+                for column, k in terms[form]:
+                    value += k * at[column]
+                if value < d * low[form]:
+                    violated = (form, True)
+                elif value > d * high[form]:
+                    violated = (form, False)
+        return violated
 
     def minimise(self, form: int) -> Fraction:
         """The least value of a form, where the vertex goes; it must be within all bounds (`refute`)."""
         while True:
-            if form not in self._rows:
-                j, up = self._columns.index(form), False
+            if form in self._basis:
+                j, up = self._basis.index(form), False
                 moves = self._values[j] > self.low[form]
             else:
-                row = self._rows[form][1]
+                row = self._row(form)
                 entering = self._entering(row, up=False)
                 moves = entering is not None
                 j, up = (0, False) if entering is None else (entering, row[entering] < 0)
@@ -112,70 +156,62 @@ class Simplex:
 
     def _advance(self, j: int, up: bool) -> None:
         """Move the nonbasic form at position `j` as far as all bounds let it go."""
-        form, values = self._columns[j], self._values
+        form, values, d = self._basis[j], self._values, self._d
         room, per = (self.high[form] - values[j] if up else values[j] - self.low[form]), 1
         leaving: tuple[int, int] | None = None
-        for basic, (d, row) in self._rows.items():
-            if row[j]:
-                grows = (row[j] > 0) == up
-                at = sum(map(operator.mul, row, values))
+        steps = {column: row[j] for column, row in self._rows.items()}
+        for basic, terms in self._terms.items():
+            if basic not in self.low or basic in self._basis:
+                continue
+            step = sum([k * steps[column] for column, k in terms])
+            if step:
+                grows = (step > 0) == up
+                at = self._scaled(basic)
                 left = d * self.high[basic] - at if grows else at - d * self.low[basic]
-                less = left * per - room * abs(row[j])
+                less = left * per - room * abs(step)
                 if less < 0 or (less == 0 and leaving is not None and basic < leaving[0]):
-                    room, per = left, abs(row[j])
+                    room, per = left, abs(step)
                     leaving = basic, self.high[basic] if grows else self.low[basic]
         if leaving is None:
             values[j] += room if up else -room
+            self._valued()
         else:
-            self._pivot(leaving[0], j, leaving[1])
-
-    def _violated(self) -> tuple[int, bool] | None:
-        """The first form out of its bounds, and whether it must grow."""
-        values = self._values
-        violated: tuple[int, bool] | None = None
-        for basic, (d, row) in self._rows.items():
-            if violated is None or basic < violated[0]:
-                at = sum(map(operator.mul, row, values))
-                if at < d * self.low[basic]:
-                    violated = (basic, True)
-                elif at > d * self.high[basic]:
-                    violated = (basic, False)
-        return violated
+            self._pivot(leaving[0], self._row(leaving[0]), j, leaving[1])
 
     def _entering(self, row: list[int], up: bool) -> int | None:
         """Position of the first nonbasic form that can move the row's form the right way."""
         entering: int | None = None
         for j, a in enumerate(row):
             if a:
-                form = self._columns[j]
+                form = self._basis[j]
                 free = (
                     self._values[j] < self.high[form] if (a > 0) == up else self._values[j] > self.low[form]
                 )
-                if free and (entering is None or form < self._columns[entering]):
+                if free and (entering is None or form < self._basis[entering]):
                     entering = j
         return entering
 
-    def _farkas(self, basic: int, d: int, row: list[int], up: bool) -> Multipliers:
+    def _farkas(self, basic: int, row: list[int], up: bool) -> Multipliers:
         sign = 1 if up else -1
-        parts = [(self._columns[j], sign * a) for j, a in enumerate(row) if a]
-        return tuple(sorted([(basic, -sign * d), *parts]))
+        divisor = math.gcd(self._d, *row)
+        parts = [(self._basis[j], sign * a // divisor) for j, a in enumerate(row) if a]
+        return tuple(sorted([(basic, -sign * self._d // divisor), *parts]))
 
-    def _pivot(self, basic: int, j: int, value: int) -> None:
-        """Exchange `basic`, which goes to its bound `value`, for nonbasic position `j`."""
-        d, row = self._rows.pop(basic)
-        entering, a = self._columns[j], row[j]
+    def _pivot(self, basic: int, row: list[int], j: int, value: int) -> None:
+        """Exchange `basic`, a row that goes to its bound `value`, for nonbasic position `j`.
+
+        Every entry is a determinant of coefficients, so that the divisions are exact (Bareiss, Sylvester's Identity, 1968).
+        """
+        d, a = self._d, row[j]
         sign = 1 if a > 0 else -1
-        solved = [-sign * c for c in row]  # |a| * entering = sum of solved
-        solved[j] = sign * d
-        a = abs(a)
-        for other, (e, old) in self._rows.items():
+        for column, old in self._rows.items():
             c = old[j]
-            if c:
-                new = [x * a + c * y for x, y in zip(old, solved, strict=True)]
-                new[j] = c * solved[j]
-                self._rows[other] = _reduced(e * a, new)
-        self._rows[entering] = _reduced(a, solved)
-        self._columns[j], self._values[j] = basic, value
+            new = [sign * (x * a - c * y) // d for x, y in zip(old, row, strict=True)]
+            new[j] = sign * c
+            self._rows[column] = new
+        self._d = abs(a)
+        self._basis[j], self._values[j] = basic, value
+        self._valued()
 
 
 def integer_point(simplex: Simplex, columns: Sequence[int], patience: int) -> Simplex | None:
@@ -248,8 +284,3 @@ def least_point(simplex: Simplex, columns: Sequence[int], patience: int) -> list
         else:
             return None
     return [key for _, key in chosen]
-
-
-def _reduced(d: int, row: list[int]) -> tuple[int, list[int]]:
-    divisor = math.gcd(d, *row)
-    return (d, row) if divisor == 1 else (d // divisor, [a // divisor for a in row])
