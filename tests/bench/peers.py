@@ -83,9 +83,9 @@ def python_bitset(program: Program, table: Table) -> bool:
     near: dict[tuple[str, Box], int] = {}
     for name in table.variables:
         stated: dict[Box, int] = {}
-        for number, box in enumerate(boxes):
-            if name in box:
-                stated[box[name]] = stated.get(box[name], 0) | 1 << number
+        for number, line in enumerate(boxes):
+            if name in line:
+                stated[line[name]] = stated.get(line[name], 0) | 1 << number
         idle = everyone & ~sum(stated.values())
         starts = sorted({end for box in stated for low, high in box for end in (low, high + 1)})
         place = {start: at for at, start in enumerate(starts)}
@@ -99,9 +99,9 @@ def python_bitset(program: Program, table: Table) -> bool:
         for box, inside in within.items():
             for at in inside:
                 near[name, box] = near.get((name, box), idle) | cells[at]
-    for number, box in enumerate(boxes):
+    for number, line in enumerate(boxes):
         others = everyone ^ 1 << number
-        for name, keys in box.items():
+        for name, keys in line.items():
             others &= near[name, keys]
         if others:
             return False
