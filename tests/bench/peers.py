@@ -101,8 +101,8 @@ def python_bitset(program: Program, table: Table) -> bool:
                 near[name, box] = near.get((name, box), idle) | cells[at]
     for number, line in enumerate(boxes):
         others = everyone ^ 1 << number
-        for name, keys in line.items():
-            others &= near[name, keys]
+        for axis, keys in line.items():
+            others &= near[axis, keys]
         if others:
             return False
     return sum(_volume(program, table, box) for box in boxes) == _volume(program, table, {})
