@@ -29,7 +29,8 @@ class TableSolver:
 
     def __init__(self, program: Program, table: Table, options: Options) -> None:
         self.program, self.table = program, table
-        self.frame, domain = declared(program.variables)
+        # What nothing here reads has some value in its range, whatever the others have.
+        self.frame, domain = declared(shown(program, table))
         self.solver = Solver(options.limits)
         self.solver.add(*domain)
         wanted = set(table.assumptions)
@@ -117,7 +118,7 @@ def _some_gap(asked: TableSolver, gaps: Sequence[Gap]) -> Answer:
     for witness in (gap.witnesses[0] for gap in gaps if gap.witnesses):
         here = [
             smt.equal(asked.frame.leaves[v.name], smt.literal(v.type, witness[v.name]), v.type)
-            for v in asked.program.variables
+            for v in shown(asked.program, asked.table)
             if v.name in witness
         ]
         if asked.holds(asked.none(), *here) is Answer.SATISFIABLE:

@@ -257,9 +257,10 @@ class _Decision:
         return NoWitness.NONE if answer is Answer.UNSATISFIABLE else NoWitness.UNKNOWN
 
     def model(self, z3: TableSolver) -> dict[str, Value]:
-        """The input that the solver gives."""
+        """The input that the solver gives, of what the table and its assumptions read."""
         leaves = z3.frame.leaves
-        return {str(v.name): z3.solver.value(leaves[v.name], v.type) for v in self.program.variables}
+        asked = (v for v in self.program.variables if v.name in leaves)
+        return {str(v.name): z3.solver.value(leaves[v.name], v.type) for v in asked}
 
     def spelled(self, asked: Question) -> list[tuple[list[tuple[Expr, int]], int, int]]:
         """The bounds of a region, their forms as sums of terms."""

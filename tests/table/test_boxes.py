@@ -13,7 +13,8 @@ from rcsc.diagnostics.codes import Code
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import holds, joined, meet
-from rcsc.lang.model import Box, Program, key_bounds, key_of, value_of_key
+from rcsc.lang.model import Box, Program, Scalar, key_bounds, key_of, value_of_key
+from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.search import furthest, halved
 from rcsc.table import boxes
@@ -523,3 +524,23 @@ def test_slices_say_which_lines_hold_and_meet(stated: list[Box], asked: list[tup
     assert near & met == met
     for (low, high), holding in axis.runs(near):
         assert holding == axis.meeting(((low, high),)) & near
+
+
+def test_z3_is_told_only_of_what_a_table_and_its_assumptions_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counted: of a level with many tables each reads few of the variables, and Z3 was told of all for each."""
+    told: list[str] = []
+    plain = smt.variable
+
+    def counted(name: str, kind: Scalar) -> smt.Term:
+        told.append(name)
+        return plain(name, kind)
+
+    monkeypatch.setattr(smt, "variable", counted)
+    declared = "".join(f"input v{at} : int 0 .. 9\n" for at in range(40))
+    program = program_of(
+        f"{declared}assume near monitored : v2 <= v3\n"
+        "table t assuming near {\n| line | v1 | when ||\n|---|---|---||\n"
+        "| low | < 5 | v2 <= v3 ||\n| high | >= 5 | ||\n}\n"
+    )
+    assert confirm(program, program.tables[0], (), Options(solver="both")) is Agreement.AGREES
+    assert sorted(name for name in told if "!" not in name) == ["v1", "v2", "v3"]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
+from functools import cache
 from typing import Any, TypeVar
 
 from rcsc.diagnostics.source import Source, Span
@@ -54,7 +55,7 @@ def _place(parties: Parties) -> Span:
 def _made(parties: Parties, whole: Sequence[tree.Declaration]) -> Iterator[str]:
     """The text of state, modules, procedures and properties that belong to no one neighbour."""
     own = {d.name.text for d in whole if isinstance(d, tree.ProcedureDecl)}
-    called = {name for d in whole for name in _calls(d)} - own
+    called = set(_calls(whole)) - own
     if parties.subordinates:
         yield written.ECHOED
     yield from written.taken(parties)
@@ -79,16 +80,23 @@ def _members(parties: Parties, called: set[str]) -> Iterator[str]:
             yield written.order_is(ordered[0], name)
 
 
-def _calls(node: Any) -> Iterator[str]:
-    """The names of procedures that are called without arguments."""
-    if isinstance(node, tree.Call) and not node.args:
-        yield node.name.text
-    elif is_dataclass(node):
-        for part in fields(node):
-            yield from _calls(getattr(node, part.name))
-    elif isinstance(node, tuple):
-        for item in node:
-            yield from _calls(item)
+def _calls(nodes: Sequence[object]) -> Iterator[str]:
+    """The names of procedures that are called without arguments, in any order."""
+    waiting = [*nodes]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, tuple):
+            waiting += node
+        elif isinstance(node, tree.Call) and not node.args:
+            yield node.name.text
+        elif is_dataclass(node) and not isinstance(node, type):
+            waiting += [getattr(node, part) for part in _parts(type(node))]
+
+
+@cache
+def _parts(kind: type[Any]) -> tuple[str, ...]:
+    """The fields of nodes of a kind in which others may stand: those that equality looks at, which are not places."""
+    return tuple(part.name for part in fields(kind) if part.compare)
 
 
 def _heading(parties: Parties, heading: tree.Heading) -> tree.Heading:
