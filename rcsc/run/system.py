@@ -258,13 +258,26 @@ def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -
     Raises:
         NotBuilt: The C could not be built.
     """
+    return several_executors(system, signs, kind)()
+
+
+def several_executors(
+    system: Description, signs: Mapping[str, Signature], kind: Kind
+) -> Callable[[], dict[str, Executor]]:
+    """Return what makes an executor for each level, others at each call, of C that is read and built once.
+
+    Raises:
+        NotBuilt: The C could not be built.
+    """
     levels = {
         name: next(level for level in sign.levels if level.name == name) for name, sign in signs.items()
     }
     if kind == "python":
-        return {name: PythonExecutor(system.generated, sign, levels[name]) for name, sign in signs.items()}
+        return lambda: {
+            name: PythonExecutor(system.generated, sign, levels[name]) for name, sign in signs.items()
+        }
     library = build(system.generated, list({sign.program: sign for sign in signs.values()}.values()))
-    return {name: CExecutor(library, sign, levels[name]) for name, sign in signs.items()}
+    return lambda: {name: CExecutor(library, sign, levels[name]) for name, sign in signs.items()}
 
 
 def assemble(

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from math import acos, asin, atan2, cos, hypot, pi, radians, sin, sqrt
 
-from rcsc_cell.database.pose import Pose, Rotation, Vector, product
+from rcsc_cell.database.pose import Pose, Rotation, Vector, apply, product
 
 SHOULDER_MM = 671.83
 UPPER_MM = 431.8
@@ -28,6 +28,10 @@ LIMITS_DEG = (
 LIMITS = tuple((radians(low), radians(high)) for low, high in LIMITS_DEG)
 STRAIGHT = 1e-9
 """Sine of the fifth joint below which the fourth and sixth turn about one line."""
+
+TURN = 2 * pi
+NEAR = 3.1
+"""Less than half a turn: so far from where it is a joint goes as it is told, and that is nearly always."""
 
 Joints = tuple[float, ...]
 _LINKS = (
@@ -67,12 +71,14 @@ def skeleton(joints: Sequence[float]) -> tuple[Vector, ...]:
 
 def _frames(joints: Sequence[float]) -> list[Pose]:
     frames = []
-    here = Pose(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
+    turned: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    x = y = z = 0.0
     for angle, (along_z, along_x, twist) in zip(joints, _LINKS, strict=True):
         c, s, ct = cos(angle), sin(angle), 0.0 if twist else 1.0
-        turn: Rotation = ((c, -s * ct, s * twist), (s, c * ct, -c * twist), (0.0, twist, ct))
-        here = here @ Pose(turn, (along_x * c, along_x * s, along_z))
-        frames.append(here)
+        dx, dy, dz = apply(turned, (along_x * c, along_x * s, along_z))
+        x, y, z = x + dx, y + dy, z + dz
+        turned = product(turned, ((c, -s * ct, s * twist), (s, c * ct, -c * twist), (0.0, twist, ct)))
+        frames.append(Pose(turned, (x, y, z)))
     return frames
 
 
@@ -156,8 +162,9 @@ def _unwound(joints: Joints, near: Sequence[float], least: float) -> Joints | No
     """Return the joints by their nearest turns within the limits; None where one turns as far as `least`."""
     unwound = []
     for angle, before, (low, high) in zip(joints, near, LIMITS, strict=False):
-        turned = angle - 2 * pi * round((angle - before) / (2 * pi))
-        turned += 2 * pi * ((turned < low) - (turned > high))
+        far = angle - before
+        turned = angle if -NEAR < far < NEAR else angle - TURN * round(far / TURN)
+        turned += TURN * ((turned < low) - (turned > high))
         if not low <= turned <= high or abs(turned - before) >= least:
             return None
         unwound.append(turned)

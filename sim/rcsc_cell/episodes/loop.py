@@ -13,7 +13,7 @@ from rcsc.run.levels import RunningLevel, running_level
 from rcsc.run.log.recorder import Recorder
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Values
-from rcsc.run.system import StateTableError, System, executors
+from rcsc.run.system import StateTableError, System, several_executors
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.kinematic import Kinematic
 from rcsc_cell.cell.mujoco_model import Make
@@ -87,7 +87,8 @@ class Loop:
                 replace(episode, rows=(), interruptions=()), self.database, signs["task"]
             )
         self.buffers = Harmed(episode.transport)
-        by_level = executors(described, signs, episode.executor)
+        made = several_executors(described, signs, episode.executor)
+        by_level = made()
         levels = tuple(
             running_level(spec, described, signs[spec.name], by_level[spec.name], self.database.queries)
             for spec in described.levels
@@ -99,12 +100,11 @@ class Loop:
         if self._recorder is not None:
             self.system.watch.append(self._recorder)
         self.system.watch.append(self._after)
-        twins = executors(described, signs, episode.executor)
         self.cycle = CycleState(
             self.database,
             self.plant,
             {level.name: level for level in levels},
-            twins,
+            made(),
             tuple(part.body for part in lying),
         )
         self.cycle.look()

@@ -74,14 +74,17 @@ class Harmed(CommonMemory):
     def publish(self, name: str, values: Values) -> None:
         """Makes this the latest value, unless something happens to it."""
         now = self._now.get(name)
-        match "" if now is None else now.kind:
+        if now is None:
+            self._arrive(name, self.tick, values)
+            return
+        match now.kind:
             case "lost":
                 return
             case "stale":
                 self._kept[name] = self.tick, values
-            case "doubled" if now is not None and (self.tick - now.first_tick) % 2 == 0:
+            case "doubled" if (self.tick - now.first_tick) % 2 == 0:
                 return
-            case "delayed" if now is not None:
+            case "delayed":
                 late = self._late.setdefault(name, deque())
                 late.append((self.tick + 1 + now.ticks, self.tick, values))
             case _:
