@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
-from rcsc.run.faults import UnknownFault, faults_of, switch
+from rcsc.run.faults import faults_of
 from rcsc.run.levels import RunningLevel
 from rcsc.run.orders.roles import COMMAND, served
 from rcsc.shell import typed_names
@@ -48,6 +48,9 @@ order [LEVEL] COMMAND [FIELD=VALUE ...]
                         order a level from outside, with the next number; other fields are as at first
 faults                  the plant's faults
 fault NAME [off]        switch one on, or off
+restart LEVEL [anew]    start a level again, as if its process had been killed: as its last cycle left it, or anew
+freeze BUFFER, thaw BUFFER
+                        what is written to a buffer gets lost, or arrives again
 undo [N]                go back to before the last cycle, or the last N
 reload [LEVEL] [anyway] prove and take a level's tables as they are now, with what they do otherwise; `anyway` even
                         where the present state is one in which the next cycle does otherwise
@@ -58,6 +61,21 @@ clear                   clear the screen; a module that is called so runs as CLE
 help, quit
 A CONDITION compares variables: task.cur_state = state_3 and not (new_command or primitive.travelled_mm > 40).
 Everything from # on is a comment."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunOrder:
+    """Cycles to be run.
+
+    Attributes:
+        most: So many at most.
+        until: What ends them; None where nothing but breakpoints does.
+        steps: Whether not even breakpoints do.
+    """
+
+    most: int
+    until: StateQuery | NamedLine | None = None
+    steps: bool = False
 
 
 @dataclass(slots=True)
@@ -100,9 +118,9 @@ class Commands:
             "break": self._break, "breaks": self._breaks, "buffers": self._buffers, "delete": self._delete,
             "diff": self._diff,
             "expect": self._expect, "fault": self._fault, "faults": self._faults,
-            "help": self._help, "level": self._level, "levels": self._levels, "order": self._order,
-            "lines": self._lines, "quit": self._quit, "reload": self._reload, "run": self._run, "show": self._show,
-            "step": self._step, "undo": self._undo,
+            "freeze": self._freeze, "help": self._help, "level": self._level, "levels": self._levels, "order": self._order,
+            "lines": self._lines, "quit": self._quit, "reload": self._reload, "restart": self._restart, "run": self._run,
+            "show": self._show, "step": self._step, "thaw": self._thaw, "undo": self._undo,
         }  # fmt: skip
 
     def completions(self) -> Iterator[str]:
@@ -123,12 +141,7 @@ class Commands:
         name, _, to = rest.partition(" ")
         if to.strip() not in {"", "on", "off"}:
             raise Refused(Code.SHELL_COMMAND, f"`{to.strip()}` is neither `on` nor `off`")
-        on = to.strip() != "off"
-        try:
-            switch(self.session.system.outside, name, on=on)
-        except UnknownFault as error:
-            raise Refused(Code.SHELL_COMMAND, str(error), *error.helps) from error
-        return [f"{name} is {'on' if on else 'off'}"]
+        return [self.session.fault(name, on=to.strip() != "off")]
 
     def _order(self, rest: str) -> Output:
         system = self.session.system.description
@@ -203,7 +216,11 @@ class Commands:
             raise typed_names.unknown(
                 rest, "buffer", [w.source for w in self.session.system.description.wires]
             )
-        return [f"{wire.source} = {wire.target}: {self._held(wire.source, wire.target)}" for wire in every]
+        frozen = self.session.memory.frozen
+        return [
+            f"{wire.source} = {wire.target}: {self._held(wire.source, wire.target)}{', frozen' * (wire.source in frozen)}"
+            for wire in every
+        ]
 
     def _held(self, source: str, target: str) -> str:
         """A buffer's latest value, in the words of the level at either end."""
@@ -251,7 +268,7 @@ class Commands:
             self.session.cycle()
             if self.session.interrupted:
                 break
-        return [f"cycle {self.session.system.tick}: {', '.join(_at(level) for level in self.session.levels)}"]
+        return self.stepped()
 
     def _alone(self, level: RunningLevel, count: int) -> Output:
         for _ in range(count):
@@ -259,29 +276,51 @@ class Commands:
         return [f"{level.name} alone: {_at(level)}"]
 
     def _run(self, rest: str) -> Output:
+        order = self._run_order(rest)
+        return [self.session.run(order.most, order.until)]
+
+    def run_order(self, line: str) -> RunOrder | None:
+        """What a line has run in cycles that somebody may want to see, or to stop; None for any other line.
+
+        Raises:
+            Refused: It would be refused.
+        """
+        word, _, rest = line.partition("#")[0].strip().partition(" ")
+        rest = rest.strip()
+        if word.casefold() == "run":
+            return self._run_order(rest)
+        if word.casefold() == "step" and (not rest or _is_number(rest)):
+            return RunOrder(_number(rest or "1"), steps=True)
+        return None
+
+    def stepped(self) -> Output:
+        """What `step` shows."""
+        return [f"cycle {self.session.system.tick}: {', '.join(_at(level) for level in self.session.levels)}"]
+
+    def _run_order(self, rest: str) -> RunOrder:
         word, _, more = rest.partition(" ")
         if word == "until":
-            return [self.session.run(MOST_CYCLES, self.session.question(more))]
+            return RunOrder(MOST_CYCLES, self.session.question(more))
         if word == "to":
-            return [self._run_to(more.strip())]
+            return self._run_to(more.strip())
         if not rest and not self.session.stops.every:
             raise Refused(
                 Code.SHELL_COMMAND,
                 "nothing would stop it",
                 "`run N`, `run until CONDITION`, or `break` first",
             )
-        return [self.session.run(_number(rest) if rest else MOST_CYCLES)]
+        return RunOrder(_number(rest) if rest else MOST_CYCLES)
 
-    def _run_to(self, place: str) -> str:
+    def _run_to(self, place: str) -> RunOrder:
         word, _, number = place.partition(" ")
         if word != "cycle":
-            return self.session.run(MOST_CYCLES, self._line(place))
+            return RunOrder(MOST_CYCLES, self._line(place))
         left = _number(number) - self.session.system.tick
         if left < 0:
             raise Refused(
                 Code.SHELL_COMMAND, f"it is cycle {self.session.system.tick} already", "`undo` goes back"
             )
-        return self.session.run(left)
+        return RunOrder(left)
 
     def _line(self, place: str) -> NamedLine:
         line = typed_names.line_of(place, self.session.levels, self.session.level)
@@ -291,7 +330,19 @@ class Commands:
 
     def _undo(self, rest: str) -> Output:
         self.session.undo(_number(rest or "1"))
-        return [f"cycle {self.session.system.tick}: {', '.join(_at(level) for level in self.session.levels)}"]
+        return self.stepped()
+
+    def _restart(self, rest: str) -> Output:
+        name, _, how = rest.partition(" ")
+        if how.strip() not in {"", "anew"}:
+            raise Refused(Code.SHELL_COMMAND, f"`{how.strip()}` is not `anew`")
+        return [self.session.restart(self._named(name), anew=bool(how.strip()))]
+
+    def _freeze(self, rest: str) -> Output:
+        return [self.session.freeze(rest, on=True)]
+
+    def _thaw(self, rest: str) -> Output:
+        return [self.session.freeze(rest, on=False)]
 
     def _reload(self, rest: str) -> Output:
         words, flags = rest.split(), set[str]()

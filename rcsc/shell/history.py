@@ -7,6 +7,7 @@ import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 
+from rcsc.run.adopt import Restarted
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Values
 from rcsc.run.system import Outside, System
@@ -15,14 +16,20 @@ MOST = 10_000
 
 
 class Memory:
-    """Common memory whose contents can be kept and put back."""
+    """Common memory whose contents can be kept and put back.
+
+    Attributes:
+        frozen: Buffers to which nothing more is written: what is published there is lost.
+    """
 
     def __init__(self, held: Mapping[str, Values]) -> None:
         self.held = dict(held)
+        self.frozen: frozenset[str] = frozenset()
 
     def publish(self, name: str, values: Values) -> None:
-        """Make this the latest value."""
-        self.held[name] = values
+        """Make this the latest value, where it is not lost."""
+        if name not in self.frozen:
+            self.held[name] = values
 
     def latest(self, name: str) -> Values | None:
         """The latest value; None before the first."""
@@ -37,6 +44,9 @@ class KeptMoment:
         levels: With the tables that they had then.
         values: Of each level, the trace too.
         answers: What the database was set by hand to say.
+        frozen: Buffers that nothing is written to.
+        restarts: Levels that were started again before the next cycle.
+        faults: Of the plants, that are on by hand.
     """
 
     tick: int
@@ -45,6 +55,9 @@ class KeptMoment:
     buffers: Mapping[str, Values]
     outside: tuple[Outside, ...]
     answers: Mapping[tuple[object, ...], Values]
+    frozen: frozenset[str]
+    restarts: tuple[Restarted, ...]
+    faults: frozenset[str]
 
     def of(self, name: str) -> tuple[RunningLevel, Values]:
         """A level of then, and its values."""
@@ -55,7 +68,9 @@ class KeptMoment:
         )
 
 
-def kept(system: System, memory: Memory, answers: Mapping[tuple[object, ...], Values]) -> KeptMoment:
+def kept(
+    system: System, memory: Memory, answers: Mapping[tuple[object, ...], Values], faults: frozenset[str]
+) -> KeptMoment:
     """The system as it is now."""
     return KeptMoment(
         system.tick,
@@ -64,13 +79,17 @@ def kept(system: System, memory: Memory, answers: Mapping[tuple[object, ...], Va
         dict(memory.held),
         tuple(_copied(outside) for outside in system.outside),
         dict(answers),
+        memory.frozen,
+        tuple(system.restarts),
+        faults,
     )
 
 
 def put_back(moment: KeptMoment, system: System, memory: Memory) -> None:
     """Makes the system what it was."""
     system.tick, system.levels, system.outside = moment.tick, moment.levels, moment.outside
-    memory.held = dict(moment.buffers)
+    memory.held, memory.frozen = dict(moment.buffers), moment.frozen
+    system.restarts[:] = moment.restarts
     for level, values in zip(moment.levels, moment.values, strict=True):
         level.put_back(values)
         level.values = values  # the trace too, which the executor does not take back

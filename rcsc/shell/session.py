@@ -5,16 +5,19 @@ printed here.
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.codes import Code
 from rcsc.host.described import nearest
 from rcsc.lang.model import Program
 from rcsc.run.description import BadDescription, Description, LevelSpec
+from rcsc.run.faults import UnknownFault, switch
 from rcsc.run.levels import Fill, Query, RunningLevel
 from rcsc.run.log.schema import fingerprints
+from rcsc.run.log.states import begun_in_words
 from rcsc.run.orders.operator import line_to
 from rcsc.run.orders.roles import Served
 from rcsc.run.signature import Signature, Value, Values
@@ -43,6 +46,7 @@ class Session:
         chosen: Name of the level whose parts and variables are meant where none is named.
         stops: Breakpoints.
         interrupted: Set, and cleared again, from outside: cycles end after the present one.
+        faults: Of the plants, that are on by hand.
     """
 
     def __init__(self, system: System, plant: Origin) -> None:
@@ -53,6 +57,7 @@ class Session:
         self.chosen = system.levels[0].name
         self.stops = Stops()
         self.interrupted = False
+        self.faults: frozenset[str] = frozenset()
         self._past: deque[history.KeptMoment] = deque(maxlen=history.MOST)
         self._answers: dict[tuple[object, ...], Values] = {}
         # By identity, as after a reload another level has the name; the level is kept, so that its number stays its own.
@@ -102,6 +107,10 @@ class Session:
             self._programs[key] = level, program_of(self.plant, self.spec(level.name), self._builds[key][2])
         return self._programs[key][1]
 
+    def digest(self, level: RunningLevel) -> str:
+        """The digest of the executors that a level runs, as logs keep it."""
+        return self._builds[id(level)][1]
+
     # --- cycles ---
 
     def cycle(self) -> None:
@@ -150,21 +159,82 @@ class Session:
         Raises:
             Refused: As `cycle`.
         """
+        if until is not None and self.holds(until):
+            return f"cycle {self.system.tick}: {reached(until)}"
+        ended = next((why for why in islice(self.cycles(until), most) if why), "")
+        return ended or self.not_met(most, until)
+
+    def cycles(self, until: StateQuery | NamedLine | None = None) -> Iterator[str]:
+        """Run cycle after cycle; say after each why a run is to end there, and nothing where it is not.
+
+        Raises:
+            Refused: As `cycle`.
+        """
         self.stops.look(self.levels)
-        if isinstance(until, StateQuery) and stands(until, self.levels):
-            return f"cycle {self.system.tick}: `{until.text}` holds"
-        for _ in range(most):
+        while True:
             self.cycle()
-            if until is not None and stands(until, self.levels):
-                return f"cycle {self.system.tick}: {reached(until)}"
-            met = self.stops.met(self.levels)
-            if met is not None:
-                return f"cycle {self.system.tick}: breakpoint {met.number}, {reached(met.what)}"
-            if self.interrupted:
-                return f"cycle {self.system.tick}: interrupted"
+            yield self._ended(until)
+
+    def _ended(self, until: StateQuery | NamedLine | None) -> str:
+        """Say why a run ends after this cycle; empty where it does not."""
+        if until is not None and stands(until, self.levels):
+            return f"cycle {self.system.tick}: {reached(until)}"
+        met = self.stops.met(self.levels)
+        if met is not None:
+            return f"cycle {self.system.tick}: breakpoint {met.number}, {reached(met.what)}"
+        return f"cycle {self.system.tick}: interrupted" if self.interrupted else ""
+
+    def not_met(self, most: int, until: StateQuery | NamedLine | None) -> str:
+        """Say that so many cycles are done.
+
+        Raises:
+            Refused: They were to come to something, and did not.
+        """
         if until is None:
             return f"cycle {self.system.tick}"
         raise Refused(Code.SHELL_COMMAND, f"{most} cycles did not come to it")
+
+    def restart(self, name: str, *, anew: bool) -> str:
+        """Start a level again, as if its process had been killed: from what its last cycle left, or anew.
+
+        Raises:
+            Refused: Its tables are not proved for that state.
+        """
+        level = self.system.level(name)
+        checkpoint = None if anew else level.values
+        self._keep()
+        try:
+            self.system.restart(name, checkpoint)
+        except StateTableError as error:
+            self._past.pop()
+            raise Refused(Code.STATE_TABLE_ERROR, str(error)) from error
+        return f"level `{name}` is started again, {begun_in_words(self.system.restarts[-1].begun)}"
+
+    def fault(self, name: str, *, on: bool) -> str:
+        """Switch a fault of a plant on or off.
+
+        Raises:
+            Refused: No plant has it.
+        """
+        try:
+            switch(self.system.outside, name, on=on)
+        except UnknownFault as error:
+            raise Refused(Code.SHELL_COMMAND, str(error), *error.helps) from error
+        self.faults = self.faults | {name} if on else self.faults - {name}
+        return f"{name} is {'on' if on else 'off'}"
+
+    def freeze(self, buffer: str, *, on: bool) -> str:
+        """Have what is written to a buffer get lost, or no more: readers go on seeing what it holds.
+
+        Raises:
+            Refused: There is no such buffer.
+        """
+        known = [wire.source for wire in self.system.description.wires]
+        if buffer not in known:
+            raise Refused(Code.SHELL_NAME, f"there is no buffer `{buffer}`", *nearest(buffer, known))
+        self._keep()
+        self.memory.frozen = self.memory.frozen | {buffer} if on else self.memory.frozen - {buffer}
+        return f"what is written to {buffer} {'is lost from now on' if on else 'arrives again'}"
 
     def undo(self, count: int) -> None:
         """Goes back to before the last cycles.
@@ -179,9 +249,18 @@ class Session:
             self._past.pop()
         reloaded = moment.levels != self.system.levels
         history.put_back(moment, self.system, self.memory)
-        self._answers = dict(moment.answers)
+        self._answers, self.faults = dict(moment.answers), moment.faults
         if reloaded:
             self.stops.ask_again(self.levels)
+
+    @property
+    def kept(self) -> int:
+        """How often `undo` can go back."""
+        return len(self._past)
+
+    def holds(self, what: StateQuery | NamedLine) -> bool:
+        """Whether `run until` would have nothing to do: the condition holds already."""
+        return isinstance(what, StateQuery) and stands(what, self.levels)
 
     def changed(self) -> list[str]:
         """Variables that the last cycle left with another value: `task.cur_state: d_state -> state_2`."""
@@ -341,7 +420,7 @@ class Session:
         return True
 
     def _keep(self) -> None:
-        self._past.append(history.kept(self.system, self.memory, self._answers))
+        self._past.append(history.kept(self.system, self.memory, self._answers, self.faults))
 
 
 def _with(values: Values, at: int, value: Value) -> Values:

@@ -10,11 +10,12 @@ bounds, and a page that hangs holds nobody up.
 >>> message(id=1, answer={"tick": 5, "speed": float("inf")})
 '{"id":1,"answer":{"tick":5,"speed":"inf"}}'
 
-A new concern is a class with `name`, `lane`, `handlers`, `greeting` and `close` and a line in `project`; a new view is a module of
+A new concern is a class with `name`, `lane`, `handlers`, `greeting`, `begin` and `close` and a line in `project`; a new view is a module of
 `page/` with `mount(root, bus)` and a row in `page/views.js`.
 
 Nothing that a page sends is run or compiled but through the shell's commands and the prover. Who may see it: `rcsc.host.guard`.
 
-Modules, in the order the data flows: `server` talks to pages, `hub` has their questions answered, `project` says by whom; `runs` is
-the running system and its time line. The folder `page` is the page, `page/vendor` parts of others with their licences.
+Modules, in the order the data flows: `server` talks to pages, `hub` has their questions answered, `project` says by whom; `build` has
+tables and levels proved in processes of their own, and `runs` is the running system and its time line. The folder `page` is the page,
+`page/vendor` parts of others with their licences.
 """

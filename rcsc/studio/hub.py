@@ -30,6 +30,8 @@ from rcsc.shell.reload.refusal import Refused
 
 Json: TypeAlias = Any
 """What JSON can hold."""
+PROVER = threading.RLock()
+"""Whoever proves in this process holds it: the solvers know one thread at a time."""
 MOST_OPEN = 32
 """Questions of one page that may be unanswered."""
 DEEPEST_MESSAGE = 12
@@ -46,10 +48,17 @@ class Ask:
         body: What was asked, checked field by field as the handler reads it.
     """
 
-    def __init__(self, body: CheckedFields, told: Callable[[Json], None]) -> None:
-        self.body = body
-        self._told, self._over = told, threading.Event()
+    def __init__(
+        self, body: CheckedFields, told: Callable[[Json], None], finish: Callable[[Callable[[], Json]], None]
+    ) -> None:
+        """Args: body: What was asked; told: Takes how far it is; finish: Sends what it calls, or why that was refused."""
+        self.body, self._told, self._finish = body, told, finish
+        self._over = threading.Event()
         self._stops: list[Callable[[], None]] = []
+
+    def done(self, how: Callable[[], Json]) -> None:
+        """Answer a question whose handler returned `LATER`: with what `how` returns, or why it raises."""
+        self._finish(how)
 
     def progress(self, text: str, done: int = 0, of: int = 0) -> None:
         """Tell the page how far it is.
@@ -92,8 +101,10 @@ class Ask:
             stop()
 
 
+LATER: Any = object()
+"""What a handler returns that will call `Ask.done`; until then its lane is free for others."""
 Handler: TypeAlias = Callable[[Ask], Json]
-"""Answers a question.
+"""Answers a question, or returns `LATER`.
 
 Raises:
     CodedError, Refused, Malformed: It is refused, with the reason.
@@ -121,6 +132,10 @@ class Concern(Protocol):
 
     def greeting(self) -> Json:
         """What a page is told of it as it opens; called in its lane."""
+        ...
+
+    def begin(self) -> None:
+        """Do what is to be done before any page asks; called in its lane once the studio is served."""
         ...
 
     def close(self) -> None:
@@ -230,6 +245,11 @@ class Hub:
                 self._lanes[concern.lane] = Lane(f"studio {concern.lane}")
             self._concerns.append(concern)
 
+    def begin(self) -> None:
+        """Have every concern begin."""
+        for concern in self._concerns:
+            self._lanes[concern.lane].do(concern.begin)
+
     def do(self, lane: str, work: Callable[[], None], after_s: float = 0.0) -> None:
         """Have something done in a lane, so many seconds from now at the earliest; from any thread."""
         self._lanes[lane].do(work, after_s)
@@ -296,18 +316,21 @@ class Hub:
             return
         concern, handler = known
         body = CheckedFields(fields.value.get("body", {}), kind)
-        ask = Ask(body, lambda how: self._progress(client, number, how))
+        ask = Ask(
+            body, partial(self._progress, client, number), lambda how: self._finish(client, number, ask, how)
+        )
         client.open[number] = ask
-        self._lanes[concern.lane].do(lambda: self._answer(client, number, handler, ask))
+        self._lanes[concern.lane].do(lambda: self._finish(client, number, ask, lambda: handler(ask)))
 
     def _progress(self, client: Client, number: int, how: Json) -> None:
         text = message(id=number, progress=how)
         self._onto_server(lambda: client.event(f"#{number}", text))
 
-    def _answer(self, client: Client, number: int, handler: Handler, ask: Ask) -> None:
-        """Answer in the lane's thread."""
-        text = _answered(number, handler, ask)
-        self._onto_server(lambda: _close(client, number, text))
+    def _finish(self, client: Client, number: int, ask: Ask, how: Callable[[], Json]) -> None:
+        """Answer, in the lane's thread."""
+        text = _answered(number, ask, how)
+        if text is not None:
+            self._onto_server(lambda: _close(client, number, text))
 
 
 def _close(client: Client, number: int, text: str) -> None:
@@ -316,10 +339,12 @@ def _close(client: Client, number: int, text: str) -> None:
     client.answer(text)
 
 
-def _answered(number: int, handler: Handler, ask: Ask) -> str:
+def _answered(number: int, ask: Ask, how: Callable[[], Json]) -> str | None:
+    """Return the message; None where the answer comes later."""
     try:
         ask.check()
-        return message(id=number, answer=handler(ask))
+        answer = how()
+        return None if answer is LATER else message(id=number, answer=answer)
     except CancelledError:
         return message(id=number, cancelled=True)
     except (CodedError, Refused) as error:

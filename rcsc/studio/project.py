@@ -4,18 +4,27 @@ In: what is to be opened. Out: the concerns, which may know each other.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from rcsc.shell.opening import Opening
+from rcsc.studio.build import Build
 from rcsc.studio.hub import Concern, Hub
 from rcsc.studio.runs.live import LANE, Live
+from rcsc.studio.runs.logs import Logs
+from rcsc.studio.runs.timeline import TimeLine
 
 
-def concerns(opening: Opening, hub: Hub) -> Sequence[Concern]:
+def concerns(opening: Opening, hub: Hub, logs: Sequence[Path] = ()) -> Sequence[Concern]:
     """Return everything that answers.
 
     Args:
         opening: The system.
         hub: What tells the pages, and does things in lanes.
+        logs: That the user names; the first is shown at once.
     """
     live = Live(opening, hub.tell, lambda work, after_s: hub.do(LANE, work, after_s))
-    return (live,)
+    time = TimeLine(live, hub.tell)
+    folders = tuple(dict.fromkeys((Path.cwd(), opening.path.resolve().parent)))
+    kept = Logs(folders, tuple(logs), lambda name, log: hub.do(LANE, lambda: time.show(name, log)))
+    build = Build(opening.path, hub, live)
+    return (live, time, kept, build)

@@ -107,6 +107,7 @@ class Server:
             self._port = runner.addresses[0][1]
             self.address = f"http://{ADDRESS}:{self._port}/{self._token}/"
             opened(self.address)
+            self.hub.begin()
             await self._over.wait()
         finally:
             self.hub.close()

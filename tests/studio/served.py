@@ -5,6 +5,7 @@ import contextlib
 import itertools
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, Self
 
 import aiohttp
@@ -14,15 +15,17 @@ from rcsc.studio.hub import Concern
 from rcsc.studio.project import concerns
 from rcsc.studio.server import Server
 
-PATIENCE_S = 240.0
+PATIENCE_S = 120.0
 """After that something is broken; a machine under load needs some seconds."""
 
 
 @contextlib.contextmanager
-def serving(opening: Opening | None = None, others: Sequence[Concern] = ()) -> Iterator[Server]:
+def serving(
+    opening: Opening | None = None, others: Sequence[Concern] = (), logs: Sequence[Path] = ()
+) -> Iterator[Server]:
     """A server with the studio's concerns for a system, or with others alone."""
     server, opened = Server(), threading.Event()
-    given = [*others] if opening is None else [*concerns(opening, server.hub), *others]
+    given = [*others] if opening is None else [*concerns(opening, server.hub, logs), *others]
     thread = threading.Thread(target=server.serve, args=(given, lambda _: opened.set()), daemon=True)
     thread.start()
     assert opened.wait(PATIENCE_S)
@@ -61,7 +64,7 @@ class Page:
         async for said in self.socket:
             one = said.json()
             if "event" in one:
-                self.events[one["event"]] = one["body"]
+                self.events[one["event"].replace(".hello", ".state")] = one["body"]
                 self._news.set()
             elif "progress" in one:
                 self.progress.append(one["progress"])

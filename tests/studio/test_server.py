@@ -28,7 +28,7 @@ class Echo:
     def __init__(self) -> None:
         self.held, self.told = threading.Event(), threading.Event()
         self.asks: list[Ask] = []
-        self.closed = False
+        self.begun = self.closed = False
 
     @property
     def handlers(self) -> Mapping[str, Callable[[Ask], Any]]:
@@ -41,6 +41,9 @@ class Echo:
 
     def greeting(self) -> Any:
         return {"warm": True}
+
+    def begin(self) -> None:
+        self.begun = True
 
     def close(self) -> None:
         self.closed = True
@@ -144,7 +147,7 @@ REFUSED: tuple[tuple[str, dict[str, Any], Code, str], ...] = (
 
 def test_questions_are_answered_and_refused_by_number() -> None:
     async def work(_: Server, one: Page) -> None:
-        assert await one.heard("echo.hello", warm=True)
+        assert await one.heard("echo.state", warm=True)
         numbers = [await one.send("echo.say", text=str(at)) for at in range(5)]
         assert [await one.answer(number) for number in reversed(numbers)] == ["4", "3", "2", "1", "0"]
         for kind, body, code, word in REFUSED:
@@ -201,6 +204,7 @@ def test_a_question_is_cancelled_by_its_page_and_when_the_page_goes() -> None:
         assert await one.ask("echo.say", text="free") == "free"  # its lane, too
 
     run(work, echo=echo)
+    assert echo.begun
     assert echo.closed
 
 

@@ -29,13 +29,15 @@ Examples:
               help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
               help="Of what is random in the plant.")  # fmt: skip
+@click.option("--log", "logs", multiple=True, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="FILE",
+              help="A log to look at, wherever it lies (repeatable); the first is shown at once.")  # fmt: skip
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Where to listen; else a free one."
 )
 @click.option("--open", "opens", is_flag=True, help="Open the page in this machine's browser.")
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
-    target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str, alone: bool, seed: int, port: int,
-    opens: bool,
+    target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str, alone: bool, seed: int,
+    logs: tuple[Path, ...], port: int, opens: bool,
 ) -> int:  # fmt: skip
     """Open one page for SYSTEM: its tables, their proof, the levels as they run, and what stands outside them.
 
@@ -57,7 +59,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
             click.launch(address)
 
     try:
-        server.serve(concerns(opening, server.hub), told)
+        server.serve(concerns(opening, server.hub, logs), told)
     except KeyboardInterrupt:
         click.echo("the studio is closed")
     return 0

@@ -1,29 +1,429 @@
-// The run: every level side by side, and what is done to it.
+// The run: every level beside the others, what is done to it, and why a line did not match.
 
 import { make } from "./bus.js";
+import { lookAt } from "./moments.js";
+
+const RATES = [["as fast as it goes", ""], ["real time", "1"], ["4 times", "4"], ["a quarter", "0.25"], ["a tenth", "0.1"]];
 
 export function mount(root, bus) {
-  const shown = make("pre", { class: "scroll" });
-  const line = make("input", { "aria-label": "A command of the shell", size: "60", spellcheck: "false" });
-  const levels = make("div");
-  root.append(
-    make("form", { onsubmit: async (event) => {
-      event.preventDefault();
-      const answer = await bus.try("run.type", { line: line.value });
-      if (answer) shown.textContent = answer.shown.join("\n");
-      line.select();
-    } }, line, make("button", {}, "Do")),
-    make("div", {},
-      make("button", { type: "button", onclick: () => bus.try("run.open") }, "Open"),
-      make("button", { type: "button", onclick: () => bus.try("run.go") }, "Run"),
-      make("button", { type: "button", onclick: () => bus.try("run.pause") }, "Pause")),
-    levels, shown);
-  let asking = false;
-  bus.on("run.state", async (state) => {
-    if (!state.open || asking) return;
-    asking = true;
-    const moment = await bus.try("run.moment", { tick: state.tick });
-    asking = false;
-    levels.replaceChildren(...(moment?.levels ?? []).map((level) => make("div", {}, `${level.level}: ${level.table}, line ${level.lines.join(" and ")}`)));
-  });
+  const cards = make("div", { class: "cards scroll", role: "list", "aria-label": "Levels" });
+  const drawer = Drawer(bus);
+  root.append(toolbar(bus, drawer), cards, drawer.root);
+  const known = new Map(); // by level: its card
+  let levels = "";
+
+  function draw() {
+    const run = bus.latest("run"), moment = bus.latest("moment");
+    if (!run?.open) {
+      levels = "";
+      known.clear();
+      cards.replaceChildren(closed(bus));
+      return;
+    }
+    const now = JSON.stringify(run.levels.map(({ name, tables }) => [name, tables]));
+    if (now !== levels) {
+      levels = now;
+      known.clear();
+      for (const level of run.levels) known.set(level.name, Card(bus, level));
+      cards.replaceChildren(...[...known.values()].map(({ root: card }) => card));
+    }
+    const head = run.source === "live" && bus.selection.tick === run.last;
+    for (const level of moment?.levels ?? []) {
+      known.get(level.level)?.show(level, moment.tick, run, head ? run.levels.find(({ name }) => name === level.level) : null);
+    }
+  }
+  let due = false;
+  const soon = () => { if (!due) { due = true; requestAnimationFrame(() => { due = false; draw(); }); } };
+  bus.on("run", soon);
+  bus.on("moment", soon);
+  bus.on("build.state", soon);
+  bus.on("selection", soon);
 }
+
+// --- what is done to all levels ---
+
+function toolbar(bus, drawer) {
+  const type = (line) => bus.try("run.type", { line }).then((answer) => { if (answer) drawer.said(line, answer.shown); return answer; });
+  const go = make("button", { type: "button", class: "go", onclick: () => bus.try(bus.latest("run.state")?.going ? "run.pause" : "run.go") }, "Run");
+  const step = make("button", { type: "button", onclick: () => type("step") }, "Step ", make("kbd", {}, "s"));
+  const undo = make("button", { type: "button", onclick: () => type("undo") }, "Undo ", make("kbd", {}, "u"));
+  const rate = make("select", { "aria-label": "How fast", onchange: () => bus.try("run.rate", { rate: rate.value ? Number(rate.value) : null }) },
+    RATES.map(([text, value]) => make("option", { value }, text)));
+  const until = make("input", { "aria-label": "Run until a condition holds", placeholder: "run until: task.cur_state = state_3", spellcheck: "false", list: "run-words" });
+  const back = make("button", { type: "button", class: "back", hidden: true, onclick: () => bus.select({ tick: bus.latest("run").last, follow: true }) }, "Back to now");
+  const live = make("button", { type: "button", hidden: true, onclick: () => bus.try("time.live") }, "Back to the live run");
+  const said = make("span", { class: "grow soft ended", role: "status" });
+  bus.on("run", (run) => {
+    const of = bus.latest("run.state");
+    const log = run.source === "log";
+    go.replaceChildren(of.going ? "Pause " : "Run ", make("kbd", {}, "space"));
+    go.setAttribute("aria-pressed", Boolean(of.going));
+    for (const one of [go, step, until, rate]) one.disabled = !of.open || log;
+    undo.disabled = !of.open || log || !of.undo;
+    if (document.activeElement !== rate) rate.value = of.rate ? String(of.rate) : "";
+    live.hidden = !log;
+    said.textContent = log ? `a log: ${run.name}${run.finding ? `: ${run.finding.text}` : ""}` : of.ended ?? "";
+    said.title = said.textContent;
+    past();
+  });
+  const past = () => {
+    const run = bus.latest("run");
+    back.hidden = !run?.open || run.source === "log" || bus.selection.tick === run.last;
+  };
+  bus.on("selection", past);
+  bus.key("space", "Run, or pause", () => go.click(), "Run");
+  bus.key("s", "One cycle of all levels", () => step.click(), "Run");
+  bus.key("u", "Undo the last cycle, or what was set", () => undo.click(), "Run");
+  bus.key("r", "Run until a condition holds: type it", () => until.focus(), "Run");
+  bus.key("c", "Type a command of the shell", () => drawer.show("console", true), "Run");
+  bus.key("v", "Variables of the level chosen", () => drawer.show("values", true), "Run");
+  return make("div", { class: "bar" }, go, step, undo, rate,
+    make("form", { class: "until", onsubmit: (event) => { event.preventDefault(); if (until.value.trim()) type(`run until ${until.value.trim()}`); } }, until),
+    back, live, said);
+}
+
+function closed(bus) {
+  const build = bus.latest("build.state") ?? {}, state = bus.latest("run.state") ?? {};
+  const findings = (build.findings ?? []).filter(({ severity }) => severity === "error");
+  return make("div", { class: "closed" },
+    make("h2", {}, build.doing ? `${build.doing[0].toUpperCase()}${build.doing.slice(1)}` : "No system runs"),
+    build.doing ? null : make("p", { class: "pre" }, state.why ?? "not connected"),
+    ...findings.slice(0, 20).map((one) => make("p", { class: "pre" }, make("strong", { class: "wrong" }, `${one.code}: `), one.message,
+      one.primary ? make("span", { class: "soft" }, ` ${one.primary.file}:${one.primary.line}`) : null)),
+    build.doing ? null : make("button", { type: "button", onclick: () => bus.try("build.open") }, "Prove, compile and open again"));
+}
+
+// --- one level ---
+
+function Card(bus, level) {
+  const type = (line) => bus.try("run.type", { line });
+  const title = make("h3", {}, level.name);
+  const ran = make("span", { class: "soft" });
+  const body = make("div", { class: "said" });
+  const tables = make("div");
+  const reasons = make("div", { class: "why" });
+  const asks = make("button", { type: "button", "aria-expanded": "false", title: "Why each other line did not match" }, "Why not");
+  const cycle = make("button", { type: "button", title: "One cycle of this level alone, on its buffers as they are", onclick: () => type(`step ${level.name}`) }, "Cycle alone");
+  const more = make("select", { "aria-label": `More for ${level.name}`, onchange: () => {
+    const line = more.value;
+    more.value = "";
+    if (line) type(line).then((answer) => answer && bus.say(answer.shown.join("\n")));
+  } }, make("option", { value: "" }, "More…"),
+  ...[["Preprocess alone", `${level.name}.preprocess`], ["State table alone", `${level.name}.state_table`], ["Postprocess alone", `${level.name}.postprocess`],
+    ["Start again, from its last cycle", `restart ${level.name}`], ["Start again, anew", `restart ${level.name} anew`],
+    ["What the edited tables do otherwise", `diff ${level.name}`], ["Take the edited tables, if they prove", `reload ${level.name}`],
+    ["Take them although the next cycle does otherwise", `reload ${level.name} anyway`], ["Prove the levels first, then take them", `reload ${level.name} proved`],
+  ].map(([text, line]) => make("option", { value: line }, text)));
+  const root = make("article", { class: "card", role: "listitem", "aria-label": `Level ${level.name}` },
+    make("header", {}, title, ran, make("span", { class: "buttons" }, asks, cycle, more)), tables, reasons, body);
+  root.addEventListener("focusin", choose);
+  root.addEventListener("pointerdown", choose);
+  function choose() { if (bus.selection.level !== level.name) bus.select({ level: level.name }); }
+
+  let open = false, asked = "", held = [];
+  asks.addEventListener("click", () => { open = !open; asks.setAttribute("aria-expanded", open); asks.setAttribute("aria-pressed", open); asked = ""; why(); });
+  let last = {};
+  async function why() {
+    const run = bus.latest("run"), tick = bus.selection.tick;
+    const key = `${run.key} ${tick}`;
+    const line = bus.selection.level === level.name ? bus.selection.line : "";
+    if (!open && !line) { reasons.replaceChildren(); asked = ""; held = []; return; }
+    if (asked !== key) {
+      asked = key;
+      try { held = (await bus.ask("time.why", { tick, level: level.name })).tables; } catch (error) { held = []; reasons.replaceChildren(make("p", { class: "soft" }, error.message)); return; }
+      if (asked !== key) return;
+    }
+    reasons.replaceChildren(...held.map((table) => reasonTable(table, open ? null : line)));
+  }
+
+  function show(box, tick, run, now) {
+    last = { box, tick, run };
+    const live = run.source === "live";
+    for (const part of [cycle, more]) part.disabled = !live;
+    title.textContent = level.name;
+    root.classList.toggle("chosen", bus.selection.level === level.name);
+    ran.textContent = `every ${level.period_ms} ms${box.ran ? "" : "; no cycle in this tick"}`;
+    const lines = now ? now.now : [...box.before, ...(box.lines.length ? box.lines : [""]).map((line) => [box.table, line])];
+    tables.replaceChildren(...chips(bus, level, lines), ...fault(now ? now.fault : box.fault, box.wrong));
+    body.replaceChildren(...exchanges(box), ...changes(box));
+    why();
+  }
+  return { root, show, last: () => last };
+}
+
+function fault(text, wrong) {
+  return [text, wrong].filter(Boolean).map((one) => make("p", { class: "wrong" }, make("strong", {}, "✗ "), one));
+}
+
+// Every line of each table that ran: the one that ran is lit, and says so.
+function chips(bus, level, lines) {
+  const by = new Map();
+  for (const [table, line] of lines) by.set(table, [...(by.get(table) ?? []), line].filter(Boolean));
+  return [...by].map(([table, ran]) => make("div", { class: "tried" },
+    make("div", { class: "name" }, make("span", { class: "soft" }, "table "), table, make("span", { class: "soft" }, ran.length ? ", line " : ": no line matched"), make("strong", {}, ran.join(" and "))),
+    make("div", { class: "chips", role: "group", "aria-label": `Lines of ${table}` }, (level.tables[table] ?? []).map((line) => {
+      const lit = ran.includes(line);
+      const chosen = bus.selection.level === level.name && bus.selection.table === table && bus.selection.line === line;
+      return make("button", { type: "button", class: `chip${lit ? " lit" : ""}`, "aria-current": lit ? "true" : undefined, "aria-pressed": String(chosen),
+        title: lit ? `line ${line} ran` : `line ${line} did not match: press to see why`,
+        onclick: () => bus.select(chosen ? { line: "" } : { level: level.name, table, line }) }, lit ? `▶ ${line}` : line);
+    })),
+    bus.selection.level === level.name && bus.selection.table === table && bus.selection.line ? lineButtons(bus, level.name, table, bus.selection.line) : null));
+}
+
+function lineButtons(bus, level, table, line) {
+  const place = `${level}.${table}.${line}`;
+  const live = bus.latest("run").source === "live";
+  const type = (text) => bus.try("run.type", { line: text }).then((answer) => answer && bus.say(answer.shown.join("\n")));
+  return make("div", { class: "bar small" }, make("span", { class: "soft" }, `line ${line}: `),
+    make("button", { type: "button", disabled: !live, onclick: () => type(`break ${place}`) }, "Break here"),
+    make("button", { type: "button", disabled: !live, onclick: () => type(`run to ${place}`) }, "Run to here"),
+    make("button", { type: "button", onclick: () => bus.tell("to-line", { level, table, line, back: true }) }, "Ran before"),
+    make("button", { type: "button", onclick: () => bus.tell("to-line", { level, table, line, back: false }) }, "Ran next"));
+}
+
+function reasonTable(table, only) {
+  const lines = table.lines.filter(({ line }) => !only || line === only);
+  if (!lines.length) return make("p", { class: "soft" }, only && only === table.default ? `line ${only} runs where no other matches` : "");
+  return make("table", { class: "reasons" }, make("tbody", {}, lines.map((one) => make("tr", { class: one.matches ? "lit" : "" },
+    make("th", { scope: "row" }, one.line),
+    one.matches ? make("td", {}, "matched") : make("td", {}, make("strong", { class: "code" }, one.values.map(([name, value]) => `${name} = ${short(value)}`).join(", ")),
+      ", the cell asks ", one.heading && one.heading !== "when" && one.heading !== one.values[0]?.[0] ? `${one.heading}: ` : "", make("code", {}, one.cell),
+      one.failing > 1 ? make("span", { class: "soft" }, `; ${one.failing - 1} more cell${one.failing > 2 ? "s do" : " does"} not hold`) : "")))));
+}
+
+// A number as it is read: six digits tell where it is; the whole of it stands among the variables.
+const short = (text) => String(text).replace(/-?\d+\.\d{5,}(?:e[-+]?\d+)?/g, (number) => String(Number(Number(number).toPrecision(6))));
+
+// Orders and echoes, as they travel: what the level took and gave in this cycle, and what it saw of those below.
+function exchanges(box) {
+  const said = [];
+  for (const { order, report } of box.above) {
+    if (order) said.push(exchange("↓", `from ${order.other || order.buffer}`, ordered(order), order.new || order.altered, order.fields));
+    if (report) said.push(exchange("↑", `to ${report.other || report.buffer}`, reported(report), false, report.fields));
+  }
+  for (const { report, order } of box.below) {
+    if (order) said.push(exchange("↓", `to ${order.other || order.buffer}`, ordered(order), order.new || order.altered, order.fields));
+    if (report) said.push(exchange("↑", `from ${report.other || report.buffer}`, reported(report), false, report.fields));
+  }
+  return said;
+}
+
+const ordered = ({ number, command, new: fresh, altered }) => `${number === null ? "orders" : `order ${number}`} ${command}${fresh ? ", new" : altered ? ", altered under the same number" : ""}`;
+function reported({ echo, echoed, status, of_number: number, of_command: command, matches }) {
+  const said = `${echo === null ? "reports" : `echo ${echo}`}${echoed ? ` ${echoed}` : ""}: ${status}`;
+  if (number === null || echo === null) return said;
+  return matches ? said : `${said}; order ${number} ${command} is on its way`;
+}
+
+function exchange(arrow, who, text, fresh, fields) {
+  const said = fields.map(({ name, value }) => `${name} ${value}`).join(", ");
+  return make("p", { class: `exchange${fresh ? " fresh" : ""}` }, make("span", { "aria-hidden": "true" }, arrow), make("span", { class: "soft" }, ` ${who}: `), text,
+    fields.length ? make("span", { class: "fields soft", title: said }, fields.flatMap(({ name, value, changed }, at) => [at ? ", " : "", changed ? make("strong", {}, `${name} ${short(value)}`) : `${name} ${short(value)}`])) : "");
+}
+
+function changes(box) {
+  const states = box.states.filter(({ before, now, pending }) => before !== now || pending);
+  return [
+    ...states.map(({ name, before, now, pending }) => make("p", { class: "change" }, make("code", {}, name), before === now ? ` is ${short(now)}` : ` ${short(before)} → `, before === now ? "" : make("strong", {}, short(now)), pending ? `, waits to become ${pending}` : "")),
+    ...box.inputs.map(({ name, value }) => make("p", { class: "change soft" }, make("code", {}, name), ` came in as ${short(value)}`)),
+  ];
+}
+
+// --- the drawer ---
+
+function Drawer(bus) {
+  const tabs = [["console", "Console", consoleTab], ["values", "Variables", valuesTab], ["breaks", "Breakpoints and faults", breaksTab], ["script", "Script", scriptTab], ["found", "Proof and findings", foundTab]];
+  const bar = make("div", { class: "bar tabs", role: "tablist" });
+  const inside = make("div", { class: "inside" });
+  const made = new Map();
+  let shown = "";
+  const hide = make("button", { type: "button", class: "plain", "aria-expanded": "true", onclick: () => { const now = !inside.hidden; inside.hidden = now; hide.setAttribute("aria-expanded", !now); hide.textContent = now ? "Show" : "Hide"; } }, "Hide");
+  for (const [name, title] of tabs) {
+    bar.append(make("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-selected": "false", tabindex: "-1", onclick: () => show(name) }, title));
+  }
+  bar.append(make("span", { class: "grow" }), hide);
+  bar.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step || event.target.role !== "tab") return;
+    event.preventDefault();
+    const at = tabs.findIndex(([name]) => name === shown);
+    show(tabs[(at + step + tabs.length) % tabs.length][0]);
+    bar.querySelector(`#tab-${shown}`).focus();
+  });
+  function show(name, focus = false) {
+    shown = name;
+    inside.hidden = false;
+    for (const tab of bar.querySelectorAll("[role=tab]")) {
+      const selected = tab.id === `tab-${name}`;
+      tab.setAttribute("aria-selected", selected);
+      tab.tabIndex = selected ? 0 : -1;
+    }
+    if (!made.has(name)) made.set(name, tabs.find(([one]) => one === name)[2](bus));
+    const { root, focus: into } = made.get(name);
+    root.setAttribute("role", "tabpanel");
+    root.setAttribute("aria-labelledby", `tab-${name}`);
+    inside.replaceChildren(root);
+    made.get(name).shown?.();
+    if (focus) into?.();
+  }
+  show("console");
+  return { root: make("section", { class: "drawer", "aria-label": "What is done and seen" }, bar, inside), show,
+    said: (line, text) => made.get("console").said(line, text) };
+}
+
+function consoleTab(bus) {
+  const text = make("div", { class: "scroll transcript code", role: "log", tabindex: "0", "aria-label": "What was typed, and the answers" });
+  const words = make("datalist", { id: "run-words" });
+  const line = make("input", { class: "code grow", "aria-label": "A command of the shell", placeholder: "a command of the shell: help lists them", spellcheck: "false", autocomplete: "off", list: "run-words" });
+  const past = [];
+  let at = 0;
+  function said(typed, shown, wrong = false) {
+    text.append(make("p", { class: "soft" }, `> ${typed}`), ...shown.map((one) => make("p", { class: wrong ? "wrong" : "" }, one)));
+    while (text.childElementCount > 800) text.firstChild.remove();
+    text.scrollTop = text.scrollHeight;
+  }
+  const form = make("form", { class: "bar", onsubmit: async (event) => {
+    event.preventDefault();
+    const typed = line.value.trim();
+    if (!typed) return;
+    past.push(typed);
+    at = past.length;
+    line.value = "";
+    if (typed === "clear") return text.replaceChildren();
+    try { said(typed, (await bus.ask("run.type", { line: typed })).shown); }
+    catch (error) { said(typed, [error.message, ...(error.helps ?? []).map((help) => `help: ${help}`)], true); }
+    return undefined;
+  } }, line, make("button", {}, "Do"));
+  line.addEventListener("keydown", (event) => {
+    const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+    if (!step || (words.childElementCount && event.altKey)) return;
+    event.preventDefault();
+    at = Math.max(0, Math.min(past.length, at + step));
+    line.value = past[at] ?? "";
+  });
+  let waiting = 0;
+  const complete = (input) => input.addEventListener("input", () => {
+    clearTimeout(waiting);
+    const part = input.value.split(/[\s()]+/).at(-1);
+    if (part.length < 2) return;
+    waiting = setTimeout(async () => {
+      const found = await bus.ask("run.words", { part }).catch(() => []);
+      const head = input.value.slice(0, input.value.length - part.length);
+      words.replaceChildren(...found.map((word) => make("option", { value: head + word })));
+    }, 150);
+  });
+  complete(line);
+  bus.on("run", () => { line.disabled = !bus.latest("run.state").open; });
+  return { root: make("div", { class: "column" }, text, form, words), said, focus: () => line.focus() };
+}
+
+function valuesTab(bus) {
+  const filter = make("input", { "aria-label": "Filter variables", placeholder: "filter", spellcheck: "false" });
+  const changed = make("input", { type: "checkbox", id: "only-changed" });
+  const rows = make("tbody");
+  const head = make("strong", {}, "");
+  let asking = false, again = false, values = [], editing = null;
+  async function ask() {
+    const run = bus.latest("run"), { tick } = bus.selection;
+    const level = bus.selection.level || run?.levels?.[0]?.name;
+    if (!run?.open || tick === null || !root.isConnected) return;
+    if (asking) { again = true; return; }
+    asking = true;
+    try { values = await bus.ask("time.values", { tick, level }); head.textContent = level; } catch { values = []; }
+    asking = false;
+    draw(level);
+    if (again) { again = false; ask(); }
+  }
+  function draw(level) {
+    if (editing?.isConnected && document.activeElement === editing) return;
+    const run = bus.latest("run");
+    const settable = run.source === "live" && bus.selection.tick === run.last;
+    const part = filter.value.toLowerCase();
+    const shown = values.filter(({ name, changed: is }) => name.toLowerCase().includes(part) && (!changed.checked || is));
+    rows.replaceChildren(...shown.slice(0, 400).map((one) => {
+      const value = one.members.length || one.type === "bool"
+        ? make("select", { "aria-label": one.name, disabled: !settable }, (one.members.length ? one.members : ["false", "true"]).map((word) => make("option", { selected: word === one.text }, word)))
+        : make("input", { "aria-label": one.name, value: one.text, size: "12", disabled: !settable, spellcheck: "false" });
+      value.addEventListener("focus", () => { editing = value; });
+      const set = () => { editing = null; bus.try("run.type", { line: `${level}.${one.name} = ${value.value}` }).then((answer) => { if (!answer) ask(); }); };
+      value.addEventListener("change", set);
+      return make("tr", { class: one.changed ? "changed" : "" }, make("td", { class: "code" }, one.name), make("td", {}, value), make("td", { class: "soft" }, one.unit),
+        make("td", {}, one.changed ? "changed" : ""), make("td", { class: "soft" }, one.kind), make("td", { class: "soft" }, one.low === null || one.members.length || one.type === "bool" ? "" : `${one.low} .. ${one.high}`),
+        make("td", { class: "soft doc" }, one.doc));
+    }));
+  }
+  filter.addEventListener("input", () => draw(bus.selection.level || bus.latest("run").levels[0].name));
+  changed.addEventListener("change", () => draw(bus.selection.level || bus.latest("run").levels[0].name));
+  const root = make("div", { class: "column" }, make("div", { class: "bar" }, make("span", {}, "Level ", head), filter, make("label", { for: "only-changed" }, changed, " only what this tick changed")),
+    make("div", { class: "scroll" }, make("table", { class: "values" }, make("thead", {}, make("tr", {}, ["Variable", "Value", "Unit", "", "Kind", "Range", ""].map((text) => make("th", {}, text)))), rows)));
+  bus.on("moment", ask);
+  bus.on("selection", (_, what) => { if (what?.has("level")) ask(); });
+  return { root, shown: ask, focus: () => filter.focus() };
+}
+
+function breaksTab(bus) {
+  const list = make("ul"), faults = make("ul"), buffers = make("ul");
+  const what = make("input", { "aria-label": "A condition, or a line, to stop at", placeholder: "task.cur_state = state_3, or task.acquire.5", size: "44", spellcheck: "false", list: "run-words" });
+  const type = (line) => bus.try("run.type", { line });
+  const add = make("form", { class: "bar", onsubmit: async (event) => { event.preventDefault(); if (await type(`break ${what.value}`)) what.value = ""; } }, what, make("button", {}, "Break there"));
+  let before = "";
+  bus.on("run.state", (state) => {
+    const key = JSON.stringify([state.open, state.breaks, state.faults, state.buffers]);
+    if (key === before) return;
+    before = key;
+    list.replaceChildren(...(state.breaks ?? []).map(({ number, text }) => make("li", {}, `${number}: `, make("code", {}, text), " ", make("button", { type: "button", "aria-label": `Delete breakpoint ${number}`, onclick: () => type(`delete ${number}`) }, "Delete"))));
+    faults.replaceChildren(...((state.faults ?? []).length ? state.faults.map(({ name, on }) => make("li", {}, make("label", {}, make("input", { type: "checkbox", checked: on, onchange: () => type(`fault ${name} ${on ? "off" : "on"}`) }), ` ${name}`, on ? make("strong", { class: "wrong" }, " is on") : ""))) : [make("li", { class: "soft" }, "what stands outside declares none")]));
+    buffers.replaceChildren(...(state.buffers ?? []).map(({ name, to, frozen }) => make("li", {}, make("label", {}, make("input", { type: "checkbox", checked: frozen, onchange: () => type(`${frozen ? "thaw" : "freeze"} ${name}`) }), " ", make("code", {}, name), ` → ${to}`, frozen ? make("strong", { class: "wrong" }, " broken: what is written to it is lost") : ""))));
+  });
+  return { root: make("div", { class: "columns scroll" }, make("section", {}, make("h3", {}, "Breakpoints"), add, list), make("section", {}, make("h3", {}, "Faults of the plant"), faults), make("section", {}, make("h3", {}, "Break a buffer"), buffers)), focus: () => what.focus() };
+}
+
+function scriptTab(bus) {
+  const rows = make("tbody"), none = make("p", { class: "soft" }, "No script orders this system: start it with one, `rcsc studio SCRIPT`, or order a level here.");
+  const order = make("input", { class: "grow code", "aria-label": "An order", placeholder: "LEVEL COMMAND FIELD=VALUE: an order with the next number", spellcheck: "false" });
+  const form = make("form", { class: "bar", onsubmit: async (event) => { event.preventDefault(); const answer = await bus.try("run.type", { line: `order ${order.value}` }); if (answer) { bus.say(answer.shown.join("\n")); order.value = ""; } } }, order, make("button", {}, "Order"));
+  bus.on("run.rows", (said) => {
+    none.hidden = Boolean(said);
+    rows.replaceChildren(...(said?.rows ?? []).map(({ number, text, state, reason, ticks }, at) => {
+      const row = make("tr", { class: at === said.at && !said.over ? "lit" : "", "aria-current": at === said.at && !said.over ? "true" : undefined }, make("td", { class: "soft" }, number), make("td", { class: "code" }, text),
+        make("td", { class: state === "done" ? "good" : state && state !== "under way" ? "wrong" : "" }, state), make("td", { class: "soft" }, ticks === null ? "" : `${ticks} cycles`), make("td", {}, reason));
+      return row;
+    }));
+    rows.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
+  });
+  return { root: make("div", { class: "column" }, form, make("div", { class: "scroll" }, none, make("table", { class: "values" }, rows))), focus: () => order.focus() };
+}
+
+function foundTab(bus) {
+  const logs = make("ul"), text = make("pre", { class: "code", hidden: true }), doing = make("span", { class: "soft", role: "status" });
+  let cancel = null;
+  const stop = make("button", { type: "button", hidden: true, onclick: () => cancel?.abort() }, "Cancel");
+  async function job(kind, body, done) {
+    cancel?.abort();
+    const mine = cancel = new AbortController();
+    stop.hidden = false;
+    try { done(await bus.ask(kind, body, { signal: mine.signal, progress: (how) => { doing.textContent = how.of ? `${how.text}: ${how.done} of ${how.of}` : how.text; } })); }
+    catch (error) { bus.say(error.message, { wrong: true, helps: error.helps }); }
+    if (cancel === mine) { cancel = null; stop.hidden = true; doing.textContent = ""; }
+  }
+  async function list() {
+    const found = await bus.try("log.list") ?? [];
+    logs.replaceChildren(...found.map(({ name, bytes, changed_s: when }) => make("li", {}, make("button", { type: "button", onclick: () => job("log.open", { name }, () => bus.say(`${name} is shown to everybody`)) }, name),
+      make("span", { class: "soft" }, ` ${bytes >= 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(bytes / 1e3)} kB`}, ${new Date(when * 1000).toLocaleString()}`))));
+    if (!found.length) logs.replaceChildren(make("li", { class: "soft" }, "no logs here: `rcsc run --log`, `rcsc prove --log` and campaigns write them"));
+  }
+  const prove = make("button", { type: "button", onclick: () => job("build.prove", {}, (answer) => {
+    text.hidden = false;
+    text.textContent = answer.text;
+    bus.say(answer.status === 0 ? "the levels are proved together" : `not all is proved: ${answer.logs.length} runs show it`, { wrong: answer.status !== 0 });
+    list();
+  }) }, "Prove the levels together");
+  const again = make("button", { type: "button", onclick: () => job("build.open", {}, (answer) => bus.say(answer.ok ? "proved, compiled and opened anew" : "the tables are not proved", { wrong: !answer.ok })) }, "Prove, compile and open anew");
+  bus.on("build.hello", (state) => bus.tell("build.state", state));
+  bus.on("build.state", (state) => { if (!cancel) doing.textContent = state.doing; });
+  return { root: make("div", { class: "column" }, make("div", { class: "bar" }, again, prove, make("button", { type: "button", onclick: list }, "List logs again"), stop, doing),
+    make("div", { class: "scroll" }, make("h3", {}, "Runs that were kept: open one on the time line"), logs, text)), shown: list, focus: () => prove.focus() };
+}
+
+export { lookAt };

@@ -3,8 +3,9 @@
 The system is a session of `rcsc shell`, and what the pages ask of it is what the shell does: nothing is done otherwise here than there.
 What it did is kept as a log is (`history`), so that one way of showing serves a run and a file.
 
-    ask("run.type", {"line": "step 5"})     the shell's command, and the shell's answer
-    ask("run.moment", {"tick": 5})          every level in that tick
+    ask("run.type", {"line": "step 5"})               the shell's command, and the shell's answer
+    ask("time.moment", {"tick": 5})                   every level in that tick
+    ask("time.why", {"tick": 5, "level": "task"})     each line of the tables that it tried, and what of it did not hold
 
 >>> from rcsc.studio.runs.history import History
 >>> History().era
@@ -12,5 +13,6 @@ What it did is kept as a log is (`history`), so that one way of showing serves a
 
 What it costs: a copy of each level's values a cycle, kept once where they come again. Nothing here is trusted for a verdict.
 
-Modules, in the order the data flows: `live` is the session, `history` what it did, `shown` a moment of it as pages draw it.
+Modules, in the order the data flows: `live` is the session, `history` what it did, `logs` opens files; `timeline` answers about any
+tick of either, with `shown` (a moment as pages draw it) and `why` (each line of a table on the values that it saw).
 """

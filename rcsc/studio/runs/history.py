@@ -6,10 +6,12 @@ In: a system, after each cycle. Out: `Log`s: one for as long as the levels run t
 
 from dataclasses import dataclass, field, replace
 
+from rcsc.run.adopt import Begun
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.read import Log, LoggedLevel, LoggedRestart, Track
 from rcsc.run.log.records import ChainCheck
 from rcsc.run.log.schema import system_facts
+from rcsc.run.signature import Values
 from rcsc.run.system import System
 
 MOST_TICKS = 200_000
@@ -44,30 +46,43 @@ class History:
             self._forget(log)
 
     def settle(self, system: System) -> None:
-        """Make the last tick what the system is now, after something else than a cycle changed it."""
+        """Follow what something else than a cycle did: undo, other tables, values that were set by hand.
+
+        What was set between two cycles is kept as the state from which the later one begins, as of a level that is started again.
+        """
         held = [log for log in self.logs if log.first <= system.tick]
-        if len(held) < len(self.logs):
-            self.era += 1
+        taken_back = len(held) < len(self.logs)
         self.logs[:] = held
         log = self._fitting(system)
+        levels = []
         for level in system.levels:
-            track = log.level(level.name).track
-            if track.ticks[-1] > system.tick:
-                self.era += 1
-                del track.packed[track.place(system.tick) + 1 :]
-                del track.ticks[track.place(system.tick) + 1 :]
-            content = level.sign.packed.pack(*level.values)
-            if track.packed[-1] != content and len(track.ticks) > 1 and track.ticks[-1] == system.tick:
-                track.packed[-1] = content
-                self.era += 1
-            elif track.packed[-1] != content and track.ticks[-1] < system.tick:
-                track.add(system.tick, content)
-            elif track.packed[-1] != content:
-                track.packed[0] = content
+            logged = log.level(level.name)
+            track = logged.track
+            keep = track.place(system.tick) + 1
+            taken_back |= keep < len(track.ticks)
+            del track.ticks[keep:], track.packed[keep:]
+            levels.append(_settled(logged, level, system.tick))
+        self.era += taken_back
+        self.logs[-1] = replace(log, levels=tuple(levels))
 
-    def at(self, tick: int) -> Log:
-        """Return the log that has a tick."""
+    def ran_at(self, tick: int) -> Log:
+        """Return the log that has the cycles of a tick; of the first tick there are none."""
+        return next((log for log in reversed(self.logs) if log.first < tick), self.logs[0])
+
+    def stood_at(self, tick: int) -> Log:
+        """Return the log that has the values as a tick left them."""
         return next((log for log in reversed(self.logs) if log.first <= tick), self.logs[0])
+
+    def values(self, name: str, tick: int) -> Values:
+        """Return a level's leaves and trace as of a tick, with what was set by hand after it.
+
+        Raises:
+            KeyError: There is no such level.
+        """
+        level = self.stood_at(tick).level(name)
+        values = level.track.latest(tick) or level.track.layout.unpack(level.track.packed[0])
+        by_hand = next((one for one in reversed(level.restarts) if one.tick == tick + 1), None)
+        return values if by_hand is None else (*by_hand.values, *values[len(level.sign.leaves) :])
 
     @property
     def first(self) -> int:
@@ -81,11 +96,10 @@ class History:
 
     def _fitting(self, system: System) -> Log:
         """Return the log that grows; a new one where a level runs other tables than it."""
-        alike = self.logs and all(
-            level.sign is logged.sign
+        if not self.logs or any(
+            level.sign is not logged.sign
             for level, logged in zip(system.levels, self.logs[-1].levels, strict=True)
-        )
-        if not alike:
+        ):
             self.begin(system)
         return self.logs[-1]
 
@@ -116,3 +130,13 @@ def _begun(level: RunningLevel, tick: int) -> LoggedLevel:
     logged = LoggedLevel(level.name, level.sign, level.level, Track(level.sign.packed))
     logged.track.add(tick, level.sign.packed.pack(*level.values))
     return logged
+
+
+def _settled(logged: LoggedLevel, level: RunningLevel, tick: int) -> LoggedLevel:
+    """Return a level with what was set by hand since its last cycle, and nothing that was taken back."""
+    earlier = tuple(one for one in logged.restarts if one.tick <= tick)
+    leaves = level.values[: len(level.sign.leaves)]
+    record = logged.track.layout.unpack(logged.track.packed[-1])[: len(leaves)]
+    before = next((one.values for one in reversed(earlier) if one.tick > logged.track.ticks[-1]), record)
+    by_hand = () if leaves == before else (LoggedRestart(tick + 1, Begun.CHECKPOINT, leaves),)
+    return replace(logged, restarts=(*earlier, *by_hand))

@@ -13,7 +13,7 @@ from rcsc.studio.runs.history import History
 
 def moment(history: History, tick: int) -> dict[str, Any]:
     """Return a tick; a level that had no cycle in it stands at the line of its last."""
-    log = history.at(tick)
+    log = history.ran_at(tick)
     shown = tick_of(log, tick, other_ends(log.system().wires))
     levels = []
     for box, logged in zip(shown.boxes, log.levels, strict=True):

@@ -1,0 +1,154 @@
+"""Proofs that take long: the tables compiled before anything runs, and the levels proved together.
+
+In: questions of kind `build.*`. Out: what was proved, and findings as runs to look at. Each proof has a process of its own, which is
+killed when its question is cancelled, and never holds up the levels.
+"""
+
+import sys
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import TimeoutError as NotYet
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.jsonform import report_to_json
+from rcsc.driver.compile import compile_system
+from rcsc.host.children import WorkerEndedError, answer, executor, kill
+from rcsc.host.children import run as run_program
+from rcsc.studio.hub import Ask, Handler, Hub, Json
+from rcsc.studio.runs.live import LANE as RUN
+from rcsc.studio.runs.live import Live
+
+LANE = "prove"
+TOLD_S = 0.5
+FOUND = Path(".rcsc-cache") / "found"
+"""Where findings are kept as logs, beside the system."""
+_COMMAND = "from rcsc.commands import main; main()"
+MOST_TEXT = 200_000
+"""Characters of what a proof says."""
+T = TypeVar("T")
+
+
+class Build:
+    """Compiles the system's tables when the studio begins and whenever a page asks; proves the levels together."""
+
+    name, lane = "build", LANE
+
+    def __init__(self, path: Path, hub: Hub, live: Live) -> None:
+        """Args: path: Of the description; hub: Of the studio; live: What runs what was compiled."""
+        self._path, self._hub, self._live = path, hub, live
+        self._said: Json = {"doing": ""}
+
+    @property
+    def handlers(self) -> Mapping[str, Handler]:
+        """By kind."""
+        return {"build.open": self._open, "build.prove": self._prove}
+
+    def greeting(self) -> Json:
+        """What is being done, and what the last compilation found."""
+        return self._said
+
+    def begin(self) -> None:
+        """Compile, and open the system."""
+        self._compile(lambda work: waited(work, self._told))
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _told(self, text: str) -> None:
+        self._said = {**self._said, "doing": text}
+        self._hub.tell("build.state", self._said)
+
+    def _open(self, ask: Ask) -> Json:
+        """Compile what changed, and open the system anew."""
+        return self._compile(lambda work: self._job(ask, work))
+
+    def _job(self, ask: Ask, work: tuple[str, Callable[..., T], tuple[Any, ...]]) -> T:
+        def told(text: str) -> None:
+            self._told(text)
+            ask.progress(text)
+
+        return waited(work, told, ask)
+
+    def _compile(self, job: Callable[[tuple[str, Callable[..., Any], tuple[Any, ...]]], Any]) -> Json:
+        try:
+            report = job(("proving and compiling the tables", compiled, (self._path,)))
+        finally:
+            self._told("")
+        errors = [one for one in report["diagnostics"] if one["severity"] == "error"]
+        self._said = {
+            "doing": "",
+            "ok": report["ok"],
+            "findings": report["diagnostics"],
+            "tables": report["tables"],
+        }
+        self._hub.tell("build.state", self._said)
+        if report["ok"]:
+            self._hub.do(RUN, self._live.open)
+        else:
+            first = errors[0]["message"] if errors else report.get("why", "")
+            more = f", and {len(errors) - 1} more" if len(errors) > 1 else ""
+            self._hub.do(RUN, lambda: self._live.close_because(f"its tables are not proved: {first}{more}"))
+        return {"ok": report["ok"], "findings": report["diagnostics"]}
+
+    def _prove(self, ask: Ask) -> Json:
+        """Prove the levels together; what fails is kept as logs."""
+        folder = self._path.parent / FOUND
+        before = _logs(folder)
+        arguments = ("prove", str(self._path), "--log", str(folder))
+        try:
+            status, text = self._job(ask, ("proving the levels together", commanded, (arguments,)))
+        finally:
+            self._told("")
+        new = sorted(name for name, changed in _logs(folder).items() if before.get(name) != changed)
+        return {"status": status, "text": text[:MOST_TEXT], "logs": new}
+
+
+def compiled(path: Path) -> dict[str, Any]:
+    """Prove and compile a system's tables; return the report as JSON. A description that is not in order is a finding, too."""
+    try:
+        return report_to_json(compile_system(path).report, "compile")
+    except CodedError as error:
+        return {"ok": False, "diagnostics": [], "tables": [], "why": error.shown}
+
+
+def commanded(arguments: tuple[str, ...]) -> tuple[int | None, str]:
+    """Run `rcsc` with arguments; return its status and what it said."""
+    ran = run_program([sys.executable, "-c", _COMMAND, *arguments])
+    return ran.status, ran.out + ran.err
+
+
+def waited(
+    work: tuple[str, Callable[..., T], tuple[Any, ...]], told: Callable[[str], None], ask: Ask | None = None
+) -> T:
+    """Have a process of its own do something, and say every while what it does and for how long.
+
+    Raises:
+        CancelledError: The question was cancelled; the process is gone.
+        WorkerEndedError: It ended without an answer.
+    """
+    what, function, arguments = work
+    processes, begun_s = executor(1), time.monotonic()
+    try:
+        if ask is not None:
+            ask.on_cancel(lambda: kill(processes))
+        future = processes.submit(function, *arguments)
+        while True:
+            told(f"{what}, {time.monotonic() - begun_s:.0f} s")
+            try:
+                future.exception(TOLD_S)
+            except NotYet:
+                continue
+            return answer(future)
+    except WorkerEndedError:
+        if ask is not None:
+            ask.check()
+        raise
+    finally:
+        kill(processes)
+        processes.shutdown(wait=False, cancel_futures=True)
+
+
+def _logs(folder: Path) -> dict[str, float]:
+    return {str(path): path.stat().st_mtime for path in folder.glob("*.mcap")} if folder.is_dir() else {}

@@ -1,0 +1,99 @@
+"""Logs that pages may open: those of the system's folder and of the one that the studio was started in.
+
+In: questions of kind `log.*`. Out: which logs there are, and one of them as the run that everybody looks at. A page names a log of that
+list, and nothing else is read. Reading has a lane of its own, for it takes seconds.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from rcsc.diagnostics.codes import Code
+from rcsc.run.log.read import Log, UnreadableLog, read
+from rcsc.shell.reload.refusal import Refused
+from rcsc.studio.hub import Ask, Handler, Json
+
+LANE = "log"
+MOST_LOGS = 200
+DEEPEST = 5
+MOST_LOOKED_AT = 20_000
+"""Files and folders that are looked at for logs."""
+_ASIDE = {".git", ".venv", "venv", "node_modules", "__pycache__"}
+
+
+class Logs:
+    """The logs that may be opened."""
+
+    name, lane = "log", LANE
+
+    def __init__(
+        self, folders: tuple[Path, ...], given: tuple[Path, ...], show: Callable[[str, Log], None]
+    ) -> None:
+        """Args: folders: Where logs are looked for; given: Logs that the user named; show: Takes one that was read."""
+        self._folders, self._given, self._show = folders, given, show
+
+    @property
+    def handlers(self) -> Mapping[str, Handler]:
+        """By kind."""
+        return {"log.list": self._list, "log.open": self._open}
+
+    def greeting(self) -> Json:
+        """Nothing that a page must know at once."""
+        return {}
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def begin(self) -> None:
+        """Show the first log that the user named, if any."""
+        for path in self._given[:1]:
+            self._show(str(path), read(path))
+
+    def _list(self, _: Ask) -> Json:
+        found = sorted(self._found().items(), key=lambda one: -one[1].stat().st_mtime)
+        return [
+            {"name": name, "bytes": path.stat().st_size, "changed_s": path.stat().st_mtime}
+            for name, path in found[:MOST_LOGS]
+        ]
+
+    def _open(self, ask: Ask) -> Json:
+        name = ask.body.text("name")
+        path = self._found().get(name)
+        if path is None:
+            raise Refused(Code.STUDIO, f"there is no log `{name}`")
+        ask.progress(f"reading {name}")
+        try:
+            log = read(path)
+        except UnreadableLog as error:
+            raise Refused(Code.LOG_UNREADABLE, str(error)) from error
+        ask.check()
+        self._show(name, log)
+        return {"name": name}
+
+    def _found(self) -> dict[str, Path]:
+        """Every log by how it is called: its path from where the studio was started."""
+        found = {str(path): path for path in self._given}
+        for folder in self._folders:
+            for path in _logs(folder):
+                found.setdefault(os.path.relpath(path), path)
+        return found
+
+
+def _logs(top: Path) -> Iterator[Path]:
+    waiting, left = [(top, 0)], MOST_LOOKED_AT
+    while waiting and left > 0:
+        folder, deep = waiting.pop()
+        try:
+            entries = list(os.scandir(folder))
+        except OSError:
+            continue
+        left -= len(entries)
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False) and deep < DEEPEST and entry.name not in _ASIDE:
+                waiting.append((Path(entry.path), deep + 1))
+            elif (
+                entry.name.endswith(".mcap")
+                and not entry.name.startswith(".")
+                and entry.is_file(follow_symlinks=False)
+            ):
+                yield Path(entry.path)

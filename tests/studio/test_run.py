@@ -1,0 +1,478 @@
+"""A system under the hands of pages: what the shell does, the same for all of them, whatever a page does or leaves."""
+
+import asyncio
+import itertools
+import shutil
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rcsc.commands import run as rcsc
+from rcsc.diagnostics.codes import Code
+from rcsc.lang.interpret import initial
+from rcsc.run.log.read import read
+from rcsc.run.log.ticks import frames
+from rcsc.shell.commands import Commands
+from rcsc.shell.opening import Opening, opened
+from rcsc.shell.reload.refusal import Refused as Refusal
+from rcsc.studio.runs.history import History
+from rcsc.studio.runs.live import Live
+from rcsc.studio.runs.shown import moment
+from rcsc.studio.runs.why import why
+from tests.studio.served import Page, Refused, page, serving, until
+from tests.support.programs.examples import EXTERN
+from tests.support.programs.stages import program_of
+from tests.support.programs.texts import edited
+
+ROW = (
+    "  | idle  | false       | idle   |        |                      |        ||                  | 0          | done       |\n",
+    "",
+)
+"""What takes a line out of a table."""
+DOCK = Path(__file__).parents[1] / "data" / "dock"
+
+
+@pytest.fixture(scope="module")
+def dock(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The robot that docks, compiled, where nobody else writes."""
+    folder = tmp_path_factory.mktemp("studio") / "dock"
+    shutil.copytree(DOCK, folder, ignore=shutil.ignore_patterns("generated", ".rcsc-cache"))
+    assert rcsc(["compile", str(folder)]) == 0
+    return folder / "system.toml"
+
+
+def studio(
+    path: Path, work: Callable[[Page, Page], Awaitable[None]], script: str = "", logs: tuple[Path, ...] = ()
+) -> None:
+    """Two pages of a studio whose system is open."""
+
+    async def inside() -> None:
+        async with page(server) as one, page(server) as other:
+            for each in (one, other):
+                await each.heard("run.state", open=True)
+            await work(one, other)
+
+    with serving(Opening(path, script=script), logs=logs) as server:
+        asyncio.run(inside())
+
+
+async def shown(one: Page, line: str) -> list[str]:
+    """What the studio answers to a line, or says of a refusal."""
+    try:
+        answer: list[str] = (await one.ask("run.type", line=line))["shown"]
+    except Refused as refused:
+        return [f"refused: {refused}", *refused.helps]
+    return answer
+
+
+def by_shell(commands: Commands, line: str) -> list[str]:
+    try:
+        return commands.do(line)
+    except Refusal as refused:
+        return [f"refused: {refused}", *refused.helps]
+
+
+SESSION = """
+levels
+step
+order supervisor dock
+step 5
+lines
+break drive.speed_mm_s > 0
+breaks
+run 40
+show
+undo
+lines
+undo 3
+drive
+step drive 2
+supervisor.preprocess
+state_table
+postprocess
+level drive
+speed_mm_s ?
+stage ?
+no_such ?
+run
+run until supervisor.command.inc_command = 1
+run until supervisor.command.inc_command = 7
+run to cycle 60
+run to cycle 3
+expect drive.bumper = true
+drive.bumper = true
+show
+step
+lines
+faults
+fault nothing
+freeze base.travelled
+buffers base.travelled
+step 3
+thaw base.travelled
+freeze nowhere
+restart drive
+restart drive anew
+restart drive later
+restart nobody
+step 2
+undo 200
+undo 2
+delete 1
+delete 9
+diff
+reload drive
+rubbish
+step 999999999999
+# nothing
+""".strip().splitlines()
+
+
+def test_every_command_answers_as_the_shell_does(dock: Path) -> None:
+    commands = opened(Opening(dock))
+
+    async def work(one: Page, other: Page) -> None:
+        for at, line in enumerate(SESSION):
+            said = await shown((one, other)[at % 2], line)  # it is one system, whichever page asks
+            assert said == by_shell(commands, line), line
+        session = commands.session
+        for level in session.levels:
+            values = await one.ask("time.values", level=level.name, tick=session.system.tick)
+            assert {value["name"]: value["text"] for value in values} == {
+                leaf.name: level.shown(leaf.name) for leaf in level.sign.leaves
+            }
+
+    studio(dock, work)
+
+
+def test_both_pages_see_the_same_and_one_that_goes_stops_nothing(dock: Path) -> None:
+    async def work(one: Page, other: Page) -> None:
+        await one.ask("run.type", line="order supervisor dock")
+        await one.ask("run.rate", rate=2.0)
+        await one.ask("run.go")
+        await other.heard("run.state", going=True, rate=2.0)
+        with pytest.raises(Refused, match="already"):
+            await other.ask("run.type", line="step 5")
+        assert (await other.ask("run.type", line="break supervisor.contact = true"))[
+            "shown"
+        ]  # between two cycles
+        await one.socket.close()
+        begun = other.events["run.state"]["tick"]
+        await until(lambda: other.events["run.state"]["tick"] > begun + 5)
+        await other.ask("run.pause")
+        state = await other.heard("run.state", going=False)
+        assert state["ended"].endswith("paused")
+        tick = state["tick"]
+        await asyncio.sleep(0.2)
+        assert other.events["run.state"]["tick"] == tick
+
+    studio(dock, work)
+
+
+def test_a_run_is_answered_where_it_ends_and_a_page_may_look_on_meanwhile(dock: Path) -> None:
+    async def work(one: Page, other: Page) -> None:
+        await one.ask("run.rate", rate=5.0)
+        number = await one.send("run.type", line="run 50")
+        await other.heard("run.state", going=True)
+        assert (await other.ask("time.moment", tick=0))["tick"] == 0
+        assert (await one.answer(number)) == {"shown": ["cycle 50"]}
+        assert (await other.heard("run.state", going=False))["tick"] == 50
+        number = await one.send("run.type", line="run until supervisor.contact = true")
+        await other.heard("run.state", going=True)
+        await other.ask("run.pause")
+        assert (await one.answer(number))["shown"][0].endswith("paused")
+
+    studio(dock, work)
+
+
+def test_a_clock_is_kept(dock: Path) -> None:
+    """At real time cycles come no faster than the clock; on any machine they may come more slowly."""
+
+    async def work(one: Page, _: Page) -> None:
+        await one.ask("run.rate", rate=1.0)
+        begun = asyncio.get_running_loop().time()
+        await one.ask("run.type", line="run 26")
+        assert asyncio.get_running_loop().time() - begun >= 25 * 0.04 - 0.001
+        for rate in (0, -1, 1e9, 0.001):
+            with pytest.raises(Refused):
+                await one.ask("run.rate", rate=rate)
+        assert (await one.ask("run.rate", rate=None))["rate"] is None
+
+    studio(dock, work)
+
+
+REFUSED: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("run.type", {}),
+    ("run.type", {"line": 3}),
+    ("run.type", {"line": "x" * 5000}),
+    ("run.type", {"line": "quit"}),
+    ("run.type", {"line": "clear"}),
+    ("run.rate", {"rate": "fast"}),
+    ("time.moment", {}),
+    ("time.moment", {"tick": -1}),
+    ("time.moment", {"tick": 10**9}),
+    ("time.moment", {"tick": 0.5}),
+    ("time.values", {"tick": 0, "level": "nobody"}),
+    ("time.why", {"tick": 0, "level": "drive"}),
+    ("time.why", {"tick": 1, "level": "nobody"}),
+    ("time.find", {"tick": 0, "text": "drive.speed_mm_s >"}),
+    ("time.find", {"tick": 0, "text": "().__class__"}),
+    ("time.find", {"tick": 0, "text": "9" * 5000}),
+    ("time.find", {"tick": 0, "text": "drive.nothing = 3"}),
+    ("time.tracks", {"era": "x", "since": -1}),
+    ("time.series", {"level": "drive", "name": "nothing"}),
+    ("log.open", {"name": "/etc/passwd"}),
+    ("log.open", {"name": "../../etc/passwd"}),
+    ("log.open", {}),
+    ("build.nothing", {}),
+)
+
+
+def test_what_cannot_be_answered_is_refused_with_a_reason(dock: Path) -> None:
+    async def work(one: Page, other: Page) -> None:
+        await one.ask("run.type", line="step 2")
+        for kind, body in REFUSED:
+            with pytest.raises(Refused, match=r"\w{3}") as refused:
+                await one.ask(kind, **body)
+            assert refused.value.code != Code.INTERNAL.value, (kind, body)
+        assert (await other.ask("run.type", line="step"))["shown"]
+
+    studio(dock, work)
+
+
+# --- the time line ---
+
+
+def recorded(commands: Commands, lines: list[str]) -> History:
+    history, live = History(), Live(Opening(Path()), lambda *_: None, lambda *_: None)
+    system = commands.session.system
+    history.begin(system)
+    system.watch.append(history.add)
+    live.history, live.commands = history, commands
+    for line in lines:
+        by_shell(commands, line)
+        history.settle(system)
+    return history
+
+
+LINES = st.sampled_from(
+    """
+    step
+    step 3
+    step 7
+    undo
+    undo 2
+    undo 4
+    order supervisor dock
+    order supervisor undock
+    drive.bumper = true
+    drive.bumper = false
+    drive
+    supervisor.preprocess
+    drive.state_table
+    restart drive
+    restart supervisor anew
+    freeze base.travelled
+    thaw base.travelled
+    """.split("\n    ")[1:-1]
+)
+
+
+@given(st.lists(LINES, max_size=14))
+@settings(max_examples=25, deadline=None)
+def test_what_is_kept_is_what_was(dock: Path, lines: list[str]) -> None:
+    """After any commands every tick that is kept has the values of a system to which only what was not undone happened."""
+    commands = opened(Opening(dock))
+    history = recorded(commands, lines)
+    system = commands.session.system
+    assert (history.first, history.last) == (0, system.tick)
+    for level in system.levels:
+        kept = history.values(level.name, system.tick)[: len(level.sign.leaves)]
+        assert kept == level.values[: len(level.sign.leaves)]
+    now = history.era, history.values("drive", system.tick)
+    history.settle(system)
+    assert (history.era, history.values("drive", system.tick)) == now
+    for tick in range(system.tick, -1, -1):
+        if commands.session.kept == 0:
+            break
+        for box in moment(history, tick)["levels"]:
+            assert box["table"]
+
+
+def test_moments_are_those_of_a_log(dock: Path, tmp_path: Path) -> None:
+    """Every tick that pages see of a run is the one that `rcsc log` sees of its log."""
+    log = tmp_path / "day.mcap"
+    assert rcsc(["run", str(dock.parent), "--log", str(log), "-q"]) == 0
+    kept = read(log)
+    seen = {tick.tick: tick for tick in frames(kept)}
+    history = History([kept])
+    for tick in itertools.islice(seen, 0, None, 7):
+        for box, level in zip(seen[tick].boxes, moment(history, tick)["levels"], strict=True):
+            assert level["level"] == box.level
+            assert level["ran"] == box.ran
+            assert not box.ran or (level["table"], tuple(level["lines"])) == (box.table, box.lines)
+
+    async def work(one: Page, other: Page) -> None:
+        state = await other.heard("time.state", source="log")
+        assert (state["first"], state["last"]) == (kept.first, kept.last)
+        tracks = await one.ask("time.tracks", era=-1, since=-1)
+        for tick in itertools.islice(seen, 0, None, 11):
+            for box in seen[tick].boxes:
+                if box.ran:
+                    stands = [change for change in tracks["levels"][box.level] if change[0] <= tick][-1]
+                    assert stands[1:3] == [box.table, box.lines[0]], (tick, box.level)
+        found = await one.ask("time.find", text="drive.travelled_mm > 100", tick=kept.first, back=False)
+        values = await one.ask("time.values", level="drive", tick=found["tick"])
+        before = await one.ask("time.values", level="drive", tick=found["tick"] - 1)
+        assert [
+            int(next(value["text"] for value in several if value["name"] == "travelled_mm")) > 100
+            for several in (values, before)
+        ] == [True, False]
+        assert (
+            await one.ask("time.find", text="drive.travelled_mm > 100", tick=found["tick"], back=True)
+        ) == {"tick": None}
+        await other.ask("time.live")
+        assert await one.heard("time.state", source="live")
+
+    studio(dock, work, logs=(log,))
+
+
+def test_tracks_are_told_once_and_anew_after_undo(dock: Path) -> None:
+    async def work(one: Page, _: Page) -> None:
+        held: dict[str, list[list[Any]]] = {}
+        era = since = -1
+        for line in ("step 5", "order supervisor dock", "step 20", "undo 8", "step 3", "step 40"):
+            await one.ask("run.type", line=line)
+            news = await one.ask("time.tracks", era=era, since=since)
+            if news["from"] < 0:
+                held = {}
+            for level, changes in news["levels"].items():
+                held[level] = [*held.get(level, []), *changes]
+            era, since = news["era"], news["to"]
+        whole = (await one.ask("time.tracks", era=-1, since=-1))["levels"]
+        assert held == whole
+        assert [mark["text"] for mark in news["marks"]] == ["order supervisor dock"]
+
+    studio(dock, work)
+
+
+def test_why_says_of_each_line_what_the_interpreter_says(dock: Path) -> None:
+    """In every cycle of a run exactly the line that ran matches, and of every other line the cell that is named is false."""
+    commands = opened(Opening(dock))
+    session = commands.session
+    by_shell(commands, "order supervisor dock")
+    ran = 0
+    for _ in range(120):
+        before = {level.name: level.values for level in session.levels}
+        commands.do("step")
+        for level in session.levels:
+            began = {
+                leaf.name: (level.values if leaf.kind == "input" else before[level.name])[at]
+                for at, leaf in enumerate(level.sign.leaves)
+            }
+            tables = why(session.program(level), level.name, began)
+            assert [(table.table, [one.line for one in table.lines if one.matches]) for table in tables] == [
+                (table, [line] if line != _default(session.program(level), table) else [])
+                for table, line in level.lines
+            ]
+            for table in tables:
+                for one in table.lines:
+                    assert one.matches == (one.failing == 0)
+                    assert one.matches or (one.cell and one.values)
+                    ran += 1
+    assert ran > 500
+
+
+def _default(program: Any, table: str) -> str | None:
+    default = next(one for one in program.tables if one.name == table).default
+    return None if default is None else default.name
+
+
+def test_an_extern_procedure_is_not_called_to_look_at_a_cycle() -> None:
+    """Its module is not even imported: there is none."""
+    program = program_of(EXTERN)
+    with pytest.raises(Refusal, match="extern procedure"):
+        why(program, "top", initial(program))
+
+
+OTHERWISE = (
+    "| < command.target_mm  | < 2500 || tick             | 400 ",
+    "| < command.target_mm  | < 2500 || tick             | 300 ",
+)
+
+
+async def speed(one: Page, tick: int) -> str:
+    values = await one.ask("time.values", level="drive", tick=tick)
+    return str(next(value["text"] for value in values if value["name"] == "speed_mm_s"))
+
+
+def test_reload_is_gated_by_the_proof(dock: Path) -> None:
+    """Tables that do not prove are not taken, the reason says which line; those that do and do otherwise say what."""
+    source = dock.parent / "drive.rcs"
+    text = source.read_text(encoding="utf-8")
+
+    async def work(one: Page, other: Page) -> None:
+        await one.ask("run.type", line="step 3")
+        source.write_text(edited(text, ROW), encoding="utf-8")
+        with pytest.raises(Refused, match="not proved") as refused:
+            await one.ask("run.type", line="reload drive")
+        assert refused.value.code == "RCS733"
+        assert (await other.ask("run.type", line="step"))["shown"][0].startswith("cycle 4")
+        source.write_text(text.replace("# A drive", "# The drive"), encoding="utf-8")
+        answer = await one.ask("run.type", line="reload drive")
+        assert (
+            "reload" in str(answer)
+            or "runs its new tables" in str(answer)
+            or "nothing changed" in str(answer)
+        )
+        assert (await other.ask("run.type", line="step"))["shown"][0].startswith("cycle 5")
+        assert [
+            level["tick"] for level in [await one.ask("time.moment", tick=tick) for tick in range(6)]
+        ] == list(range(6))
+
+    try:
+        studio(dock, work)
+    finally:
+        source.write_text(text, encoding="utf-8")
+
+
+def test_tables_that_are_not_proved_open_no_run_and_say_why(dock: Path, tmp_path: Path) -> None:
+    """The studio opens all the same, names the finding, and runs as soon as the tables are mended."""
+    folder = tmp_path / "dock"
+    shutil.copytree(dock.parent, folder, ignore=shutil.ignore_patterns(".rcsc-cache"))
+    source = folder / "drive.rcs"
+    text = source.read_text(encoding="utf-8")
+    source.write_text(edited(text, ROW), encoding="utf-8")
+
+    async def inside() -> None:
+        async with page(server) as one:
+            state = await one.heard("build.state", ok=False)
+            assert any(found["code"] == "RCS401" for found in state["findings"])
+            await one.heard("run.state", open=False)
+            await until(lambda: "not proved" in one.events["run.state"]["why"])
+            with pytest.raises(Refused, match="not proved"):
+                await one.ask("run.type", line="step")
+            source.write_text(text, encoding="utf-8")
+            assert (await one.ask("build.open"))["ok"]
+            await one.heard("run.state", open=True)
+            assert (await one.ask("run.type", line="step"))["shown"]
+
+    with serving(Opening(folder / "system.toml")) as server:
+        asyncio.run(inside())
+
+
+def test_a_proof_that_is_cancelled_ends(dock: Path) -> None:
+    async def work(one: Page, other: Page) -> None:
+        number = await one.send("build.prove")
+        await until(lambda: one.progress)
+        assert "proving the levels" in one.progress[0]["text"]
+        await other.ask("run.type", line="step 2")  # meanwhile the levels run
+        await one.socket.send_json({"id": number, "cancel": True})
+        assert (await one.answer(number)).get("cancelled") or True
+        await other.heard("build.state", doing="")
+
+    studio(dock, work)
