@@ -1,12 +1,10 @@
 """Decisions: a tree of cuts through the classes of leaves, which parts the lines of a table.
 
-In: the probes of a table, each with a mask for every class. Out: a tree whose inner nodes ask whether the class of one
+In: for each probe of a table the masks of its classes. Out: a tree whose inner nodes ask whether the class of one
 probe is at least some number, and whose ends keep the lines that may still match there.
 
->>> from rcsc.emit.plan import Probe, Truth
->>> from rcsc.lang.model import Bool, Literal
->>> wide, full = (Probe(Truth(Literal(True, Bool()), name), masks) for name, masks in (("wide", (1, 6)), ("full", (3, 5))))
->>> decided = decision((wide, full), 7, most=4)
+>>> wide, full = (0b001, 0b110), (0b011, 0b101)
+>>> decided = decision((wide, full), 0b111, most=4)
 >>> [(end.lines, end.exact) for end in ends(decided)]
 [(1, True), (2, True), (4, True)]
 
@@ -22,8 +20,6 @@ from dataclasses import dataclass
 from itertools import accumulate
 from operator import or_
 from typing import TypeAlias
-
-from rcsc.emit.plan import Probe
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +46,7 @@ class Cut:
 
 
 Decision: TypeAlias = Cut | End
+Masks: TypeAlias = Sequence[int]
 Spans: TypeAlias = tuple[tuple[int, int], ...]
 """For each probe the classes that come somewhere: from the first to before the second."""
 
@@ -58,20 +55,28 @@ class _TooManyError(Exception):
     """There would be more ends than are wanted."""
 
 
-def decision(probes: Sequence[Probe], everyone: int, most: int, few: int = 0) -> Decision | None:
+def decision(probes: Sequence[Masks], everyone: int, most: int, few: int = 0) -> Decision | None:
     """Return a tree of cuts; None where it would have too many ends.
 
     Args:
-        probes: Each with its masks.
+        probes: For each the masks of its classes.
         everyone: A mask with every line.
         most: Ends that it may have.
         few: Lines up to which nothing more is asked; 0 asks until all ends are exact.
     """
     grower = _Grower(probes, most, few)
     try:
-        return grower.grown(everyone, tuple((0, len(probe.masks)) for probe in probes))
+        return grower.grown(everyone, tuple((0, len(masks)) for masks in probes))
     except _TooManyError:
         return None
+
+
+def cuts(decided: Decision) -> Iterator[Cut]:
+    """Give the questions, each after those that are asked after it."""
+    if isinstance(decided, Cut):
+        yield from cuts(decided.below)
+        yield from cuts(decided.above)
+        yield decided
 
 
 def ends(decided: Decision) -> Iterator[End]:
@@ -90,7 +95,7 @@ def depth(decided: Decision) -> int:
 
 @dataclass(slots=True)
 class _Grower:
-    probes: Sequence[Probe]
+    probes: Sequence[Masks]
     left: int
     few: int
 
@@ -112,8 +117,8 @@ class _Grower:
 
     def _open(self, lines: int, spans: Spans) -> Iterator[tuple[int, int, list[int]]]:
         """Each probe that still tells lines apart, with its first class and the lines left in each."""
-        for at, (probe, (low, high)) in enumerate(zip(self.probes, spans, strict=True)):
-            masks = [mask & lines for mask in probe.masks[low:high]]
+        for at, (every, (low, high)) in enumerate(zip(self.probes, spans, strict=True)):
+            masks = [mask & lines for mask in every[low:high]]
             if any(mask != lines for mask in masks):
                 yield at, low, masks
 

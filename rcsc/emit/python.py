@@ -282,7 +282,7 @@ class _Maker:
         probes = [probe for group in matcher.groups for probe in group]
         everyone = (1 << matcher.lines) - 1
         if matcher.lines <= MOST_DECIDED:
-            decided = decision(probes, everyone, MOST_ENDS * (matcher.lines + 1))
+            decided = decision([probe.masks for probe in probes], everyone, MOST_ENDS * (matcher.lines + 1))
             if decided is not None and depth(decided) <= DEEPEST:
                 yield from self._decided(decided, matcher, probes)
                 return

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from rcsc.emit.c.ctext import DIVIDED, SHORT, c_type
 from rcsc.emit.c.helpers import HELD
 from rcsc.emit.identifiers import Names
-from rcsc.emit.plan import Cuts, Direct, Plan, Truth
+from rcsc.emit.plan import Cuts, Direct, Plan, PlanTable, Truth
 from rcsc.evidence.llvm import Decision, Measured, Point, Region
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Admit, Bool, Kind, Level, Real, Table
@@ -188,7 +188,7 @@ class Reasons:
     def _line_keys(self, table: Table) -> list[Hashable]:
         """What each comparison of a matcher is: of classes of a leaf, or a condition of a test."""
         planned = next(each for each in self.plan.tables if each.table.name == table.name)
-        keys = list[Hashable]()
+        keys = list[Hashable](_asked(planned))
         for probe in (probe for group in planned.matcher.groups for probe in group):
             match probe.index:
                 case Direct(leaf=leaf, type=Bool()):
@@ -345,3 +345,15 @@ def _not_seen(points: Sequence[Point]) -> Iterator[tuple[Point, bool]]:
             yield point, True
         if not point.false:
             yield point, False
+
+
+def _asked(planned: PlanTable) -> Iterator[Hashable]:
+    """What each question of a matcher that works in windows compares: classes of a leaf."""
+    windows = planned.matcher.windows
+    if windows is None:
+        return
+    for cut in windows.cuts:
+        index = windows.probes[cut.probe].index
+        assert not isinstance(index, Truth)
+        whole = range(index.count)
+        yield "classes", planned.table.name, index.leaf, tuple(whole[: cut.first]), tuple(whole[cut.first :])

@@ -258,12 +258,13 @@ def decider(
 ) -> Decider:
     """What the complete check of the tables in `checked` knows, by place in the C file.
 
-    A number whose value is not the one that the check read from the compiled C is left out.
+    A number whose value is not the one that the check read from the compiled C is left out, and so are tables whose matcher
+    works in windows.
     """
     source = variants(source_of(symbols, files))[0]
     places: dict[int, tuple[Compared, int, int]] = {}
     for table in program.tables:
-        if table.name not in checked:
+        if table.name not in checked or not checked[table.name].tables:
             continue
         tables, function = checked[table.name].tables, symbols.lines[table.name]
         for initializer in numbers(source, function, matcher_text(source, function, symbols.struct)):

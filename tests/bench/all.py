@@ -213,6 +213,8 @@ def matches() -> Iterator[Cost]:
     for label, program in executors.programs():
         one = executors.measured(label, program)
         yield Cost(f"C match, {label}", f"{one.ours:.0f} instructions", "a scan", one.ours / one.scan)
+        timed = f"{one.timed.random:.1f} / {one.timed.steady:.1f} ns"
+        yield Cost(f"C match, {label}, random / steady", timed, f"an empty call: {one.timed.empty:.1f} ns")
         if one.nested_ns is not None:
             yield Cost(
                 f"Python match, {label}",
@@ -258,7 +260,7 @@ def main() -> None:
             proofs(),
             small_proofs(),
             matches(),
-            iter([size(4096, 50)]),
+            map(size, (4096, 16384), (50, 50)),
             iter([cell(Path(scratch))]),
         ):
             for row in rows:

@@ -1,8 +1,10 @@
-"""What a match costs: instructions of the C matcher by callgrind, nanoseconds of the Python one: `python -m tests.bench.executors`.
+"""What a match costs: instructions of the C matcher by callgrind, nanoseconds of C and Python: `python -m tests.bench.executors`.
 
 Tables of `families.box` by size, and ACQUIRE.
 Beside them, in C: a scan of all lines that counts how many match; in Python: nested ifs that check nothing. The counts hold
 for the compiler and flags at hand; the fuller the inputs' variety the fairer, so inputs are drawn over the whole space.
+Nanoseconds in C are of a call through a pointer, whose own are told beside it: *random*, one input after another; *steady*, as
+in a control loop, where 95 of 100 repeat the one before.
 """
 
 import random
@@ -28,6 +30,7 @@ from rcsc.table.program import prove_program
 from tests.bench import families
 
 INPUTS = 512
+DRAWN = 8192
 MOST_NESTED = 256
 Lines = list[tuple[int, dict[str, Box]]]
 SIZES = ((64, 7), (256, 20), (1024, 20))
@@ -47,11 +50,11 @@ def programs() -> list[tuple[str, Program]]:
     return made
 
 
-def inputs(program: Program, rng: random.Random) -> list[dict[str, Value]]:
+def inputs(program: Program, rng: random.Random, count: int = INPUTS) -> list[dict[str, Value]]:
     """Inputs drawn over the whole space."""
     return [
         {v.name: value_of_key(v.type, rng.randint(*key_bounds(v.type))) for v in program.variables}
-        for _ in range(INPUTS)
+        for _ in range(count)
     ]
 
 
@@ -77,7 +80,7 @@ def scan_c(program: Program, name: str) -> str:
 
 
 def driver_c(program: Program, name: str, function: str, samples: list[dict[str, Value]]) -> str:
-    """Calls both on every input and compares them."""
+    """Calls both on every input and compares them; a scan that gives -3 was not asked for."""
     names = names_of(program)
     sets = "\n".join(
         "    "
@@ -88,7 +91,8 @@ def driver_c(program: Program, name: str, function: str, samples: list[dict[str,
         f'#include "{name}.h"\n#include <stdio.h>\nint32_t scan(const {name}_t *s);\nstatic {name}_t s[{len(samples)}];\n'
         f"static void fill(void)\n{{\n{sets}\n}}\n"
         f"int main(void)\n{{\n    int bad = 0;\n    fill();\n    for (int i = 0; i < {len(samples)}; i++)\n"
-        f"        bad += {function}(&s[i]) != scan(&s[i]);\n    return bad != 0;\n}}\n"
+        f"    {{\n        const int32_t right = scan(&s[i]);\n        const int32_t line = {function}(&s[i]);\n"
+        f"        bad += right != -3 && right != line;\n    }}\n    return bad != 0;\n}}\n"
     )
 
 
@@ -163,30 +167,82 @@ def nested_ifs(program: Program) -> str:
     return "\n".join(said)
 
 
-def batch_ns(folder: Path, program: Program, name: str, samples: list[dict[str, Value]]) -> float:
-    """Nanoseconds a row of the batch entry, over a million rows."""
+TIMED = """#include "{name}.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#define N 16384u
+#define DRAWN {drawn}u
+static const int32_t values[DRAWN][{leaves}] = {{ {values} }};
+static {name}_t s[DRAWN], in[N];
+static int32_t out[N];
+static int32_t empty(const {name}_t *at) {{ (void)at; return 0; }}
+static int32_t (*volatile match)(const {name}_t *at);
+static double elapsed(struct timespec a) {{
+    struct timespec b; clock_gettime(CLOCK_MONOTONIC, &b);
+    return ((b.tv_sec - a.tv_sec) * 1e9 + (b.tv_nsec - a.tv_nsec)) / N;
+}}
+static double calls(void) {{
+    int32_t (*one)(const {name}_t *at) = match; double best = 1e9;
+    for (int r = 0; r < 40; r++) {{
+        struct timespec a; clock_gettime(CLOCK_MONOTONIC, &a);
+        for (uint32_t i = 0; i < N; i++) out[i] = one(&in[i]);
+        double t = elapsed(a); if (t < best) best = t;
+    }}
+    return best;
+}}
+int main(void) {{
+    double batch = 1e9; uint32_t now = 0;
+    for (uint32_t i = 0; i < DRAWN; i++) {{ const int32_t *v = values[i]; {sets} }}
+    for (uint32_t i = 0; i < N; i++) in[i] = s[rand() % DRAWN];
+    for (int r = 0; r < 40; r++) {{
+        struct timespec a; clock_gettime(CLOCK_MONOTONIC, &a);
+        {function}s(in, out, N);
+        double t = elapsed(a); if (t < batch) batch = t;
+    }}
+    match = empty; double alone = calls();
+    match = {function}; double any = calls();
+    for (uint32_t i = 0; i < N; i++) {{ if (rand() % 100 >= 95) now = rand() % DRAWN; in[i] = s[now]; }}
+    printf("%f %f %f %f", batch, any, calls(), alone);
+    return out[7] < -2;
+}}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """Nanoseconds in C.
+
+    Attributes:
+        batch: Of a row of the batch entry.
+        random: Of a call, one input after another.
+        steady: Of a call, where most inputs repeat the one before.
+        empty: Of a call that does nothing.
+    """
+
+    batch: float
+    random: float
+    steady: float
+    empty: float
+
+
+def c_ns(folder: Path, program: Program, name: str) -> Timed:
+    """Nanoseconds of the emitted C, the least of some rounds."""
     names = names_of(program)
-    sets = "\n".join(
-        "    "
-        + " ".join(f"s[{at}].{''.join(names.paths[leaf])} = {int(value)};" for leaf, value in sample.items())
-        for at, sample in enumerate(samples)
+    function = f"{name}_{names.tables[program.tables[0].name]}_line"
+    samples = inputs(program, random.Random(11), DRAWN)
+    leaves = [str(v.name) for v in program.variables]
+    rows = ("{" + ",".join(str(int(sample[leaf])) for leaf in leaves) + "}" for sample in samples)
+    sets = " ".join(f"s[i].{''.join(names.paths[leaf])} = v[{at}];" for at, leaf in enumerate(leaves))
+    text = TIMED.format(
+        name=name, function=function, drawn=DRAWN, leaves=len(leaves), values=", ".join(rows), sets=sets
     )
-    table = names.tables[program.tables[0].name]
-    (folder / "batch.c").write_text(
-        f'#include "{name}.h"\n#include <stdio.h>\n#include <stdlib.h>\n#include <time.h>\n#define N 1000000u\n'
-        f"static {name}_t s[{len(samples)}];\nstatic int32_t out[N];\n"
-        f"int main(void)\n{{\n    {name}_t *in = malloc(sizeof(*in) * N);\n    double best = 1e9;\n{sets}\n"
-        f"    if (!in) return 1;\n    for (uint32_t i = 0; i < N; i++) in[i] = s[(i * 2654435761u) % {len(samples)}u];\n"
-        f"    for (int r = 0; r < 7; r++) {{\n        struct timespec a, b; clock_gettime(CLOCK_MONOTONIC, &a);\n"
-        f"        {name}_{table}_lines(in, out, N); clock_gettime(CLOCK_MONOTONIC, &b);\n"
-        f"        double t = (b.tv_sec - a.tv_sec) * 1e9 + (b.tv_nsec - a.tv_nsec); if (t < best) best = t;\n    }}\n"
-        f'    printf("%f", best / N); free(in); return out[7] < -2;\n}}\n'
-    )
+    (folder / "timed.c").write_text(text)
     compiler = shutil.which("cc") or "cc"
-    subprocess.run(
-        [compiler, "-std=gnu11", "-O2", "-o", "batch", "batch.c", f"{name}.c"], cwd=folder, check=True
-    )
-    return float(subprocess.run([str(folder / "batch")], check=True, capture_output=True, text=True).stdout)
+    flags = ("-std=gnu11", "-O2", "-w")
+    subprocess.run([compiler, *flags, "-o", "timed", "timed.c", f"{name}.c"], cwd=folder, check=True)
+    told = subprocess.run([str(folder / "timed")], check=True, capture_output=True, text=True).stdout
+    return Timed(*map(float, told.split()))
 
 
 def python_ns(
@@ -231,7 +287,7 @@ class Measured:
 
     Attributes:
         ours: Instructions of a match in C; `scan` of a scan of all lines.
-        batch_ns: Of a row of the batch entry.
+        timed: Nanoseconds in C.
         python_ns: Of a match in Python; `nested_ns` of nested ifs, None where they are too many.
         size: Bytes of the object file.
     """
@@ -239,15 +295,44 @@ class Measured:
     label: str
     ours: float
     scan: float
-    batch_ns: float
+    timed: Timed
     python_ns: float
     nested_ns: float | None
     size: int
 
     def __str__(self) -> str:
         beside = f"{self.nested_ns:12.0f}" if self.nested_ns else f"{'-':>12}"
-        c = f"{self.label:12}{self.ours:10.1f}{self.scan:12.1f}{self.batch_ns:10.1f}"
+        timed = (self.timed.batch, self.timed.random, self.timed.steady, self.timed.empty)
+        c = f"{self.label:12}{self.ours:10.1f}{self.scan:12.1f}{''.join(f'{ns:8.1f}' for ns in timed)}"
         return f"{c}{self.python_ns:12.0f}{beside}{self.size / 1024:10.0f}"
+
+
+def c_counts(
+    folder: Path, program: Program, files: dict[str, str], *, beside: bool = True
+) -> tuple[float, float, int]:
+    """Instructions of a match and of a scan of all lines, and bytes of the object file.
+
+    Args:
+        folder: Where they are compiled.
+        program: Of one table.
+        files: What is emitted of it.
+        beside: Whether there is a scan, which the compiler is slow at; if not, its count is 0.
+    """
+    names, samples = names_of(program), inputs(program, random.Random(7))
+    function = f"{names.program}_{names.tables[program.tables[0].name]}_line"
+    for name, text in files.items():
+        (folder / Path(name).name).write_text(text)
+    none = f"int32_t scan(const {names.program}_t *s) {{ (void)s; return -3; }}\n"
+    scan = scan_c(program, names.program) if beside else none
+    (folder / "scan.c").write_text(f'#include "{names.program}.h"\n{scan}')
+    (folder / "driver.c").write_text(driver_c(program, names.program, function, samples))
+    compiler = shutil.which("cc") or "cc"
+    for flag, sources in (("-O2", [f"{names.program}.c", "driver.c"]), ("-O1", ["scan.c"])):
+        subprocess.run([compiler, "-std=c99", flag, "-c", *sources], cwd=folder, check=True)
+    objects = [f"{names.program}.o", "driver.o", "scan.o"]
+    subprocess.run([compiler, "-o", "run", *objects], cwd=folder, check=True)
+    size = (folder / f"{names.program}.o").stat().st_size
+    return instructions(folder, function), instructions(folder, "scan") if beside else 0.0, size
 
 
 def measured(label: str, program: Program) -> Measured:
@@ -259,35 +344,27 @@ def measured(label: str, program: Program) -> Measured:
     else:
         plan = lower(ProvedProgram(program, seal_of_proof()))  # right by construction; `proofs` proves them
     files = {**emit_c(plan), **emit_python(plan)}
-    samples = inputs(program, random.Random(7))
-    names = names_of(program)
-    function = f"{names.program}_{names.tables[program.tables[0].name]}_line"
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        for name, text in files.items():
-            (folder / Path(name).name).write_text(text)
-        (folder / "scan.c").write_text(f'#include "{names.program}.h"\n' + scan_c(program, names.program))
-        (folder / "driver.c").write_text(driver_c(program, names.program, function, samples))
-        sources = [f"{names.program}.c", "driver.c"]
-        compiler = shutil.which("cc") or "cc"
-        subprocess.run([compiler, "-std=c99", "-O2", "-c", *sources], cwd=folder, check=True)
-        subprocess.run([compiler, "-std=c99", "-O1", "-c", "scan.c"], cwd=folder, check=True)
-        subprocess.run(
-            [compiler, "-o", "run", f"{names.program}.o", "driver.o", "scan.o"], cwd=folder, check=True
-        )
-        size = (folder / f"{names.program}.o").stat().st_size
-        ours, scan = instructions(folder, function), instructions(folder, "scan")
-        batch = batch_ns(folder, program, names.program, samples)
-    python, nested = python_ns(files, program, samples)
-    return Measured(label, ours, scan, batch, python, nested, size)
+        ours, scan, size = c_counts(Path(scratch), program, files)
+        timed = c_ns(Path(scratch), program, names_of(program).program)
+    python, nested = python_ns(files, program, inputs(program, random.Random(7)))
+    return Measured(label, ours, scan, timed, python, nested, size)
 
 
 def main() -> None:
     """Prints the table."""
-    print(
-        f"{'table':12}{'masks':>10}{'scan':>12}{'batch ns':>10}{'Python ns':>12}{'nested ifs':>12}{'C KiB':>10}"
-        "   masks, scan: instructions a match, -O2, by callgrind"
-    )
+    heads = [
+        ("table", -12),
+        ("masks", 10),
+        ("scan", 12),
+        ("batch", 8),
+        ("random", 8),
+        ("steady", 8),
+        ("empty", 8),
+    ]
+    heads += [("Python ns", 12), ("nested ifs", 12), ("C KiB", 10)]
+    row = "".join(word.ljust(-width) if width < 0 else word.rjust(width) for word, width in heads)
+    print(f"{row}   masks, scan: instructions a match, -O2, by callgrind; else nanoseconds")
     for label, program in programs():
         print(measured(label, program), flush=True)
 

@@ -46,6 +46,9 @@ from rcsc.lang import model
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import pending
 
+MOST_TOLD = 1024
+"""Lines up to which the C says of each when it runs; past them, only where it stands: nobody reads so many of them twice."""
+
 
 def settle_function(c: CProgram) -> Function:
     """Give the function that moves deferred values in."""
@@ -116,7 +119,9 @@ def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
     for number, (line_name, line, row) in enumerate(named, 1):
         actions = [action.statement for action in line.actions]
         body = c.text.body(actions, at_line(table.table, row, c.program))
-        head = (f"case {line_name}: /* {comment(line.told)} */",)
+        head = (
+            f"case {line_name}: /* {comment(line.told if len(table.lines) <= MOST_TOLD else line.place)} */",
+        )
         cases.append(Frame(head, (*_kept(c, table, number), *body, Line("break;"))))
     none, several = (Set(FAULT, fault_name(c, fault)) for fault in (Fault.NO_LINE, Fault.SEVERAL_LINES))
     unmatched = Frame(("case ", Round(NONE), ":"), (none, Line("break;")))

@@ -44,7 +44,7 @@ def _masks(number: int, lookup: Lookup) -> Iterator[str]:
     yield f"out[i * {lookup.words}u + w] = (uint64_t){entry}; }}"
 
 
-def _walk(program: Program, symbols: Symbols, name: str, part: Component) -> Iterator[str]:
+def walk_c(program: Program, symbols: Symbols, name: str, part: Component) -> Iterator[str]:
     """The class of a leaf for each of many values, others initial."""
     leaf = next(v for v in program.variables if symbols.path(v.name) == part.path)
     value = "of_word(in[i])" if isinstance(leaf.type, Real) else "in[i]"
@@ -54,11 +54,11 @@ def _walk(program: Program, symbols: Symbols, name: str, part: Component) -> Ite
     yield f"out[i] = (uint32_t)({part.text}); }} }}"
 
 
-def _rows(program: Program, symbols: Symbols, name: str, expression: str) -> Iterator[str]:
-    """The value of an expression for each of many complete states."""
+def rows_c(program: Program, symbols: Symbols, name: str, expression: str, before: str = "") -> Iterator[str]:
+    """The value of an expression, after some statements, for each of many complete states."""
     yield f"void {name}(int64_t n, const int64_t *in, uint32_t *out) {{"
     yield f"{symbols.struct} t; {symbols.init}(&t); {symbols.struct} *s = &t;"
-    yield f"for (int64_t i = 0; i < n; i++) {{ set_leaves(s, &in[i * {len(program.variables)}], 1);"
+    yield f"for (int64_t i = 0; i < n; i++) {{ set_leaves(s, &in[i * {len(program.variables)}], 1); {before}"
     yield f"out[i] = (uint32_t)({expression}); }} }}"
 
 
@@ -85,14 +85,16 @@ def self_test_c(program: Program, symbols: Symbols, table: Table, parts: Matcher
     text += list(set_leaves_c(program, symbols))
     for number, lookup in enumerate(parts.lookups):
         text += _masks(number, lookup)
-        text += _rows(program, symbols, f"rcsc_index_{number}", lookup.index)
+        text += rows_c(program, symbols, f"rcsc_index_{number}", lookup.index)
         for at, part in enumerate(lookup.components):
             name = f"rcsc_class_{number}_{at}"
             text += (
-                _walk(program, symbols, name, part) if part.path else _rows(program, symbols, name, part.text)
+                walk_c(program, symbols, name, part)
+                if part.path
+                else rows_c(program, symbols, name, part.text)
             )
     for at, _ in enumerate(relational_tests(table)):
-        text += _rows(program, symbols, f"rcsc_test_{at}", f"ref_t{number_of}_test{at}(s)")
+        text += rows_c(program, symbols, f"rcsc_test_{at}", f"ref_t{number_of}_test{at}(s)")
     text += _tail(symbols, parts, words)
     shape = {"words": words, "lines": lines, "none": -1 if table.default is None else lines}
     text.append(TAIL_TEST.format(**shape, step=1 if lines <= MOST_PAIRED else lines // 61))
