@@ -31,9 +31,14 @@ from rcsc.lang.model import (
 
 def parts(expr: Expr) -> Iterator[Expr]:
     """The expression and all below it, wholes before parts."""
-    yield expr
-    for operand in operands(expr):
-        yield from parts(operand)
+    waiting = [expr]
+    while waiting:
+        part = waiting.pop()
+        yield part
+        if isinstance(part, Apply):
+            waiting += part.args[::-1]
+        elif not isinstance(part, Read | Literal):  # most of them
+            waiting += operands(part)
 
 
 def operands(expr: Expr) -> tuple[Expr, ...]:

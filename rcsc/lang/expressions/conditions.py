@@ -150,25 +150,27 @@ class Tests:
     def _joined(self, written: tree.Expr, places: tuple[tuple[int, int], ...], cell: Cell) -> Expr | None:
         """What the conditions mean that `and` joins, at these places of a cell."""
         if len(places) == 1:
-            return self._piece(written, cell.part(*places[0]))
+            return self._piece(written, cell, places[0])
         assert isinstance(written, tree.Binary)
         left = self._joined(written.left, places[:-1], cell)
-        right = self._piece(written.right, cell.part(*places[-1]))
+        right = self._piece(written.right, cell, places[-1])
         if left is None or right is None:
             return None
         return Apply(Op.AND, (left, right), Bool(), tree.absolute(written.span, cell))
 
-    def _piece(self, written: tree.Expr, cell: Cell) -> Expr | None:
+    def _piece(self, written: tree.Expr, whole: Cell, place: tuple[int, int]) -> Expr | None:
         """What one of them means, which is resolved once; where it may be undefined, with spans of its own in each line."""
         if id(written) not in self.pieces:
-            self.scope.cell = cell
+            cell = self.scope.cell = whole.part(*place)
             condition = boolean(self.scope, Body(), written)
             if condition is not None:
                 condition = condition if may_be_undefined(condition) else placed(condition, cell)
                 self.reads[id(condition)] = frozenset(read_by(condition))
             self.pieces[id(written)] = condition
         condition = self.pieces[id(written)]
-        return None if condition is None else placed(condition, cell)
+        if condition is None or condition.span.file:
+            return condition
+        return placed(condition, whole.part(*place))
 
     def _reads(self, condition: Expr) -> frozenset[VariableName]:
         if id(condition) in self.reads:

@@ -44,15 +44,15 @@ def may_be_undefined(expr: Expr) -> bool:
 
 
 def _may_fail(applied: Apply) -> bool:
-    kinds = [part.type for part in (*applied.args, applied)]
-    numbers = [kind for kind in kinds if isinstance(kind, Int)]
+    numbers = [part.type for part in (*applied.args, applied) if isinstance(part.type, Int)]
     if numbers:
+        least, greatest = min([kind.low for kind in numbers]), max([kind.high for kind in numbers])
         low, high = word(numbers)
-        if any(kind.low < low or kind.high > high for kind in numbers):
+        if least < low or greatest > high:
             return True
     if applied.op not in (Op.DIV, Op.MOD):
         return False
-    divisor = kinds[1]
+    divisor = applied.args[1].type
     return not (isinstance(divisor, Int | Real) and divisor.low > 0 and math.isfinite(divisor.high))
 
 

@@ -12,7 +12,9 @@ from rcsc.lang.model import (
     Assign,
     Call,
     Expr,
+    Literal,
     Place,
+    Read,
     Statement,
     ToElement,
 )
@@ -27,6 +29,10 @@ def placed(expr: Expr, cell: Cell) -> Expr:
     span = tree.absolute(expr.span, cell)
     if isinstance(expr, Apply):  # most of them
         return Apply(expr.op, tuple([placed(part, cell) for part in expr.args]), expr.type, span)
+    if isinstance(expr, Read):
+        return Read(expr.name, expr.type, span)
+    if isinstance(expr, Literal):
+        return Literal(expr.value, expr.type, span)
     return replace(rebuilt(expr, lambda part: placed(part, cell)), span=span)
 
 
