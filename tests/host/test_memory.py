@@ -7,7 +7,7 @@ import pytest
 
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Settings
-from rcsc.host.memory import uncollected
+from rcsc.host.memory import last_work, uncollected
 from rcsc.table.decide import prove_table
 from tests.bench import families
 from tests.support.programs.stages import BOXES, program_of
@@ -42,3 +42,24 @@ def test_nothing_is_collected_while_a_table_is_read_and_proved(tmp_path: Path) -
     finally:
         gc.callbacks.remove(collected)
     assert len(seen) <= 2 * 6, "on the way in and out, twice told each"
+
+
+def test_what_is_left_of_the_last_work_is_not_looked_at_again() -> None:
+    was_on, before = gc.isenabled(), gc.get_freeze_count()
+    gc.enable()
+    try:
+        with last_work():
+            made = [[at] for at in range(1000)]
+            assert not gc.isenabled()
+        assert gc.isenabled()
+        assert gc.get_freeze_count() - before >= len(made)
+        seen: list[int] = []
+        gc.callbacks.append(collected := lambda phase, _told: seen.append(len(phase)))
+        try:
+            again = [[at] for at in range(10)]
+        finally:
+            gc.callbacks.remove(collected)
+        assert (seen, len(again)) == ([], 10)
+    finally:
+        gc.unfreeze()
+        (gc.enable if was_on else gc.disable)()

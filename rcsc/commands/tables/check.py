@@ -5,6 +5,7 @@ import click
 from rcsc.commands.shared.options import PATHS, proving, settings_of, showing
 from rcsc.commands.shared.show import Output, finish
 from rcsc.driver.check import check
+from rcsc.host.memory import last_work
 from rcsc.solvers.options import Options
 
 
@@ -29,4 +30,5 @@ def command(paths: tuple[str, ...], options: Options, use_cache: bool, output: O
     stands for, and what would help. What was proved once is not proved again until something changes. An assumption is shown
     as assumed, as monitored, or as proved where `rcsc prove` has shown that the levels of these very files keep it.
     """
-    return finish(check(settings_of(options, use_cache, output, paths)), "check", output)
+    with last_work():
+        return finish(check(settings_of(options, use_cache, output, paths)), "check", output)
