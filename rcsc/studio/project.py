@@ -9,20 +9,23 @@ from pathlib import Path
 from rcsc.shell.opening import Opening
 from rcsc.studio.build import Build
 from rcsc.studio.hub import Concern, Hub
-from rcsc.studio.runs.live import LANE, Live
+from rcsc.studio.runs.live import LANE, WATCHED_RATE, Live
 from rcsc.studio.runs.logs import Logs
 from rcsc.studio.runs.timeline import TimeLine
 
 
-def concerns(opening: Opening, hub: Hub, logs: Sequence[Path] = ()) -> Sequence[Concern]:
+def concerns(
+    opening: Opening, hub: Hub, logs: Sequence[Path] = (), rate: float | None = WATCHED_RATE
+) -> Sequence[Concern]:
     """Return everything that answers.
 
     Args:
         opening: The system.
         hub: What tells the pages, and does things in lanes.
         logs: That the user names; the first is shown at once.
+        rate: How many times as fast as the clock the system runs at first; None for as fast as it goes.
     """
-    live = Live(opening, hub.tell, lambda work, after_s: hub.do(LANE, work, after_s))
+    live = Live(opening, hub.tell, lambda work, after_s: hub.do(LANE, work, after_s), rate)
     time = TimeLine(live, hub.tell)
     folders = tuple(dict.fromkeys((Path.cwd(), opening.path.resolve().parent)))
     kept = Logs(folders, tuple(logs), lambda name, log: hub.do(LANE, lambda: time.show(name, log)))

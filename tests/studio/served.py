@@ -25,7 +25,7 @@ def serving(
 ) -> Iterator[Server]:
     """A server with the studio's concerns for a system, or with others alone."""
     server, opened = Server(), threading.Event()
-    given = [*others] if opening is None else [*concerns(opening, server.hub, logs), *others]
+    given = [*others] if opening is None else [*concerns(opening, server.hub, logs, None), *others]
     thread = threading.Thread(target=server.serve, args=(given, lambda _: opened.set()), daemon=True)
     thread.start()
     assert opened.wait(PATIENCE_S)

@@ -135,6 +135,7 @@ const spoken = (event) => [event.ctrlKey && "ctrl", event.altKey && "alt", event
 const typed = (target) => target.closest?.("input:not([type=checkbox]):not([type=range]), textarea, select, [contenteditable], dialog[open], [data-keys=own]");
 let before = "";
 document.addEventListener("keydown", (event) => {
+  if (event.key === "Escape" && typed(event.target) && !event.target.closest("dialog")) event.target.blur(); // the keys are free again
   if (event.defaultPrevented || ["Control", "Shift", "Alt", "Meta"].includes(event.key)) return;
   const now = spoken(event);
   const free = !typed(event.target);
@@ -156,6 +157,7 @@ function listKeys() {
 }
 page("help").addEventListener("click", listKeys);
 bus.key("?", "List the keys", listKeys);
+bus.key("escape", "Leave a field: keys mean what they say here again", () => {});
 bus.key("t", "Light, dark, or as the system has it", nextTheme);
 
 // --- begin ---

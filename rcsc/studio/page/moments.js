@@ -28,7 +28,7 @@ export function followMoments(bus) {
     if (!live || !time) return;
     const log = time.source === "log";
     const run = log ? { ...time, open: true, going: false } : { ...live, source: "live" };
-    run.key = log ? `log ${time.name}` : `live ${live.era} ${live.last} ${live.undo}`;
+    run.key = log ? `log ${time.name} ${live.open}` : `live ${live.era} ${live.last} ${live.undo}`;
     bus.tell("run", run);
     if (!run.open) return;
     const { tick, follow } = bus.selection;

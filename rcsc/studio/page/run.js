@@ -3,7 +3,7 @@
 import { make } from "./bus.js";
 import { lookAt } from "./moments.js";
 
-const RATES = [["as fast as it goes", ""], ["real time", "1"], ["4 times", "4"], ["a quarter", "0.25"], ["a tenth", "0.1"]];
+const RATES = [["4 times the clock", "4"], ["real time", "1"], ["20 times", "20"], ["as fast as it goes", ""], ["a quarter", "0.25"], ["a tenth", "0.1"]];
 
 export function mount(root, bus) {
   const cards = make("div", { class: "cards scroll", role: "list", "aria-label": "Levels" });
@@ -62,7 +62,7 @@ function toolbar(bus, drawer) {
     undo.disabled = !of.open || log || !of.undo;
     if (document.activeElement !== rate) rate.value = of.rate ? String(of.rate) : "";
     live.hidden = !log;
-    said.textContent = log ? `a log: ${run.name}${run.finding ? `: ${run.finding.text}` : ""}` : of.ended ?? "";
+    said.textContent = log ? `${run.finding ? `finding: ${run.finding.text}; ` : ""}log ${run.name}, ${run.text}` : of.ended ?? "";
     said.title = said.textContent;
     past();
   });
@@ -76,6 +76,9 @@ function toolbar(bus, drawer) {
   bus.key("u", "Undo the last cycle, or what was set", () => undo.click(), "Run");
   bus.key("r", "Run until a condition holds: type it", () => until.focus(), "Run");
   bus.key("c", "Type a command of the shell", () => drawer.show("console", true), "Run");
+  bus.key("i", "Order a level", () => drawer.show("script", true), "Run");
+  bus.key("b", "Breakpoints, faults, broken buffers", () => drawer.show("breaks", true), "Run");
+  bus.key("p", "Proof, findings and logs", () => drawer.show("found", true), "Run");
   bus.key("v", "Variables of the level chosen", () => drawer.show("values", true), "Run");
   return make("div", { class: "bar" }, go, step, undo, rate,
     make("form", { class: "until", onsubmit: (event) => { event.preventDefault(); if (until.value.trim()) type(`run until ${until.value.trim()}`); } }, until),
@@ -88,9 +91,20 @@ function closed(bus) {
   return make("div", { class: "closed" },
     make("h2", {}, build.doing ? `${build.doing[0].toUpperCase()}${build.doing.slice(1)}` : "No system runs"),
     build.doing ? null : make("p", { class: "pre" }, state.why ?? "not connected"),
-    ...findings.slice(0, 20).map((one) => make("p", { class: "pre" }, make("strong", { class: "wrong" }, `${one.code}: `), one.message,
-      one.primary ? make("span", { class: "soft" }, ` ${one.primary.file}:${one.primary.line}`) : null)),
+    ...findings.slice(0, 20).map(finding),
+    findings.length > 20 ? make("p", { class: "soft" }, `and ${findings.length - 20} more`) : null,
     build.doing ? null : make("button", { type: "button", onclick: () => bus.try("build.open") }, "Prove, compile and open again"));
+}
+
+// What a check found: where, the least input that shows it, and what would mend it.
+function finding({ code, message, primary, witnesses, help }) {
+  const { file, start } = primary.place;
+  return make("section", { class: "finding" },
+    make("p", {}, make("strong", { class: "wrong" }, `${code}: `), message, make("span", { class: "soft" }, ` at ${file}:${start.line}:${start.column}`)),
+    ...witnesses.slice(0, 3).map((witness) => make("p", {}, make("span", { class: "soft" }, "for instance "), make("code", {}, witness.input.map(({ variable, value }) => `${variable} = ${value}`).join(", ")),
+      witness.lines.length ? `: lines ${witness.lines.map(({ name }) => name).join(" and ")} match` : "",
+      witness.region.length ? make("span", { class: "soft" }, "; all of ", make("code", {}, witness.region.join(", "))) : "")),
+    ...help.map((text) => make("p", {}, make("span", { class: "soft" }, "help: "), text)));
 }
 
 // --- one level ---
@@ -133,7 +147,8 @@ function Card(bus, level) {
       try { held = (await bus.ask("time.why", { tick, level: level.name })).tables; } catch (error) { held = []; reasons.replaceChildren(make("p", { class: "soft" }, error.message)); return; }
       if (asked !== key) return;
     }
-    reasons.replaceChildren(...held.map((table) => reasonTable(table, open ? null : line)));
+    const of = held.filter(({ table }) => open || table === bus.selection.table);
+    reasons.replaceChildren(...of.map((table) => reasonTable(table, open ? null : line)));
   }
 
   function show(box, tick, run, now) {
@@ -143,8 +158,9 @@ function Card(bus, level) {
     title.textContent = level.name;
     root.classList.toggle("chosen", bus.selection.level === level.name);
     ran.textContent = `every ${level.period_ms} ms${box.ran ? "" : "; no cycle in this tick"}`;
-    const lines = now ? now.now : [...box.before, ...(box.lines.length ? box.lines : [""]).map((line) => [box.table, line])];
-    tables.replaceChildren(...chips(bus, level, lines), ...fault(now ? now.fault : box.fault, box.wrong));
+    const alone = now?.now.every(([, line]) => line); // what was set by hand may choose another table, of which no line ran
+    const lines = alone ? now.now : [...box.before, ...(box.lines.length ? box.lines : [""]).map((line) => [box.table, line])];
+    tables.replaceChildren(...chips(bus, level, lines, box.ran), ...fault(now ? now.fault : box.fault, box.wrong));
     body.replaceChildren(...exchanges(box), ...changes(box));
     why();
   }
@@ -156,11 +172,11 @@ function fault(text, wrong) {
 }
 
 // Every line of each table that ran: the one that ran is lit, and says so.
-function chips(bus, level, lines) {
+function chips(bus, level, lines, cycled) {
   const by = new Map();
   for (const [table, line] of lines) by.set(table, [...(by.get(table) ?? []), line].filter(Boolean));
   return [...by].map(([table, ran]) => make("div", { class: "tried" },
-    make("div", { class: "name" }, make("span", { class: "soft" }, "table "), table, make("span", { class: "soft" }, ran.length ? ", line " : ": no line matched"), make("strong", {}, ran.join(" and "))),
+    make("div", { class: "name" }, make("span", { class: "soft" }, "table "), table, make("span", { class: "soft" }, ran.length ? ", line " : cycled ? ": no line ran" : ": no cycle yet"), make("strong", {}, ran.join(" and "))),
     make("div", { class: "chips", role: "group", "aria-label": `Lines of ${table}` }, (level.tables[table] ?? []).map((line) => {
       const lit = ran.includes(line);
       const chosen = bus.selection.level === level.name && bus.selection.table === table && bus.selection.line === line;
@@ -233,7 +249,7 @@ function changes(box) {
 // --- the drawer ---
 
 function Drawer(bus) {
-  const tabs = [["console", "Console", consoleTab], ["values", "Variables", valuesTab], ["breaks", "Breakpoints and faults", breaksTab], ["script", "Script", scriptTab], ["found", "Proof and findings", foundTab]];
+  const tabs = [["console", "Console", consoleTab], ["values", "Variables", valuesTab], ["breaks", "Breakpoints and faults", breaksTab], ["script", "Script and orders", scriptTab], ["found", "Proof and findings", foundTab]];
   const bar = make("div", { class: "bar tabs", role: "tablist" });
   const inside = make("div", { class: "inside" });
   const made = new Map();
@@ -380,19 +396,42 @@ function breaksTab(bus) {
 }
 
 function scriptTab(bus) {
-  const rows = make("tbody"), none = make("p", { class: "soft" }, "No script orders this system: start it with one, `rcsc studio SCRIPT`, or order a level here.");
-  const order = make("input", { class: "grow code", "aria-label": "An order", placeholder: "LEVEL COMMAND FIELD=VALUE: an order with the next number", spellcheck: "false" });
-  const form = make("form", { class: "bar", onsubmit: async (event) => { event.preventDefault(); const answer = await bus.try("run.type", { line: `order ${order.value}` }); if (answer) { bus.say(answer.shown.join("\n")); order.value = ""; } } }, order, make("button", {}, "Order"));
+  const rows = make("tbody"), none = make("p", { class: "soft" }, "No script orders this system; `rcsc studio SCRIPT` starts it with one. Orders given here have the next number.");
+  const level = make("select", { "aria-label": "Level that is ordered", onchange: () => draw() });
+  const fields = make("span", { class: "bar small" });
+  let orders = [];
+  const form = make("form", { class: "bar", onsubmit: async (event) => {
+    event.preventDefault();
+    const given = [...fields.querySelectorAll("[data-field]")].filter((one) => one.value !== one.dataset.initial || one.dataset.command);
+    const said = given.map((one) => (one.dataset.command ? one.value : `${one.dataset.field}=${one.value}`)).join(" ");
+    const answer = await bus.try("run.type", { line: `order ${level.value} ${said}` });
+    if (answer) bus.say(answer.shown.join("\n"));
+  } }, level, fields, make("button", {}, "Order"));
+  function draw() {
+    const of = orders.find(({ level: name }) => name === level.value);
+    fields.replaceChildren(...(of?.fields ?? []).flatMap(({ name, command, members, text, unit, low, high }) => {
+      const one = members.length ? make("select", {}, members.map((word) => make("option", { selected: word === text && !command }, word)))
+        : make("input", { value: text, size: "6", title: low === null ? "" : `${low} .. ${high}`, spellcheck: "false" });
+      Object.assign(one.dataset, { field: name, initial: text, ...(command ? { command: "yes" } : {}) });
+      return [make("label", {}, make("span", { class: "soft" }, command ? "" : `${name} `), one, unit ? make("span", { class: "soft" }, ` ${unit}`) : "")];
+    }));
+  }
+  bus.on("run.orders", (said) => {
+    orders = said ?? [];
+    form.hidden = !orders.length;
+    level.replaceChildren(...orders.map(({ level: name }) => make("option", { value: name }, name)));
+    draw();
+  });
   bus.on("run.rows", (said) => {
     none.hidden = Boolean(said);
     rows.replaceChildren(...(said?.rows ?? []).map(({ number, text, state, reason, ticks }, at) => {
-      const row = make("tr", { class: at === said.at && !said.over ? "lit" : "", "aria-current": at === said.at && !said.over ? "true" : undefined }, make("td", { class: "soft" }, number), make("td", { class: "code" }, text),
+      const now = at === said.at && !said.over;
+      return make("tr", { class: now ? "lit" : "", "aria-current": now ? "true" : undefined }, make("td", { class: "soft" }, number), make("td", { class: "code" }, text),
         make("td", { class: state === "done" ? "good" : state && state !== "under way" ? "wrong" : "" }, state), make("td", { class: "soft" }, ticks === null ? "" : `${ticks} cycles`), make("td", {}, reason));
-      return row;
     }));
     rows.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
   });
-  return { root: make("div", { class: "column" }, form, make("div", { class: "scroll" }, none, make("table", { class: "values" }, rows))), focus: () => order.focus() };
+  return { root: make("div", { class: "column" }, form, make("div", { class: "scroll" }, none, make("table", { class: "values" }, rows))), focus: () => level.focus() };
 }
 
 function foundTab(bus) {
@@ -423,7 +462,7 @@ function foundTab(bus) {
   bus.on("build.hello", (state) => bus.tell("build.state", state));
   bus.on("build.state", (state) => { if (!cancel) doing.textContent = state.doing; });
   return { root: make("div", { class: "column" }, make("div", { class: "bar" }, again, prove, make("button", { type: "button", onclick: list }, "List logs again"), stop, doing),
-    make("div", { class: "scroll" }, make("h3", {}, "Runs that were kept: open one on the time line"), logs, text)), shown: list, focus: () => prove.focus() };
+    make("div", { class: "scroll" }, text, make("h3", {}, "Runs that were kept: open one on the time line"), logs)), shown: list, focus: () => prove.focus() };
 }
 
 export { lookAt };

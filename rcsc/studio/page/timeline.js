@@ -9,7 +9,7 @@ export function mount(root, bus) {
   followMoments(bus);
   const canvas = make("canvas");
   const names = make("div", { class: "names" });
-  const slider = make("div", { class: "line", role: "slider", tabindex: "0", "aria-label": "Tick", "data-keys": "own" }, canvas);
+  const slider = make("div", { class: "line", role: "slider", tabindex: "0", "aria-label": "Tick" }, canvas);
   const readout = make("output", { class: "grow readout" });
   const find = make("input", { "aria-label": "Find a tick by a condition", placeholder: "find: task.cur_state = state_3", spellcheck: "false", list: "run-words" });
   const bar = make("div", { class: "bar" });

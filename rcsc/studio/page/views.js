@@ -2,7 +2,7 @@
 // A view is mounted when it is first shown, and stays.
 
 export const VIEWS = [
-  { name: "run", title: "Run", load: () => import("./run.js") },
+  { name: "run", title: "Levels", load: () => import("./run.js") },
 ];
 
 /** What stands below the views. */

@@ -15,6 +15,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.run.faults import faults_of
 from rcsc.run.levels import RunningLevel
 from rcsc.run.orders.operator import Operator
+from rcsc.run.orders.roles import Served, field_of, served
 from rcsc.run.orders.together import Together
 from rcsc.run.system import System
 from rcsc.shell.commands import Commands, Output, RunOrder
@@ -34,6 +35,8 @@ TOLD_S = 0.08
 LONGEST_LINE = 4000
 """Characters of a command."""
 FASTEST = 1000.0
+WATCHED_RATE = 4.0
+"""How many times as fast as the clock a system runs that somebody watches, where nobody says."""
 MOST_MARKS = 2000
 _LOOKING = ("?", "help", "show", "lines", "levels", "buffers", "breaks", "faults", "diff", "expect")
 """Commands that change nothing, and leave no mark on the time line."""
@@ -90,8 +93,16 @@ class Live:
         opening: Opening,
         tell: Callable[[str, Json], None],
         later: Callable[[Callable[[], None], float], None],
+        rate: float | None = WATCHED_RATE,
     ) -> None:
-        """Args: opening: What `open` opens; tell: As `Hub.tell`; later: Has something done in this lane after so many seconds."""
+        """Prepare; open nothing yet.
+
+        Args:
+            opening: What `open` opens.
+            tell: As `Hub.tell`.
+            later: Has something done in this lane after so many seconds.
+            rate: How many times as fast as the clock it runs; None for as fast as it goes.
+        """
         self.opening, self._tell, self._later = opening, tell, later
         self.commands: Commands | None = None
         self.history = History()
@@ -100,7 +111,7 @@ class Live:
         self.marks: list[Mark] = []
         self._going: Going | None = None
         self._ended = ""
-        self._rate: float | None = None
+        self._rate = rate
         self._told_s = 0.0
         self._rows: object = None
 
@@ -115,6 +126,8 @@ class Live:
         """The state, and whose it is."""
         self._rows = None
         self._later(self._tell_rows, 0.0)
+        if self.commands is not None:
+            self._tell("run.orders", self._orders())
         return self.state()
 
     def begin(self) -> None:
@@ -140,6 +153,7 @@ class Live:
         self.commands, self.why = commands, ""
         for told in self.opened:
             told(commands.session)
+        self._tell("run.orders", self._orders())
         self.changed()
 
     def close_because(self, *why: str) -> None:
@@ -200,6 +214,18 @@ class Live:
         if key != self._rows:
             self._rows = key
             self._tell("run.rows", None if operator is None else _rows(operator))
+
+    def _orders(self) -> Json:
+        """Every level that is ordered from outside, with the fields of an order."""
+        session = self.session()
+        levels = served(session.system.description, {level.name: level.sign for level in session.levels})
+        return [
+            {
+                "level": to.level,
+                "fields": [_field(to, at) for at in range(len(to.order_leaves)) if at != to.number],
+            }
+            for to in levels
+        ]
 
     def session(self) -> Session:
         """The session.
@@ -367,6 +393,15 @@ def _level(level: RunningLevel) -> dict[str, Any]:
         "now": [list(line) for line in level.lines],
         "fault": level.sign.fault_text(level.values) if level.fault else "",
     }
+
+
+def _field(to: Served, at: int) -> dict[str, Any]:
+    leaf = to.order_leaves[at]
+    members = ["false", "true"] if leaf.c_type == "bool" else list(leaf.members)
+    return {
+        "name": field_of(leaf), "command": at == to.command, "members": members, "text": leaf.shown(leaf.initial), "unit": leaf.unit,
+        "low": leaf.low, "high": leaf.high,
+    }  # fmt: skip
 
 
 def operator_of(system: System) -> Operator | None:

@@ -47,7 +47,7 @@ class Logs:
     def begin(self) -> None:
         """Show the first log that the user named, if any."""
         for path in self._given[:1]:
-            self._show(str(path), read(path))
+            self._show(self._called(path), read(path))
 
     def _list(self, _: Ask) -> Json:
         found = sorted(self._found().items(), key=lambda one: -one[1].stat().st_mtime)
@@ -71,12 +71,19 @@ class Logs:
         return {"name": name}
 
     def _found(self) -> dict[str, Path]:
-        """Every log by how it is called: its path from where the studio was started."""
-        found = {str(path): path for path in self._given}
+        """Every log by how it is called: its path in the first of the folders that has it, or as the user gave it."""
+        found: dict[str, Path] = {}
+        for path in self._given:
+            found[self._called(path)] = path
         for folder in self._folders:
             for path in _logs(folder):
-                found.setdefault(os.path.relpath(path), path)
+                found.setdefault(self._called(path), path)
         return found
+
+    def _called(self, path: Path) -> str:
+        whole = path.resolve()
+        within = next((folder for folder in self._folders if whole.is_relative_to(folder)), None)
+        return str(path if within is None else whole.relative_to(within))
 
 
 def _logs(top: Path) -> Iterator[Path]:
