@@ -51,12 +51,16 @@ Spans: TypeAlias = tuple[tuple[int, int], ...]
 """For each probe the classes that come somewhere: from the first to before the second."""
 
 
+DEEPEST = 60
+"""Questions after one another, at most: Python takes no more than a hundred ifs inside each other, and no reader as many."""
+
+
 class _TooManyError(Exception):
-    """There would be more ends than are wanted."""
+    """There would be more ends than are wanted, or more questions after one another."""
 
 
 def decision(probes: Sequence[Masks], everyone: int, most: int, few: int = 0) -> Decision | None:
-    """Return a tree of cuts; None where it would have too many ends.
+    """Return a tree of cuts; None where it would have too many ends, or be deeper than `DEEPEST`.
 
     Args:
         probes: For each the masks of its classes.
@@ -66,7 +70,7 @@ def decision(probes: Sequence[Masks], everyone: int, most: int, few: int = 0) ->
     """
     grower = _Grower(probes, most, few)
     try:
-        return grower.grown(everyone, tuple((0, len(masks)) for masks in probes))
+        return grower.grown(everyone, tuple((0, len(masks)) for masks in probes), DEEPEST)
     except _TooManyError:
         return None
 
@@ -99,7 +103,7 @@ class _Grower:
     left: int
     few: int
 
-    def grown(self, lines: int, spans: Spans) -> Decision:
+    def grown(self, lines: int, spans: Spans, deep: int) -> Decision:
         """The tree for the lines that may match within these classes."""
         cut = None if lines.bit_count() <= self.few else self._best(lines, spans)
         if cut is None:
@@ -107,13 +111,15 @@ class _Grower:
             if self.left < 0:
                 raise _TooManyError
             return End(lines, exact=not any(True for _ in self._open(lines, spans)))
+        if deep == 0:
+            raise _TooManyError
         at, first, below, above = cut
         low, high = spans[at]
         under, over = (
             (*spans[:at], (low, first), *spans[at + 1 :]),
             (*spans[:at], (first, high), *spans[at + 1 :]),
         )
-        return Cut(at, first, self.grown(below, under), self.grown(above, over))
+        return Cut(at, first, self.grown(below, under, deep - 1), self.grown(above, over, deep - 1))
 
     def _open(self, lines: int, spans: Spans) -> Iterator[tuple[int, int, list[int]]]:
         """Each probe that still tells lines apart, with its first class and the lines left in each."""

@@ -32,7 +32,7 @@ from rcsc.emit.code_tree import (
     read,
     when,
 )
-from rcsc.emit.decision import Cut, Decision, End, decision, depth
+from rcsc.emit.decision import Cut, Decision, End, decision
 from rcsc.emit.identifiers import DIGEST, FAILED_BITS, comment, names_in
 from rcsc.emit.plan import (
     WORD,
@@ -73,8 +73,6 @@ MOST_DECIDED = 2048
 """Up to so many lines are parted by nested ifs, which read only what they ask for."""
 MOST_ENDS = 4
 """Up to so many ends for each line: where there would be more, the masks of all leaves are joined."""
-DEEPEST = 60
-"""Up to so many ifs stand inside each other; Python itself takes no more than a hundred."""
 MOST_KEYS = 8192
 """Up to so many combinations of classes the line of each is looked up at once."""
 MOST_GROUPED = 512
@@ -283,7 +281,7 @@ class _Maker:
         everyone = (1 << matcher.lines) - 1
         if matcher.lines <= MOST_DECIDED:
             decided = decision([probe.masks for probe in probes], everyone, MOST_ENDS * (matcher.lines + 1))
-            if decided is not None and depth(decided) <= DEEPEST:
+            if decided is not None:
                 yield from self._decided(decided, matcher, probes)
                 return
         yield from self._joined(matcher, probes, upper)

@@ -9,6 +9,7 @@ from random import Random
 
 import pytest
 
+from rcsc.emit import decision as decisions
 from rcsc.emit import lower as lower_module
 from rcsc.emit.decision import Cut, decision, depth, ends
 from rcsc.emit.lower import lower
@@ -120,21 +121,49 @@ def test_an_end_that_is_exact_is_so_for_all_its_classes() -> None:
     assert min(kinds[True], kinds[False]) > 100
 
 
-def test_a_table_that_no_few_cuts_part_is_decided_by_masks() -> None:
-    """Each line states a leaf of its own: ifs would be as many as combinations of all."""
-    names = [f"x{at}" for at in range(8)]
+def ladder(lines: int, *, apart: bool) -> str:
+    """A leaf a line: each states its own, and, where they are apart, that none of those before it holds."""
+    names = [f"x{at}" for at in range(lines)]
     rows = [
-        f"| l{at} | " + " | ".join("true" if at == by else "" for by in range(8)) + " ||" for at in range(8)
+        f"| l{at} | "
+        + " | ".join("true" if at == by else "false" if apart and by < at else "" for by in range(lines))
+        + " ||"
+        for at in range(lines)
     ]
     inputs = "".join(f"input {name} : bool\n" for name in names)
-    text = f"{inputs}table t {{\n| line | {' | '.join(names)} ||\n" + "\n".join(rows) + "\n}\n"
-    program = program_of(text)
-    [module] = [code for name, code in emitted(program).items() if name.endswith(".py")]
+    return f"{inputs}table t {{\n| line | {' | '.join(names)} ||\n" + "\n".join(rows) + "\n}\n"
+
+
+@pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
+@pytest.mark.parametrize(("lines", "count"), [(8, 4000), (70, 400)])
+def test_a_table_that_no_few_cuts_part_is_decided_by_masks(lines: int, count: int) -> None:
+    """Ifs would be as many as combinations of all leaves, and so would windows."""
+    program = program_of(ladder(lines, apart=False))
+    files = emitted(program)
+    [module] = [code for name, code in files.items() if name.endswith(".py")]
     assert "_T_" in module
-    assert len(module.splitlines()) < 500
-    answers = compared(program, 4000)
-    assert answers[SEVERAL] > 0 < answers[NONE]
-    assert len(answers) > 5
+    assert not any("t.order" in text for text in files.values())
+    assert isinstance(check(program, files), Checked)
+    answers = compared(program, count)
+    assert answers[SEVERAL] > 0
+    assert lines > 8 or answers[NONE] > 0 < answers[5]
+
+
+@pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
+@pytest.mark.parametrize(
+    ("lines", "ifs"), [(decisions.DEEPEST, True), (decisions.DEEPEST + 1, False), (90, False)]
+)
+def test_ifs_stand_inside_each_other_as_deep_as_python_takes(lines: int, ifs: bool) -> None:
+    program = program_of(ladder(lines, apart=True))
+    [module] = [code for name, code in emitted(program).items() if name.endswith(".py")]
+    assert ("_T_0" not in module) == ifs
+    assert len(compared(program, 300)) > 5
+
+
+def test_a_long_ladder_is_given_up_early() -> None:
+    count = 3000
+    masks = [(~(1 << at) & (1 << count) - 1, (2 << at) - 1) for at in range(count)]
+    assert decision(masks, (1 << count) - 1, 10 * count) is None
 
 
 # --- windows of many lines in C ---
