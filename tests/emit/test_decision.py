@@ -305,3 +305,19 @@ def test_the_c_of_a_large_table_is_small() -> None:
     program = program_of(box(4096, 50, 4146))
     [source] = [text for name, text in emitted(program).items() if name.endswith(".c")]
     assert len(source) < 1_150_000
+
+
+@pytest.mark.needs("valgrind")
+@pytest.mark.parametrize(("lines", "variables", "widened"), [(70, 9, 0), (200, 12, 100)])
+def test_the_shape_that_is_chosen_takes_fewer_instructions(
+    lines: int, variables: int, widened: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = program_of(box(lines, variables, lines + variables, "ok", widened), "bench.rcs")
+    counts = {}
+    for shape, of_a_cut in (("windows", lower_module.OF_A_CUT), ("words", 1_000_000)):
+        monkeypatch.setattr(lower_module, "OF_A_CUT", of_a_cut)
+        (tmp_path / shape).mkdir()
+        files = emitted(program)
+        assert any("t.order" in text for text in files.values()) == (shape == "windows")
+        counts[shape], _, _ = c_counts(tmp_path / shape, program, files, beside=False)
+    assert counts["windows"] < counts["words"]
