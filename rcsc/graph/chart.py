@@ -97,12 +97,18 @@ class SheetArrow:
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A placed chart; x goes right and y down, in pixels."""
+    """A placed chart; x goes right and y down, in pixels.
+
+    Attributes:
+        frames: Open composites.
+        headings: Of each frame, inside it: what is true of each of its states.
+    """
 
     width_px: float
     height_px: float
     boxes: tuple[SheetBox, ...]
     frames: tuple[SheetBox, ...]
+    headings: tuple[SheetBox, ...]
     arrows: tuple[SheetArrow, ...]
 
 
@@ -120,6 +126,7 @@ def sheet(chart: Chart, shut: Sequence[str] = ()) -> Sheet:
     boxes = {box.name: box for box in _boxes(chart, shut)}
     parts = [(arrow, _label(arrow)) for arrow in _arrows(chart, boxes)]
     named = {f"={at}": label for at, (_, label) in enumerate(parts) if label is not None}
+    named |= {f"#{each.name}": _heading(each) for each in opened}
     sized = [
         LayoutBox(name, box.width_px, box.height_px, round=False) for name, box in (boxes | named).items()
     ]
@@ -296,10 +303,9 @@ def _frames(
             around[f"={at}"] = _common(opened, boxes, chart, arrow)
 
     def frame(each: Composite) -> Frame:
-        heading = _heading(each)
         inner = tuple(frame(other) for other in opened if inside(opened, other.name) == each.name)
         own = tuple(name for name, where in around.items() if where == each.name)
-        return Frame(each.name, own, inner, heading.width_px, heading.height_px)
+        return Frame(each.name, (f"#{each.name}", *own), inner)
 
     return [frame(each) for each in opened if not inside(opened, each.name)]
 
@@ -318,8 +324,8 @@ def _common(
 
 
 def _heading(each: Composite) -> SheetBox:
-    """What stands in the upper left corner of an open composite."""
-    many = _words("name", f"any of these {len(each.states)}", ", ".join(each.states))
+    """What stands in an open composite beside its states."""
+    many = _words("name", f"any of these {len(each.states)}  ", ", ".join(each.states))
     return _sized(each.name, "open", each.states, _stacked([many, *map(_staying, each.stays)]))
 
 
@@ -354,7 +360,7 @@ def _placed(
     frames = list[SheetBox]()
     for each in opened:
         (left, top), (right, low) = moved(placed.frames[each.name])
-        rows = _heading(each).rows
-        frames.append(SheetBox(each.name, "open", each.states, rows, (left, top), right - left, low - top))
+        frames.append(SheetBox(each.name, "open", each.states, (), (left, top), right - left, low - top))
     size = (placed.width_px + 2 * _MARGIN_PX, placed.height_px + 2 * _MARGIN_PX)
-    return Sheet(*size, tuple(at(*pair) for pair in boxes.items()), tuple(frames), tuple(arrows))
+    headings = tuple(at(f"#{each.name}", named[f"#{each.name}"]) for each in opened)
+    return Sheet(*size, tuple(at(*pair) for pair in boxes.items()), tuple(frames), headings, tuple(arrows))

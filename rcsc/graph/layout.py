@@ -56,13 +56,11 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A rectangle around boxes and other frames, with room for a heading of `width_px` by `height_px` in its upper left corner."""
+    """A rectangle around boxes and other frames."""
 
     name: str
     boxes: tuple[str, ...]
     frames: "tuple[Frame, ...]" = ()
-    width_px: float = 0.0
-    height_px: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,14 +156,14 @@ def _text(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow], frames: Sequence[
 
 
 def _framed(frame: Frame, number: Mapping[str, int], words: Mapping[str, str]) -> Iterator[str]:
-    yield f"  subgraph {words[frame.name]} {{ margin=14; labelloc=t; labeljust=l; label={_blank(frame)};"
+    yield f"  subgraph {words[frame.name]} {{ margin=14;"
     yield " ".join(f"n{number[name]};" for name in frame.boxes)
     for inner in frame.frames:
         yield from _framed(inner, number, words)
     yield "  }"
 
 
-def _blank(arrow: Arrow | Frame) -> str:
+def _blank(arrow: Arrow) -> str:
     """A label that takes this much room and no more."""
     size = f'WIDTH="{round(arrow.width_px)}" HEIGHT="{round(arrow.height_px)}"'
     return f'<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="0" FIXEDSIZE="TRUE" {size}><TR><TD></TD></TR></TABLE>>'

@@ -25,5 +25,6 @@ Two tables are the *same* if for every input the same line outcome has the same 
 has the least input. Used by `graph` (round trips), `diff` and the shell's `reload`; no verdict of `rcsc check` rests
 on it. Trusted for what those say: all of it, and Z3.
 
-Modules: `steps` (which line leads from which state to which), `follow` (which line comes after which), `same`.
+Modules: `steps` (which line leads from which state to which), `follow` (which line comes after which), `same`, `under`
+(which lines can match where a condition holds).
 """

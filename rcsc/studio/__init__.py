@@ -16,6 +16,6 @@ A new concern is a class with `name`, `lane`, `handlers`, `greeting`, `begin` an
 Nothing that a page sends is run or compiled but through the shell's commands and the prover. Who may see it: `rcsc.host.guard`.
 
 Modules, in the order the data flows: `server` talks to pages, `hub` has their questions answered, `project` says by whom; `build` has
-tables and levels proved in processes of their own, and `runs` is the running system and its time line. The folder `page` is the page,
-`page/vendor` parts of others with their licences.
+tables and levels proved in processes of their own, `runs` is the running system and its time line, `tables` the open files with their
+grids, proof and graphs. The folder `page` is the page, `page/vendor` parts of others with their licences.
 """

@@ -12,6 +12,9 @@ from rcsc.studio.hub import Concern, Hub
 from rcsc.studio.runs.live import LANE, WATCHED_RATE, Live
 from rcsc.studio.runs.logs import Logs
 from rcsc.studio.runs.timeline import TimeLine
+from rcsc.studio.tables.desk import Desk
+from rcsc.studio.tables.editing import Tables
+from rcsc.studio.tables.proving import Graphs, Proof
 
 
 def concerns(
@@ -30,4 +33,5 @@ def concerns(
     folders = tuple(dict.fromkeys((Path.cwd(), opening.path.resolve().parent)))
     kept = Logs(folders, tuple(logs), lambda name, log: hub.do(LANE, lambda: time.show(name, log)))
     build = Build(opening.path, hub, live)
-    return (live, time, kept, build)
+    desk = Desk(opening.path, hub.tell, hub.do)
+    return (live, time, kept, build, Tables(desk), Proof(desk), Graphs(desk))

@@ -51,7 +51,7 @@ def points(curve: tuple[Point, ...]) -> Iterator[Point]:
 
 def crossed(placed: Sheet) -> list[tuple[str, str, str]]:
     """Arrows that go through a label or a box."""
-    boxes = [*placed.boxes, *(arrow.label for arrow in placed.arrows if arrow.label)]
+    boxes = [*placed.boxes, *placed.headings, *(arrow.label for arrow in placed.arrows if arrow.label)]
     return [
         (arrow.source, arrow.target, box.rows[0].whole if box.rows else box.name)
         for arrow in placed.arrows
@@ -71,7 +71,7 @@ def overlapping(one: SheetBox, other: SheetBox) -> bool:
 def check(placed: Sheet) -> None:
     """What makes a drawing legible."""
     assert crossed(placed) == []
-    boxes = [*placed.boxes, *(arrow.label for arrow in placed.arrows if arrow.label)]
+    boxes = [*placed.boxes, *placed.headings, *(arrow.label for arrow in placed.arrows if arrow.label)]
     for at, box in enumerate(boxes):
         assert not any(overlapping(box, other) for other in boxes[:at]), box
         assert box.corner[0] >= 0
@@ -84,31 +84,21 @@ def check(placed: Sheet) -> None:
             assert all(len(text) <= MOST_LETTERS + 4 for _, text in row.texts)
             assert len(row.texts) <= 3 * MOST_TEXTS
     for frame in placed.frames:
-        for box in placed.boxes:
+        for box in (*placed.boxes, *placed.headings):
             within = frame.holds(box.corner) and frame.holds(
                 (box.corner[0] + box.width_px, box.corner[1] + box.height_px)
             )
-            assert within == (box.kind in ("state", "shut") and set(box.states) <= set(frame.states)), (
+            assert within == (
+                box.kind in ("state", "shut", "open") and set(box.states) <= set(frame.states)
+            ), (
                 frame.name,
                 box.name,
             )
-        for box in (*placed.boxes, *(arrow.label for arrow in placed.arrows if arrow.label)):
-            for row in frame.rows:  # the heading stands free
-                heading = SheetBox(
-                    "",
-                    "",
-                    (),
-                    (),
-                    (frame.corner[0], frame.corner[1] + row.top_px),
-                    row.width_px,
-                    row.height_px,
-                )
-                assert not overlapping(heading, box)
 
 
 def shown(placed: Sheet) -> set[str]:
     """The lines that the drawing names."""
-    boxes = [*placed.boxes, *placed.frames, *(arrow.label for arrow in placed.arrows if arrow.label)]
+    boxes = [*placed.boxes, *placed.headings, *(arrow.label for arrow in placed.arrows if arrow.label)]
     return {row.line for box in boxes for row in box.rows if row.line}
 
 

@@ -3,6 +3,8 @@
 
 export const VIEWS = [
   { name: "run", title: "Levels", load: () => import("./run.js") },
+  { name: "tables", title: "Tables", load: () => import("./grid.js") },
+  { name: "graph", title: "Graph", load: () => import("./graph.js") },
 ];
 
 /** What stands below the views. */

@@ -1,0 +1,290 @@
+// The graph of the table that is shown: states, composite states, and an arrow for each line; linked to the rows, and drawn in.
+
+import { make, Refusal } from "./bus.js";
+import { deskOf } from "./tables/desk.js";
+
+const SVG = "http://www.w3.org/2000/svg";
+function put(kind, attributes = {}, ...inside) {
+  const made = document.createElementNS(SVG, kind);
+  for (const [name, value] of Object.entries(attributes)) if (value !== undefined && value !== null) made.setAttribute(name, value);
+  made.append(...inside.filter((one) => one !== null && one !== undefined));
+  return made;
+}
+const TEXT = 15, LEFT = 8;
+
+export function mount(root, bus) {
+  const desk = deskOf(bus);
+  const words = make("span", { class: "graph-words" });
+  const state = make("input", { class: "filter", size: "14", "aria-label": "Variable whose values are the states", placeholder: "state variable", spellcheck: "false" });
+  const zooms = [["−", "Smaller", 1 / 1.25], ["+", "Larger", 1.25]].map(([text, what, by]) => make("button", { type: "button", title: what, "aria-label": what, onclick: () => zoom(by) }, text));
+  const fit = make("button", { type: "button", title: "Fit the graph into the view", onclick: () => fitted() }, "Fit");
+  const all = make("button", { type: "button", title: "Shut or open every composite state", onclick: () => shutAll() }, "Shut all");
+  const place = make("div", { class: "graph-place", "data-keys": "own", tabindex: "-1" });
+  const whole = make("div", { class: "graph-whole", role: "status", "aria-live": "polite" });
+  root.append(make("div", { class: "bar" }, make("form", { onsubmit: (event) => { event.preventDefault(); ask(true); } }, state), all, ...zooms, fit, words), place, whole);
+
+  let shown = null, key = "", scale = 1, asking = null, from = null, hint = "";
+  const shut = new Map(); // by file and table: a set
+
+  const hidden = () => { const name = `${desk.file} ${desk.table}`; if (!shut.has(name)) shut.set(name, new Set()); return shut.get(name); };
+
+  async function ask(force = false) {
+    if (!root.isConnected || !desk.doc?.known || !desk.table) return;
+    const now = JSON.stringify([desk.file, desk.doc.version, desk.table, [...hidden()], state.value]);
+    if (now === key && !force) return;
+    key = now;
+    asking?.abort();
+    asking = new AbortController();
+    if (shown && (shown.file !== desk.file || shown.table !== desk.table)) { shown = null; place.replaceChildren(); }
+    if (!shown) words.textContent = "deriving the graph …";
+    const { signal } = asking;
+    try {
+      const answer = await desk.ask("graph.show", { shut: [...hidden()].map((name) => ({ name })), state: state.value.trim() }, { signal });
+      if (signal.aborted || answer.table !== desk.table) return;
+      const other = !shown;
+      shown = { ...answer, file: desk.file };
+      draw();
+      if (other) fitted(0.8);
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      if (signal.aborted || error.message.includes("meanwhile")) return;
+      if (!desk.doc.whole && shown?.table === desk.table) { words.textContent = "The graph is of the last text that was in order."; return; }
+      shown = null;
+      place.replaceChildren(make("p", { class: "soft no-graph" }, `No graph: ${error.message}.`, ...error.helps.map((help) => make("span", {}, ` Help: ${help.replace("`--state`", "the field above")}.`))));
+      words.textContent = "";
+    }
+  }
+
+  // --- drawing ---
+
+  function draw() {
+    const held = document.activeElement?.closest?.(".graph-place [data-focus]")?.dataset.focus;
+    const svg = put("svg", { viewBox: `0 0 ${shown.width} ${shown.height}`, width: shown.width * scale, height: shown.height * scale, role: "group", "aria-label": `Graph of table ${shown.table}` });
+    const over = put("g", {});
+    for (const frame of shown.frames) svg.append(framed(frame));
+    for (const [at, arrow] of shown.arrows.entries()) {
+      svg.append(curve(arrow, at));
+      if (arrow.label) over.append(labelled(arrow, at));
+    }
+    for (const box of shown.boxes) svg.append(boxed(box));
+    svg.append(over);
+    place.replaceChildren(svg);
+    const said = [`states: values of ${shown.state}`, shown.everywhere && `on every arrow from a state also: ${shown.everywhere}`, ...shown.notes].filter(Boolean);
+    words.textContent = said.join(" · ");
+    words.title = said.join("\n");
+    all.disabled = !shown.composites.length;
+    all.textContent = hidden().size ? "Open all" : "Shut all";
+    if (held) place.querySelector(`[data-focus="${CSS.escape(held)}"]`)?.focus({ preventScroll: true });
+    marks();
+  }
+
+  function rowsOf(parent, box, arrow = null) {
+    const [x, y] = box.corner;
+    box.rows.forEach((row, number) => {
+      const top = y + row.top_px;
+      const group = put("g", { class: row.line ? "row" : "words", "data-line": row.line || null });
+      if (row.line) {
+        Object.entries({ tabindex: "0", role: "button", "data-focus": `${arrow ?? box.name} ${row.line} ${number}`, "aria-label": row.whole }).forEach(([name, value]) => group.setAttribute(name, value));
+        group.append(put("rect", { class: "back", x: x + 2, y: top, width: box.size[0] - 4, height: row.height_px, rx: 4 }));
+        group.append(put("rect", { class: "badge", x: x + LEFT, y: top + 1.5, width: row.badge_px - 4, height: 14, rx: 7 }), put("text", { class: "number", x: x + LEFT + (row.badge_px - 4) / 2, y: top + 12 }, row.line));
+        group.addEventListener("click", () => { bus.select({ table: desk.table, line: row.line }); say(row.whole); });
+      }
+      row.texts.forEach(([kind, text], at) => group.append(put("text", { class: kind, x: x + LEFT + row.badge_px, y: top + 12 + at * TEXT }, text)));
+      group.append(put("title", {}, row.whole));
+      group.addEventListener("focusin", () => say(row.whole));
+      group.addEventListener("pointerenter", () => say(row.whole));
+      parent.append(group);
+    });
+  }
+
+  function framed(frame) {
+    const [x, y] = frame.corner, [width, height] = frame.size;
+    const group = put("g", { class: "frame", "data-name": frame.name }, put("rect", { class: "body", x, y, width, height, rx: 10 }));
+    const { heading } = frame;
+    const [left, top] = heading.corner;
+    const head = put("g", { class: "row head", tabindex: "0", role: "button", "aria-expanded": "true", "data-focus": `frame ${frame.name}`, "aria-label": `Composite state of ${frame.states.join(", ")}: shut it` },
+      put("rect", { class: "back", x: left, y: top, width: heading.size[0], height: 20, rx: 4 }));
+    head.addEventListener("click", () => toggle(frame.name));
+    head.append(put("text", { class: "name", x: left + LEFT, y: top + 15 }, `▾ ${heading.rows[0].texts[0][1]}`), put("title", {}, `${heading.rows[0].whole}\nshut it: click, or Enter`));
+    head.addEventListener("focusin", () => say(heading.rows[0].whole));
+    group.append(head);
+    rowsOf(group, { ...heading, rows: heading.rows.slice(1) }, `frame ${frame.name}`);
+    return group;
+  }
+
+  function boxed(box) {
+    const [x, y] = box.corner, [width, height] = box.size;
+    if (box.kind === "begin") return put("g", { class: "begin" }, put("circle", { class: "tip", cx: x + width / 2, cy: y + height / 2, r: width / 2 }, put("title", {}, "here the table begins")));
+    const group = put("g", { class: `box ${box.kind}`, "data-name": box.name });
+    const words_ = box.kind === "shut" ? "shut composite state: open it" : `state ${box.name}`;
+    const head = put("g", { tabindex: "0", role: "button", class: "state", "data-focus": `state ${box.name}`, "data-state": box.kind === "state" ? box.name : null, "aria-label": box.kind === "any" ? "any state" : words_ },
+      put("rect", { x, y, width, height, rx: 7 }));
+    head.addEventListener("focusin", () => say(box.rows.map(({ whole: text }) => text).join("\n")));
+    if (box.kind === "shut") head.addEventListener("click", () => toggle(box.name));
+    else if (box.kind === "state") head.addEventListener("pointerdown", (event) => drag(event, box));
+    group.append(head);
+    rowsOf(group, box);
+    for (const text of group.querySelectorAll(".words")) text.setAttribute("pointer-events", "none");
+    return group;
+  }
+
+  function curve(arrow, at) {
+    const group = put("g", { class: `arrow${arrow.dashed ? " dashed" : ""}`, "data-arrow": at, "data-lines": arrow.label?.rows.map(({ line }) => line).join(" ") ?? "" });
+    for (const [first, ...rest] of arrow.curves) group.append(put("path", { class: "line", d: `M ${first} C ${rest.join(" ")}` }));
+    const end = arrow.curves.at(-1).at(-1), [x, y] = end, [a, b] = arrow.tip;
+    const far = Math.max(1e-6, Math.hypot(a - x, b - y)), across = [(-(b - y) / far) * 4, ((a - x) / far) * 4];
+    group.append(put("path", { class: "tip", d: `M ${x + across[0]} ${y + across[1]} L ${x - across[0]} ${y - across[1]} L ${a} ${b} Z` }));
+    return group;
+  }
+
+  function labelled(arrow, at) {
+    const group = put("g", { class: "label" });
+    rowsOf(group, arrow.label, `arrow ${at}`);
+    return group;
+  }
+
+  function say(text) {
+    whole.textContent = hint ? `${hint}\n${text}` : text;
+  }
+
+  // --- what is selected, and what runs ---
+
+  function marks() {
+    const { line, table } = bus.selection;
+    const levels = (bus.latest("moment")?.levels ?? []).filter((level) => level.table === desk.table);
+    const now = new Set(levels.flatMap((level) => level.lines ?? []));
+    const chosen = table === desk.table ? line : "";
+    for (const row of place.querySelectorAll(".row[data-line]")) {
+      row.classList.toggle("selected", row.dataset.line === chosen && Boolean(chosen));
+      row.classList.toggle("now", now.has(row.dataset.line));
+    }
+    for (const arrow of place.querySelectorAll(".arrow")) {
+      const lines = arrow.dataset.lines.split(" ");
+      arrow.classList.toggle("selected", Boolean(chosen) && lines.includes(chosen));
+      arrow.classList.toggle("now", lines.some((name) => now.has(name)));
+    }
+    const states = new Set(levels.map((level) => level.values?.[shown?.state] ?? level.state).filter(Boolean));
+    for (const box of shown?.boxes ?? []) place.querySelector(`.box[data-name="${CSS.escape(box.name)}"]`)?.classList.toggle("here", box.kind !== "any" && box.states.some((one) => states.has(one)));
+  }
+  bus.on("selection", (_, changed) => {
+    marks();
+    if (changed?.has("line") && !place.contains(document.activeElement)) place.querySelector(".row.selected")?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  });
+  bus.on("moment", marks);
+
+  // --- composite states, and size ---
+
+  function toggle(name) {
+    if (!hidden().delete(name)) hidden().add(name);
+    ask();
+  }
+  function shutAll() {
+    const names = shown?.composites ?? [];
+    const was = hidden().size;
+    hidden().clear();
+    if (!was) for (const name of names) hidden().add(name);
+    ask();
+  }
+  function sized() {
+    const svg = place.querySelector("svg");
+    if (!svg || !shown) return;
+    svg.setAttribute("width", shown.width * scale);
+    svg.setAttribute("height", shown.height * scale);
+  }
+  function zoom(by) {
+    scale = Math.max(0.2, Math.min(3, scale * by));
+    sized();
+  }
+  function fitted(least = 0.3) {
+    if (!shown || !place.clientWidth) return;
+    scale = Math.max(least, Math.min(1.2, (place.clientWidth - 4) / shown.width));
+    sized();
+  }
+
+  // --- drawing an arrow ---
+
+  function begin(name) {
+    from = name;
+    hint = `An arrow from ${name}: go to the state where it ends, and press Enter; Escape leaves it.`;
+    place.classList.add("choosing");
+    say("");
+  }
+  function leave() {
+    from = null;
+    hint = "";
+    place.querySelector(".drawing")?.remove();
+    place.querySelectorAll(".target").forEach((one) => one.classList.remove("target"));
+    place.classList.remove("choosing");
+  }
+  async function finish(target) {
+    const source = from;
+    leave();
+    const done = await desk.try("graph.draw", { source, target });
+    if (!done) return;
+    bus.select({ table: desk.table, line: done.line });
+    bus.say(`line ${done.line} leads from ${source} to ${target}: the proof answers in the table`);
+  }
+  function point(event) {
+    const svg = place.querySelector("svg"), box = svg.getBoundingClientRect();
+    return [(event.clientX - box.left) / scale, (event.clientY - box.top) / scale];
+  }
+  const stateAt = (event) => document.elementFromPoint(event.clientX, event.clientY)?.closest?.("[data-state]");
+  function drag(event, box) {
+    if (event.button !== 0) return;
+    const start = [event.clientX, event.clientY];
+    let line = null;
+    const move = (at) => {
+      if (!line && Math.hypot(at.clientX - start[0], at.clientY - start[1]) < 8) return;
+      if (!line) {
+        begin(box.name);
+        line = put("path", { class: "drawing" });
+        place.querySelector("svg").append(line);
+      }
+      const [x, y] = point(at);
+      line.setAttribute("d", `M ${box.corner[0] + box.size[0] / 2} ${box.corner[1] + box.size[1] / 2} L ${x} ${y}`);
+      place.querySelectorAll(".target").forEach((one) => one.classList.remove("target"));
+      stateAt(at)?.closest(".box").classList.add("target");
+    };
+    const up = (at) => {
+      removeEventListener("pointermove", move);
+      const target = line && stateAt(at)?.dataset.state;
+      if (line && target && target !== box.name) finish(target);
+      else if (line) leave();
+    };
+    addEventListener("pointermove", move);
+    addEventListener("pointerup", up, { once: true });
+    event.preventDefault();
+    event.currentTarget.focus({ preventScroll: true });
+  }
+
+  place.addEventListener("keydown", (event) => {
+    const focus = event.target.closest?.("[data-focus]");
+    const done = () => { event.preventDefault(); event.stopPropagation(); };
+    if (event.key === "Escape" && from) { done(); leave(); say("no arrow was drawn"); } else if (event.key === "a" && focus?.dataset.state && !from && !event.ctrlKey) { done(); begin(focus.dataset.state); } else if ((event.key === "Enter" || event.key === " ") && focus) {
+      done();
+      if (from && focus.dataset.state) finish(focus.dataset.state);
+      else focus.dispatchEvent(new MouseEvent("click", { bubbles: true }));
+    } else if (/^Arrow/.test(event.key) && focus && !event.ctrlKey) { done(); near(focus, event.key); } else if (event.ctrlKey && event.key.toLowerCase() === "z") { done(); if (event.shiftKey) desk.redo(); else desk.undo(); } else if (event.key === "+" || event.key === "-") { done(); zoom(event.key === "+" ? 1.25 : 0.8); }
+  });
+
+  /** Go to what is next in a direction; only to states while an arrow is drawn. */
+  function near(focus, key_) {
+    const middle = (one) => { const box = one.getBoundingClientRect(); return [box.left + box.width / 2, box.top + box.height / 2]; };
+    const [x, y] = middle(focus);
+    const [right, down] = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] }[key_];
+    let best = null, least = Infinity;
+    for (const one of place.querySelectorAll(from ? "[data-state]" : "[data-focus]")) {
+      const [a, b] = middle(one);
+      const ahead = (a - x) * right + (b - y) * down, aside = Math.abs((a - x) * down + (b - y) * right);
+      if (one !== focus && ahead > 2 && ahead + 2 * aside < least) { best = one; least = ahead + 2 * aside; }
+    }
+    best?.focus();
+    best?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  }
+
+  desk.on(() => ask());
+  for (const [keys, what] of [["a", "Draw an arrow from the state, then choose where it ends"], ["arrows", "Go to what is next"], ["enter", "Select the line; shut or open a composite state"], ["+ and -", "Larger and smaller"]]) {
+    bus.keys.push({ keys: `In the graph: ${keys}`, what, run: () => {}, where: "Graph" });
+  }
+  return { shown: () => { ask(); marks(); } };
+}

@@ -1,0 +1,177 @@
+// The open file that grid, text and graph show: one for the page, so that they always show the same.
+
+import { make, Refusal } from "../bus.js";
+
+const desks = new WeakMap();
+
+/** The desk of this page. */
+export function deskOf(bus) {
+  if (!desks.has(bus)) desks.set(bus, new Desk(bus));
+  return desks.get(bus);
+}
+
+export class Desk {
+  files = []; // { file, tables, levels }
+  file = "";
+  doc = null; // as the server told it last
+  table = ""; // the name of the table that is shown
+  condition = null; // { text, can, unknown, every } of the filter
+  #bus;
+  #heard = new Set();
+  #stop = null;
+  #types = new Map(); // heading -> { type, unit }, of the last text that was looked at
+
+  constructor(bus) {
+    this.#bus = bus;
+    bus.on("tables.hello", ({ files }) => this.#greeted(files));
+    bus.on("selection", (now, changed) => { if (changed?.has("level") || changed?.has("table")) this.#follow(now); });
+    addEventListener("focus", () => { if (this.file) this.open(this.file, this.table); });
+  }
+
+  /** Hear of every change of the file, of the table, and of the filter; at once, too. */
+  on(handler) {
+    this.#heard.add(handler);
+    if (this.doc) handler(this);
+    return () => this.#heard.delete(handler);
+  }
+
+  tell() {
+    if (this.doc) for (const handler of this.#heard) handler(this);
+  }
+
+  get shown() {
+    return this.doc?.tables.find(({ name }) => name === this.table) ?? null;
+  }
+
+  /** Findings of the table that is shown; and those of elsewhere. */
+  findings(here = true) {
+    return (this.doc?.findings ?? []).filter((one) => (one.table === this.table) === here);
+  }
+
+  async open(file, table = "") {
+    if (!file) return;
+    const changed = file !== this.file;
+    try {
+      if (changed) {
+        this.#stop?.();
+        Object.assign(this, { file, doc: null, table, condition: null });
+        this.#types.clear();
+        this.#stop = this.#bus.on(`tables.file/${file}`, (doc) => this.#take(doc));
+      } else if (table && table !== this.table) {
+        Object.assign(this, { table, condition: null });
+        this.#selected();
+        this.tell();
+      }
+      await this.#bus.ask("tables.open", { file });
+    } catch (error) {
+      this.#refused(error);
+    }
+  }
+
+  /** Ask something about the text as it is here. */
+  async ask(kind, body = {}, options = {}) {
+    return this.#bus.ask(kind, { file: this.file, version: this.doc?.version ?? 0, table: this.table, ...body }, options);
+  }
+
+  /** The same; where it is refused it is said, and undefined returned. */
+  async try(kind, body = {}, options = {}) {
+    try {
+      return await this.ask(kind, body, options);
+    } catch (error) {
+      this.#refused(error);
+      return undefined;
+    }
+  }
+
+  async undo() {
+    const done = await this.try("tables.undo");
+    if (done) this.#bus.say(`undone: ${done.made}`);
+  }
+
+  async redo() {
+    const done = await this.try("tables.redo");
+    if (done) this.#bus.say(`done again: ${done.made}`);
+  }
+
+  async save(over = false) {
+    try {
+      const { made } = await this.ask("tables.save", { over });
+      this.#bus.say(made ? `${this.file} is written, laid out` : `${this.file} is written as it is: a text that does not parse is not laid out`);
+      this.conflict = "";
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      this.conflict = error.message.includes("on disk") ? error.message : "";
+      this.#refused(error);
+    }
+    this.tell();
+  }
+
+  async take() {
+    this.conflict = "";
+    await this.try("tables.take");
+    this.tell();
+  }
+
+  /** Show only lines that can match where a condition holds; all for an empty one. */
+  async filter(text) {
+    if (!text.trim()) {
+      this.condition = null;
+      this.tell();
+      return;
+    }
+    const answer = await this.try("proof.filter", { condition: text });
+    if (answer) {
+      this.condition = { text, ...answer };
+      this.tell();
+    }
+  }
+
+  type(heading) {
+    return this.#types.get(`${this.table} ${heading}`) ?? { type: "", unit: "" };
+  }
+
+  #take(doc) {
+    if (doc.version < (this.doc?.version ?? 0)) return;
+    const stale = this.condition && this.doc && doc.version !== this.doc.version;
+    this.doc = doc;
+    for (const { name, columns } of doc.tables) {
+      for (const { heading, type, unit } of columns) if (type) this.#types.set(`${name} ${heading}`, { type, unit });
+    }
+    if (!this.shown) this.table = doc.tables[0]?.name ?? "";
+    this.#selected();
+    this.tell();
+    if (stale && doc.known) this.filter(this.condition.text);
+  }
+
+  #selected() {
+    this.#bus.select({ table: this.table });
+  }
+
+  #greeted(files) {
+    this.files = files;
+    if (!this.file) {
+      const first = files.find(({ levels }) => levels.length) ?? files[0];
+      if (first) this.open(first.file, first.tables[0]);
+    } else {
+      this.open(this.file, this.table); // the connection was lost meanwhile
+    }
+    this.tell();
+  }
+
+  #follow({ level, table }) {
+    if (!table || table === this.table) return;
+    const named = this.files.filter(({ tables }) => tables.includes(table));
+    const found = named.find(({ levels }) => levels.includes(level)) ?? named.find(({ levels }) => levels.length) ?? named[0];
+    if (found) this.open(found.file, table);
+  }
+
+  #refused(error) {
+    if (!(error instanceof Refusal)) throw error;
+    this.#bus.say(error.message, { wrong: true, helps: error.helps });
+  }
+}
+
+/** A sentence with names between back quotes, these as code. */
+export function spoken(text) {
+  return text.split(/`([^`]*)`/).map((piece, at) => (at % 2 ? make("code", {}, piece) : piece));
+}

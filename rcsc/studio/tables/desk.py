@@ -1,0 +1,259 @@
+"""All open files, and what is known of them: the one place that all pages and both lanes share.
+
+In: changes, from the lane `tables`. Out: an event `tables.file/NAME` for every change, and one more when the text was looked at, in the
+lane `proof`. A text that changes while it is looked at is given up, and the new one looked at.
+"""
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from rcsc.diagnostics.codes import Code
+from rcsc.editor.memo import OutdatedError
+from rcsc.editor.values import Repair
+from rcsc.editor.workspace import Checked, Workspace
+from rcsc.editor.written import tables_of
+from rcsc.lang.project import listed, load, project_root
+from rcsc.run.description import BadDescription, description, places
+from rcsc.shell.reload.refusal import Refused
+from rcsc.studio.hub import PROVER
+from rcsc.studio.tables.document import Document
+from rcsc.studio.tables.shown import Json, Known, document
+
+PROOF = "proof"
+"""The lane in which texts are looked at."""
+MOST_FILES = 2_000
+MOST_OPEN = 64
+"""Files that are open at once."""
+MOST_LISTED_BYTES = 300_000
+"""Of a file whose tables are listed before it is opened."""
+
+
+class Desk:
+    """Files of one project.
+
+    Attributes:
+        workspace: Of the lane `proof` alone.
+    """
+
+    def __init__(
+        self, system: Path, tell: Callable[[str, Json], None], do: Callable[[str, Callable[[], None]], None]
+    ) -> None:
+        """Args: system: The description; tell: As `Hub.tell`; do: Has something done in a lane."""
+        self.system = system.resolve()
+        self.root = os.path.realpath(project_root(str(self.system)))
+        self.workspace = Workspace()
+        self._tell, self._do = tell, do
+        self._lock = threading.RLock()
+        self._open: dict[str, Document] = {}
+        self._known: dict[str, Known] = {}
+        self._offered: dict[tuple[str, int, int], tuple[Repair, ...]] = {}
+
+    # --- what there is ---
+
+    def files(self) -> list[Json]:
+        """Every file that has tables, with their names, and the levels that run them; those of the system first."""
+        levels = self._levels()
+        found = []
+        for path in listed([self.root])[:MOST_FILES]:
+            names = [each.name for each in tables_of(_glance(path))]
+            if names:
+                name = self._name(path)
+                found.append({"file": name, "tables": names, "levels": levels.get(name, [])})
+        order = list(dict.fromkeys(level for each in levels.values() for level in each))
+        return sorted(
+            found, key=lambda each: (min(map(order.index, each["levels"]), default=len(order)), each["file"])
+        )
+
+    def _levels(self) -> dict[str, list[str]]:
+        """By file the levels whose program has it, from the top down."""
+        found: dict[str, list[str]] = {}
+        try:
+            specs = description(self.system).levels
+        except (BadDescription, OSError):
+            return found
+        for spec in specs:
+            root = next((each for each in places(self.system, spec.program) if each.is_file()), None)
+            for file in () if root is None else load([str(root)]).files:
+                found.setdefault(self._name(file), []).append(spec.name)
+        return found
+
+    def _name(self, path: str) -> str:
+        return os.path.relpath(os.path.realpath(path), self.root).replace(os.sep, "/")
+
+    # --- files ---
+
+    def opened(self, name: str) -> Document:
+        """An open file; opens it where it is not.
+
+        Raises:
+            Refused: The project has no such file, or it cannot be read.
+        """
+        with self._lock:
+            if name not in self._open:
+                path = os.path.join(self.root, *name.split("/"))
+                inside = os.path.realpath(path).startswith(self.root + os.sep)
+                if not name.endswith(".rcs") or not inside or not os.path.isfile(path):
+                    raise Refused(Code.STUDIO, f"the project has no file `{name}`")
+                if len(self._open) >= MOST_OPEN:
+                    self._forget()
+                self._open[name] = Document.opened(os.path.realpath(path))
+                self._look_soon(name)
+            return self._open[name]
+
+    def _forget(self) -> None:
+        """Close a file that has nothing to lose.
+
+        Raises:
+            Refused: There is none.
+        """
+        idle = next((name for name, each in self._open.items() if not each.dirty), None)
+        if idle is None:
+            raise Refused(Code.STUDIO, f"{MOST_OPEN} files are open and not saved", "save some of them")
+        file = self._open.pop(idle).file
+        self._known.pop(idle, None)
+        self._do(PROOF, lambda: self.workspace.close(file))
+
+    def named(self, path: str) -> str:
+        """The name of a file of the project by its path.
+
+        Raises:
+            Refused: It is outside.
+        """
+        name = self._name(path)
+        if name.startswith("../"):
+            raise Refused(Code.STUDIO, f"`{os.path.basename(path)}` is no file of this project")
+        return name
+
+    def at(self, name: str, version: int) -> Document:
+        """An open file whose text is the one that a page has seen.
+
+        Raises:
+            Refused: It is another one by now.
+        """
+        found = self.opened(name)
+        if found.version != version:
+            raise Refused(
+                Code.STUDIO, "the text was changed meanwhile: nothing was done", "look at it, and do it again"
+            )
+        return found
+
+    def change(self, name: str, make: Callable[[Document], object]) -> Json:
+        """Change an open file, tell every page, and have it looked at; the answer for the page that asked.
+
+        Raises:
+            Refused: As `make` does; nothing was changed then.
+        """
+        with self._lock:
+            found = self.opened(name)
+            before = found.version
+            try:
+                made = make(found)
+            finally:
+                if found.version != before:
+                    self._look_soon(name)
+                self.show(name)
+            return {"version": found.version, "made": made}
+
+    def show(self, name: str) -> Json:
+        """Tell every page of an open file; what was told."""
+        with self._lock:
+            shown = document(name, self._open[name], self._known.get(name))
+        self._tell(f"tables.file/{name}", shown)
+        return shown
+
+    # --- what is known ---
+
+    def _look_soon(self, name: str) -> None:
+        self._do(PROOF, lambda: self._look(name))
+
+    def _look(self, name: str) -> None:
+        """Look at a file as it is now, in the lane `proof`; other files that use it, too, where they are open."""
+        for each in [name, *self._open]:
+            known = self._known.get(each)
+            if each != name and (known is None or self._uses(each, name) is False):
+                continue
+            self._look_at(each, again=each != name)
+
+    def _uses(self, user: str, name: str) -> bool:
+        with self._lock:
+            if user not in self._open or name not in self._open:
+                return False
+            path, wanted = self._open[user].file, self._open[name].file
+        return any(os.path.realpath(each) == wanted for each in self.workspace.reading(path).loaded.files)
+
+    def _look_at(self, name: str, *, again: bool) -> None:
+        with self._lock:
+            found = self._open.get(name)
+            known = self._known.get(name)
+            if found is None or (known is not None and known.version == found.version and not again):
+                return
+            version, text, file = found.version, found.text, found.file
+        began = time.perf_counter()
+        try:
+            with PROVER:
+                self.workspace.open(file, text)
+                answer = self.workspace.check(file, lambda: found.version == version)
+                program = self.workspace.reading(os.path.normpath(file)).nearest
+        except OutdatedError:
+            return  # what changed it has the new text looked at
+        with self._lock:
+            self._known[name] = Known(version, answer, program, time.perf_counter() - began)
+            self._offered = {key: each for key, each in self._offered.items() if key[0] != name}
+            if name in self._open:
+                self.show(name)
+
+    def known(self, name: str, version: int) -> Known:
+        """What is known of the text that a page has seen; looks at it first, where nobody has. In the lane `proof`.
+
+        Raises:
+            Refused: It is another one by now.
+        """
+        self.at(name, version)
+        self._look_at(name, again=False)
+        known = self._known.get(name)
+        self.at(name, version)
+        if known is None or known.version != version:
+            raise Refused(Code.STUDIO, "the text was changed meanwhile: nothing was done")
+        return known
+
+    def checked(self, name: str, version: int) -> Checked:
+        """The program of the text that a page has seen, in the lane `proof`.
+
+        Raises:
+            Refused: It is another one by now.
+        """
+        self.known(name, version)
+        with PROVER:
+            return self.workspace.checked(os.path.normpath(self.opened(name).file))
+
+    def repairs(self, name: str, version: int, finding: int) -> tuple[Repair, ...]:
+        """Repairs of a finding, made and checked once; in the lane `proof`.
+
+        Raises:
+            Refused: There is no such finding, or the text is another one by now.
+        """
+        known = self.known(name, version)
+        if not 0 <= finding < len(known.answer.findings):
+            raise Refused(Code.STUDIO, "there is no such finding any more")
+        key = (name, version, finding)
+        if key not in self._offered:
+            with PROVER:
+                self._offered[key] = self.workspace.repairs(known.answer.findings[finding])
+        return self._offered[key]
+
+    def others(self) -> Iterator[tuple[str, Document]]:
+        """Every open file."""
+        with self._lock:
+            yield from list(self._open.items())
+
+
+def _glance(path: str) -> str:
+    """The beginning of a file; empty where it cannot be read."""
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(MOST_LISTED_BYTES).decode(errors="replace")
+    except OSError:
+        return ""
