@@ -264,6 +264,7 @@ class Solver:
         self.refuted: list[Term] = []
         self._remembers = remembers
         self._added: list[list[Term]] = []
+        self._model: Any = None
         self.names = 0
 
     def named(self, term: Term) -> Term:
@@ -302,6 +303,7 @@ class Solver:
 
     def check(self, *assuming: Term) -> Answer:
         """Whether all asserted terms, and these, hold together for some values."""
+        self._model = None
         if spent():
             return Answer.UNKNOWN
         z3 = _z3()
@@ -376,7 +378,9 @@ class Solver:
     def value(self, term: Term, kind: Scalar) -> Value:
         """The value of a constant in the model of the last satisfiable answer."""
         z3 = _z3()
-        evaluated = self._solver.model().eval(term, model_completion=True)
+        if self._model is None:
+            self._model = self._solver.model()
+        evaluated = self._model.eval(term, model_completion=True)
         if isinstance(kind, Bool):
             return bool(z3.is_true(evaluated))
         if isinstance(kind, Real):

@@ -9,7 +9,9 @@ With `--svg` cost by size is measured, too, and drawn (`drawn`).
 import argparse
 import os
 import re
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -73,6 +75,23 @@ def seconds(*command: str, folder: Path = REPO, ends: tuple[int, ...] = (0,)) ->
     return after.children_user + after.children_system - before.children_user - before.children_system
 
 
+def killed(*command: str, folder: Path, after_s: float) -> None:
+    """Start a process that the kernel kills, without a word to it, once it has had so many seconds of the processor.
+
+    Raises:
+        AssertionError: It ends before.
+    """
+    limit = max(1, round(after_s))
+    ended = subprocess.run(
+        command,
+        cwd=folder,
+        capture_output=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit)),
+    )
+    assert ended.returncode == -signal.SIGKILL, f"{command}: {ended.returncode}"
+
+
 def least(work: Callable[[], float]) -> float:
     """The least of some: the others waited for somebody else."""
     return min(work() for _ in range(ROUNDS))
@@ -110,7 +129,7 @@ def commands(folder: Path) -> Iterator[Cost]:
 
 
 def proofs_of_levels(folder: Path, rcsc: Callable[..., float], empty: float) -> Iterator[Cost]:
-    """The shipped system's levels together: cold, nothing changed, one cell changed."""
+    """The shipped system's levels together: cold, nothing changed, one cell changed, killed half-way and run again."""
     beside = "an empty Python"
     cold = rcsc("prove", "tables/system.toml")
     yield Cost("rcsc prove, the shipped system, cold", f"{cold:.1f} s", beside, cold / empty)
@@ -124,6 +143,12 @@ def proofs_of_levels(folder: Path, rcsc: Callable[..., float], empty: float) -> 
     spent = rcsc("prove", "tables/system.toml", ends=(0, 1))
     table.write_text(text, "utf-8")
     yield Cost("rcsc prove, one cell changed", f"{spent:.1f} s", "cold", spent / cold)
+    again = folder / "again"
+    shutil.copytree(REPO / "tables", again / "tables", ignore=shutil.ignore_patterns(".rcsc-cache"))
+    prove = (*RCSC, "prove", "--jobs", "1", "tables/system.toml")
+    killed(*prove, folder=again, after_s=cold / 2)
+    rest = seconds(*prove, folder=again)
+    yield Cost("rcsc prove, killed half-way, run again", f"{rest:.1f} s", "cold", rest / cold)
 
 
 # --- proofs ---

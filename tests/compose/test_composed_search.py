@@ -18,10 +18,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.commands import run
+from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.obligations import Obligation, obligations
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
-from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
+from rcsc.compose.invariant.cubes import Masks, Pair, Reached, Valuation, Way, Ways, shown
 from rcsc.compose.invariant.search import Effort, FoundInvariant, search
 from rcsc.compose.proof import context as context_
 from rcsc.compose.proof import level as level_proof
@@ -645,6 +646,59 @@ def test_after_one_cell_has_changed_the_same_is_concluded_as_from_nothing(
     assert 0 < broken < EDITS
 
 
+ATOMS = (
+    "new_command", "not new_command", "begun", "not begun", "idle", "cur_state = going", "cur_state /= d_state", "status_in = done",
+    "status_report = executing", "to_lower.input_command = go", "to_lower.input_command = pause", "report.status_report /= failed",
+)  # fmt: skip
+
+
+def with_another_invariant(random: Random, folder: Path) -> Iterator[TransitionSystem]:
+    """Yield the upper level with a drawn invariant more."""
+    for at in range(100):
+        first, second = random.sample(ATOMS, 2)
+        stated = ("assume in_step", f"invariant drawn : {first} implies {second}\n\nassume in_step")
+        with suppress(NoProgramError):
+            yield small_level(folder / str(at), "upper", upper=small_text("upper", stated))
+
+
+def with_another_assumption(random: Random, folder: Path) -> Iterator[TransitionSystem]:
+    """Yield the upper level with another condition assumed of its table."""
+    for at in range(100):
+        first, second = random.sample(ATOMS, 2)
+        assumed = ("monitored : not new_command implies", f"monitored : {first} implies {second} or")
+        with suppress(NoProgramError):
+            yield small_level(folder / str(at), "upper", upper=small_text("upper", assumed))
+
+
+def with_another_buffer(random: Random, folder: Path) -> Iterator[TransitionSystem]:
+    """Yield the upper level where less is known of what it takes: its orders are not numbered, or reports are not linked to orders."""
+    del random, folder
+    ts = transition_systems(SYSTEM)["upper"]
+    above = ts.links.above
+    assert above is not None
+    other = (
+        replace(ts.links, above=replace(above, numbered=())),
+        replace(ts.links, below=(), free=(*ts.links.free, *leaves_under(ts.program, "lower"))),
+    )
+    for links in other:
+        yield TransitionSystem(ts.program, ts.level, links, ts.safety)
+
+
+@pytest.mark.parametrize("edits", [with_another_invariant, with_another_assumption, with_another_buffer])
+def test_after_something_else_has_changed_the_same_is_concluded_as_from_nothing(
+    edits: Callable[[Random, Path], Iterator[TransitionSystem]], tmp_path: Path, cache: Cache
+) -> None:
+    """An invariant, an assumption or a buffer, in levels of which some are proved and some are not, or none is."""
+    before = prove_level(transition_systems(SYSTEM)["upper"], LITTLE)
+    broken = 0
+    for ts in islice(edits(Random(3), tmp_path), EDITS):  # noqa: S311  # repeatable on purpose
+        keep_candidates(cache, ts, FoundInvariant(before.predicates, before.clauses), Candidates())
+        proof = prove_level(ts, LITTLE, cache)
+        assert concluded(proof) == concluded(prove_level(ts, LITTLE))
+        broken += bool(proof.open)
+    assert broken > 0
+
+
 def test_a_proof_goes_on_where_another_was_ended(monkeypatch: pytest.MonkeyPatch, cache: Cache) -> None:
     """When its search was done; the next one is asked for each clause that was found whether it still holds, and for little else."""
     ts = transition_systems(SYSTEM)["upper"]
@@ -765,3 +819,74 @@ def test_a_level_is_kept_before_the_next_one_is_begun(cache: Cache, monkeypatch:
         prove_transition_systems(made, LITTLE, 1, (first, second), None, cache)
     assert recall(cache, made[first], LITTLE) is not None
     assert recall(cache, made[second], LITTLE) is None
+
+
+# --- what the search need not ask ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_a_cycle_that_is_known_leads_where_it_did_from_frames_that_have_its_beginning(seed: int) -> None:
+    """Drawn cycles and clauses: one is named if, and only if, one begins in the frame outside the cube and ends in the cube."""
+    random, sizes = Random(seed), (2, 2, 3, 4)  # noqa: S311  # repeatable on purpose
+    masks, ways = Masks.of(sizes), Ways()
+
+    def cube() -> tuple[Pair, ...]:
+        places = sorted(random.sample(range(4), random.randint(1, 2)))
+        return tuple((at, _value(random, sizes[at])) for at in places)
+
+    def point() -> Valuation:
+        return tuple(random.randrange(size) for size in sizes)
+
+    def lies(state: Valuation, inside: tuple[Pair, ...]) -> bool:
+        return all(state[at] == value if value >= 0 else state[at] != ~value for at, value in inside)
+
+    known: list[tuple[Valuation, Valuation]] = []
+    clauses: list[tuple[tuple[Pair, ...], int]] = []
+    for _ in range(30):
+        if random.random() < 0.5:
+            start, end = point(), point()
+            starts, ends = (masks.implied(tuple(enumerate(state))) for state in (start, end))
+            outside = max((frame for clause, frame in clauses if lies(start, clause)), default=0)
+            ways.add(Way(start, end, starts, ends), outside)
+            known.append((start, end))
+        elif random.random() < 0.3:
+            clauses.append((cube(), random.randint(1, 3)))
+            ways.exclude(masks.of_cube(clauses[-1][0]), clauses[-1][1])
+        asked, frame = cube(), random.randint(1, 3)
+        allowed = [
+            (start, end)
+            for start, end in known
+            if lies(end, asked) and not lies(start, asked)
+            if not any(lies(start, clause) and at >= frame for clause, at in clauses)
+        ]
+        found = ways.into(masks.of_cube(asked), frame)
+        assert (found is None) == (not allowed)
+        assert found is None or (found.start, found.end) in allowed
+
+
+def _value(random: Random, size: int) -> int:
+    value = random.randrange(size)
+    return ~value if random.random() < 0.5 else value
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_simpler_clauses_say_the_same_of_what_is_read(seed: int) -> None:
+    """Drawn clauses of 12 variables, four of them read: the same answers to all that can be assumed of those, and values that may be."""
+    random = Random(seed)  # noqa: S311  # repeatable on purpose
+    variables = range(1, 13)
+    clauses = [
+        [random.choice((1, -1)) * at for at in random.sample(variables, random.randint(1, 3))]
+        for _ in range(random.randint(0, 34))
+    ]
+    read = random.sample(variables, 4)
+    whole, simpler = Sat(clauses), Sat(clauses, read)
+    for signs in product((-1, 0, 1), repeat=4):
+        assuming = [sign * at for sign, at in zip(signs, read, strict=True) if sign]
+        holds = simpler.holds(assuming)
+        assert holds == whole.holds(assuming)
+        if holds:
+            assert whole.holds([at if simpler.value(at) else -at for at in read])
+        else:
+            assert not whole.holds(simpler.core())
+    for sat in (whole, simpler):
+        sat.close()

@@ -323,6 +323,7 @@ def test_enumerations_of_many_members_are_followed() -> None:
     few, many = costs(chain((3, 5))), costs(chain((3, 20)))
     assert [cost.open for cost in (*few, *many)] == [0] * 4
     assert many[0].questions < 1.3 * few[0].questions  # as a solver's models have it
+    assert many[0].questions < 350  # 285; 417 where clauses are pushed one by one, and models forgotten
     assert many[1].questions < 1.1 * 20 / 5 * few[1].questions  # in proportion, about
 
 

@@ -180,6 +180,7 @@ class _Ranking:
         restless: Lines that may give orders for ever; `unanswered`, that may stay unanswered in quiet cycles for ever.
     """
 
+    silent: set[LinePair]
     restless: set[int]
     unanswered: set[int]
 
@@ -218,10 +219,14 @@ class _Ranking:
             self.always, always, self.orders, None if weaker is None else weaker.restless
         )
         silent = self.always if weaker is None else self.always & weaker.silent
-        self.silent: set[LinePair] = self._uncounted(self._steps(self.quiet, silent), self.quiet)
-        self.unanswered = self._unstopped(
-            self.silent, self.quiet, waits, None if weaker is None else weaker.unanswered
-        )
+        among = None if weaker is None else weaker.unanswered
+        if weaker is not None:  # which of these steps may be taken matters only if they are too many
+            self.silent = self._uncounted(silent, self.quiet)
+            self.unanswered = self._unstopped(self.silent, self.quiet, waits, among)
+            if not self.unanswered:
+                return
+        self.silent = self._uncounted(self._steps(self.quiet, silent), self.quiet)
+        self.unanswered = self._unstopped(self.silent, self.quiet, waits, among)
 
     @property
     def endless(self) -> set[int]:
@@ -243,17 +248,16 @@ class _Ranking:
         if not among:
             return among
         lines, possible = range(len(self.now)), set[LinePair]()
-        self.solver.push()
-        self.solver.add(when, smt.any_of([self._step(step) for step in sorted(among)]))
-        while (answer := self.solver.check()) is Answer.SATISFIABLE:
+        new = self.solver.switch(smt.any_of([self._step(step) for step in sorted(among)]))
+        asked = [self.solver.switch(when), new]
+        while (answer := self.solver.check(*asked)) is Answer.SATISFIABLE:
             here, there = (
                 [line for line in lines if self.solver.value(runs[line], Bool())]
                 for runs in (self.now, self.next)
             )
             seen = sorted((among & set(product(here, there))) - possible)
             possible.update(seen)
-            self.solver.add(*(smt.negation(self._step(step)) for step in seen))
-        self.solver.pop()
+            self.solver.add(*(smt.implication(new, smt.negation(self._step(step))) for step in seen))
         return among if answer is Answer.UNKNOWN else possible
 
     def _step(self, step: LinePair) -> Term:
@@ -273,51 +277,53 @@ class _Ranking:
 
     def _stops(self, line: int, part: Part, when: Term, then: Term) -> bool:
         """Return whether the line runs only finitely often while the part's lines follow one another; note the counter."""
-        self.solver.push()
-        for turn in (self.last, self.next):
-            self.solver.add(smt.any_of([turn[other] for other in sorted(part)]))
-        self.solver.add(when)
-        runs = smt.all_of([self.now[line], then])
+        asked = [*(self._one_of(turn, part) for turn in (self.last, self.next)), self.solver.switch(when)]
+        runs = [*asked, self.now[line], self.solver.switch(then)]
         rising = self._rising_once(runs)
-        counted = next(self._rising(line, part, runs, rising), None) if rising is not None else None
-        self.solver.pop()
+        if rising is None:
+            return True
+        counted = next(self._rising(line, part, asked, runs, rising), None)
         if counted is not None and counted not in self.counted:
             self.counted.append(counted)
-        return rising is None or counted is not None
+        return counted is not None
 
-    def _rising_once(self, runs: Term) -> list[KeptNumber] | None:
+    def _one_of(self, turn: list[Term], part: Part) -> Term:
+        """Return a switch for one of the part's lines to run in this turn."""
+        return self.solver.switch(smt.any_of([turn[other] for other in sorted(part)]))
+
+    def _rising_once(self, runs: list[Term]) -> list[KeptNumber] | None:
         """Return the numbers that rise in one such cycle, to try only these; None if there is no such cycle."""
-        self.solver.push()
-        self.solver.add(runs)
-        answer = self.solver.check()
-        seen = [
+        answer = self.solver.check(*runs)
+        if answer is Answer.UNSATISFIABLE:
+            return None
+        return [
             number
             for number, rises in zip(self.numbers, self.rises, strict=True)
             if answer is not Answer.SATISFIABLE or self.solver.value(rises, Bool())
         ]
-        self.solver.pop()
-        return None if answer is Answer.UNSATISFIABLE else seen
 
-    def _rising(self, line: int, part: Part, runs: Term, among: list[KeptNumber]) -> Iterator[RisingLine]:
+    def _rising(
+        self, line: int, part: Part, asked: list[Term], runs: list[Term], among: list[KeptNumber]
+    ) -> Iterator[RisingLine]:
         """Yield the numbers that always rise with the line and never fall within the part."""
-        others = smt.any_of([self.now[other] for other in sorted(part)])
+        others = [*asked, self._one_of(self.now, part)] if among else asked
         name = str(self.turn.at.lines[line][0].name)
         for number in among:
-            if may(self.solver, others, smt.below(number.after, number.before, KEY)):
+            if may(self.solver, *others, smt.below(number.after, number.before, KEY)):
                 continue
             if isinstance(number.kind, Real):
                 least = self._least_rise(runs, number, number.kind.high - number.kind.low)
                 if least is not None:
                     yield RisingLine(name, number.name, least)
-            elif not may(self.solver, runs, smt.at_most(number.after, number.before, KEY)):
+            elif not may(self.solver, *runs, smt.at_most(number.after, number.before, KEY)):
                 yield RisingLine(name, number.name)
 
-    def _least_rise(self, runs: Term, number: KeptNumber, width: float) -> float | None:
+    def _least_rise(self, runs: list[Term], number: KeptNumber, width: float) -> float | None:
         """Return the least rise of the real; None if no rise is shown."""
 
         def rises(power: int) -> bool:
             risen = smt.integer_operation("+", number.before, smt.fraction(width / 2**power))
-            return not may(self.solver, runs, smt.below(number.after, risen, KEY))
+            return not may(self.solver, *runs, smt.below(number.after, risen, KEY))
 
         power = least_power(rises)
         return None if power is None else width / 2**power
