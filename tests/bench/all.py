@@ -192,6 +192,8 @@ PROOFS: tuple[tuple[str, int, int, Fault, int, bool], ...] = (
     ("linear", 40, 4, "ok", 0, True),
     ("linear", 256, 6, "ok", 0, True),
     ("linear", 1024, 6, "ok", 0, True),
+    ("cells", 8, 2, "ok", 0, True),
+    ("cells", 30, 2, "ok", 0, True),
     ("linear", 1024, 6, "overlap", 0, False),
     ("linear", 1024, 6, "ok", 3, False),
 )

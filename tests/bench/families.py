@@ -1,12 +1,19 @@
 """Tables by seed, right by construction, as source text; each also with one overlap or one gap planted.
 
 `box`: random recursive cuts of the input space over bools, enumerations and integer ranges. `linear`: recursive cuts by
-planes `a*x + b*y <= c` over integers, atoms respelt.
+planes `a*x + b*y <= c` over integers, atoms respelt. `cells`: the cells between planes.
 """
 
+import math
 import random
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
+
+from rcsc.lang.model import Int, Read, VariableName
+from rcsc.table.regions.atoms import Universe
+from rcsc.table.regions.points import within
+from rcsc.table.regions.region import NoWitness
 
 Fault = Literal["ok", "overlap", "gap"]
 
@@ -132,5 +139,50 @@ def linear(lines: int, variables: int, seed: int, fault: Fault = "ok", widened: 
     if fault == "overlap":
         conditions.append(conditions[0])
     rows = [f"| {at} | {condition} ||" for at, condition in enumerate(conditions)]
+    declared = "".join(f"input {name} : int -1000 .. 1000\n" for name in names)
+    return declared + "table t {\n| line | when ||\n" + "\n".join(rows) + "\n}\n"
+
+
+def cells(planes: int, variables: int, seed: int, fault: Fault = "ok") -> str:
+    """A table with a line for each cell into which planes (at most 50) divide the space; it names those that bound the cell.
+
+    Cells that hold no integers are none. No plane divides all of them well, and a line is silent about most: harder than `linear`.
+    """
+    rng = random.Random(seed)
+    names = [f"x{at}" for at in range(variables)]
+    universe = Universe()
+    columns = [universe.column(Read(VariableName(name), Int(-1000, 1000))) for name in names]
+    sides: dict[int, tuple[tuple[int, int], tuple[int, int]]] = {}
+    while len(sides) < planes:
+        one, two = sorted(rng.sample(columns, 2))
+        first, second = rng.randint(1, 9), rng.choice((-1, 1)) * rng.randint(1, 9)
+        divisor = math.gcd(first, second)
+        form = universe.form(((one, first // divisor), (two, second // divisor)))
+        cut = sum(k * rng.randint(-700, 700) for _, k in universe.forms[form])
+        sides.setdefault(form, ((universe.low[form], cut), (cut + 1, universe.high[form])))
+
+    def has_points(bounds: Mapping[int, tuple[int, int]]) -> bool:
+        return not isinstance(within(universe, bounds, {}), NoWitness)
+
+    found: list[dict[int, tuple[int, int]]] = [{}]
+    for form, both in sides.items():
+        found = [wider for bounds in found for side in both if has_points(wider := {**bounds, form: side})]
+    for bounds in found:
+        for form in list(bounds):
+            [other] = {*sides[form]} - {bounds[form]}
+            if not has_points({**bounds, form: other}):
+                del bounds[form]
+    if fault == "gap":
+        del found[rng.randrange(len(found))]
+    if fault == "overlap":
+        found.append(dict(rng.choice(found)))
+    rng.shuffle(found)
+    rows = []
+    for number, bounds in enumerate(found):
+        said = []
+        for form, (low, high) in bounds.items():
+            total = " + ".join(f"{k} * {names[column]}" for column, k in universe.forms[form])
+            said.append(f"{total} <= {high}" if low == universe.low[form] else f"{total} >= {low}")
+        rows.append(f"| {number} | {' and '.join(said) or 'true'} ||")
     declared = "".join(f"input {name} : int -1000 .. 1000\n" for name in names)
     return declared + "table t {\n| line | when ||\n" + "\n".join(rows) + "\n}\n"
