@@ -224,7 +224,9 @@ class _Here:
                 if row.start <= offset <= row.past and table.parts and table.parts[0].heading:
                     cells = regions(row)
                     cell = next((at for at, each in enumerate(cells) if offset <= each.end), len(cells) - 1)
-                    return cls(table, number, at, max(cell, 0))
+                    if not cells or not all(regions(part.heading[0]) for part in table.parts):
+                        return None
+                    return cls(table, number, at, cell)
         return None
 
     def again(self, text: str) -> WrittenTable:

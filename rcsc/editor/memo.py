@@ -11,6 +11,7 @@ from typing import TypeVar
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.driver.proofs import moved
 from rcsc.lang.model import Program, Table
+from rcsc.solvers import smt
 from rcsc.table.verdict import TableVerdict
 
 T = TypeVar("T")
@@ -49,11 +50,13 @@ class Memo:
 
     Attributes:
         go_on: Asked before each table; where it says no the proof ends with `OutdatedError`.
+        keeps_all: Whether what was made with questions left open is kept, too: not where a larger budget may answer them.
         made: How many verdicts were made because none was known.
     """
 
     go_on: Callable[[], bool] = lambda: True
     made: int = 0
+    keeps_all: bool = True
     _versions: list[_Versions] = field(default_factory=list)
     _program: Program | None = None
 
@@ -63,14 +66,17 @@ class Memo:
         Raises:
             OutdatedError: Nobody waits for it.
         """
-        self._asked()
+        self.asked()
         kept = self._of(program).verdicts.setdefault(str(table.name), [])
         for known in kept:
             if known.table == table:
                 return replace(known, table=table)
+        before = smt.unanswered()
         verdict = make()
+        self.asked()
         self.made += 1
-        _keep(kept, verdict)
+        if self.keeps_all or smt.unanswered() == before:
+            _keep(kept, verdict)
         return verdict
 
     def told(
@@ -81,18 +87,26 @@ class Memo:
         Raises:
             OutdatedError: Nobody waits for them.
         """
-        self._asked()
+        self.asked()
         span, shape = verdict.table.span, _shape(verdict.table)
         assert self._program is not None  # its verdict was asked for
         kept = self._of(self._program).told.setdefault(str(verdict.table.name), [])
         for known in kept:
             if (known.shape, known.unproved) == (shape, unproved) and known.verdict == verdict:
                 return [moved(each, span.start - known.start, span.file) for each in known.diagnostics]
+        before = smt.unanswered()
         diagnostics = make()
-        _keep(kept, _Told(verdict, unproved, shape, tuple(diagnostics), span.start))
+        self.asked()
+        if self.keeps_all or smt.unanswered() == before:
+            _keep(kept, _Told(verdict, unproved, shape, tuple(diagnostics), span.start))
         return diagnostics
 
-    def _asked(self) -> None:
+    def asked(self) -> None:
+        """Go on only if somebody waits; what was proved since nobody did may be of questions left open, and is not kept.
+
+        Raises:
+            OutdatedError: Nobody does.
+        """
         if not self.go_on():
             raise OutdatedError
 

@@ -182,9 +182,11 @@ class Answer:
         findings: In order of file and place; those of used files, too.
         tables: Those that the file itself declares, in order.
         whole: Whether the text is in order, so that `rcsc check` comes to verdicts.
+        final: Whether nothing is left open that takes longer; what is, is not told as yet, and its table is stale.
     """
 
     file: str
     findings: tuple[Finding, ...]
     tables: tuple[Grid, ...]
     whole: bool
+    final: bool = True

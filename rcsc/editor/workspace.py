@@ -5,8 +5,10 @@ Nothing is kept on disk, and the cache of earlier runs is not asked: what is typ
 """
 
 import os
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -16,17 +18,18 @@ from rcsc.diagnostics.report import TableReport, resting
 from rcsc.diagnostics.source import Source, Span
 from rcsc.driver.proofs import table_report
 from rcsc.editor.grid import grids
-from rcsc.editor.memo import Memo
+from rcsc.editor.memo import Memo, OutdatedError
 from rcsc.editor.places import Area, Lines, difference
 from rcsc.editor.recovery import Rest, rest_of
 from rcsc.editor.repairs import with_proposal, with_spelling
-from rcsc.editor.standing import standing
+from rcsc.editor.standing import BEING_PROVED, standing
 from rcsc.editor.values import Answer, Finding, Repair, Standing, Witness, WitnessLine
 from rcsc.editor.written import WrittenTable, tables_of
 from rcsc.host.memory import uncollected
 from rcsc.lang.model import Program
 from rcsc.lang.project import PROJECT_FILE, Loaded, load, project_root
 from rcsc.lang.resolve import resolve
+from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
 
@@ -34,6 +37,12 @@ if TYPE_CHECKING:
     from rcsc.lang.syntax import tree
 
 BOM = "\ufeff"
+GLANCE_STEPS = 200_000
+"""Steps of Z3 a question while somebody types: some hundredths of a second."""
+GLANCE_S = 0.25
+"""Processor time in which all questions of a glance have to be asked, in seconds, and that of the last."""
+_LEFT_OPEN = {Code.UNDECIDED}
+"""Findings that a larger budget may take away."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,12 +175,63 @@ class Workspace:
             OutdatedError: Nobody waits for the answer.
         """
         path = os.path.normpath(os.path.abspath(file))
-        self.memo.go_on = go_on
-        checked = self.checked(path)
+        with self._asking(go_on):
+            return self._answer(path, self.checked(path))
+
+    def glance(self, file: str, go_on: Callable[[], bool] = lambda: True) -> Answer:
+        """What can be known of a file in a moment: the answer, or one that is not final, where a question needs more steps.
+
+        Args:
+            file: As for `check`.
+            go_on: As for `check`.
+
+        Raises:
+            OutdatedError: Nobody waits for the answer.
+        """
+        path = os.path.normpath(os.path.abspath(file))
+        with self._asking(go_on):
+            reading = self.reading(path)
+            known = self._checked.get(path)
+            if known is not None and known.reading is reading:
+                return self._answer(path, known)
+            before = smt.unanswered()
+            options = replace(self.options, steps=min(GLANCE_STEPS, self.options.steps), cpu_s=GLANCE_S)
+            self.memo.keeps_all = False
+            try:
+                end_s = time.thread_time() + GLANCE_S
+                with smt.until(lambda: time.thread_time() >= end_s):
+                    checked = self._check(reading, options)
+            finally:
+                self.memo.keeps_all = True
+            self.memo.asked()
+            if smt.unanswered() == before:
+                self._checked[path] = checked
+                return self._answer(path, checked)
+            return _answer(path, checked, final=False)
+
+    def _answer(self, path: str, checked: Checked) -> Answer:
         known = self._answers.get(path)
         if known is None or known[0] is not checked:
             self._answers[path] = known = (checked, _answer(path, checked))
         return known[1]
+
+    @contextmanager
+    def _asking(self, go_on: Callable[[], bool]) -> Iterator[None]:
+        """Prove as long as somebody waits.
+
+        Raises:
+            OutdatedError: Nobody does any more.
+        """
+        self.memo.go_on = go_on
+        try:
+            with uncollected(), smt.until(lambda: not go_on()):
+                yield
+            if not go_on():
+                raise OutdatedError
+        except KeyboardInterrupt:
+            if go_on():
+                raise
+            raise OutdatedError from None
 
     @uncollected()
     def reading(self, path: str) -> Reading:
@@ -189,28 +249,31 @@ class Workspace:
             self._readings[path] = reading = _read(path, loaded, overlay)
             return reading
 
-    @uncollected()
     def checked(self, path: str) -> Checked:
         """A file checked, from memory where no text that it depends on has changed."""
         reading = self.reading(path)
         before = self._checked.get(path)
         if before is None or before.reading is not reading:
-            self._checked[path] = before = self._check(reading)
+            before = self._check(reading, self.options)
+            self.memo.asked()
+            self._checked[path] = before
         return before
 
-    def _check(self, reading: Reading) -> Checked:
+    def _check(self, reading: Reading, options: Options) -> Checked:
         if reading.program is not None:
-            found, reports = self._proved(reading.program)
+            found, reports = self._proved(reading.program, options)
             every = tuple(sorted({*reading.wrong, *found}, key=sort_key))
             return Checked(reading, every, (), reports)
         assert reading.rest is not None
-        found = () if reading.rest.program is None else self._proved(reading.rest.program)[0]
+        found = () if reading.rest.program is None else self._proved(reading.rest.program, options)[0]
         more = {*reading.rest.wrong, *_serious(found)} - set(reading.wrong)
         return Checked(reading, reading.wrong, tuple(sorted(more, key=sort_key)), {})
 
-    def _proved(self, program: Program) -> tuple[tuple[Diagnostic, ...], dict[tuple[str, str], TableReport]]:
+    def _proved(
+        self, program: Program, options: Options
+    ) -> tuple[tuple[Diagnostic, ...], dict[tuple[str, str], TableReport]]:
         names = [table.name for table in program.tables]
-        verdict = prove_program(program, self.options, only=names, known=self.memo)
+        verdict = prove_program(program, options, only=names, known=self.memo)
         reports = {}
         for each in verdict.tables:
             report = resting(table_report(each, program), verdict.unproved, verdict.unsafe)
@@ -356,10 +419,13 @@ class _Files:
         )
 
 
-def _answer(path: str, checked: Checked) -> Answer:
+def _answer(path: str, checked: Checked, *, final: bool = True) -> Answer:
+    """The answer; in one that is not final nothing is said of what was left open."""
     reading = checked.reading
     files = _Files(reading.sources)
     told = [(each, False) for each in checked.diagnostics] + [(each, True) for each in checked.meanwhile]
+    if not final:
+        told = [(each, meanwhile) for each, meanwhile in told if each.code not in _LEFT_OPEN]
     told.sort(key=lambda each: sort_key(each[0]))
     findings = tuple(_finding(files, each, meanwhile) for each, meanwhile in told)
     errors = [each for each in findings if each.severity == Severity.ERROR]
@@ -367,10 +433,13 @@ def _answer(path: str, checked: Checked) -> Answer:
 
     def standing_of(table: WrittenTable) -> Standing:
         inside = [each.message for each in errors if (each.area.file, each.table) == (path, table.name)]
-        return standing(checked.reports.get((path, table.name)), inside, broken)
+        report = checked.reports.get((path, table.name))
+        if not final and not inside:  # of no table it is known that nothing is left open of it
+            return BEING_PROVED
+        return standing(report, inside, broken)
 
     tables = tuple(grids(path, files.of(path), reading.nearest, standing_of))
-    return Answer(path, findings, tables, reading.program is not None)
+    return Answer(path, findings, tables, reading.program is not None, final)
 
 
 def _first(error: Finding) -> str:

@@ -24,9 +24,9 @@ class Limits:
     cpu_s: float = 60.0
 
     @classmethod
-    def of(cls, steps: int, memory_mb: int = 4_096) -> "Limits":
-        """Limits whose backstop leaves the steps several times what they take."""
-        return cls(steps, memory_mb, max(60.0, 3e-6 * steps))
+    def of(cls, steps: int, memory_mb: int = 4_096, cpu_s: float = 0.0) -> "Limits":
+        """Limits whose backstop leaves the steps several times what they take, or is said."""
+        return cls(steps, memory_mb, cpu_s or max(60.0, 3e-6 * steps))
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,17 +40,19 @@ class Options:
         solver: `auto` lets Z3 confirm every table that should cost it little, `both` every
             table, `boxes` none (procedures are still Z3's).
         jobs: Processes that prove tables.
+        cpu_s: The backstop of a question, in seconds; 0 for one that the steps do not need.
     """
 
     steps: int = STEPS
     memory_mb: int = 4_096
     solver: Literal["auto", "both", "boxes"] = "auto"
     jobs: int = 1
+    cpu_s: float = 0.0
 
     @property
     def limits(self) -> Limits:
         """What one question to the solver may cost."""
-        return Limits.of(self.steps, self.memory_mb)
+        return Limits.of(self.steps, self.memory_mb, self.cpu_s)
 
     @property
     def together(self) -> int:

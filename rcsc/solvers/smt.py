@@ -8,7 +8,7 @@ import signal
 import struct
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -47,6 +47,21 @@ def cut_short() -> int:
     return len(_cut)
 
 
+_open: list[str] = []
+"""Why there was none, of each question of this process without an answer."""
+
+
+def unanswered() -> int:
+    """Count this process's questions that had no answer: where none is added, a larger budget changes nothing."""
+    return len(_open)
+
+
+def interrupt() -> None:
+    """End the question that another thread is asking, if there is one: there it raises KeyboardInterrupt."""
+    if "z3" in sys.modules:
+        _z3().main_ctx().interrupt()
+
+
 @dataclass(slots=True)
 class Budget:
     """What all questions that are asked inside `together` may cost.
@@ -63,7 +78,30 @@ class Budget:
         return self.left <= 0
 
 
+@dataclass(slots=True)
+class _Until(Budget):
+    """No steps, but something that happens, in place of a budget: for who shows what is known so far, or gives up."""
+
+    over: Callable[[], bool]
+
+    @property
+    def spent(self) -> bool:
+        """Whether it has happened."""
+        return self.over()
+
+
 _budgets: list[Budget] = []
+
+
+@contextmanager
+def until(over: Callable[[], bool]) -> Iterator[None]:
+    """Inside, nothing more is asked once something is over; every answer is then `UNKNOWN`."""
+    ending = _Until(sys.maxsize, over)
+    _budgets.append(ending)
+    try:
+        yield
+    finally:
+        _budgets.remove(ending)
 
 
 @contextmanager
@@ -305,6 +343,7 @@ class Solver:
         """Whether all asserted terms, and these, hold together for some values."""
         self._model = None
         if spent():
+            _open.append("spent")
             return Answer.UNKNOWN
         z3 = _z3()
         self.queries += 1
@@ -319,6 +358,8 @@ class Solver:
             self.refuted.append(all_of([*(term for terms in self._added for term in terms), *assuming]))
         if answer == z3.sat:
             return Answer.SATISFIABLE
+        if answer != z3.unsat:
+            _open.append(why)
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
 
     def _answer(self, assuming: tuple[Term, ...]) -> tuple[Any, str]:

@@ -32,6 +32,7 @@ from rcsc.editor.written import joined_cells, table_of
 from rcsc.host.files.read import Malformed, content
 from rcsc.lang.model import Program
 from rcsc.lang.resolve import resolve
+from rcsc.lang.resolve.program import closure
 from rcsc.lang.syntax.rows import stub_of
 
 MOST_SEARCHED = 1 << 20
@@ -163,12 +164,22 @@ def _location(converter: Converter, span: Span) -> types.Location:
     return types.Location(converter.uri(span.file), converter.between(span.file, span.start, span.end))
 
 
-def _project(session: Session, path: str) -> Names:
-    """The names of all files that may belong with one."""
+def _project(session: Session, path: str, name: Occurrence) -> Names:
+    """The names of all files of the project that are in a program with the declaration of a name; all where it is not found.
+
+    A program is one scope: what a file declares is seen in every file that one which uses it uses, too.
+    """
     loaded = session.workspace.read_all(session.workspace.project(path))
-    files = dict(loaded.files)
-    for file in loaded.sources.keys() - files.keys():  # half written: what is left of them
-        files |= {name: each for name, each in session.workspace.reading(file).files.items() if name == file}
+    declared = {each.span.file for each in session.names(path).uses(name) if each.declares}
+    related = set(loaded.sources)
+    if declared:
+        programs = [set(closure(root, loaded)) for root in loaded.given]
+        related = {path}.union(*(program for program in programs if program & declared))
+    files = {file: each for file, each in loaded.files.items() if file in related}
+    for file in related & loaded.sources.keys() - files.keys():  # half written: what is left of them
+        files |= {
+            other: each for other, each in session.workspace.reading(file).files.items() if other == file
+        }
     return Names(files, loaded.sources, session.workspace.reading(path).nearest)
 
 
@@ -177,7 +188,7 @@ def _references(session: Session, params: types.ReferenceParams) -> list[types.L
     name = names.at(path, offset)
     if name is None:
         return []
-    project = _project(session, path)
+    project = _project(session, path, name)
     converter = session.converter({file: source.text for file, source in project.sources.items()})
     uses = (each for each in project.uses(name) if params.context.include_declaration or not each.declares)
     return [_location(converter, each.span) for each in uses]
@@ -203,7 +214,7 @@ def _prepare(session: Session, params: types.PrepareRenameParams) -> types.Prepa
     if name is None:
         return None
     try:
-        renamable(_project(session, path), name)
+        renamable(_project(session, path, name), name)
     except RefusedError as refused:
         raise Failed(str(refused)) from refused
     return types.PrepareRenamePlaceholder(converter.between(path, name.span.start, name.span.end), name.text)
@@ -214,7 +225,7 @@ def _rename(session: Session, params: types.RenameParams) -> tuple[types.Workspa
     name = names.at(path, offset)
     if name is None:
         return None, ""
-    project = _project(session, path)
+    project = _project(session, path, name)
     try:
         done = renamed(
             project, name, params.new_name, lambda texts: _wrong_with(session, path, project, name, texts)

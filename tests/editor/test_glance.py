@@ -1,0 +1,91 @@
+"""A glance says nothing that a check takes back, and what nobody waits for ends."""
+
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from rcsc.editor import Workspace
+from rcsc.editor.memo import OutdatedError
+from rcsc.editor.values import Answer, State
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Answer as Solved
+
+REPO = Path(__file__).parents[2]
+HARD = str(REPO / "tables/primitive/gothru.rcs")
+
+
+def blanked(text: str) -> str:
+    """The table with a condition blank, so that lines overlap of which it is hard to say whether they do the same."""
+    lines = text.split("\n")
+    rows = [at for at, line in enumerate(lines) if line.lstrip().startswith("| ") and "--" not in line]
+    cells = lines[rows[7]].split("|")
+    cells[4] = " " * len(cells[4])
+    lines[rows[7]] = "|".join(cells)
+    return "\n".join(lines)
+
+
+def said(answer: Answer) -> set[tuple[str, str]]:
+    return {(each.code, each.message) for each in answer.findings}
+
+
+@pytest.mark.parametrize(
+    "name", ["task/acquire.rcs", "gallery/tcas/published.rcs", "examples/grip.rcs", "emove/locate.rcs"]
+)
+def test_a_final_glance_is_the_answer(name: str) -> None:
+    file = str(REPO / "tables" / name)
+    glance = Workspace().glance(file)
+    if glance.final:  # on a slow machine it may be none
+        assert glance == Workspace().check(file)
+
+
+def test_what_a_glance_leaves_open_is_neither_told_nor_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no question is answered, no table is called proved, none undecided; the check after it is whole."""
+    file = str(REPO / "tables/emove/locate.rcs")
+    workspace = Workspace()
+    with monkeypatch.context() as patch:
+        patch.setattr("rcsc.editor.workspace.GLANCE_S", 0.0)
+        glance = workspace.glance(file)
+    assert not glance.final
+    assert {table.standing.state for table in glance.tables} == {State.STALE}
+    assert "RCS409" not in {each.code for each in glance.findings}
+    answer = workspace.check(file)
+    assert answer == Workspace().check(file)
+    assert said(glance) <= said(answer)
+    assert workspace.glance(file) is answer
+
+
+def test_an_outdated_check_ends_and_leaves_nothing_wrong() -> None:
+    """Amid a question that takes minutes."""
+    workspace, going = Workspace(), threading.Event()
+    text = Path(HARD).read_text()
+    workspace.open(HARD, blanked(text))
+
+    def give_up() -> None:
+        time.sleep(0.5)
+        going.set()
+        while not ended.wait(0.05):
+            smt.interrupt()
+
+    ended = threading.Event()
+    thread = threading.Thread(target=give_up)
+    thread.start()
+    try:
+        with pytest.raises(OutdatedError):
+            workspace.check(HARD, lambda: not going.is_set())
+    finally:
+        ended.set()
+        thread.join()
+    workspace.open(HARD, text)
+    assert {table.standing.state for table in workspace.check(HARD).tables} == {State.ASSUMED}
+
+
+def test_nothing_is_asked_once_it_is_over() -> None:
+    solver = smt.Solver()
+    before = smt.unanswered()
+    with smt.until(lambda: True):
+        assert solver.check() is Solved.UNKNOWN
+    assert smt.unanswered() == before + 1
+    assert solver.check() is Solved.SATISFIABLE
+    assert smt.unanswered() == before + 1
