@@ -9,16 +9,22 @@ from pathlib import Path
 from rcsc.shell.opening import Opening
 from rcsc.studio.build import Build
 from rcsc.studio.hub import Concern, Hub
+from rcsc.studio.plots import Plots
 from rcsc.studio.runs.live import LANE, WATCHED_RATE, Live
 from rcsc.studio.runs.logs import Logs
 from rcsc.studio.runs.timeline import TimeLine
+from rcsc.studio.scene import Cell, Drawer
 from rcsc.studio.tables.desk import Desk
 from rcsc.studio.tables.editing import Tables
 from rcsc.studio.tables.proving import Graphs, Proof
 
 
 def concerns(
-    opening: Opening, hub: Hub, logs: Sequence[Path] = (), rate: float | None = WATCHED_RATE
+    opening: Opening,
+    hub: Hub,
+    logs: Sequence[Path] = (),
+    rate: float | None = WATCHED_RATE,
+    drawer: Drawer | None = None,
 ) -> Sequence[Concern]:
     """Return everything that answers.
 
@@ -27,6 +33,7 @@ def concerns(
         hub: What tells the pages, and does things in lanes.
         logs: That the user names; the first is shown at once.
         rate: How many times as fast as the clock the system runs at first; None for as fast as it goes.
+        drawer: Draws a tick of the cell, where somebody can.
     """
     live = Live(opening, hub.tell, lambda work, after_s: hub.do(LANE, work, after_s), rate)
     time = TimeLine(live, hub.tell)
@@ -34,4 +41,5 @@ def concerns(
     kept = Logs(folders, tuple(logs), lambda name, log: hub.do(LANE, lambda: time.show(name, log)))
     build = Build(opening.path, hub, live)
     desk = Desk(opening.path, hub.tell, hub.do)
-    return (live, time, kept, build, Tables(desk), Proof(desk), Graphs(desk))
+    cell = Cell(time, hub.tell, drawer)
+    return (live, time, kept, build, Tables(desk), Proof(desk), Graphs(desk), cell, Plots(time))

@@ -13,6 +13,7 @@ import aiohttp
 from rcsc.shell.opening import Opening
 from rcsc.studio.hub import Concern
 from rcsc.studio.project import concerns
+from rcsc.studio.scene import Drawer
 from rcsc.studio.server import Server
 
 PATIENCE_S = 120.0
@@ -21,11 +22,14 @@ PATIENCE_S = 120.0
 
 @contextlib.contextmanager
 def serving(
-    opening: Opening | None = None, others: Sequence[Concern] = (), logs: Sequence[Path] = ()
+    opening: Opening | None = None,
+    others: Sequence[Concern] = (),
+    logs: Sequence[Path] = (),
+    drawer: Drawer | None = None,
 ) -> Iterator[Server]:
     """A server with the studio's concerns for a system, or with others alone."""
     server, opened = Server(), threading.Event()
-    given = [*others] if opening is None else [*concerns(opening, server.hub, logs, None), *others]
+    given = [*others] if opening is None else [*concerns(opening, server.hub, logs, None, drawer), *others]
     thread = threading.Thread(target=server.serve, args=(given, lambda _: opened.set()), daemon=True)
     thread.start()
     assert opened.wait(PATIENCE_S)

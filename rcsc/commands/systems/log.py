@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from rcsc.commands.shared.cells import cell_of
 from rcsc.commands.shared.logs import FILE, SHOWN, refuse, told
 from rcsc.commands.shared.show import writing
 from rcsc.commands.shared.stopped import stopped
@@ -20,13 +21,11 @@ from rcsc.run.log.plot import plot as draw
 from rcsc.run.log.read import Log, LoggedLevel, read
 from rcsc.run.log.records import Seal
 from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
-from rcsc.run.system import signatures
 from rcsc_cell.database.build import BadData
 from rcsc_cell.pages.finding_page import trace
 from rcsc_cell.pages.log_page import story_of
 from rcsc_cell.pages.report import report as run_page
-from rcsc_cell.pictures.scene import DrawnCell, cell, same_system
-from rcsc_cell.workstation.prepared import database_of
+from rcsc_cell.pictures.scene import DrawnCell, same_system
 
 _TO = click.Path(dir_okay=False, path_type=Path)
 
@@ -192,30 +191,10 @@ def _cell_of(log: Log, given: Path | None) -> tuple[DrawnCell | None, str]:
         path = system_path(given)
         if description(path).database.name == NO_DATA:
             return None, "the system has no data of which the paper's cell is made."
-        return _cell(log, path), ""
+        return cell_of(log, path), ""
     except NoSystem as error:
         return None, f"{error}; `--system` names one."
     except (BadData, BadDescription) as error:
         if given is not None:
             raise stopped(error) from error  # of the system that was named, not of the log
         return None, f"{error}; `--system` names another system."
-
-
-def _cell(log: Log, path: Path) -> DrawnCell:
-    """The cell of a description.
-
-    Raises:
-        BadDescription: It is of another system, or of none that is compiled.
-        BadData: The system has no cell.
-    """
-    system = description(path)
-    if not same_system(log, system):
-        raise BadDescription(f"the log is of system `{log.facts['name']}`, and `{path}` of `{system.name}`")
-    try:
-        signs = signatures(system)
-    except BadDescription as error:
-        raise BadDescription(f"the tables of `{path}` are not compiled") from error
-    try:
-        return cell(log, system, database_of(system, signs))
-    except (KeyError, StopIteration) as error:
-        raise BadData((f"`{path}` has no level `task` that names parts",)) from error

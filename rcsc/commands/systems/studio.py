@@ -1,13 +1,16 @@
 """`rcsc studio`: tables, proof, running levels and cell in one page."""
 
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.systems import EXECUTOR, PLANT, SYSTEM, meant
 from rcsc.shell.opening import Opening
+
+if TYPE_CHECKING:
+    from rcsc.studio.scene import Drawer
 
 
 @click.command(
@@ -59,7 +62,17 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
             click.launch(address)
 
     try:
-        server.serve(concerns(opening, server.hub, logs), told)
+        server.serve(concerns(opening, server.hub, logs, drawer=_drawer(path)), told)
     except KeyboardInterrupt:
         click.echo("the studio is closed")
     return 0
+
+
+def _drawer(path: Path) -> "Drawer | None":
+    """Who draws the paper's cell; None where the system has none, or the extra `cell` is not installed."""
+    try:
+        from rcsc.commands.shared.cells import Drawn  # of an extra
+    except ModuleNotFoundError:
+        return None
+    drawn = Drawn(path)
+    return drawn if drawn.can else None

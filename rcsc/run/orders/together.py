@@ -6,7 +6,7 @@ what a plant says; where no plant fills the buffer they stay.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -55,6 +55,16 @@ class Together:
         """Whether the script is at its end and its level rests, or a plant says that it is over."""
         ended = self.operator is not None and self.operator.over and self.operator.at_rest
         return ended or any(getattr(plant, "over", False) for plant in self.others)
+
+    def space(self) -> Any:
+        """How a plant looks in space (`rcsc.run.plant.space`); None where none says so."""
+        offered = (getattr(plant, "space", None) for plant in self.others)
+        return next((space for ask in offered if ask is not None and (space := ask()) is not None), None)
+
+    @property
+    def pictures(self) -> Mapping[str, Callable[[], str]]:
+        """How plants look, by kind of picture."""
+        return {kind: draw for plant in self.others for kind, draw in getattr(plant, "pictures", {}).items()}
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
         """One tick of all: each sees what the tick before left."""

@@ -24,7 +24,8 @@ Before anything moves, types, ranges, units and members are held against the var
 is told at its buffer's line (RCS729). Metres become millimetres exactly, a float is rounded to a whole number, a
 record is a class with annotated attributes, an array a `list` or `tuple`, an enumeration a `Literal`, an `Enum` or a `str`.
 A method that is named as what a feed asks answers it. An attribute `over` that is true ends the run. A constructor that
-takes `seed` gets it. What `picture` gives, an SVG document, is shown by page and report. A field of type `Fault` makes the
+takes `seed` gets it. What `picture` gives, an SVG document, is shown by page and report; what `space` gives
+(`space`), by the studio. A field of type `Fault` makes the
 plant misbehave, and a method whose result is a `Property` says whether all is as it must be: whoever tests the system
 switches the one and asks the other.
 
@@ -32,7 +33,8 @@ Trusted: the file of a plant that a description names, which is imported and run
 
 Modules, in the order the data flows: `fields` (what a class declares), `units`, `values` (a field against leaves), `held` (what
 a plant holds, for a run that goes on in another process), `bind`
-(a class against the buffers), `load` (a plant by its name), `staging` (with its script). A model for MuJoCo is bound by
+(a class against the buffers), `space` (how it looks, for who watches),
+`load` (a plant by its name), `staging` (with its script). A model for MuJoCo is bound by
 data in `rcsc_cell.bound`.
 """
 

@@ -22,6 +22,7 @@ from rcsc.run.levels import StateTableError
 from rcsc.run.orders.roles import served
 from rcsc.run.plant import fields
 from rcsc.run.plant.held import held_of, put_back
+from rcsc.run.plant.space import Space
 from rcsc.run.plant.values import BadValue, Link, Misfit, link, shape
 from rcsc.run.signature import Leaf, Signature, Values
 
@@ -102,6 +103,19 @@ class BoundPlant:
     def pictures(self) -> dict[str, Callable[[], str]]:
         """How it looks, by kind of picture; empty where its class has no `picture`."""
         return {"plant": self._drawn} if callable(getattr(self.plant, "picture", None)) else {}
+
+    def space(self) -> Space | None:
+        """How it looks in space; None where its class has no method `space`.
+
+        Raises:
+            PlantFailed: The method raised.
+        """
+        offered = getattr(self.plant, "space", None)
+        if not callable(offered):
+            return None
+        with _told("the plant's `space` failed"):
+            space: Space = offered()
+            return space
 
     def _drawn(self) -> str:
         """An SVG document.

@@ -20,6 +20,7 @@ from rcsc.run.plant.load import Setup, Staged
 from rcsc.run.plant.values import BadValue
 from rcsc.run.signature import Leaf, Value, Values
 from rcsc_cell.bound.bindings import ActuatorBinding, Binder, FaultBinding, SensorBinding, ends
+from rcsc_cell.cell.space import ModelSpace
 from rcsc_cell.pictures.solid import View, solid
 
 KEPT = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -88,6 +89,10 @@ class BoundModel:
         return {
             name: tuple(self._read(tick, sensor, still) for sensor in sensors) for name, sensors in self.gives
         }
+
+    def space(self) -> ModelSpace:
+        """How the model looks."""
+        return ModelSpace(self.model, self.data)
 
     def state(self) -> dict[str, Any]:
         """All that the model's next step is made of, in plain values; which faults are on is none of it."""

@@ -18,7 +18,7 @@ tests.bench.loop`).
 
 Modules, in the order the data flows: `arm` is the arm's geometry, `reach` whether it gets where the data says;
 `robot` and `fixture` are controllers, `faults` are switches, `plant` joins them over a mechanism, which is `physical`
-(MuJoCo, of the `mujoco_model`) or `kinematic`; `ready` makes a plant for the first cycle.
+(MuJoCo, of the `mujoco_model`) or `kinematic`; `ready` makes a plant for the first cycle, `space` says how one looks.
 
 Source: Corke and Armstrong-Helouvry, "A search for consensus among model parameters reported for the PUMA 560 robot",
 ICRA 1994.

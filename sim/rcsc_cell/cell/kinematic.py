@@ -8,7 +8,7 @@ import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import atan2, hypot
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from rcsc_cell.vision.flood import Features, FoundPart
 from rcsc_cell.vision.formulas import Top, perceive, perceive_surface
 from rcsc_cell.vision.line import Surface
 from rcsc_cell.vision.optics import NOISY, STANDARD, Optics
+
+if TYPE_CHECKING:
+    from rcsc_cell.cell.space import MechanismSpace
 
 JAW_MM_S = 100.0
 PAD_WIDTH_MM = 24.0
@@ -60,6 +63,7 @@ class Kinematic:
     def __init__(self, database: Database, bodies: Sequence[Body], start: Joints, seed: int = 0) -> None:
         self.database, self.bodies, self.start, self.seed = database, tuple(bodies), start, seed
         self._vise = next((station for station in database.stations.values() if station.vise), None)
+        self._space: MechanismSpace | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -78,6 +82,7 @@ class Kinematic:
         """Copy it; the copy goes on by itself with the same database."""
         other = copy.copy(self)
         other.faults, other._poses = replace(self.faults), list(self._poses)  # noqa: SLF001  # its own class
+        other._space = None if self._space is None else self._space.of(other)  # noqa: SLF001  # likewise
         other._rng = copy.deepcopy(self._rng, memo)  # noqa: SLF001  # likewise
         return other
 
@@ -102,6 +107,14 @@ class Kinematic:
     def touching(self) -> frozenset[tuple[str, str]]:
         """Return what the hand holds, the only contact of kinematics."""
         return self._touching
+
+    def space(self) -> "MechanismSpace":
+        """How it looks: as the model that physics moves looks where everything is."""
+        from rcsc_cell.cell.space import MechanismSpace  # MuJoCo is loaded only where somebody looks
+
+        if self._space is None or self._space.mechanism is not self:
+            self._space = MechanismSpace(self, self.database, self.bodies)
+        return self._space
 
     # --- put back after a stop ---
 

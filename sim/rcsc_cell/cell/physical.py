@@ -17,6 +17,7 @@ from rcsc_cell.cell.arm import Joints
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.mujoco_model import GAIN_N_M, USUAL, Body, Make, mjcf
 from rcsc_cell.cell.plant import CYCLE_S, EMPTY_MM, JAWS_MM, Grip, Noise, noise_of, put_noise
+from rcsc_cell.cell.space import ModelSpace
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import Pose, Rotation, Vector
 from rcsc_cell.vision.camera import Camera
@@ -135,6 +136,10 @@ class Physical:
             (first, second) if first <= second else (second, first)
             for first, second in ((self._named[a], self._named[b]) for a, b in pairs)
         )
+
+    def space(self) -> ModelSpace:
+        """How it looks."""
+        return ModelSpace(self.model, self.data)
 
     # --- put back after a stop ---
 

@@ -12,6 +12,7 @@ from typing import Any, Literal, Protocol, get_type_hints
 import numpy as np
 
 from rcsc.host.files.plain import alike, plain, read
+from rcsc.run.plant.space import Space
 from rcsc.run.signature import Value, Values
 from rcsc_cell.cell.arm import Joints, plate
 from rcsc_cell.cell.faults import Faults
@@ -144,6 +145,10 @@ class Mechanism(Protocol):
         """What touched what in the last cycle, by the names of the things, in order: for those who judge."""
         ...
 
+    def space(self) -> Space:
+        """How it looks: for those who watch."""
+        ...
+
 
 @dataclass(slots=True)
 class Plant:
@@ -190,6 +195,10 @@ class Plant:
     def plate(self) -> tuple[float, ...]:
         """The nine numbers of where the wrist plate is in truth."""
         return nine(plate(self.mechanism.joints()))
+
+    def space(self) -> Space:
+        """How the cell looks."""
+        return self.mechanism.space()
 
     # --- put back after a stop ---
 

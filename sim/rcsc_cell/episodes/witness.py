@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from rcsc.run.plant.space import Space as SpaceOfPlant
 from rcsc.run.signature import Values
 from rcsc.run.system import System
 from rcsc_cell.cell.arm import margins_deg, solve
@@ -46,6 +47,10 @@ class Timed:
         given = self.inner.step(tick, latest)
         self.seconds += time.perf_counter() - begun
         return given
+
+    def space(self) -> SpaceOfPlant:
+        """The plant's."""
+        return self.inner.space()
 
     def state(self) -> dict[str, object]:
         """The plant's."""

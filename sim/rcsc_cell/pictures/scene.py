@@ -4,7 +4,7 @@ In: a log, a description of the same system, and the cell's database. Out: a pic
 is told by the description: it is what the database is asked for. A log holds numbers and names; where they are, the database says.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.run.description import Description
@@ -20,7 +20,7 @@ from rcsc_cell.database.build import BadData
 from rcsc_cell.database.pose import Pose, Vector, pose_of
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import Mark, block, outline
-from rcsc_cell.pictures.views import ALONE
+from rcsc_cell.pictures.views import ALONE, Perspective, View
 
 PLATE, OPENING = ".plate", ".opening_mm"
 """How the names end of nine numbers of the wrist plate, and of how far the fingers are apart."""
@@ -80,8 +80,8 @@ class DrawnCell:
     data: str
     rest: Joints
 
-    def drawn(self, tick: int) -> DrawnScene:
-        """The cell as of a tick."""
+    def drawn(self, tick: int, pictures: Sequence[View | Perspective] = ALONE) -> DrawnScene:
+        """The cell as of a tick, in these pictures."""
         held = {level.name: level.track.latest(tick) for level in self.log.levels}
         states = {name: values for name, values in held.items() if values is not None}
         named = self._named(states)
@@ -103,7 +103,7 @@ class DrawnCell:
         outlines = tuple(map(outline, self.database.stations.values()))
         scene = Scene(outlines, (), self.database.hand.tool_mm, blocks, marks)
         return DrawnScene(
-            stick(plate, self._opening_mm(states), joints, scene, ALONE),
+            stick(plate, self._opening_mm(states), joints, scene, pictures),
             (note, *self._told(named), *(f"`{other.name}` is marked." for other in others)),
         )
 

@@ -131,8 +131,7 @@ def _picture(picture: View | Perspective, figure: _Figure, scene: Scene) -> Iter
     if isinstance(picture, Perspective) or picture is TOP:
         yield from (name(picture, outline) for outline in scene.outlines)
     yield from _robot(picture, figure, scene)
-    for mark in scene.marks:
-        yield from pointed_at(picture, mark)
+    yield from pointed_at(picture, scene.marks)
     yield "</svg>"
     if left:  # a picture that fills the page has no frame, nor room for words beneath it
         yield (

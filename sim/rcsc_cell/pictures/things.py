@@ -3,15 +3,17 @@
 In: things, and a picture of the room. Out: lines of SVG.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
 from rcsc_cell.database.ask import Station
 from rcsc_cell.database.pose import Pose, Vector
-from rcsc_cell.pictures.views import HIGH_MM, LOW_MM, TOP, Perspective, View, line, text
+from rcsc_cell.pictures.views import HIGH_MM, LOW_MM, TOP, Perspective, Point, View, line, text
 
 GRID_MM = 200.0
+_LETTER_PX, _LINE_PX = 7.0, 14.0
+"""Of a mark's name: about how wide a letter is, and how far apart names stand."""
 NAMED = "#c9308e"
 """What is named: a mid tone, to be told apart on white and on black."""
 
@@ -102,15 +104,24 @@ def lying(picture: View | Perspective, block: Block) -> Iterator[str]:
     yield line(picture, block.top_mm, kind, f'{thin} fill="{ink}" fill-opacity=".3"', close=True)
 
 
-def pointed_at(picture: View | Perspective, mark: Mark) -> Iterator[str]:
-    """A place: a ring, its plumb line to the floor, its name."""
-    x, y = picture.flat(mark.at_mm)
-    if picture is not TOP:
-        path = _plumb(picture, mark.at_mm, 0.0)
-        yield f'<path class="plumb" d="{path}" stroke="{NAMED}" stroke-opacity=".7" stroke-dasharray="3 3"/>'
-    yield f'<path class="leader" d="M{x + 4:.1f} {y - 4:.1f}l14 -22" stroke="{NAMED}"/>'
-    yield f'<circle class="mark" cx="{x:.1f}" cy="{y:.1f}" r="5.5" stroke="{NAMED}" stroke-width="2"/>'
-    yield text((x + 20, y - 26), escape(mark.name), size="12", colour=NAMED)
+def pointed_at(picture: View | Perspective, marks: Sequence[Mark]) -> Iterator[str]:
+    """Places: a ring each, its plumb line to the floor, its name; names that would lie on another's stand above it."""
+    taken: list[Point] = []
+    for mark in marks:
+        x, y = picture.flat(mark.at_mm)
+        if picture is not TOP:
+            path = _plumb(picture, mark.at_mm, 0.0)
+            yield f'<path class="plumb" d="{path}" stroke="{NAMED}" stroke-opacity=".7" stroke-dasharray="3 3"/>'
+        wide_px = _LETTER_PX * len(mark.name)
+        left = x + 20 + wide_px > picture.left_px + picture.size_px[0]
+        side = -1 if left else 1
+        low = y - 26
+        while any(abs(low - other) < _LINE_PX and abs(x - at) < 2 * wide_px + 40 for at, other in taken):
+            low -= _LINE_PX
+        taken.append((x, low))
+        yield f'<path class="leader" d="M{x + 4 * side:.1f} {y - 4:.1f}L{x + 18 * side:.1f} {low:.1f}" stroke="{NAMED}"/>'
+        yield f'<circle class="mark" cx="{x:.1f}" cy="{y:.1f}" r="5.5" stroke="{NAMED}" stroke-width="2"/>'
+        yield text((x + 20 * side, low), escape(mark.name), "end" if left else "start", "12", NAMED)
 
 
 def name(picture: View | Perspective, outline: Outline) -> str:

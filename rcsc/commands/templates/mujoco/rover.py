@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import mujoco
 
 from rcsc.run.plant import Fault, Range
+from rcsc_cell.cell.space import ModelSpace
 
 MODEL = Path(__file__).with_name("rover.xml")
 FAR_M = 2.0
@@ -39,6 +40,10 @@ class Rover:
         seen = float(self.data.sensor("range").data[0])
         self.range = FAR_M if seen < 0 else min(seen, FAR_M)  # -1: nothing is in sight
         self.contact = float(self.data.sensor("touch").data[0])
+
+    def space(self) -> ModelSpace:
+        """How it looks, for the studio's view in space."""
+        return ModelSpace(self.model, self.data)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Rover":
         """Another rover in the same state: for the shell's undo. The model does not change."""

@@ -1,0 +1,262 @@
+// The cell: what stands outside the levels, in space and as a drawing, at the tick that everybody looks at.
+
+import { make, Refusal } from "./bus.js";
+import { OrbitControls } from "./vendor/three/OrbitControls.js";
+import * as THREE from "./vendor/three/three.module.js";
+
+const [FLOOR_M, GRID_M] = [2, 0.2];
+
+export function mount(root, bus) {
+  const whole = "the whole";
+  const look = make("select", { "aria-label": "What the eye looks at" });
+  const trace = make("select", { "aria-label": "Whose way is drawn" });
+  const how = make("select", { "aria-label": "How it is drawn" }, make("option", { value: "space" }, "in space"), make("option", { value: "drawing" }, "as a drawing"),
+    make("option", { value: "projections" }, "in projections"));
+  const note = make("span", { class: "soft grow" });
+  const canvas = make("canvas", { tabindex: "0", "aria-label": "The cell in space; arrow keys turn it, + and - go nearer and farther", "data-keys": "own" });
+  const stage = make("div", { class: "stage" }, canvas);
+  const drawing = make("div", { class: "drawing scroll", hidden: true, tabindex: "0", role: "img" });
+  const why = make("div", { class: "closed pre", role: "status", hidden: true });
+  root.append(make("div", { class: "bar" }, how, make("label", {}, "Look at ", look), make("label", {}, "Trace ", trace), note), stage, drawing, why);
+
+  let state = { space: false, drawn: false, why: "" };
+  let space = null, renderer = null, shown = true, asking = false, wanted = "", got = "";
+
+  // --- space ---
+
+  const scene = new THREE.Scene();
+  const camera = new THREE.PerspectiveCamera(42, 1, 0.01, 60);
+  camera.up.set(0, 0, 1);
+  scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f94, 1.6));
+  const sun = new THREE.DirectionalLight(0xffffff, 1.9);
+  sun.position.set(1.5, -2, 4);
+  scene.add(sun);
+  const grid = new THREE.GridHelper(2 * FLOOR_M, 2 * FLOOR_M / GRID_M);
+  grid.rotation.x = Math.PI / 2;
+  grid.position.z = 0.001;
+  const way = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: 0xd12f8a }));
+  way.frustumCulled = false;
+  const room = new THREE.Group();
+  scene.add(grid, way, room);
+  let groups = [], controls = null;
+
+  function begin() {
+    if (renderer) return true;
+    try {
+      renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    } catch {
+      return false;
+    }
+    renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+    controls = new OrbitControls(camera, canvas);
+    controls.listenToKeyEvents(canvas);
+    controls.addEventListener("change", soon);
+    canvas.addEventListener("keydown", (event) => {
+      const by = { "+": 0.87, "=": 0.87, "-": 1.15 }[event.key];
+      if (!by) return;
+      event.preventDefault();
+      camera.position.sub(controls.target).multiplyScalar(by).add(controls.target);
+      soon();
+    });
+    new ResizeObserver(size).observe(stage);
+    size();
+    return true;
+  }
+
+  function size() {
+    const { clientWidth: wide, clientHeight: high } = stage;
+    if (!renderer || !wide || !high) return;
+    renderer.setSize(wide, high, false);
+    camera.aspect = wide / high;
+    camera.updateProjectionMatrix();
+    soon();
+  }
+
+  let due = false;
+  function soon() {
+    if (due || !renderer || !shown) return;
+    due = true;
+    requestAnimationFrame(() => { due = false; controls.update(); renderer.render(scene, camera); root.dataset.frames = Number(root.dataset.frames ?? 0) + 1; });
+  }
+
+  function build(answer) {
+    space = answer;
+    room.clear();
+    groups = answer.bodies.map(() => new THREE.Group());
+    room.add(...groups);
+    for (const shape of answer.shapes) (shape.body < 0 ? room : groups[shape.body]).add(solid(shape));
+    const option = (value, text) => make("option", { value }, text);
+    const named = answer.bodies.map((name, at) => option(at, name || `body ${at}`));
+    look.replaceChildren(option("", whole), ...named.map((one) => one.cloneNode(true)));
+    trace.replaceChildren(option("", "none"), ...named);
+    const hand = answer.bodies.findIndex((name) => /hand|grip|tool|plate/i.test(name));
+    if (hand >= 0) trace.value = String(hand);
+  }
+
+  function overview() {
+    const box = new THREE.Box3();
+    for (const one of room.children) if (!one.userData.endless) box.expandByObject(one);
+    const middle = box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
+    const far = box.isEmpty() ? 2 : Math.max(0.3, box.getSize(new THREE.Vector3()).length());
+    controls.target.copy(middle);
+    camera.position.copy(middle).add(new THREE.Vector3(0.75, -0.62, 0.5).multiplyScalar(far));
+    grid.material.opacity = 0.5;
+  }
+
+  function place(poses) {
+    groups.forEach((group, at) => {
+      const [x, y, z, w, i, j, k] = poses.slice(7 * at, 7 * at + 7);
+      group.position.set(x, y, z);
+      group.quaternion.set(i, j, k, w);
+    });
+    follow();
+    soon();
+  }
+
+  function follow() {
+    if (look.value === "" || !groups[look.value]) return;
+    const to = groups[look.value].position;
+    camera.position.add(to).sub(controls.target);
+    controls.target.copy(to);
+  }
+
+  look.addEventListener("change", () => {
+    if (look.value === "") overview();
+    else {
+      const to = groups[look.value].position;
+      controls.target.copy(to);
+      camera.position.copy(to).add(new THREE.Vector3(0.32, -0.3, 0.16));
+    }
+    soon();
+  });
+  trace.addEventListener("change", () => { way.geometry.setFromPoints([]); wanted = ""; fetch(); });
+  how.addEventListener("change", arrange);
+
+  // --- what is there at a tick ---
+
+  async function fetch() {
+    const { tick } = bus.selection;
+    const run = bus.latest("run");
+    if (!shown || !run?.open || tick === null) return;
+    const key = `${run.source} ${run.key ?? ""} ${tick} ${how.value} ${trace.value} ${look.value}`;
+    wanted = key;
+    if (asking || got === key) return;
+    asking = true;
+    try {
+      if (showing() === "drawing") await drawn(tick);
+      else await posed(tick);
+      said("");
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      said(error.message);
+    } finally {
+      asking = false;
+      got = key;
+      root.dataset.tick = tick;
+    }
+    if (wanted !== key) fetch();
+  }
+
+  async function posed(tick) {
+    if (!space) {
+      build(await bus.ask("cell.space"));
+      place((await bus.ask("cell.poses", { tick })).poses);
+      overview();
+    } else {
+      place((await bus.ask("cell.poses", { tick })).poses);
+    }
+    if (trace.value === "") return;
+    const { points } = await bus.ask("cell.trace", { tick, body: Number(trace.value) });
+    way.geometry.dispose();
+    way.geometry = new THREE.BufferGeometry().setFromPoints(points.map(([x, y, z]) => new THREE.Vector3(x, y, z)));
+    soon();
+  }
+
+  async function drawn(tick) {
+    const { svg, caption } = await bus.ask("cell.drawing", { tick, projected: how.value === "projections" });
+    const picture = new DOMParser().parseFromString(svg, "image/svg+xml").documentElement;
+    drawing.replaceChildren(document.adoptNode(picture), ...caption.map((text) => make("p", {}, text)));
+    drawing.setAttribute("aria-label", caption.join(" "));
+  }
+
+  const live = () => bus.latest("run")?.source !== "log";
+  const inSpace = () => state.space && live();
+  const showing = () => (how.value === "space" && inSpace()) || !state.drawn ? "space" : "drawing";
+
+  function said(text) {
+    why.hidden = !text;
+    why.textContent = text;
+  }
+
+  function arrange() {
+    how.querySelector("[value=space]").disabled = !inSpace();
+    for (const value of ["drawing", "projections"]) how.querySelector(`[value=${value}]`).disabled = !state.drawn;
+    const now = showing();
+    const there = now === "drawing" || inSpace();
+    stage.hidden = now !== "space" || !there;
+    drawing.hidden = now !== "drawing";
+    for (const one of [look, trace]) one.disabled = now !== "space" || !there;
+    if (!there) return said(live() ? state.why : "A log holds no poses, and this system has no drawing.");
+    if (now === "space" && !begin()) {
+      stage.hidden = true;
+      return said("This browser cannot draw in space (WebGL).");
+    }
+    note.textContent = now === "space" ? `a square of the floor is ${GRID_M * 1000} mm; drag to turn, wheel to go nearer` : how.value === "space" && state.space ? "a log holds no poses: drawn of what buffers say" : "";
+    said("");
+    size();
+    got = "";
+    return fetch();
+  }
+
+  function theme() {
+    const style = getComputedStyle(document.documentElement);
+    scene.background = new THREE.Color(style.getPropertyValue("--paper").trim());
+    grid.material.color?.set(style.getPropertyValue("--strong-edge").trim());
+    grid.material.vertexColors = false;
+    grid.material.transparent = true;
+    grid.material.needsUpdate = true;
+    soon();
+  }
+
+  const told = (now) => { state = now; space = null; arrange(); };
+  bus.on("cell.hello", told);
+  bus.on("cell.state", told);
+  let source = "";
+  bus.on("run", (run) => { if (run.source !== source) { source = run.source; arrange(); } else fetch(); });
+  bus.on("selection", (_, changed) => { if (changed?.has("tick")) fetch(); });
+  bus.on("theme", theme);
+  return { shown() { shown = true; size(); fetch(); }, hidden() { shown = false; } };
+}
+
+/** A shape as something to be drawn. */
+function solid({ kind, size_m: [a, b, c], colour: [red, green, blue, opacity], at_m, turn: [w, i, j, k], mesh, name }) {
+  const colour = new THREE.Color().setRGB(red, green, blue, THREE.SRGBColorSpace);
+  const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.75, metalness: 0.05, transparent: opacity < 1, opacity });
+  const made = new THREE.Mesh(geometry(kind, [a, b, c], mesh), material);
+  made.position.set(...at_m);
+  made.quaternion.set(i, j, k, w);
+  made.name = name;
+  if (kind === "plane") {
+    made.userData.endless = true;
+    material.transparent = true;
+    material.opacity = 0.25;
+    material.depthWrite = false;
+  }
+  return made;
+}
+
+function geometry(kind, [a, b, c], mesh) {
+  const upright = (one) => one.rotateX(Math.PI / 2); // three's lie along y, MuJoCo's along z
+  if (kind === "box") return new THREE.BoxGeometry(2 * a, 2 * b, 2 * c);
+  if (kind === "ball") return new THREE.SphereGeometry(a, 32, 20);
+  if (kind === "ellipsoid") return new THREE.SphereGeometry(1, 32, 20).scale(a, b, c);
+  if (kind === "cylinder") return upright(new THREE.CylinderGeometry(a, a, 2 * b, 40));
+  if (kind === "capsule") return upright(new THREE.CapsuleGeometry(a, 2 * b, 12, 32));
+  if (kind === "plane") return new THREE.PlaneGeometry(2 * (a || FLOOR_M), 2 * (b || FLOOR_M));
+  const made = new THREE.BufferGeometry();
+  made.setAttribute("position", new THREE.Float32BufferAttribute(mesh.corners_m, 3));
+  made.setIndex(mesh.faces);
+  const flat = made.toNonIndexed();
+  flat.computeVertexNormals();
+  return flat;
+}

@@ -1,0 +1,291 @@
+// Graphs of any variables: several curves each, against time or against another variable; a value that nobody has set is a gap.
+
+import { make, Refusal } from "./bus.js";
+import { lookAt } from "./moments.js";
+import uPlot from "./vendor/uplot/uPlot.js";
+
+const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3], [4, 2], [1, 4]];
+const COLOURS = { light: ["#1560b7", "#b3261a", "#15703a", "#8a4bb0", "#8a5a00", "#4a5560"], dark: ["#6fb1f5", "#ff8f7d", "#63cf93", "#d3a2f2", "#ecbb59", "#b8c2ca"] };
+const EVERY_MS = 250;
+
+export function mount(root, bus) {
+  const words = make("datalist", { id: "plot-words" });
+  const what = make("input", { list: "plot-words", class: "grow", "aria-label": "A variable, or one over another: a over b", placeholder: "a variable, or  a over b", spellcheck: "false" });
+  const shows = make("select", { "aria-label": "Graphs that the system shows" });
+  const list = make("div", { class: "graphs scroll" });
+  const empty = make("p", { class: "closed soft" }, "No graph yet. Name a variable above, or choose what the system shows.");
+  root.append(make("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); add(what.value.trim()); } },
+    what, make("button", { type: "submit" }, "New graph"), shows), words, list, empty);
+  const sheet = make("link", { rel: "stylesheet", href: "vendor/uplot/uPlot.css" });
+  document.head.append(sheet);
+
+  let graphs = []; // { names, over, element, plot, curves }
+  let known = [], displays = {}, named = "", shown = true, asking = false, again = false, last = 0;
+
+  // --- which there are ---
+
+  const store = () => `studio.plots.${bus.latest("run.state")?.title ?? ""}`;
+  function keep() {
+    try { localStorage.setItem(store(), JSON.stringify(graphs.map(({ names, over }) => ({ names, over })))); } catch { /* a private window keeps nothing */ }
+  }
+
+  function add(text, quietly = false) {
+    const [drawn, over = ""] = text.split(/\s+over\s+/);
+    const names = drawn.split(/[\s,]+/).filter(Boolean);
+    const wrong = [...names, over].filter(Boolean).find((name) => !known.includes(name));
+    if (!names.length) return undefined;
+    if (wrong) return bus.say(`there is no variable \`${wrong}\``, { wrong: true, helps: near(wrong) });
+    const graph = { names, over, curves: [] };
+    graph.element = frame(graph);
+    graphs.push(graph);
+    list.append(graph.element);
+    what.value = "";
+    if (!quietly) { keep(); graph.element.scrollIntoView({ block: "nearest" }); }
+    empty.hidden = true;
+    return soon();
+  }
+
+  const near = (text) => {
+    const found = known.filter((name) => name.includes(text.split(".").at(-1))).slice(0, 3);
+    return found.length ? [`perhaps ${found.join(", ")}`] : [];
+  };
+
+  function remove(graph) {
+    graph.plot?.destroy();
+    graph.element.remove();
+    graphs = graphs.filter((one) => one !== graph);
+    empty.hidden = graphs.length > 0;
+    keep();
+  }
+
+  function frame(graph) {
+    const more = make("input", { list: "plot-words", "aria-label": `Another curve beside ${graph.names.join(", ")}`, placeholder: "one more curve", spellcheck: "false" });
+    const legend = make("ul", { class: "legend" });
+    const place = make("div", { class: "plot" });
+    const element = make("section", { class: "graph", "aria-label": `Graph of ${graph.names.join(", ")}` },
+      make("div", { class: "bar small" }, legend,
+        make("form", { onsubmit: (event) => {
+          event.preventDefault();
+          const name = more.value.trim();
+          if (!known.includes(name)) return bus.say(`there is no variable \`${name}\``, { wrong: true, helps: near(name) });
+          graph.names.push(name);
+          more.value = "";
+          keep();
+          return soon();
+        } }, more),
+        make("button", { type: "button", "aria-label": `Remove the graph of ${graph.names.join(", ")}`, onclick: () => remove(graph) }, "Remove")),
+      place);
+    Object.assign(graph, { legend, place });
+    return element;
+  }
+
+  async function names() {
+    const run = bus.latest("run");
+    if (!run?.open) return;
+    const key = `${run.source} ${run.name ?? ""} ${run.levels.map((one) => one.name ?? one).join()}`;
+    if (key === named) return;
+    named = key;
+    try {
+      const answer = await bus.ask("plot.names");
+      known = answer.names.map(({ name }) => name);
+      displays = answer.displays;
+      words.replaceChildren(...answer.names.map(({ name, unit }) => make("option", { value: name }, unit)));
+      const sets = Object.keys(displays);
+      shows.hidden = !sets.length;
+      shows.replaceChildren(make("option", { value: "" }, "the system shows"), ...sets.map((name) => make("option", { value: name }, name)));
+      for (const graph of [...graphs]) if (![...graph.names, graph.over].filter(Boolean).every((name) => known.includes(name))) remove(graph);
+      if (!graphs.length) remembered(sets);
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      named = "";
+    }
+  }
+
+  function remembered(sets) {
+    let kept = [];
+    try { kept = JSON.parse(localStorage.getItem(store()) ?? "[]"); } catch { /* none */ }
+    for (const { names: several, over } of kept) if (several.every((name) => known.includes(name))) add(over ? `${several.join(" ")} over ${over}` : several.join(" "), true);
+    if (!graphs.length && sets.length) for (const text of displays[sets[0]]) add(text, true);
+  }
+  shows.addEventListener("change", () => { for (const text of displays[shows.value] ?? []) add(text); shows.value = ""; });
+
+  // --- curves ---
+
+  function soon() {
+    if (!shown) return;
+    const wait = Math.max(0, last + EVERY_MS - performance.now());
+    if (again) return;
+    again = true;
+    setTimeout(() => { again = false; draw(); }, wait);
+  }
+
+  async function draw() {
+    if (asking || !bus.latest("run")?.open) return;
+    asking = true;
+    last = performance.now();
+    try {
+      await names();
+      for (const graph of [...graphs]) {
+        const wanted = [...new Set([...graph.names, graph.over].filter(Boolean))];
+        const answer = await bus.ask("plot.curves", { names: wanted });
+        if (graphs.includes(graph)) chart(graph, answer);
+      }
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      bus.say(error.message, { wrong: true, helps: error.helps });
+    } finally {
+      asking = false;
+    }
+  }
+
+  const seconds = () => (bus.latest("run")?.tick_ms ?? 40) / 1000;
+
+  /** Every curve at every tick at which one of them changes: held in between, for nothing happens between cycles. */
+  function together(answer) {
+    const ticks = [...new Set([...answer.curves.flatMap(({ changes }) => changes.map(([tick]) => tick)), answer.last])].sort((a, b) => a - b);
+    const values = answer.curves.map(({ changes }) => {
+      let at = 0, held = null;
+      return ticks.map((tick) => {
+        while (at < changes.length && changes[at][0] <= tick) held = changes[at++][1];
+        return held;
+      });
+    });
+    return { ticks, values };
+  }
+
+  function chart(graph, answer) {
+    const { ticks, values } = together(answer);
+    graph.curves = answer.curves;
+    graph.ticks = ticks;
+    graph.values = values;
+    const data = graph.over ? across(graph) : [ticks.map((tick) => tick * seconds()), ...values];
+    const shape = `${bus.latest("theme")} ${graph.names.join()} ${graph.over} ${answer.curves.map(({ members }) => members.join()).join(";")}`;
+    if (graph.plot && graph.shape === shape) graph.plot.setData(data);
+    else {
+      graph.plot?.destroy();
+      graph.plot = new uPlot(options(graph), data, graph.place);
+      graph.shape = shape;
+      graph.plot.over.addEventListener("click", () => choose(graph));
+    }
+    legends();
+  }
+
+  function across(graph) {
+    const xs = graph.values[graph.curves.findIndex(({ name }) => name === graph.over)].filter((one) => one !== null);
+    const ys = graph.values.flatMap((one, at) => graph.curves[at].name === graph.over ? [] : one.filter((value) => value !== null));
+    const range = (all) => all.length ? [all.reduce((a, b) => Math.min(a, b)), all.reduce((a, b) => Math.max(a, b))] : [0, 1];
+    return [range(xs), ...graph.curves.filter(({ name }) => name !== graph.over).map(() => range(ys))];
+  }
+
+  function options(graph) {
+    const style = getComputedStyle(document.documentElement);
+    const [ink, edge] = [style.getPropertyValue("--soft").trim(), style.getPropertyValue("--edge").trim()];
+    const drawn = graph.curves.filter(({ name }) => name !== graph.over);
+    const x = graph.curves.find(({ name }) => name === graph.over);
+    const axis = (curves, label) => {
+      const members = curves.length && curves.every((one) => one.members.join() === curves[0].members.join()) ? curves[0].members : [];
+      return { stroke: ink, grid: { stroke: edge, width: 1 }, ticks: { stroke: edge, width: 1 }, label, labelSize: 18, size: members.length ? 96 : 62,
+        ...(members.length ? { incrs: [1, 2, 5, 10, 20, 50], space: members.length > 1 ? 15 : 40, values: (_, splits) => splits.map((at) => Number.isInteger(at) ? members[at] ?? "" : "") } : {}) };
+    };
+    const units = [...new Set(drawn.map(({ unit }) => unit).filter(Boolean))].join(", ");
+    return {
+      width: Math.max(240, graph.place.clientWidth), height: 190, legend: { show: false }, cursor: { drag: { x: !graph.over, y: false } },
+      scales: { x: { time: false } },
+      axes: [{ ...axis(x ? [x] : [], x ? `${x.name}${x.unit ? ` (${x.unit})` : ""}` : "time (s)"), size: 34 }, axis(drawn, units)],
+      series: [{}, ...drawn.map((one, at) => ({ label: one.name, scale: "y", stroke: colour(at), dash: DASHES[at % DASHES.length], width: 1.6, spanGaps: false,
+        points: { show: false }, paths: graph.over ? () => null : uPlot.paths.stepped({ align: 1 }) }))],
+      hooks: { draw: [(plot) => { if (graph.over) path(plot, graph); now(plot, graph); }] },
+    };
+  }
+
+  const colour = (at) => COLOURS[bus.latest("theme") === "dark" ? "dark" : "light"][at % 6];
+
+  /** A curve over another variable: from each tick to the next, with nothing where either was not set. */
+  function path(plot, graph) {
+    const across = graph.curves.findIndex(({ name }) => name === graph.over);
+    const { ctx } = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
+    ctx.clip();
+    graph.curves.filter((_, at) => at !== across).forEach((curve, at) => {
+      const ys = graph.values[graph.curves.indexOf(curve)];
+      ctx.strokeStyle = colour(at);
+      ctx.lineWidth = 1.6 * devicePixelRatio;
+      ctx.setLineDash(DASHES[at % DASHES.length].map((one) => one * devicePixelRatio));
+      ctx.beginPath();
+      let on = false;
+      graph.values[across].forEach((x, place) => {
+        if (x === null || ys[place] === null) { on = false; return; }
+        const point = [plot.valToPos(x, "x", true), plot.valToPos(ys[place], "y", true)];
+        if (on) ctx.lineTo(...point); else ctx.moveTo(...point);
+        on = true;
+      });
+      ctx.stroke();
+    });
+    ctx.restore();
+  }
+
+  const at = (graph, tick) => { let low = 0, high = graph.ticks.length; while (low < high) { const middle = (low + high) >> 1; if (graph.ticks[middle] <= tick) low = middle + 1; else high = middle; } return low - 1; };
+
+  /** Where everybody looks: a line at the time, or a ring on the curve. */
+  function now(plot, graph) {
+    const { tick } = bus.selection;
+    if (tick === null) return;
+    const { ctx } = plot;
+    ctx.save();
+    ctx.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--ink").trim();
+    ctx.lineWidth = devicePixelRatio;
+    ctx.beginPath();
+    if (!graph.over) {
+      const x = plot.valToPos(tick * seconds(), "x", true);
+      if (x >= plot.bbox.left && x <= plot.bbox.left + plot.bbox.width) { ctx.moveTo(x, plot.bbox.top); ctx.lineTo(x, plot.bbox.top + plot.bbox.height); }
+    } else {
+      const place = at(graph, tick), x = graph.values[graph.curves.findIndex(({ name }) => name === graph.over)][place];
+      graph.curves.forEach(({ name }, curve) => {
+        const y = graph.values[curve][place];
+        if (name === graph.over || x === null || y === null || place < 0) return;
+        ctx.moveTo(plot.valToPos(x, "x", true) + 5 * devicePixelRatio, plot.valToPos(y, "y", true));
+        ctx.arc(plot.valToPos(x, "x", true), plot.valToPos(y, "y", true), 5 * devicePixelRatio, 0, 7);
+      });
+    }
+    ctx.stroke();
+    ctx.restore();
+  }
+
+  function choose(graph) {
+    if (graph.over || graph.plot.cursor.left < 0) return;
+    lookAt(bus, graph.plot.posToVal(graph.plot.cursor.left, "x") / seconds());
+  }
+
+  /** Names, and each one's value at the tick, in words. */
+  function legends() {
+    const { tick } = bus.selection;
+    for (const graph of graphs) {
+      if (!graph.ticks) continue;
+      const place = at(graph, tick ?? 0);
+      let drawn = 0;
+      graph.legend.replaceChildren(...graph.curves.map(({ name, unit, members }, curve) => {
+        const value = place < 0 ? null : graph.values[curve][place];
+        const never = graph.values[curve].every((one) => one === null);
+        const text = value === null || value === undefined ? (never ? "never set" : "not set") : members[value] ?? `${Number.isInteger(value) ? value : Number(value).toPrecision(6)}${unit ? ` ${unit}` : ""}`;
+        const key = name === graph.over ? "across" : "";
+        const mark = make("span", { class: `mark mark-${key ? "across" : drawn++ % 6}`, "aria-hidden": "true" });
+        const drop = graph.names.length > 1 && !key ? make("button", { type: "button", class: "plain", "aria-label": `Remove ${name}`, onclick: () => { graph.names = graph.names.filter((one) => one !== name); keep(); soon(); } }, "×") : null;
+        return make("li", {}, mark, `${key ? "over " : ""}${name} = `, make("strong", {}, text), drop);
+      }));
+    }
+  }
+
+  // --- following ---
+
+  bus.on("run", (run) => { if (run.open) soon(); });
+  bus.on("selection", (_, changed) => {
+    if (!changed?.has("tick") || !shown) return;
+    legends();
+    for (const { plot } of graphs) plot?.redraw(false, false);
+  });
+  bus.on("theme", () => soon());
+  new ResizeObserver(() => { for (const { plot, place } of graphs) if (place.clientWidth > 240) plot?.setSize({ width: place.clientWidth, height: 190 }); }).observe(list);
+  return { shown() { shown = true; soon(); }, hidden() { shown = false; } };
+}
