@@ -1,0 +1,1 @@
+"""The editors' parts of `grammar/editors`, in the editors themselves."""
