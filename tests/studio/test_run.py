@@ -132,7 +132,8 @@ step 999999999999
 """.strip().splitlines()
 
 
-def test_every_command_answers_as_the_shell_does(dock: Path) -> None:
+def test_every_command_answers_as_the_shell_does(dock: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rcsc.shell.commands.MOST_CYCLES", 500)  # else one of them runs for an hour of control time
     commands = opened(Opening(dock))
 
     async def work(one: Page, other: Page) -> None:
