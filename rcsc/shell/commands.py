@@ -71,11 +71,13 @@ class RunOrder:
         most: So many at most.
         until: What ends them; None where nothing but breakpoints does.
         steps: Whether not even breakpoints do.
+        alone: The level that runs alone; empty for all.
     """
 
     most: int
     until: StateQuery | NamedLine | None = None
     steps: bool = False
+    alone: str = ""
 
 
 @dataclass(slots=True)
@@ -273,7 +275,7 @@ class Commands:
     def _alone(self, level: RunningLevel, count: int) -> Output:
         for _ in range(count):
             self.session.cycle_alone(level)
-        return [f"{level.name} alone: {_at(level)}"]
+        return self.stepped(level.name)
 
     def _run(self, rest: str) -> Output:
         order = self._run_order(rest)
@@ -291,10 +293,24 @@ class Commands:
             return self._run_order(rest)
         if word.casefold() == "step" and (not rest or _is_number(rest)):
             return RunOrder(_number(rest or "1"), steps=True)
+        if word.casefold() == "step":
+            name, _, count = rest.partition(" ")
+            level = typed_names.level_of(name, self.session.levels)
+            return RunOrder(_number(count.strip() or "1"), steps=True, alone=level.name)
         return None
 
-    def stepped(self) -> Output:
-        """What `step` shows."""
+    def proves(self, line: str) -> bool:
+        """Whether a line has something proved or compiled: tables that are taken or compared, and parts that run by name."""
+        text = line.partition("#")[0].strip()
+        word = text.partition(" ")[0].casefold()
+        return word in {"diff", "reload"} or not (
+            word in self._words or _SHOW.match(text) or _SET.match(text)
+        )
+
+    def stepped(self, alone: str = "") -> Output:
+        """What `step` shows, or `step LEVEL`."""
+        if alone:
+            return [f"{alone} alone: {_at(self.session.system.level(alone))}"]
         return [f"cycle {self.session.system.tick}: {', '.join(_at(level) for level in self.session.levels)}"]
 
     def _run_order(self, rest: str) -> RunOrder:

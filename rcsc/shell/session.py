@@ -47,6 +47,7 @@ class Session:
         stops: Breakpoints.
         interrupted: Set, and cleared again, from outside: cycles end after the present one.
         faults: Of the plants, that are on by hand.
+        changes: How often something was done that `undo` takes back, and was not taken back.
     """
 
     def __init__(self, system: System, plant: Origin) -> None:
@@ -58,6 +59,7 @@ class Session:
         self.stops = Stops()
         self.interrupted = False
         self.faults: frozenset[str] = frozenset()
+        self.changes = 0
         self._past: deque[history.KeptMoment] = deque(maxlen=history.MOST)
         self._answers: dict[tuple[object, ...], Values] = {}
         # By identity, as after a reload another level has the name; the level is kept, so that its number stays its own.
@@ -175,6 +177,16 @@ class Session:
             self.cycle()
             yield self._ended(until)
 
+    def cycles_alone(self, level: RunningLevel) -> Iterator[str]:
+        """Run cycle after cycle of one level; nothing ends it but an interrupt.
+
+        Raises:
+            Refused: As `cycle_alone`.
+        """
+        while True:
+            self.cycle_alone(level)
+            yield "interrupted" if self.interrupted else ""
+
     def _ended(self, until: StateQuery | NamedLine | None) -> str:
         """Say why a run ends after this cycle; empty where it does not."""
         if until is not None and stands(until, self.levels):
@@ -206,7 +218,7 @@ class Session:
         try:
             self.system.restart(name, checkpoint)
         except StateTableError as error:
-            self._past.pop()
+            self._forget()
             raise Refused(Code.STATE_TABLE_ERROR, str(error)) from error
         return f"level `{name}` is started again, {begun_in_words(self.system.restarts[-1].begun)}"
 
@@ -246,7 +258,7 @@ class Session:
             raise Refused(Code.SHELL_COMMAND, f"only {len(self._past)} cycles can be undone")
         moment = self._past[-count]
         for _ in range(count):
-            self._past.pop()
+            self._forget()
         reloaded = moment.levels != self.system.levels
         history.put_back(moment, self.system, self.memory)
         self._answers, self.faults = dict(moment.answers), moment.faults
@@ -419,7 +431,12 @@ class Session:
             return False
         return True
 
+    def _forget(self) -> None:
+        self._past.pop()
+        self.changes -= 1
+
     def _keep(self) -> None:
+        self.changes += 1
         self._past.append(history.kept(self.system, self.memory, self._answers, self.faults))
 
 

@@ -5,9 +5,11 @@ killed when its question is cancelled, and never holds up the levels.
 """
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import TimeoutError as NotYet
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,7 +18,7 @@ from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.driver.compile import compile_system
 from rcsc.host.children import WorkerEndedError, answer, executor, kill
 from rcsc.host.children import run as run_program
-from rcsc.studio.hub import Ask, Handler, Hub, Json
+from rcsc.studio.hub import Ask, CancelledError, Handler, Hub, Json
 from rcsc.studio.runs.live import LANE as RUN
 from rcsc.studio.runs.live import Live
 
@@ -39,6 +41,8 @@ class Build:
         """Args: path: Of the description; hub: Of the studio; live: What runs what was compiled."""
         self._path, self._hub, self._live = path, hub, live
         self._said: Json = {"doing": ""}
+        self._over = threading.Event()
+        self._stop: Callable[[], None] = lambda: None
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
@@ -51,10 +55,13 @@ class Build:
 
     def begin(self) -> None:
         """Compile, and open the system."""
-        self._compile(lambda work: waited(work, self._told))
+        with suppress(CancelledError):  # the studio ends
+            self._compile(lambda work: self._waited(work, self._told))
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Kill the process of the proof under way."""
+        self._over.set()
+        self._stop()
 
     def _told(self, text: str) -> None:
         self._said = {**self._said, "doing": text}
@@ -69,7 +76,44 @@ class Build:
             self._told(text)
             ask.progress(text)
 
-        return waited(work, told, ask)
+        return self._waited(work, told, ask)
+
+    def _waited(
+        self,
+        work: tuple[str, Callable[..., T], tuple[Any, ...]],
+        told: Callable[[str], None],
+        ask: Ask | None = None,
+    ) -> T:
+        """Have a process of its own do something, and say every while what it does and for how long.
+
+        Raises:
+            CancelledError: The question was cancelled, or the studio ends; the process is gone.
+            WorkerEndedError: It ended without an answer.
+        """
+        what, function, arguments = work
+        processes, begun_s = executor(1), time.monotonic()
+        self._stop = lambda: kill(processes)
+        if ask is not None:
+            ask.on_cancel(self._stop)
+        try:
+            future = processes.submit(function, *arguments)
+            while not self._over.is_set():
+                told(f"{what}, {time.monotonic() - begun_s:.0f} s")
+                try:
+                    future.exception(TOLD_S)
+                except NotYet:
+                    continue
+                return answer(future)
+            raise CancelledError
+        except WorkerEndedError:
+            if self._over.is_set():
+                raise CancelledError from None
+            if ask is not None:
+                ask.check()
+            raise
+        finally:
+            kill(processes)
+            processes.shutdown(wait=False, cancel_futures=True)
 
     def _compile(self, job: Callable[[tuple[str, Callable[..., Any], tuple[Any, ...]]], Any]) -> Json:
         try:
@@ -117,37 +161,6 @@ def commanded(arguments: tuple[str, ...]) -> tuple[int | None, str]:
     """Run `rcsc` with arguments; return its status and what it said."""
     ran = run_program([sys.executable, "-c", _COMMAND, *arguments])
     return ran.status, ran.out + ran.err
-
-
-def waited(
-    work: tuple[str, Callable[..., T], tuple[Any, ...]], told: Callable[[str], None], ask: Ask | None = None
-) -> T:
-    """Have a process of its own do something, and say every while what it does and for how long.
-
-    Raises:
-        CancelledError: The question was cancelled; the process is gone.
-        WorkerEndedError: It ended without an answer.
-    """
-    what, function, arguments = work
-    processes, begun_s = executor(1), time.monotonic()
-    try:
-        if ask is not None:
-            ask.on_cancel(lambda: kill(processes))
-        future = processes.submit(function, *arguments)
-        while True:
-            told(f"{what}, {time.monotonic() - begun_s:.0f} s")
-            try:
-                future.exception(TOLD_S)
-            except NotYet:
-                continue
-            return answer(future)
-    except WorkerEndedError:
-        if ask is not None:
-            ask.check()
-        raise
-    finally:
-        kill(processes)
-        processes.shutdown(wait=False, cancel_futures=True)
 
 
 def _logs(folder: Path) -> dict[str, float]:

@@ -133,7 +133,9 @@ step 999999999999
 
 
 def test_every_command_answers_as_the_shell_does(dock: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rcsc.shell.commands.MOST_CYCLES", 500)  # else one of them runs for an hour of control time
+    monkeypatch.setattr(
+        "rcsc.shell.commands.MOST_CYCLES", 500
+    )  # else one of them runs for an hour of control time
     commands = opened(Opening(dock))
 
     async def work(one: Page, other: Page) -> None:
@@ -190,6 +192,19 @@ def test_a_run_is_answered_where_it_ends_and_a_page_may_look_on_meanwhile(dock: 
     studio(dock, work)
 
 
+def test_a_run_whose_system_goes_away_is_answered(dock: Path) -> None:
+    async def work(one: Page, other: Page) -> None:
+        await one.ask("run.rate", rate=0.1)
+        number = await one.send("run.type", line="step drive 5000")
+        await other.heard("run.state", going=True)
+        assert (await other.ask("build.open"))["ok"]
+        with pytest.raises(Refused, match="opened anew"):
+            await one.answer(number)
+        assert (await other.heard("run.state", going=False, tick=0))["open"]
+
+    studio(dock, work)
+
+
 def test_a_clock_is_kept(dock: Path) -> None:
     """At real time cycles come no faster than the clock; on any machine they may come more slowly."""
 
@@ -212,6 +227,7 @@ REFUSED: tuple[tuple[str, dict[str, Any]], ...] = (
     ("run.type", {"line": "x" * 5000}),
     ("run.type", {"line": "quit"}),
     ("run.type", {"line": "clear"}),
+    ("run.type", {"line": "reload drive proved"}),
     ("run.rate", {"rate": "fast"}),
     ("time.moment", {}),
     ("time.moment", {"tick": -1}),
@@ -357,6 +373,16 @@ def test_tracks_are_told_once_and_anew_after_undo(dock: Path) -> None:
         whole = (await one.ask("time.tracks", era=-1, since=-1))["levels"]
         assert held == whole
         assert [mark["text"] for mark in news["marks"]] == ["order supervisor dock"]
+        for line, left in (
+            ("drive.bumper = true", 2),
+            ("step", 2),
+            ("undo", 2),
+            ("undo", 1),
+            ("undo 200", 1),
+            ("undo 57", 0),
+        ):
+            await shown(one, line)
+            assert len((await one.ask("time.tracks", era=-1, since=-1))["marks"]) == left, line
 
     studio(dock, work)
 

@@ -7,6 +7,7 @@ import click
 
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.systems import EXECUTOR, PLANT, SYSTEM, meant
+from rcsc.run.description import description
 from rcsc.shell.opening import Opening
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     from rcsc.studio.server import Server
 
     path, named = meant(target, system, script)
+    description(path)  # what is wrong with it is told here; what is wrong with its tables, in the page
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     opening = Opening(path, kind, plant or "", named, alone, seed)
     server = Server(port)

@@ -116,6 +116,15 @@ export class Bus {
   }
 }
 
+/** Do a line as the shell does it; what takes long says so. Returns the lines that the shell shows, or undefined where it is refused. */
+export async function doLine(bus, line) {
+  const late = setTimeout(() => bus.say(`${line}: under way`), 500);
+  const answer = await bus.try("run.type", { line });
+  clearTimeout(late);
+  if (bus.latest("said")?.text === `${line}: under way`) bus.say(answer ? answer.shown.join("\n") || `${line}: done` : "", {});
+  return answer;
+}
+
 /** Make an element: `make("button", { type: "button", class: "x", onclick: f }, "text", child)`. */
 export function make(kind, attributes = {}, ...inside) {
   const made = document.createElement(kind);

@@ -1,6 +1,6 @@
 // The run: every level beside the others, what is done to it, and why a line did not match.
 
-import { make } from "./bus.js";
+import { doLine, make } from "./bus.js";
 import { lookAt } from "./moments.js";
 
 const RATES = [["4 times the clock", "4"], ["real time", "1"], ["20 times", "20"], ["as fast as it goes", ""], ["a quarter", "0.25"], ["a tenth", "0.1"]];
@@ -43,7 +43,7 @@ export function mount(root, bus) {
 // --- what is done to all levels ---
 
 function toolbar(bus, drawer) {
-  const type = (line) => bus.try("run.type", { line }).then((answer) => { if (answer) drawer.said(line, answer.shown); return answer; });
+  const type = (line) => doLine(bus, line).then((answer) => { if (answer) drawer.said(line, answer.shown); return answer; });
   const go = make("button", { type: "button", class: "go", onclick: () => bus.try(bus.latest("run.state")?.going ? "run.pause" : "run.go") }, "Run");
   const step = make("button", { type: "button", onclick: () => type("step") }, "Step ", make("kbd", {}, "s"));
   const undo = make("button", { type: "button", onclick: () => type("undo") }, "Undo ", make("kbd", {}, "u"));
@@ -110,7 +110,7 @@ function finding({ code, message, primary, witnesses, help }) {
 // --- one level ---
 
 function Card(bus, level) {
-  const type = (line) => bus.try("run.type", { line });
+  const type = (line) => doLine(bus, line);
   const title = make("h3", {}, level.name);
   const ran = make("span", { class: "soft" });
   const body = make("div", { class: "said" });
@@ -126,7 +126,7 @@ function Card(bus, level) {
   ...[["Preprocess alone", `${level.name}.preprocess`], ["State table alone", `${level.name}.state_table`], ["Postprocess alone", `${level.name}.postprocess`],
     ["Start again, from its last cycle", `restart ${level.name}`], ["Start again, anew", `restart ${level.name} anew`],
     ["What the edited tables do otherwise", `diff ${level.name}`], ["Take the edited tables, if they prove", `reload ${level.name}`],
-    ["Take them although the next cycle does otherwise", `reload ${level.name} anyway`], ["Prove the levels first, then take them", `reload ${level.name} proved`],
+    ["Take them although the next cycle does otherwise", `reload ${level.name} anyway`],
   ].map(([text, line]) => make("option", { value: line }, text)));
   const root = make("article", { class: "card", role: "listitem", "aria-label": `Level ${level.name}` },
     make("header", {}, title, ran, make("span", { class: "buttons" }, asks, cycle, more)), tables, reasons, body);
@@ -190,7 +190,7 @@ function chips(bus, level, lines, cycled) {
 function lineButtons(bus, level, table, line) {
   const place = `${level}.${table}.${line}`;
   const live = bus.latest("run").source === "live";
-  const type = (text) => bus.try("run.type", { line: text }).then((answer) => answer && bus.say(answer.shown.join("\n")));
+  const type = (text) => doLine(bus, text).then((answer) => answer && bus.say(answer.shown.join("\n")));
   return make("div", { class: "bar small" }, make("span", { class: "soft" }, `line ${line}: `),
     make("button", { type: "button", disabled: !live, onclick: () => type(`break ${place}`) }, "Break here"),
     make("button", { type: "button", disabled: !live, onclick: () => type(`run to ${place}`) }, "Run to here"),
@@ -381,7 +381,7 @@ function valuesTab(bus) {
 function breaksTab(bus) {
   const list = make("ul"), faults = make("ul"), buffers = make("ul");
   const what = make("input", { "aria-label": "A condition, or a line, to stop at", placeholder: "task.cur_state = state_3, or task.acquire.5", size: "44", spellcheck: "false", list: "run-words" });
-  const type = (line) => bus.try("run.type", { line });
+  const type = (line) => doLine(bus, line);
   const add = make("form", { class: "bar", onsubmit: async (event) => { event.preventDefault(); if (await type(`break ${what.value}`)) what.value = ""; } }, what, make("button", {}, "Break there"));
   let before = "";
   bus.on("run.state", (state) => {

@@ -4,8 +4,10 @@ In: questions of kind `run.*`. Out: answers, and `run.state` to every page whene
 that a pause is heard between two of them; nothing here waits for a page, and a page that goes leaves the levels as they are.
 """
 
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, cast
@@ -41,6 +43,11 @@ MOST_MARKS = 2000
 _LOOKING = ("?", "help", "show", "lines", "levels", "buffers", "breaks", "faults", "diff", "expect")
 """Commands that change nothing, and leave no mark on the time line."""
 
+_PROVED = re.compile(r"^\s*reload\b.*\bproved\b", re.IGNORECASE)
+_PROVE_FIRST = (
+    "have the levels proved together first, which may be cancelled; `reload LEVEL` then knows what was proved",
+)
+
 
 @dataclass(slots=True)
 class Going:
@@ -69,11 +76,13 @@ class Mark:
     Attributes:
         tick: After which it was.
         kind: `hand`, or `stop`.
+        changes: The session's then; where `undo` has gone back behind it, it is no more.
     """
 
     tick: int
     kind: str
     text: str
+    changes: int = 0
 
 
 class Live:
@@ -139,7 +148,7 @@ class Live:
 
     def open(self) -> None:
         """Open the system anew; what ran is gone."""
-        self._going, self._ended = None, ""
+        self._drop("the system is opened anew")
         self.commands, self.history, self.marks = None, History(), []
         try:
             with PROVER:
@@ -158,8 +167,15 @@ class Live:
 
     def close_because(self, *why: str) -> None:
         """Have nothing open, and say why."""
-        self._going, self.commands, self.why = None, None, "; ".join(filter(None, why))
+        self._drop("the system is closed")
+        self.commands, self.why = None, "; ".join(filter(None, why))
         self.changed()
+
+    def _drop(self, why: str) -> None:
+        """End a run whose system goes away; who asked for it is told."""
+        going, self._going, self._ended = self._going, None, ""
+        if going is not None:
+            going.done(lambda: _shown([], Refused(Code.STUDIO, why)))
 
     # --- what pages see ---
 
@@ -257,13 +273,17 @@ class Live:
                 "that is of a terminal",
                 "close the page, or press Ctrl-C where `rcsc studio` runs",
             )
+        if _PROVED.search(line):
+            raise Refused(
+                Code.STUDIO, "that proof takes minutes, and the levels would wait for it", *_PROVE_FIRST
+            )
         tick = commands.session.system.tick
         try:
-            with PROVER:
+            with PROVER if commands.proves(line) else nullcontext():
                 shown = commands.do(line)
         finally:
             self.history.settle(commands.session.system)
-            self._forget_marks(commands.session.system.tick)
+            self._forget_marks(commands.session.changes)
             self.changed()
         if (
             line.split()[:1]
@@ -283,11 +303,14 @@ class Live:
         if self._going is not None:
             raise Refused(Code.STUDIO, "it runs already", "pause it first")
         session = self.session()
+        if order.steps and order.most == 0:
+            return {"shown": self._open_commands().stepped(order.alone)}
         if order.most == 0 or (order.until is not None and session.holds(order.until)):
-            text = session.run(order.most, order.until)
-            return {"shown": [text]}
+            return {"shown": [session.run(order.most, order.until)]}
         self._ended = ""
-        self._going = Going(order, session.cycles(order.until), done, order.most)
+        alone = session.system.level(order.alone) if order.alone else None
+        cycles = session.cycles(order.until) if alone is None else session.cycles_alone(alone)
+        self._going = Going(order, cycles, done, order.most)
         self._slice(self._going)
         return LATER
 
@@ -348,7 +371,11 @@ class Live:
                 self._end(why)
             elif going.left == 0:
                 session, order = self.commands.session, going.order
-                shown = self.commands.stepped() if order.steps else [session.not_met(order.most, order.until)]
+                shown = (
+                    self.commands.stepped(order.alone)
+                    if order.steps
+                    else [session.not_met(order.most, order.until)]
+                )
                 self._end(shown[0], hand=True)
             elif (over := ended(system)) and going.order.most < 0:
                 self._end(f"cycle {system.tick}: {over}")
@@ -369,12 +396,12 @@ class Live:
     # --- marks ---
 
     def _mark(self, tick: int, kind: str, text: str) -> None:
-        self.marks.append(Mark(tick, kind, text))
+        self.marks.append(Mark(tick, kind, text, self.session().changes))
         del self.marks[:-MOST_MARKS]
         self.changed()
 
-    def _forget_marks(self, tick: int) -> None:
-        self.marks[:] = [mark for mark in self.marks if mark.tick <= tick]
+    def _forget_marks(self, changes: int) -> None:
+        self.marks[:] = [mark for mark in self.marks if mark.changes <= changes]
 
 
 def _shown(lines: Output, refused: Refused | None) -> Json:
