@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 BOM = "\ufeff"
 GLANCE_STEPS = 200_000
 """Steps of Z3 a question while somebody types: some hundredths of a second."""
-GLANCE_S = 0.25
+GLANCE_S = 0.1
 """Processor time in which all questions of a glance have to be asked, in seconds, and that of the last."""
 _LEFT_OPEN = {Code.UNDECIDED}
 """Findings that a larger budget may take away."""
@@ -195,7 +195,8 @@ class Workspace:
             if known is not None and known.reading is reading:
                 return self._answer(path, known)
             before = smt.unanswered()
-            options = replace(self.options, steps=min(GLANCE_STEPS, self.options.steps), cpu_s=GLANCE_S)
+            steps = min(GLANCE_STEPS, self.options.steps)
+            options = replace(self.options, steps=steps, cpu_s=GLANCE_S, brief=True)
             self.memo.keeps_all = False
             try:
                 end_s = time.thread_time() + GLANCE_S

@@ -41,6 +41,7 @@ class Options:
             table, `boxes` none (procedures are still Z3's).
         jobs: Processes that prove tables.
         cpu_s: The backstop of a question, in seconds; 0 for one that the steps do not need.
+        brief: Whether what would mend a finding, and whether lines that overlap do the same, is left for later.
     """
 
     steps: int = STEPS
@@ -48,6 +49,7 @@ class Options:
     solver: Literal["auto", "both", "boxes"] = "auto"
     jobs: int = 1
     cpu_s: float = 0.0
+    brief: bool = False
 
     @property
     def limits(self) -> Limits:

@@ -72,12 +72,9 @@ def diagnostics(
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
     with smt.together(options.together):
         shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
-        effects = [
-            alike(program, table, (each.first, each.second), options)
-            for each in overlaps[MOST_PAIRS:MOST_COMPARED]
-        ]
+        effects = [_effects(program, table, each, options) for each in overlaps[MOST_PAIRS:MOST_COMPARED]]
     shown = grouped(table, overlaps, shown)
-    if shown and (together := _together(program, table, overlaps[:MOST_PAIRS])):
+    if shown and not options.brief and (together := _together(program, table, overlaps[:MOST_PAIRS])):
         last = max(
             (at for at, each in enumerate(shown) if not each.told_with), key=lambda at: sort_key(shown[at])
         )
@@ -100,15 +97,17 @@ def diagnostics(
                 Code.OVERLAP, message, Label(table.span), notes=notes, witnesses=others, only_listed=True
             )
         )
-    return shown + list(_others(program, verdict, unproved)) + _lower(table)
+    return shown + list(_others(program, verdict, options, unproved)) + _lower(table)
 
 
-def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) -> Iterator[Diagnostic]:
+def _others(
+    program: Program, verdict: TableVerdict, options: Options, unproved: Collection[str]
+) -> Iterator[Diagnostic]:
     table = verdict.table
     for finding in verdict.findings:
         match finding:
             case Gap():
-                yield _gap(program, table, finding)
+                yield _gap(program, table, finding, options)
             case DeadLine(line, assuming):
                 yield _dead(table, line, assuming, _under(table, unproved))
             case ContradictoryAssumptions():
@@ -208,8 +207,8 @@ def _under(table: Table, unproved: Collection[str]) -> tuple[str, ...]:
 def _overlap(program: Program, table: Table, overlap: Overlap, options: Options) -> Diagnostic:
     first, second = table.lines[overlap.first], table.lines[overlap.second]
     column = _column(program, table, overlap.witness, (overlap.first, overlap.second), overlap.region)
-    repair = parting(program, table, overlap)
-    effects = alike(program, table, (overlap.first, overlap.second), options)
+    repair = None if options.brief else parting(program, table, overlap)
+    effects = _effects(program, table, overlap, options)
     return Diagnostic(
         Code.OVERLAP,
         f"lines `{first.name}` and `{second.name}` of table `{table.name}` both match some input",
@@ -218,7 +217,7 @@ def _overlap(program: Program, table: Table, overlap: Overlap, options: Options)
             Label(first.cell_span(-1), "and this one"),
             *_far(table, (first, second), repair),
         ),
-        notes=(str(effects),),
+        notes=() if effects is None else (str(effects),),
         help=(*(() if repair is None else (repair.shown(table),)), *_as_same(first, second, effects)),
         witnesses=(column,),
         effects=effects,
@@ -227,7 +226,7 @@ def _overlap(program: Program, table: Table, overlap: Overlap, options: Options)
 
 
 def _proposals(
-    table: Table, lines: tuple[Line, Line], repair: PartingCell | None, effects: Effects
+    table: Table, lines: tuple[Line, Line], repair: PartingCell | None, effects: Effects | None
 ) -> tuple[Proposal, ...]:
     """What would mend an overlap: a cell that parts the lines, or that they do the same."""
     first, second = lines
@@ -235,7 +234,7 @@ def _proposals(
     if repair is not None:
         proved = f"it parts the two lines, and line `{table.lines[repair.other].name}` takes what `{table.lines[repair.line].name}` loses"
         proposals.append(Proposal(repair.write(table), str(table.name), proved, (repair.change(table),)))
-    if effects.same:
+    if effects is not None and effects.same:
         title = f"say that line `{second.name}` does the same as `{first.name}`"
         change = Change(Place.SAME, str(second.name), texts=(str(first.name),))
         proposals.append(Proposal(title, str(table.name), "both do the same wherever both match", (change,)))
@@ -251,10 +250,18 @@ def _far(table: Table, lines: Sequence[Line], repair: PartingCell | None) -> tup
     return () if near else (Label(cell, "the cell of the help"),)
 
 
-def _as_same(first: Line, second: Line, effects: Effects) -> tuple[str, ...]:
+def _effects(program: Program, table: Table, overlap: Overlap, options: Options) -> Effects | None:
+    """What two lines that overlap do; None where that is left for later."""
+    if options.brief:
+        smt.leave_open("whether two lines do the same")
+        return None
+    return alike(program, table, (overlap.first, overlap.second), options)
+
+
+def _as_same(first: Line, second: Line, effects: Effects | None) -> tuple[str, ...]:
     """Propose to say that two lines do the same, where they do."""
     same = f"or keep both, and say that they do the same: `{second.name} same {first.name}`"
-    return (same,) if effects.same else ()
+    return (same,) if effects is not None and effects.same else ()
 
 
 def _most_overlapping(table: Table, overlaps: Sequence[Overlap]) -> str:
@@ -279,7 +286,7 @@ def _together(program: Program, table: Table, overlaps: Sequence[Overlap]) -> st
 # --- gaps ----------------------------------------------------------------------------
 
 
-def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
+def _gap(program: Program, table: Table, gap: Gap, options: Options) -> Diagnostic:
     columns = tuple(
         replace(_column(program, table, witness, (), region), inputs=inputs)
         for witness, region, inputs in zip(gap.witnesses, gap.regions, _inputs(program, gap), strict=True)
@@ -287,7 +294,9 @@ def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
     notes = (*_patterns(gap), *_by_member(program, gap))
     share = f"{_share(*gap.count)} of the inputs" if gap.count else "some inputs"
     if must_cover(table) and table.default is None:
-        repair = new_line(program, table, gap)
+        repair = None if options.brief else new_line(program, table, gap)
+        if options.brief:
+            smt.leave_open("a line for a gap")
         message = f"no line of table `{table.name}` matches {share}"
         return Diagnostic(
             Code.GAP,

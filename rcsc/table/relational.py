@@ -287,8 +287,10 @@ class _Decision:
         for asked in search.doubtful:
             pairs.update(self.others(asked, pairs))
         findings: list[TableFinding] = []
+        if self.options.brief and len(pairs) > 1:
+            smt.leave_open("where else two lines meet")
         for first, second in sorted(pairs):
-            grown = len(findings) < _MOST_GROWN
+            grown = len(findings) < (1 if self.options.brief else _MOST_GROWN)
             findings.append(self.overlap(first, second, grown=grown))
         return findings
 

@@ -112,7 +112,7 @@ def _actions(server: LanguageServer, session: Session) -> None:
     @current
     async def actions(params: types.CodeActionParams) -> list[types.CodeAction]:
         path = session.path(params.text_document.uri)
-        answer = await session.answer(path)
+        answer = await session.final(path)
         converter = converter_of(session, answer)
         only = params.context.only
         found: list[types.CodeAction] = []
@@ -203,7 +203,7 @@ def _lenses(server: LanguageServer, session: Session) -> None:
 
     @server.command("rcsc.status")
     async def status(uri: str) -> dict[str, object]:
-        return status_of(session, await session.answer(session.path(uri)))
+        return status_of(session, await session.final(session.path(uri)))
 
 
 def _witness(session: Session, path: str, table: str, which: int) -> Shown:

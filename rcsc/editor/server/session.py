@@ -104,7 +104,7 @@ class Session:
                 await self.listens(await self.answer(path))
         for path in order:
             with contextlib.suppress(OutdatedError):
-                await self.listens(await self._final(path))
+                await self.listens(await self.final(path))
 
     # --- answers ---
 
@@ -117,7 +117,12 @@ class Session:
         turn = self.turn
         return await self.proving(self.workspace.glance, path, lambda: self.turn == turn)
 
-    async def _final(self, path: str) -> Answer:
+    async def final(self, path: str) -> Answer:
+        """The answer to a file as it is now, with all that it leaves open for a moment.
+
+        Raises:
+            OutdatedError: A text has changed meanwhile.
+        """
         turn = self.turn
         return await self.proving(self.workspace.check, path, lambda: self.turn == turn)
 
