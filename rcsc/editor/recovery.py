@@ -123,42 +123,43 @@ def _named(text: str, found: re.Match[str]) -> tuple[str, tuple[int, int]] | Non
     return found["name"], found.span("name")
 
 
-def rest_of(root: str, loaded: Loaded, overlay: Mapping[str, str]) -> Rest:
+def rest_of(root: str, loaded: Loaded, wrong: Sequence[Diagnostic], overlay: Mapping[str, str]) -> Rest:
     """What is left of the program of a file when what is broken is left out.
 
     Args:
         root: The file.
         loaded: As it was read.
+        wrong: Why it is not in order.
         overlay: Texts that stand for what is on disk, by real path.
     """
     pieces: dict[str, _Pieces] = {}
     out: dict[Span, None] = {}
-    wrong: dict[Diagnostic, None] = {}
-    current, told = loaded, _errors(root, loaded)
+    found: dict[Diagnostic, None] = {}
+    current, told = (
+        loaded,
+        tuple(each for each in wrong if each.primary.span.file in set(closure(root, loaded))),
+    )
     for _ in range(MOST_ROUNDS):
         pieces |= {name: _Pieces.of(source) for name, source in current.sources.items() if name not in pieces}
-        wrong.update(dict.fromkeys(_of_the_rest(told, pieces, out)))
+        found.update(dict.fromkeys(_of_the_rest(told, pieces, out)))
         new = [span for each in told if (span := _piece(each, pieces, out)) is not None and span not in out]
         if not new:
             break
         out.update(dict.fromkeys(new))
         current = load([root], overlay={**overlay, **_blanked(pieces, out)})
-        told = _errors(root, current)
-        if not told and root in current.files:
-            program = resolve(root, current)
-            if isinstance(program, Program):
-                return Rest(program, current, tuple(out), tuple(wrong))
-    return Rest(None, current, tuple(out), tuple(wrong))
+        program = _resolved(root, current)
+        if isinstance(program, Program):
+            return Rest(program, current, tuple(out), tuple(found))
+        told = program
+    return Rest(None, current, tuple(out), tuple(found))
 
 
-def _errors(root: str, loaded: Loaded) -> tuple[Diagnostic, ...]:
-    """What was found wrong in reading the file and what it uses; else in resolving it."""
+def _resolved(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
+    """The program, or what is wrong with it."""
+    if root in loaded.files:
+        return resolve(root, loaded)
     files = set(closure(root, loaded))
-    wrong = tuple(each for each in loaded.diagnostics if each.primary.span.file in files)
-    if wrong or root not in loaded.files:
-        return wrong
-    resolved = resolve(root, loaded)
-    return () if isinstance(resolved, Program) else resolved
+    return tuple(each for each in loaded.diagnostics if each.primary.span.file in files)
 
 
 def _piece(diagnostic: Diagnostic, pieces: Mapping[str, _Pieces], out: Collection[Span] = ()) -> Span | None:

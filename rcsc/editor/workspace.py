@@ -370,7 +370,7 @@ def _read(path: str, loaded: Loaded, overlay: Mapping[str, str]) -> Reading:
     if isinstance(resolved, Program):
         return Reading(path, loaded, resolved, None, loaded.diagnostics)
     wrong = tuple(sorted({*loaded.diagnostics, *resolved}, key=sort_key))
-    return Reading(path, loaded, None, rest_of(path, loaded, overlay), wrong)
+    return Reading(path, loaded, None, rest_of(path, loaded, wrong, overlay), wrong)
 
 
 def _alike(before: Loaded, now: Loaded) -> bool:

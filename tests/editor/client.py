@@ -5,7 +5,7 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -115,6 +115,15 @@ class Client:
         """The last notification of a kind, once there are so many."""
         with self._arrived:
             assert self._arrived.wait_for(lambda: len(self.told.get(method, ())) >= count, PATIENCE_S), method
+            return self.told[method][-1]
+
+    def heard_that(self, method: str, is_so: Callable[[Any], bool]) -> Any:
+        """The last notification of a kind, once it is so."""
+        with self._arrived:
+            arrived = self._arrived.wait_for(
+                lambda: self.told.get(method) and is_so(self.told[method][-1]), PATIENCE_S
+            )
+            assert arrived, self.told.get(method)
             return self.told[method][-1]
 
     # --- documents ---
