@@ -21,16 +21,20 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 PATIENCE_S = 300.0
 """After that something is broken; a machine under load needs some seconds."""
 OPTIONS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--hide-scrollbars",
+    "--headless", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--hide-scrollbars",
     "--disable-background-networking", "--disable-component-update", "--disable-extensions", "--disable-sync",
-    "--window-size=1400,1300", "--remote-debugging-pipe",
+    "--remote-debugging-pipe",
 )  # fmt: skip
+FLAT = ("--disable-gpu",)
+IN_SPACE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""WebGL, drawn by the processor: the same picture on every machine."""
 
 
 class Browser:
     """One browser with one page; a context manager."""
 
-    def __init__(self) -> None:
+    def __init__(self, width: int = 1400, height: int = 1300, *, in_space: bool = False) -> None:
+        """Args: width, height: Of the page in pixels; in_space: With WebGL, which is slow here."""
         found = next((path for name in NAMES if (path := shutil.which(name))), None)
         assert found, "Chromium is needed (Debian's package `chromium`)"
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
@@ -39,7 +43,8 @@ class Browser:
         self._process = subprocess.Popen(
             [
                 "bash", "-c", f'exec "$@" 3<&{orders} 4>&{answers}', "browser",
-                found, *OPTIONS, f"--user-data-dir={self._profile.name}", "about:blank",
+                found, *OPTIONS, *(IN_SPACE if in_space else FLAT), f"--window-size={width},{height}",
+                f"--user-data-dir={self._profile.name}", "about:blank",
             ],
             pass_fds=(orders, answers), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL, start_new_session=True,
@@ -53,6 +58,13 @@ class Browser:
         self._session = self._tell("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self._tell(f"{domain}.enable")
+        self._tell(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
 
     def __enter__(self) -> Self:
         return self

@@ -1,0 +1,141 @@
+"""The studio in a real browser: a folder to be worked in, and a page that a user's hands are on."""
+
+import contextlib
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from rcsc.shell.opening import Opening
+from tests.studio.served import serving
+from tests.support.browser import Browser
+
+DOCK = Path(__file__).parents[1] / "data" / "dock"
+WIDE, HIGH = 1280, 800
+
+MODIFIERS = {"alt": 1, "ctrl": 2, "meta": 4, "shift": 8}
+KEYS = {
+    "enter": ("Enter", 13, "\r"), "tab": ("Tab", 9, ""), "escape": ("Escape", 27, ""), "space": (" ", 32, " "),
+    "left": ("ArrowLeft", 37, ""), "up": ("ArrowUp", 38, ""), "right": ("ArrowRight", 39, ""), "down": ("ArrowDown", 40, ""),
+    "home": ("Home", 36, ""), "end": ("End", 35, ""), "f2": ("F2", 113, ""), "delete": ("Delete", 46, ""),
+    "pageup": ("PageUp", 33, ""), "pagedown": ("PageDown", 34, ""),
+}  # fmt: skip
+"""Keys with names: what the page calls one, its number, and what it types."""
+
+
+def dock(folder: Path, *edits: tuple[str, str]) -> Path:
+    """The robot that docks, where nobody else writes; with edits of its drive's tables."""
+    shutil.copytree(DOCK, folder, ignore=shutil.ignore_patterns("generated", ".rcsc-cache"))
+    drive = folder / "drive.rcs"
+    text = drive.read_text(encoding="utf-8")
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    drive.write_text(text, encoding="utf-8")
+    return folder / "system.toml"
+
+
+class Seat(Browser):
+    """A browser with a studio in it."""
+
+    def enter(self, address: str, *, dark: bool = False) -> None:
+        """Open the studio, and wait until the page is there."""
+        self.open(address, dark=dark)
+        self.wait("document.documentElement.dataset.ready === 'yes'")
+
+    def reads(self, selector: str) -> str:
+        """The text of an element as it is read; empty where there is none."""
+        return str(self.value(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''"))
+
+    def until(self, selector: str, text: str) -> None:
+        """Wait until an element says something."""
+        self.wait(
+            f"[...document.querySelectorAll({json.dumps(selector)})].some((one) => one.innerText.includes({json.dumps(text)}))"
+        )
+
+    def button(self, text: str, within: str = "body") -> str:
+        """A button that is seen and begins with a text, as an expression."""
+        every = f"document.querySelectorAll({json.dumps(f'{within} button, {within} [role=tab]')})"
+        return f"([...{every}].find((one) => one.checkVisibility() && one.innerText.trim().startsWith({json.dumps(text)})))"
+
+    def press(self, *several: str) -> None:
+        """Presses keys one after another: `a`, `tab`, `ctrl+s`."""
+        for keys in several:
+            *held, name = keys.split("+") if keys != "+" else ["+"]
+            key, number, text = KEYS.get(name, (name, ord(name[0].upper()), name))
+            modifiers = sum(MODIFIERS[one] for one in held)
+            how = {"key": key, "windowsVirtualKeyCode": number, "modifiers": modifiers}
+            typed = {"text": text} if text and not modifiers & ~MODIFIERS["shift"] else {}
+            self._tell("Input.dispatchKeyEvent", type="keyDown" if typed else "rawKeyDown", **how, **typed)
+            self._tell("Input.dispatchKeyEvent", type="keyUp", **how)
+
+    def write(self, text: str) -> None:
+        """Types into what has the focus."""
+        self._tell("Input.insertText", text=text)
+
+    def click(self, element: str) -> None:
+        """Clicks, as a mouse does, the middle of the first element that an expression or a selector names; waits for it to be seen."""
+        found = element if element.startswith("(") else f"document.querySelector({json.dumps(element)})"
+        self.wait(f"{found}?.checkVisibility()")
+        self.value(f"{found}.scrollIntoView({{block: 'nearest', inline: 'nearest'}})")
+        x, y = self.value(
+            f"(({{left, top, width, height}}) => [left + width / 2, top + height / 2])({found}.getBoundingClientRect())"
+        )
+        self.mouse("mouseMoved", x, y, 0)
+        self.mouse("mousePressed", x, y)
+        self.mouse("mouseReleased", x, y)
+
+    def mouse(self, kind: str, x: float, y: float, buttons: int = 1) -> None:
+        """Moves the mouse, or presses or releases its left button."""
+        button = "left" if buttons else "none"
+        self._tell(
+            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=buttons, clickCount=1
+        )
+
+    def heap(self) -> int:
+        """Bytes that the page's objects take, after what nobody needs is thrown away."""
+        self._tell("HeapProfiler.collectGarbage")
+        return int(self._tell("Runtime.getHeapUsage")["usedSize"])
+
+    def choose(self, selector: str, begins: str) -> None:
+        """Choose what begins with a text, as who opens a list and takes it."""
+        self.value(
+            f"((one) => {{ one.value = [...one.options].find(({{ text }}) => text.startsWith({json.dumps(begins)})).value;"
+            f" one.dispatchEvent(new Event('change', {{ bubbles: true }})); }})(document.querySelector({json.dumps(selector)}))"
+        )
+
+    def go_to(self, text: str, kind: str = "BUTTON", most: int = 120) -> None:
+        """Press Tab until something of a kind has the focus that is called so."""
+        seen = []
+        for _ in range(most):
+            self.press("tab")
+            seen.append(self.focused())
+            if seen[-1].startswith(kind) and text in seen[-1]:
+                return
+        raise AssertionError(f"Tab never came to {text}: {dict.fromkeys(seen)}")
+
+    def focused(self) -> str:
+        """What has the focus, in a few words."""
+        return str(
+            self.value(
+                "((one) => `${one.tagName} ${one.className} ${one.ariaLabel ?? ''} ${one.innerText ?? ''}`)(document.activeElement)"
+            )
+        )
+
+    def tick(self) -> int:
+        """The tick that the time line shows."""
+        return int(
+            self.value("Number(document.querySelector('#time [role=slider]').getAttribute('aria-valuenow'))")
+        )
+
+
+@contextlib.contextmanager
+def seated(
+    opening: Opening, *, dark: bool = False, in_space: bool = False, logs: tuple[Path, ...] = ()
+) -> Iterator[Seat]:
+    """A studio with a browser before it, at the size that it must be readable at."""
+    with serving(opening, logs=logs) as server, Seat(WIDE, HIGH, in_space=in_space) as seat:
+        seat.enter(server.address, dark=dark)
+        yield seat
+        wrong = [said for said in seat.said if "favicon" not in said]
+        assert not wrong, f"the page complains: {wrong}"

@@ -1,0 +1,98 @@
+"""A first-time user in a real browser: from a table that is wrong to a run that is done, by mouse and by keyboard alone."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run as rcsc
+from rcsc.shell.opening import Opening
+from tests.studio.driven import Seat, dock, seated
+
+pytestmark = pytest.mark.needs("chromium")
+OVERLAP = ("< 2500 || tick             | 400 ", "       || tick             | 400 ")
+"""A line whose cell is emptied matches where another does."""
+
+
+def by_mouse(seat: Seat) -> None:
+    """To the table that is wrong, its repair taken, the file written, and the system run to the end."""
+    seat.click(seat.button("Tables"))
+    seat.wait("document.querySelector('.table-choice')?.options.length")
+    seat.choose(".table-choice", "goto ")
+    _told_at_the_cell(seat)
+    seat.click("tr.finding button.repair")
+    _mended(seat)
+    seat.click(seat.button("Save"))
+    seat.until("#said", "is written")
+    seat.click(seat.button("Levels"))
+    seat.click(seat.button("Prove, compile and open again"))
+    seat.until("#state", "paused at cycle 0")
+    seat.click(seat.button("Run", ".bar"))
+    seat.until(".view-run .ended", "the script is at its end")
+
+
+def by_keys(seat: Seat) -> None:
+    """The same without a mouse: what is used is reached by a key, or by going on to it."""
+    seat.press("2")
+    seat.go_to("Table", kind="SELECT")
+    seat.press("g")
+    _told_at_the_cell(seat)
+    seat.go_to("write <= 2499")
+    seat.press("enter")
+    _mended(seat)
+    seat.press("ctrl+s")
+    seat.until("#said", "is written")
+    seat.press("escape", "1")
+    seat.go_to("Prove, compile and open again")
+    seat.press("enter")
+    seat.until("#state", "paused at cycle 0")
+    seat.press("escape", "space")
+    seat.until(".view-run .ended", "the script is at its end")
+
+
+def _told_at_the_cell(seat: Seat) -> None:
+    """The overlap stands in words below its line, with the input that shows it."""
+    seat.until("tr.finding.error .told", "Wrong: lines go and late of table goto both match some input")
+    assert "waited = 2500" in seat.reads("tr.finding.error .witness-more")
+    assert seat.reads("tr.finding.error .region-words").startswith("Region: ")
+    assert seat.reads(".standing").startswith("✗ failed")
+    assert seat.value(
+        "[...document.querySelectorAll('tr.wrong-line')].map(({ dataset }) => dataset.name)"
+    ) == ["go", "late"]
+
+
+def _mended(seat: Seat) -> None:
+    """Nothing is marked any more, and the table is proved."""
+    seat.wait("!document.querySelector('tr.finding.error, .wrong-line, .wrong-cell')")
+    seat.until(".standing", "✓ proved")
+
+
+@pytest.mark.parametrize("hands", [by_mouse, by_keys])
+def test_a_wrong_table_is_mended_written_run_and_looked_back_at(
+    hands: Callable[[Seat], None], tmp_path: Path
+) -> None:
+    system = dock(tmp_path / "dock", OVERLAP)
+    drive = system.parent / "drive.rcs"
+    with seated(Opening(system, script="dock.csv")) as seat:
+        seat.until(".view-run .finding", "RCS402")
+        hands(seat)
+        assert "<= 2499" in drive.read_text(encoding="utf-8")
+        assert rcsc(["fmt", "--check", str(drive)]) == 0
+        last = seat.tick()
+        assert last > 100
+        _looked_back(seat, last)
+
+
+def _looked_back(seat: Seat, last: int) -> None:
+    """Any tick is shown as it was: stopped at first, started where its stage begins to be `moving`."""
+    shown = "document.querySelector('[aria-label=\"Level drive\"]').innerText"
+    now = "Number(document.querySelector('#time [role=slider]').getAttribute('aria-valuenow'))"
+    seat.press("l", "home", "right")
+    seat.wait(f"{now} === 1 && {shown}.includes('table stop')")
+    seat.press("escape", "f")
+    seat.write("drive.stage = moving")
+    seat.press("enter", "escape")
+    seat.wait(f"{now} > 1 && {shown}.includes('table goto, line start')")
+    assert seat.tick() < last
+    seat.press("e")
+    seat.wait(f"{now} === {last} && !{shown}.includes('line start')")
