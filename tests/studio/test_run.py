@@ -352,6 +352,12 @@ def test_moments_are_those_of_a_log(dock: Path, tmp_path: Path) -> None:
         assert (
             await one.ask("time.find", text="drive.travelled_mm > 100", tick=found["tick"], back=True)
         ) == {"tick": None}
+        for box in seen[kept.last].boxes:
+            if box.ran:
+                told = await one.ask("time.why", tick=kept.last, level=box.level)
+                assert [line["line"] for line in told["tables"][-1]["lines"] if line["matches"]] == [
+                    *box.lines
+                ]
         await other.ask("time.live")
         assert await one.heard("time.state", source="live")
 
@@ -372,6 +378,8 @@ def test_tracks_are_told_once_and_anew_after_undo(dock: Path) -> None:
             era, since = news["era"], news["to"]
         whole = (await one.ask("time.tracks", era=-1, since=-1))["levels"]
         assert held == whole
+        for changes in whole.values():
+            assert all(one[0] < then[0] and one[1:] != then[1:] for one, then in itertools.pairwise(changes))
         assert [mark["text"] for mark in news["marks"]] == ["order supervisor dock"]
         for line, left in (
             ("drive.bumper = true", 2),
