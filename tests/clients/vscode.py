@@ -174,9 +174,10 @@ def story(editor: Editor, address: str, picture: Callable[[str], None]) -> None:
     picture("typed")
     editor.go(LINE["rest"], 5)
     editor.command("Show the Graph of This Table")
-    editor.wait("document.querySelector('.webview.ready, iframe.webview')")
     editor.wait("[...document.querySelectorAll('.tab')].some(e => e.textContent.includes('graph of door'))")
-    picture("graph")  # without what is in it: this server has no pages of extensions
+    image = "document.querySelector('iframe.webview')?.contentDocument?.querySelector('iframe')?.contentDocument?.querySelector('img')"
+    editor.wait(f"{image}?.naturalWidth > 100")
+    picture("graph")
 
 
 def _cells(editor: Editor) -> None:
