@@ -27,7 +27,7 @@ MOST_MARKED = 1000
 LONGEST = 4000
 _BREATH = 2000
 """Ticks between two looks at whether a search is still wanted."""
-MOST_KNOWN = 200_000
+MOST_KNOWN = 50_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,13 @@ Stand = tuple[str, str, str]
 
 @dataclass(slots=True)
 class Lines:
-    """Which line each state of a level means, found once a state."""
+    """Which line each state of a level means, found once a state.
 
-    known: dict[tuple[int, bytes], Stand] = field(default_factory=dict)
+    Attributes:
+        known: By signature and state; the signature is kept, so that its number stays its own.
+    """
+
+    known: dict[tuple[int, bytes], tuple[Signature, Stand]] = field(default_factory=dict)
 
     def of(self, logged: LoggedLevel, content: bytes) -> Stand:
         """Table, line and fault of a record."""
@@ -61,8 +65,8 @@ class Lines:
         if key not in self.known:
             if len(self.known) > MOST_KNOWN:
                 self.known.clear()
-            self.known[key] = _stand(logged, logged.track.layout.unpack(content))
-        return self.known[key]
+            self.known[key] = logged.sign, _stand(logged, logged.track.layout.unpack(content))
+        return self.known[key][1]
 
 
 def _stand(logged: LoggedLevel, values: Values) -> Stand:
