@@ -19,7 +19,7 @@ from rcsc.run.description import Description, LevelSpec, Wire
 from rcsc.run.executors import PythonExecutor
 from rcsc.run.log.export import csv_text, json_text, unset
 from rcsc.run.log.plot import _series
-from rcsc.run.log.read import read
+from rcsc.run.log.read import Log, read
 from rcsc.run.log.recorder import Recorder
 from rcsc.run.log.schema import signature_from, signature_text
 from rcsc.run.orders.operator import ScriptedRun
@@ -168,11 +168,35 @@ def test_a_level_that_begins_anew_has_its_gaps_again_and_who_takes_from_it_too(t
     assert account["task", 32] > account.get(("task", 31), 0)
     assert account["emove", 33] > account.get(("emove", 32), 0)
     by_tick = dict(zip(log.ticks, unset(log), strict=True))
+    assert _again(log, by_tick) > 0
     for level in log.levels:
         adopted = {level.sign.leaves[at].name for at in level.sign.restart}
         for restart in (one for one in level.restarts if one.begun is Begun.ANEW):
             next_cycle = next(tick for tick in level.track.ticks if tick >= restart.tick and tick > log.first)
             assert not adopted & {level.sign.leaves[at].name for at in by_tick[next_cycle][level.name]}
+
+
+def _again(log: Log, by_tick: Mapping[int, Mapping[str, frozenset[int]]]) -> int:
+    """How often an input was unset again after it had been set, as what fills it began anew; each is unset as long as that is."""
+    levels, had, again = {level.name: level for level in log.levels}, set[tuple[str, int]](), 0
+    for wire in log.system().wires:
+        (source, _, given), (target, _, taken) = wire.source.partition("."), wire.target.partition(".")
+        if source not in levels or target not in levels:
+            continue
+        sign = levels[target].sign
+        numbers = {sign.index[name] for group in sign.unset for name in group.leaves}
+        for at, other in zip(sign.record(taken), levels[source].sign.record(given), strict=True):
+            for tick in sorted(set(levels[target].track.ticks) & set(log.ticks)):
+                before = [ran for ran in levels[source].track.ticks if log.first < ran < tick]
+                values = levels[target].track.latest(tick)
+                assert values is not None
+                as_first = values[at] == sign.leaves[at].initial
+                if at in numbers and before and as_first:
+                    assert (at in by_tick[tick][target]) == (other in by_tick[before[-1]][source])
+                if at not in by_tick[tick][target]:
+                    had.add((target, at))
+                again += at in by_tick[tick][target] and (target, at) in had
+    return again
 
 
 def test_exports_and_plots_have_gaps_where_nothing_was_set(tmp_path: Path) -> None:
