@@ -249,7 +249,7 @@ function changes(box) {
 // --- the drawer ---
 
 function Drawer(bus) {
-  const tabs = [["console", "Console", consoleTab], ["values", "Variables", valuesTab], ["breaks", "Breakpoints and faults", breaksTab], ["script", "Script and orders", scriptTab], ["found", "Proof and findings", foundTab]];
+  const tabs = [["console", "Console", consoleTab], ["values", "Variables", valuesTab], ["breaks", "Breaks and faults", breaksTab], ["script", "Orders", scriptTab], ["found", "Proof and logs", foundTab]];
   const bar = make("div", { class: "bar tabs", role: "tablist" });
   const inside = make("div", { class: "inside" });
   const made = new Map();
