@@ -101,6 +101,10 @@ class Memo:
             _keep(kept, _Told(verdict, unproved, shape, tuple(diagnostics), span.start))
         return diagnostics
 
+    def forget(self) -> None:
+        """Forget every verdict."""
+        self._versions, self._program = [], None
+
     def asked(self) -> None:
         """Go on only if somebody waits; what was proved since nobody did may be of questions left open, and is not kept.
 

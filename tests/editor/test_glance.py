@@ -56,6 +56,38 @@ def test_what_a_glance_leaves_open_is_neither_told_nor_kept(monkeypatch: pytest.
     assert workspace.glance(file) is answer
 
 
+@pytest.mark.parametrize(
+    "name", ["gallery/tcas/published.rcs", "examples/grip.rcs", "examples/acquire_published.rcs"]
+)
+def test_a_check_after_a_glance_has_what_the_glance_left_out(name: str) -> None:
+    """Repairs, and whether lines do the same."""
+    file = str(REPO / "tables" / name)
+    workspace = Workspace()
+    assert not any(each.told.proposals for each in workspace.glance(file).findings if each.code == "RCS402")
+    answer = workspace.check(file)
+    assert answer == Workspace().check(file)
+    assert any(each.mendable for each in answer.findings)
+
+
+@pytest.mark.parametrize("name", ["emove/locate.rcs", "gallery/tcas/published.rcs"])
+def test_a_check_given_up_anywhere_leaves_nothing_wrong(name: str) -> None:
+    """Nobody waits any more after so many questions; what came of those that were not asked is not kept."""
+    file = str(REPO / "tables" / name)
+    wanted = Workspace().check(file)
+    workspace, given_up = Workspace(), 0
+    for most in (0, 1, 2, 3, 5, 8, 13, 21, 34, 55):
+        asked = iter(range(most))
+        try:
+            workspace.check(file, lambda asked=asked: next(asked, None) is not None)
+        except OutdatedError:
+            given_up += 1
+        fresh = Workspace()
+        fresh.memo = workspace.memo
+        assert fresh.check(file) == wanted
+        workspace.memo.forget()
+    assert given_up >= 3
+
+
 def test_an_outdated_check_ends_and_leaves_nothing_wrong() -> None:
     """Amid a question that takes minutes."""
     workspace, going = Workspace(), threading.Event()
