@@ -224,15 +224,10 @@ class Workspace:
             OutdatedError: Nobody does any more.
         """
         self.memo.go_on = go_on
-        try:
-            with uncollected(), smt.until(lambda: not go_on()):
-                yield
-            if not go_on():
-                raise OutdatedError
-        except KeyboardInterrupt:
-            if go_on():
-                raise
-            raise OutdatedError from None
+        with uncollected(), smt.until(lambda: not go_on()):
+            yield
+        if not go_on():
+            raise OutdatedError
 
     @uncollected()
     def reading(self, path: str) -> Reading:

@@ -61,12 +61,6 @@ def leave_open(why: str) -> None:
     _open.append(why)
 
 
-def interrupt() -> None:
-    """End the question that another thread is asking, if there is one: there it raises KeyboardInterrupt."""
-    if "z3" in sys.modules:
-        _z3().main_ctx().interrupt()
-
-
 @dataclass(slots=True)
 class Budget:
     """What all questions that are asked inside `together` may cost.

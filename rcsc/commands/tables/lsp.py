@@ -8,6 +8,9 @@ from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.options import steps_option
 from rcsc.solvers.options import Options
 
+PATIENCE_S = 5.0
+"""Processor time of one question, in seconds: no question can be interrupted, and the next key waits for it."""
+
 
 @click.command(
     "lsp",
@@ -28,5 +31,5 @@ def command(stdio: bool, steps: int) -> int:  # noqa: ARG001 - editors give it
     need("lsp")
     from rcsc.editor.server.serve import serve  # keep lazy: its packages are an extra
 
-    serve(Options(steps=steps), sys.stdin.buffer, sys.stdout.buffer)
+    serve(Options(steps=steps, cpu_s=PATIENCE_S), sys.stdin.buffer, sys.stdout.buffer)
     return 0

@@ -18,13 +18,10 @@ from rcsc.editor.places import Lines, Units
 from rcsc.editor.server.convert import Converter, path_of
 from rcsc.editor.values import Answer
 from rcsc.editor.workspace import Workspace
-from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 
 RESTS_S = 0.08
 """How long keys rest before anything is checked, in seconds."""
-GIVES_UP_S = 0.05
-"""How often a question is interrupted that nobody waits for, in seconds."""
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -56,9 +53,7 @@ class Session:
     _results: dict[str, tuple[Answer, int]] = field(default_factory=dict)
     _proves: ThreadPoolExecutor = field(init=False)
     _reads: ThreadPoolExecutor = field(init=False)
-    _proving: int = -1
     _waiting: "asyncio.Task[None] | None" = None
-    _ending: "asyncio.Task[None] | None" = None
 
     def __post_init__(self) -> None:
         self.workspace = Workspace(self.options)
@@ -93,9 +88,7 @@ class Session:
         if self._waiting is not None:
             self._waiting.cancel()
         order = sorted(self.uris, key=lambda each: each != path)
-        loop = asyncio.get_running_loop()
-        self._waiting = loop.create_task(self._check(order))
-        self._ending = loop.create_task(self._give_up())
+        self._waiting = asyncio.get_running_loop().create_task(self._check(order))
 
     async def _check(self, order: list[str]) -> None:
         await asyncio.sleep(RESTS_S)
@@ -132,26 +125,7 @@ class Session:
         Raises:
             OutdatedError: A text has changed meanwhile.
         """
-        turn, loop = self.turn, asyncio.get_running_loop()
-        return await loop.run_in_executor(self._proves, lambda: self._proved(turn, ask, *args, **kwargs))
-
-    def _proved(self, turn: int, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Ask in the worker; again where a question was interrupted that somebody waits for."""
-        while True:
-            self._proving = turn
-            try:
-                return ask(*args, **kwargs)
-            except KeyboardInterrupt:
-                if self.turn != turn:
-                    raise OutdatedError from None
-            finally:
-                self._proving = -1
-
-    async def _give_up(self) -> None:
-        """Interrupt the question that nobody waits for any more, until it ends."""
-        while self._proving not in {-1, self.turn}:
-            smt.interrupt()
-            await asyncio.sleep(GIVES_UP_S)
+        return await asyncio.get_running_loop().run_in_executor(self._proves, lambda: ask(*args, **kwargs))
 
     async def reading(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Ask for something that needs no proof."""
@@ -183,6 +157,5 @@ class Session:
     def stop(self) -> None:
         """Give up what is being proved, as soon as it can be."""
         self.turn += 1
-        smt.interrupt()
         for worker in (self._proves, self._reads):
             worker.shutdown(wait=False, cancel_futures=True)
