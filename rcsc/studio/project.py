@@ -14,6 +14,7 @@ from rcsc.studio.runs.live import LANE, WATCHED_RATE, Live
 from rcsc.studio.runs.logs import Logs
 from rcsc.studio.runs.timeline import TimeLine
 from rcsc.studio.scene import Cell, Drawer
+from rcsc.studio.share.sharing import Findings, Moments
 from rcsc.studio.tables.desk import Desk
 from rcsc.studio.tables.editing import Tables
 from rcsc.studio.tables.proving import Graphs, Proof
@@ -42,4 +43,16 @@ def concerns(
     build = Build(opening.path, hub, live)
     desk = Desk(opening.path, hub.tell, hub.do)
     cell = Cell(time, hub.tell, drawer)
-    return (live, time, kept, build, Tables(desk), Proof(desk), Graphs(desk), cell, Plots(time))
+    return (
+        live,
+        time,
+        kept,
+        build,
+        Tables(desk),
+        Proof(desk),
+        Graphs(desk),
+        cell,
+        Plots(time),
+        Moments(hub, time, cell),
+        Findings(desk),
+    )

@@ -8,7 +8,7 @@ from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from rcsc.diagnostics.codes import Code
 from rcsc.run.levels import RunningLevel, StateTableError
@@ -18,6 +18,7 @@ from rcsc.run.system import System
 from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.session import Session
 from rcsc.studio.hub import Ask, Handler, Json
+from rcsc.studio.runs.history import History
 from rcsc.studio.runs.live import LANE
 from rcsc.studio.runs.timeline import TimeLine
 
@@ -162,14 +163,27 @@ class Cell:
         }
 
     def _drawn(self, ask: Ask) -> Json:
+        history = self._history()
+        tick = ask.body.whole("tick", history.first, history.last)
+        return {"tick": tick, **self.drawing(tick, projected=ask.body.flag("projected"))}
+
+    def drawing(self, tick: int, *, projected: bool) -> dict[str, Any]:
+        """Draw a tick of the run that everybody looks at: `svg`, and `caption`, a sentence each.
+
+        Raises:
+            CodedError, Refused: It cannot be drawn, with the reason.
+        """
+        history = self._history()
+        if self._drawer is None:
+            return {"svg": self._picture(tick), "caption": []}
+        drawing = self._drawer(history.stood_at(tick), tick, projected=projected)
+        return {"svg": drawing.svg, "caption": list(drawing.caption)}
+
+    def _history(self) -> History:
         history = self._time.source.history
         if not history.logs:
             raise Refused(Code.STUDIO, f"no run is there: {self._time.live.why}")
-        tick = ask.body.whole("tick", history.first, history.last)
-        if self._drawer is None:
-            return {"tick": tick, "svg": self._picture(tick), "caption": []}
-        drawing = self._drawer(history.stood_at(tick), tick, projected=ask.body.flag("projected"))
-        return {"tick": tick, "svg": drawing.svg, "caption": list(drawing.caption)}
+        return history
 
     def _picture(self, tick: int) -> str:
         """The plant's own picture, which is of now alone."""

@@ -5,6 +5,8 @@
 //   bus.select({ level: "task", line: "5" })     every view follows: bus.on("selection", (now, changed) => ...)
 //   bus.key("ctrl+s", "Write the file", () => ..., "Tables")
 
+export { make } from "./make.js";
+
 /** The server, or the page, did not do what was asked; `code` is what `rcsc explain` knows, `helps` are sentences. */
 export class Refusal extends Error {
   constructor({ code = "", text, helps = [] }) {
@@ -123,16 +125,4 @@ export async function doLine(bus, line) {
   clearTimeout(late);
   if (bus.latest("said")?.text === `${line}: under way`) bus.say(answer ? answer.shown.join("\n") || `${line}: done` : "", {});
   return answer;
-}
-
-/** Make an element: `make("button", { type: "button", class: "x", onclick: f }, "text", child)`. */
-export function make(kind, attributes = {}, ...inside) {
-  const made = document.createElement(kind);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-    else if (typeof value === "boolean") made.toggleAttribute(name, value);
-    else if (value !== undefined && value !== null) made.setAttribute(name, value);
-  }
-  made.append(...inside.flat().filter((one) => one !== undefined && one !== null));
-  return made;
 }

@@ -1,6 +1,7 @@
 // The page's frame: the views in one pane or two, what is said, the keys, and the theme.
 
 import { Bus, make } from "./bus.js";
+import { sharing } from "./share.js";
 import { BELOW, VIEWS } from "./views.js";
 
 const bus = new Bus();
@@ -159,6 +160,8 @@ page("help").addEventListener("click", listKeys);
 bus.key("?", "List the keys", listKeys);
 bus.key("escape", "Leave a field: keys mean what they say here again", () => {});
 bus.key("t", "Light, dark, or as the system has it", nextTheme);
+
+sharing(bus, page("share"), page("sharing"));
 
 // --- begin ---
 

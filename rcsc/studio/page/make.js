@@ -1,0 +1,13 @@
+// Elements of a page, and nothing that a page needs a server for.
+
+/** Make an element: `make("button", { type: "button", class: "x", onclick: f }, "text", child)`. */
+export function make(kind, attributes = {}, ...inside) {
+  const made = document.createElement(kind);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (typeof value === "boolean") made.toggleAttribute(name, value);
+    else if (value !== undefined && value !== null) made.setAttribute(name, value);
+  }
+  made.append(...inside.flat().filter((one) => one !== undefined && one !== null));
+  return made;
+}
