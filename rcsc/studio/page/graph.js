@@ -1,7 +1,7 @@
 // The graph of the table that is shown: states, composite states, and an arrow for each line; linked to the rows, and drawn in.
 
 import { make, Refusal } from "./bus.js";
-import { deskOf } from "./tables/desk.js";
+import { deskOf, spoken } from "./tables/desk.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 function put(kind, attributes = {}, ...inside) {
@@ -23,7 +23,7 @@ export function mount(root, bus) {
   const whole = make("div", { class: "graph-whole", role: "status", "aria-live": "polite" });
   root.append(make("div", { class: "bar" }, make("form", { onsubmit: (event) => { event.preventDefault(); ask(true); } }, state), all, ...zooms, fit, words), place, whole);
 
-  let shown = null, key = "", scale = 1, asking = null, from = null, hint = "";
+  let shown = null, key = "", scale = 1, asking = null, from = null, hint = "", said = [];
   const shut = new Map(); // by file and table: a set
 
   const hidden = () => { const name = `${desk.file} ${desk.table}`; if (!shut.has(name)) shut.set(name, new Set()); return shut.get(name); };
@@ -38,19 +38,22 @@ export function mount(root, bus) {
     if (shown && (shown.file !== desk.file || shown.table !== desk.table)) { shown = null; place.replaceChildren(); }
     if (!shown) words.textContent = "deriving the graph …";
     const { signal } = asking;
+    place.classList.add("stale");
     try {
       const answer = await desk.ask("graph.show", { shut: [...hidden()].map((name) => ({ name })), state: state.value.trim() }, { signal });
       if (signal.aborted || answer.table !== desk.table) return;
       const other = !shown;
+      place.classList.remove("stale");
       shown = { ...answer, file: desk.file };
       draw();
-      if (other) fitted(0.8);
+      if (other) { fitted(0.8); begun(); }
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
       if (signal.aborted || error.message.includes("meanwhile")) return;
       if (!desk.doc.whole && shown?.table === desk.table) { words.textContent = "The graph is of the last text that was in order."; return; }
       shown = null;
-      place.replaceChildren(make("p", { class: "soft no-graph" }, `No graph: ${error.message}.`, ...error.helps.map((help) => make("span", {}, ` Help: ${help.replace("`--state`", "the field above")}.`))));
+      place.classList.remove("stale");
+      place.replaceChildren(make("p", { class: "soft no-graph" }, "No graph: ", ...spoken(error.message), ".", ...error.helps.map((help) => make("span", {}, " Help: ", ...spoken(help.replace("`--state`", "the field above")), "."))));
       words.textContent = "";
     }
   }
@@ -69,8 +72,7 @@ export function mount(root, bus) {
     for (const box of shown.boxes) svg.append(boxed(box));
     svg.append(over);
     place.replaceChildren(svg);
-    const said = [`states: values of ${shown.state}`, shown.everywhere && `on every arrow from a state also: ${shown.everywhere}`, ...shown.notes].filter(Boolean);
-    words.textContent = said.join(" · ");
+    said = [`states: values of ${shown.state}`, shown.everywhere && `on every arrow from a state also: ${shown.everywhere}`, ...shown.notes].filter(Boolean);
     words.title = said.join("\n");
     all.disabled = !shown.composites.length;
     all.textContent = hidden().size ? "Open all" : "Shut all";
@@ -163,8 +165,10 @@ export function mount(root, bus) {
       arrow.classList.toggle("selected", Boolean(chosen) && lines.includes(chosen));
       arrow.classList.toggle("now", lines.some((name) => now.has(name)));
     }
-    const states = new Set(levels.map((level) => level.values?.[shown?.state] ?? level.state).filter(Boolean));
+    const states = new Set(levels.map((level) => level.now?.[shown?.state]).filter(Boolean));
     for (const box of shown?.boxes ?? []) place.querySelector(`.box[data-name="${CSS.escape(box.name)}"]`)?.classList.toggle("here", box.kind !== "any" && box.states.some((one) => states.has(one)));
+    const runs = levels.map((level) => `${level.level} is in ${level.now?.[shown?.state] ?? "?"}, line ${(level.lines ?? []).join(" and ") || "none"}`);
+    if (shown) words.textContent = [...runs, ...said].join(" · ");
   }
   bus.on("selection", (_, changed) => {
     marks();
@@ -201,6 +205,13 @@ export function mount(root, bus) {
     sized();
   }
 
+  /** Show where the table begins. */
+  function begun() {
+    const first = shown.arrows.find(({ source }) => source === "")?.target ?? shown.boxes[0]?.name;
+    const box = shown.boxes.find(({ name }) => name === first);
+    if (box) place.scrollTo({ left: Math.max(0, (box.corner[0] + box.size[0] / 2) * scale - place.clientWidth / 2), top: 0 });
+  }
+
   // --- drawing an arrow ---
 
   function begin(name) {
@@ -219,7 +230,9 @@ export function mount(root, bus) {
   async function finish(target) {
     const source = from;
     leave();
+    say(`drawing an arrow from ${source} to ${target} …`);
     const done = await desk.try("graph.draw", { source, target });
+    say(done ? `line ${done.line}: from ${source} to ${target}` : "no arrow was drawn");
     if (!done) return;
     bus.select({ table: desk.table, line: done.line });
     bus.say(`line ${done.line} leads from ${source} to ${target}: the proof answers in the table`);

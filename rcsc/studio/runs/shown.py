@@ -8,6 +8,7 @@ from typing import Any
 
 from rcsc.run.log.states import line_of
 from rcsc.run.log.ticks import LevelTick, other_ends, tick_of
+from rcsc.run.signature import Signature, Values
 from rcsc.studio.runs.history import History
 
 
@@ -22,8 +23,17 @@ def moment(history: History, tick: int) -> dict[str, Any]:
         if not box.ran:
             line = line_of(logged.sign, logged.level, values)
             said |= {"table": logged.sign.table_of(logged.level, values), "lines": [line] if line else []}
-        levels.append(said)
+        levels.append(said | {"now": _named(logged.sign, values)})
     return {"tick": tick, "levels": levels}
+
+
+def _named(sign: Signature, values: Values) -> dict[str, str]:
+    """The member that each state variable of an enumeration has after the cycle, for who draws states."""
+    return {
+        leaf.name: leaf.members[int(value)]
+        for leaf, value in zip(sign.leaves, values, strict=False)  # values go on with the trace
+        if leaf.kind == "state" and 0 <= int(value) < len(leaf.members)
+    }
 
 
 def _box(box: LevelTick) -> dict[str, Any]:

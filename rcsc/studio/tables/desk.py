@@ -27,6 +27,7 @@ PROOF = "proof"
 MOST_FILES = 2_000
 MOST_OPEN = 64
 """Files that are open at once."""
+CHANGED = "the text was changed meanwhile: nothing was done"
 MOST_LISTED_BYTES = 300_000
 """Of a file whose tables are listed before it is opened."""
 
@@ -136,7 +137,7 @@ class Desk:
         found = self.opened(name)
         if found.version != version:
             raise Refused(
-                Code.STUDIO, "the text was changed meanwhile: nothing was done", "look at it, and do it again"
+                Code.STUDIO, CHANGED, "look at it, and do it again"
             )
         return found
 
@@ -216,7 +217,7 @@ class Desk:
         known = self._known.get(name)
         self.at(name, version)
         if known is None or known.version != version:
-            raise Refused(Code.STUDIO, "the text was changed meanwhile: nothing was done")
+            raise Refused(Code.STUDIO, CHANGED)
         return known
 
     def checked(self, name: str, version: int) -> Checked:
@@ -227,6 +228,7 @@ class Desk:
         """
         self.known(name, version)
         with PROVER:
+            self.workspace.memo.go_on = lambda: True
             return self.workspace.checked(os.path.normpath(self.opened(name).file))
 
     def repairs(self, name: str, version: int, finding: int) -> tuple[Repair, ...]:
@@ -240,8 +242,16 @@ class Desk:
             raise Refused(Code.STUDIO, "there is no such finding any more")
         key = (name, version, finding)
         if key not in self._offered:
-            with PROVER:
-                self._offered[key] = self.workspace.repairs(known.answer.findings[finding])
+            found = self.opened(name)
+            try:
+                with PROVER:
+                    self.workspace.memo.go_on = lambda: found.version == version
+                    offered = self.workspace.repairs(known.answer.findings[finding])
+            except OutdatedError as error:
+                raise Refused(Code.STUDIO, CHANGED) from error
+            with self._lock:
+                self._offered[key] = offered
+            return offered
         return self._offered[key]
 
     def others(self) -> Iterator[tuple[str, Document]]:

@@ -103,6 +103,7 @@ export class SheetGrid {
       this.#put(this.#cells[0][at + 1], heading, `${heading}${known.type ? `: ${known.type}` : ""}${known.unit ? ` [${known.unit}]` : ""}`, known);
     });
     const filter = this.#desk.condition;
+    this.#table.classList.toggle("no-shares", this.#desk.doc.known && !rows.some(({ share }) => share));
     rows.forEach((row, line) => {
       const cells = this.#cells[line + 1];
       this.#put(cells[0], row.stub, `line ${row.name}`);
@@ -167,7 +168,7 @@ export class SheetGrid {
     one.witnesses.forEach((witness, at) => {
       const key = `${one.id} ${at}`;
       const pressed = key === this.#shownWitness;
-      const region = witness.region.length ? `Region: ${witness.region.join(", ")}${witness.inputs === null ? "" : `; ${witness.inputs.toLocaleString("en")} inputs`}; what is not named is free.` : "";
+      const region = witness.region.length ? `Region: ${witness.region.join(", ")}${witness.inputs === null ? "" : `; ${witness.inputs === 1 ? "1 input" : `${witness.inputs.toLocaleString("en")} inputs`}`}; what is not named is free.` : "";
       box.append(" ", make("button", { type: "button", class: "small", "aria-pressed": pressed, onclick: () => { this.#shownWitness = pressed ? "" : key; this.draw(); } },
         `${pressed ? "Hide" : "Show"} ${one.witnesses.length > 1 ? `input ${at + 1}` : "the input"}`));
       if (pressed) {
@@ -411,6 +412,7 @@ export class SheetGrid {
     cell.dataset.text = text.trim();
     cell.replaceChildren(make("span", { class: "text waits" }, text.trim()));
     const done = await this.write(at, [[text]]);
+    cell.querySelector(".waits")?.classList.remove("waits");
     if (!done) {
       delete cell.dataset.text;
       this.draw();
