@@ -3,8 +3,8 @@
 
 export const VIEWS = [
   { name: "run", title: "Levels", load: () => import("./run.js") },
-  { name: "tables", title: "Tables", load: () => import("./grid.js") },
-  { name: "graph", title: "Graph", load: () => import("./graph.js") },
+  { name: "tables", title: "Tables", load: () => import("./tables/grid.js") },
+  { name: "graph", title: "Graph", load: () => import("./tables/graph.js") },
   { name: "cell", title: "Cell", load: () => import("./cell.js") },
   { name: "plots", title: "Curves", load: () => import("./plots.js") },
 ];

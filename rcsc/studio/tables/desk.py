@@ -136,9 +136,7 @@ class Desk:
         """
         found = self.opened(name)
         if found.version != version:
-            raise Refused(
-                Code.STUDIO, CHANGED, "look at it, and do it again"
-            )
+            raise Refused(Code.STUDIO, CHANGED, "look at it, and do it again")
         return found
 
     def change(self, name: str, make: Callable[[Document], object]) -> Json:

@@ -1,9 +1,9 @@
 // Tables: a grid and the text of one file, with what is proved of it.
 
-import { make } from "./bus.js";
-import { deskOf, spoken } from "./tables/desk.js";
-import { SheetGrid } from "./tables/sheet.js";
-import { TextView } from "./tables/text.js";
+import { make } from "../bus.js";
+import { deskOf, spoken } from "./desk.js";
+import { SheetGrid } from "./sheet.js";
+import { TextView } from "./text.js";
 
 const SIGNS = { proved: "✓", "rests on an assumption": "◑", stale: "…", failed: "✗" };
 

@@ -1,7 +1,7 @@
 // The graph of the table that is shown: states, composite states, and an arrow for each line; linked to the rows, and drawn in.
 
-import { make, Refusal } from "./bus.js";
-import { deskOf, spoken } from "./tables/desk.js";
+import { make, Refusal } from "../bus.js";
+import { deskOf, spoken } from "./desk.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 function put(kind, attributes = {}, ...inside) {
