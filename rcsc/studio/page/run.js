@@ -1,6 +1,7 @@
 // The run: every level beside the others, what is done to it, and why a line did not match.
 
 import { doLine, make } from "./bus.js";
+import { changes, exchanges, short } from "./exchanges.js";
 import { lookAt } from "./moments.js";
 
 const RATES = [["4 times the clock", "4"], ["real time", "1"], ["20 times", "20"], ["as fast as it goes", ""], ["a quarter", "0.25"], ["a tenth", "0.1"]];
