@@ -1,0 +1,158 @@
+"""The grid and the graph in a real browser, by keys: cells, rectangles, lines, undo, the text of the same file, a filter, an arrow."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rcsc.shell.opening import Opening
+from tests.studio.driven import Seat, seated
+
+pytestmark = pytest.mark.needs("chromium")
+REPO = Path(__file__).parents[2]
+HERE = "`${document.activeElement.dataset.line},${document.activeElement.dataset.column}`"
+
+
+def cell(line: int, column: int) -> str:
+    return f'document.querySelector(\'.sheet [data-line="{line}"][data-column="{column}"]\')'
+
+
+def says(seat: Seat, line: int, column: int, text: str) -> None:
+    """Wait until a cell says something, and the table was looked at."""
+    seat.wait(
+        f"{cell(line, column)}?.dataset.text === {text!r} && !document.querySelector('.standing.stale, .sheet .waits')"
+    )
+
+
+def lines(seat: Seat) -> int:
+    return int(
+        seat.value(
+            "[...document.querySelectorAll('.sheet tr[data-row]')].filter((row) => !row.hidden).length"
+        )
+    )
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    shutil.copytree(REPO / "tables" / "gallery" / "cia402", tmp_path / "gallery" / "cia402")
+    (tmp_path / "rcsc.toml").touch()
+    return tmp_path
+
+
+def test_the_grid_and_the_graph_by_keys(drive: Path) -> None:
+    before = (drive / "gallery" / "cia402" / "drive.rcs").read_text()
+    with seated(Opening(drive / "system.toml", alone=True)) as seat:
+        seat.click(seat.button("Tables"))
+        seat.wait("document.querySelector('.table-choice')?.options.length")
+        seat.choose(".table-choice", "drive ")
+        seat.until(".standing", "✓ proved")
+        many = lines(seat)
+        seat.click("(" + cell(1, 0) + ")")
+        _cells(seat)
+        _rectangle(seat)
+        _line(seat, many)
+        _text(seat)
+        seat.value("document.querySelector('.filter').focus()")
+        seat.write("now = fault")
+        seat.press("enter")
+        seat.until(".filter-form span", "lines can match")
+        assert 0 < lines(seat) < many
+        seat.press("escape")
+        seat.wait(
+            f"[...document.querySelectorAll('.sheet tr[data-row]')].filter((row) => !row.hidden).length === {many}"
+        )
+        _arrow(seat)
+        seat.click(seat.button("Tables"))
+        seat.until(".standing", "✓ proved")
+    assert (drive / "gallery" / "cia402" / "drive.rcs").read_text() == before
+
+
+def _cells(seat: Seat) -> None:
+    """Move, write, leave, undo."""
+    begun = seat.value(cell(2, 1) + ".dataset.text")
+    seat.press("down", "right")
+    assert seat.value(HERE) == "2,1"
+    seat.press("f2")
+    seat.write("nonsense")
+    seat.press("escape")
+    says(seat, 2, 1, begun)
+    seat.press("home", "right", "right", "enter")
+    seat.value("document.activeElement.select()")
+    seat.write("nobody")
+    seat.press("tab")
+    says(seat, 2, 1, "nobody")
+    assert seat.value(HERE) == "2,2"
+    assert seat.reads(".standing").startswith("✗ failed")
+    assert "nobody" in seat.reads("tr.finding")
+    seat.press("ctrl+z")
+    says(seat, 2, 1, begun)
+    seat.until(".standing", "✓ proved")
+
+
+def _rectangle(seat: Seat) -> None:
+    """Copy two lines, paste them over two others, and undo it in one step."""
+    texts = [[seat.value(cell(line, column) + ".dataset.text") for column in (0, 1)] for line in (1, 2, 3, 4)]
+    seat.click("(" + cell(1, 0) + ")")
+    seat.press("shift+down", "shift+right")
+    copied = seat.value(
+        "(() => { const given = new DataTransfer(); document.activeElement.dispatchEvent("
+        "new ClipboardEvent('copy', { clipboardData: given, bubbles: true, cancelable: true })); return given.getData('text/plain'); })()"
+    )
+    assert copied == "\n".join("\t".join(row) for row in texts[:2])
+    seat.click("(" + cell(3, 0) + ")")
+    seat.value(
+        f"(() => {{ const given = new DataTransfer(); given.setData('text/plain', {copied!r}); document.activeElement.dispatchEvent("
+        "new ClipboardEvent('paste', { clipboardData: given, bubbles: true, cancelable: true })); })()"
+    )
+    says(seat, 3, 0, texts[0][0])
+    says(seat, 4, 1, texts[1][1])
+    seat.press("ctrl+z")
+    says(seat, 4, 1, texts[3][1])
+    says(seat, 3, 0, texts[2][0])
+
+
+def _line(seat: Seat, many: int) -> None:
+    """Insert a line and delete it."""
+    seat.press("alt+enter")
+    seat.wait(
+        f"document.querySelectorAll('.sheet tr[data-row]').length === {many + 1} && !document.querySelector('.standing.stale')"
+    )
+    assert seat.value(HERE) == "4,0"
+    seat.press("ctrl+delete")
+    seat.wait(
+        f"document.querySelectorAll('.sheet tr[data-row]').length === {many} && !document.querySelector('.standing.stale')"
+    )
+
+
+def _text(seat: Seat) -> None:
+    """What is typed into the text stands in the grid, and is undone there."""
+    was = seat.value(cell(0, 0) + ".dataset.text")
+    seat.click(seat.button("Both"))
+    seat.value(
+        "(() => { const text = document.querySelector('.text-area'); text.focus(); let at = text.value.indexOf('|--'); "
+        "at = text.value.indexOf('\\n', at) + 4; at = text.value.indexOf('|', at) + 2; text.setSelectionRange(at, at); })()"
+    )
+    seat.write("not")
+    seat.wait(f"{cell(0, 0)}.dataset.text !== {was!r} && !document.querySelector('.standing.stale')")
+    assert seat.value(cell(0, 0) + ".dataset.text").startswith("not")
+    seat.press("ctrl+z")
+    says(seat, 0, 0, was)
+    seat.click(seat.button("Grid"))
+    seat.until(".standing", "✓ proved")
+
+
+def _arrow(seat: Seat) -> None:
+    """Draw an arrow from a state to the one that Tab comes to, and take it back."""
+    seat.click(seat.button("Graph"))
+    seat.wait(
+        "document.querySelector('.graph-place [data-state]') && !document.querySelector('.graph-place.stale')"
+    )
+    seat.value("document.querySelector('.graph-place [data-state=fault]').focus()")
+    seat.press("a")
+    assert "An arrow from fault" in seat.reads(".graph-whole")
+    seat.value("document.querySelector('.graph-place [data-state=operation_enabled]').focus()")
+    seat.press("enter")
+    seat.until("#said", "leads from fault to operation_enabled")
+    seat.value("document.querySelector('.graph-place [data-state=fault]').focus()")
+    seat.press("ctrl+z")
+    seat.until("#said", "undone: draw an arrow from fault to operation_enabled")
