@@ -2,9 +2,11 @@
 
 import contextlib
 import json
+import random
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from rcsc.shell.opening import Opening
 from tests.studio.served import serving
@@ -122,6 +124,16 @@ class Seat(Browser):
             )
         )
 
+    def settled(self, expression: str) -> Any:
+        """What an expression is once the page has stopped changing."""
+        still = """new Promise((done) => {
+          let waiting = setTimeout(done, 400);
+          const seen = new MutationObserver(() => { clearTimeout(waiting); waiting = setTimeout(done, 400); });
+          seen.observe(document.body, { subtree: true, childList: true, characterData: true });
+          setTimeout(done, 4000);
+        })"""
+        return self.value(f"{still}.then(() => {expression})")
+
     def tick(self) -> int:
         """The tick that the time line shows."""
         return int(
@@ -139,3 +151,42 @@ def seated(
         yield seat
         wrong = [said for said in seat.said if "favicon" not in said]
         assert not wrong, f"the page complains: {wrong}"
+
+
+SHOWN = """new Promise((done) => {
+  const now = document.querySelector("#time [role=slider]"), view = document.querySelector(".view-run");
+  let frames = 0;
+  const look = () => {
+    frames += 1;
+    if (window.wanted !== undefined && now.ariaValueNow === view.dataset.tick && performance.now() >= window.wanted)
+      return done([Number(view.dataset.tick), performance.now() - window.wanted, frames]);
+    return requestAnimationFrame(look);
+  };
+  requestAnimationFrame(look);
+})"""
+"""Waits until levels and time line show one tick: which, after how many milliseconds, in how many frames."""
+
+
+def scrubbed(
+    seat: Seat, many: int, places: random.Random, wait_every: int = 1
+) -> Iterator[tuple[int, tuple[float, int]]]:
+    """Drag along the time line; after every so many moves yield the tick that is shown, how long that took, and the frames.
+
+    Raises:
+        AssertionError: Another tick is shown than the mouse stands on.
+    """
+    left, top, width, first, last = seat.value("""(() => {
+      const one = document.querySelector("#time [role=slider]"), { left, top, width } = one.getBoundingClientRect();
+      one.addEventListener("pointermove", () => { window.wanted = performance.now(); });
+      return [left, top, width, Number(one.ariaValueMin), Number(one.ariaValueMax)];
+    })()""")
+    seat.press("0")
+    seat.mouse("mousePressed", left + 5, top + 8)
+    for move in range(1, many + 1):
+        at = places.uniform(0.01, 0.99)
+        seat.mouse("mouseMoved", left + at * width, top + 8)
+        if move % wait_every == 0:
+            tick, after_ms, frames = seat.value(SHOWN)
+            assert abs(tick - (first + at * (last - first))) <= 1 + 2 * (last - first) / width
+            yield tick, (after_ms, frames)
+    seat.mouse("mouseReleased", left + 5, top + 8, 0)

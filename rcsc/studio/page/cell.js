@@ -138,7 +138,7 @@ export function mount(root, bus) {
     const { tick } = bus.selection;
     const run = bus.latest("run");
     if (!shown || !run?.open || tick === null) return;
-    const key = `${run.source} ${run.key ?? ""} ${tick} ${how.value} ${trace.value} ${look.value}`;
+    const key = `${run.source} ${run.key ?? ""} ${tick} ${showing()} ${how.value} ${trace.value} ${look.value}`;
     wanted = key;
     if (asking || got === key) return;
     asking = true;

@@ -29,6 +29,7 @@ export function mount(root, bus) {
       cards.replaceChildren(...[...known.values()].map(({ root: card }) => card));
     }
     const head = run.source === "live" && bus.selection.tick === run.last;
+    root.dataset.tick = moment?.tick ?? "";
     for (const level of moment?.levels ?? []) {
       known.get(level.level)?.show(level, moment.tick, run, head ? run.levels.find(({ name }) => name === level.level) : null);
     }

@@ -1,0 +1,101 @@
+"""Every view in both themes, at the least size: nothing is cut, sticks out, or is too faint to be read; and scrubbing shows what was."""
+
+import random
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run as rcsc
+from rcsc.shell.opening import Opening
+from tests.studio.driven import HIGH, WIDE, Seat, dock, scrubbed, seated
+
+pytestmark = pytest.mark.needs("chromium")
+LOOK = Path(__file__).with_name("look.js").read_text(encoding="utf-8").partition("\n\n")[2]
+"""What is wrong with how a page looks, a sentence each."""
+VIEWS = ("run", "tables", "graph", "cell", "plots")
+DRAWER = ("values", "breaks", "script", "found", "console")
+WRONG = {
+    "text is cut": "<div style='width:50px;overflow:hidden;white-space:nowrap'>a long text that is cut here</div>",
+    "text is cut: button": "<button style='width:30px;overflow:hidden;white-space:nowrap'>a long button</button>",
+    "too faint": "<p style='color:#999'>faint</p>",
+    "too faint: p. «dark": "<div style='background:#000'><p style='background:rgba(255,255,255,.2);color:#333'>dark on dark</p></div>",
+    "sticks out sideways": "<div style='position:absolute;left:1200px;width:200px'>out of it</div>",
+    "sticks out downwards": "<div style='position:absolute;top:900px'>below</div>",
+}
+RIGHT = (
+    "<p>fine</p>", "<div style='width:50px;overflow:auto;white-space:nowrap'>a long text that is scrolled</div>",
+    "<p style='color:#767676'>just dark enough</p>",
+    "<p title='a long text' style='width:50px;overflow:hidden;white-space:nowrap;text-overflow:ellipsis'>a long text</p>",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def seat(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Seat]:
+    """The robot that docks, at the end of its script."""
+    system = dock(tmp_path_factory.mktemp("looks") / "dock")
+    assert rcsc(["compile", str(system)]) == 0
+    with seated(Opening(system, script="dock.csv")) as one:
+        one.until("#state", "paused at cycle 0")
+        one.press("space")
+        one.until(".view-run .ended", "the script is at its end")
+        yield one
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_every_view_can_be_read_in_both_themes(seat: Seat, theme: str) -> None:
+    while seat.value("document.documentElement.dataset.theme") != theme:
+        seat.click("#theme")
+    for view in VIEWS:
+        seat.click(f"#views button[data-view={view}]")
+        seat.wait(f"document.querySelector('.view-{view}')?.childElementCount")
+        assert seat.settled(LOOK) == [], f"{view}, {theme}"
+    seat.click("#views button[data-view=run]")
+    for tab in DRAWER:
+        seat.click(f"#tab-{tab}")
+        assert seat.settled(LOOK) == [], f"{tab}, {theme}"
+    for key, dialog in (("?", "keys"), ("x", "sharing")):
+        seat.press("escape", key)
+        seat.wait(f"document.querySelector('#{dialog}').open")
+        assert seat.settled(LOOK) == [], f"{dialog}, {theme}"
+        seat.press("escape")
+        seat.wait(f"!document.querySelector('#{dialog}').open")
+
+
+def test_what_is_wrong_is_seen(tmp_path: Path) -> None:
+    file = tmp_path / "page.html"
+    with Seat(WIDE, HIGH) as bare:
+        for said, inside in [*WRONG.items(), *(("", inside) for inside in RIGHT)]:
+            file.write_text(f"<!doctype html><body style='background:#fff'>{inside}", encoding="utf-8")
+            bare.open(file.as_uri())
+            found = bare.value(LOOK)
+            assert [one for one in found if one.startswith(said)] == found, inside
+            assert bool(found) is bool(said), inside
+
+
+def test_scrubbing_shows_the_last_tick_and_keeps_nothing(seat: Seat) -> None:
+    seat.click("#views button[data-view=run]")
+    seat.press("escape")
+    places = random.Random(7)  # noqa: S311  # the same places each time
+    for _ in scrubbed(seat, 30, places):
+        pass
+    before = seat.heap()
+    shown = list(scrubbed(seat, 300, places, wait_every=10))
+    assert len(shown) == 30  # each time what was wanted last
+    assert len({tick for tick, _ in shown}) > 15
+    assert seat.heap() - before < 2_000_000
+
+
+def test_a_moment_is_shared_by_keys(seat: Seat) -> None:
+    seat.value("""(() => {
+      window.written = [];
+      URL.createObjectURL = (blob) => { window.written.push(blob); return "data:,"; };
+      HTMLAnchorElement.prototype.click = function () { window.written.push(this.download); };
+    })()""")
+    seat.press("x")
+    seat.wait("document.querySelector('#sharing').open")
+    seat.press("enter")
+    seat.wait("window.written.length === 2")
+    assert seat.value("window.written[1]").startswith("dock_tick_")
+    assert "<!doctype html>" in seat.value("window.written[0].text()")
+    seat.press("escape")
