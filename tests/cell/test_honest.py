@@ -15,7 +15,8 @@ from rcsc_cell.cell.mujoco_model import mjcf
 from rcsc_cell.cell.physical import Physical
 from rcsc_cell.cell.plant import Grip, Plant
 from rcsc_cell.cell.reach import home
-from rcsc_cell.cell.ready import lying, plant
+from rcsc_cell.cell.ready import Backend, lying, plant
+from rcsc_cell.cell.space import ModelSpace
 from rcsc_cell.database.ask import Database
 from rcsc_cell.vision.flood import Features
 from rcsc_cell.workstation.prepared import prepare
@@ -114,16 +115,34 @@ def test_a_run_is_its_controls_and_nothing_else(monkeypatch: pytest.MonkeyPatch,
 
 
 def test_nothing_writes_where_a_part_is_after_the_first_cycle() -> None:
-    """Positions, speeds and outside forces are written where a cell begins and where a stopped one is put back; nowhere else."""
-    allowed = {"reset", "restore"}
+    """Positions, speeds and outside forces are written where a cell begins and where a stopped one is put back; nowhere else.
+
+    A cell without physics is shown by a model that nothing steps: there its own places are put.
+    """
+    physics, shown = ("physical.py", {"reset", "restore"}), ("space.py", {"_put"})
     found = set()
     for path in CELL.rglob("*.py"):
         for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(function, ast.FunctionDef):
                 for name in _written(function):
                     found.add((path.name, function.name, name))
-    assert {(file, name) for file, _, name in found} == {("physical.py", "qpos")}
-    assert {function for _, function, _ in found} <= allowed
+    assert {(file, name) for file, _, name in found} == {(file, "qpos") for file, _ in (physics, shown)}
+    for file, allowed in (physics, shown):
+        assert {function for where, function, _ in found if where == file} <= allowed
+
+
+def test_to_look_at_a_cell_changes_nothing_in_it() -> None:
+    backends: tuple[Backend, ...] = ("mujoco", "kinematic")
+    for backend in backends:
+        cell = plant(database(), backend)
+        space = cell.space()
+        assert isinstance(space, ModelSpace) is (backend == "mujoco"), (
+            "the model that is put is never that of physics"
+        )
+        before = cell.state()
+        assert space.shapes
+        assert len(space.poses()) == 7 * len(space.bodies)
+        assert cell.state() == before
 
 
 def _written(function: ast.FunctionDef) -> set[str]:
