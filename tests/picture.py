@@ -1,8 +1,12 @@
-"""The README's pictures, as SVG: `python -m tests.picture` makes them from what the commands print and draw."""
+"""The README's pictures: `python -m tests.picture` makes them, as SVG, from what the commands print and draw; with `studio` the studio's.
+
+The studio's is what Chromium shows of it at 1280 x 800, as PNG: the paper's cell in space beside the table that runs.
+"""
 
 import contextlib
 import io
 import re
+import sys
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -13,6 +17,8 @@ from rich.terminal_theme import MONOKAI
 from rich.text import Text
 
 from rcsc.commands.group import commands
+from rcsc.shell.opening import Opening
+from tests.studio.driven import seated
 
 REPO = Path(__file__).parents[1]
 PICTURES = REPO / "tests" / "pictures"
@@ -21,6 +27,8 @@ RUN = ("run", "make_boxt", "--report", "boxt.html")
 WIDTH = 132
 FRAMES = (1, 23, 40)
 """Which pictures of the report's filmstrip are shown."""
+CYCLES = 420
+"""After which the studio is shown."""
 FRAME_PX, CAPTION_PX = (360, 260), 26
 
 
@@ -82,9 +90,33 @@ def robot() -> str:
 PICTURE_OF = {"first_minute.svg": finding, "make_boxt.svg": robot}
 
 
+def studio(path: Path) -> None:
+    """Write a picture of the studio: the cell after so many cycles of MAKE BOXT, and the table of its task with the line that ran."""
+    opening = Opening(REPO / "tables" / "system.toml", plant="kinematic", script="make_boxt")
+    with seated(opening, in_space=True) as seat:
+        seat.until("#state", "paused at cycle 0")
+        seat.press("c")
+        seat.write(f"run {CYCLES}")
+        seat.press("enter", "escape")
+        seat.until("#state", f"paused at cycle {CYCLES}")
+        seat.click("#views button[data-view=cell]")
+        now = seat.value("document.querySelector('#time [role=slider]').getAttribute('aria-valuetext')")
+        seat.choose(".table-choice", f"{re.findall(r'; task (.+) .+?,', now)[0].partition(' ')[0]} (task/")
+        seat.wait(
+            f"document.querySelector('.sheet tr.now') && document.querySelector('.view-cell')?.dataset.tick === '{CYCLES}'"
+            " && Number(document.querySelector('.view-cell')?.dataset.frames) > 1"
+        )
+        seat.value("document.querySelector('.sheet tr.now').scrollIntoView({ block: 'nearest' })")
+        seat.settled("0")
+        seat.screenshot(path)
+
+
 def main() -> None:
     """Writes the pictures."""
     PICTURES.mkdir(exist_ok=True)
+    if sys.argv[1:] == ["studio"]:
+        studio(PICTURES / "studio.png")
+        return
     for name, draw in PICTURE_OF.items():
         (PICTURES / name).write_text(draw(), encoding="utf-8")
 
