@@ -1,13 +1,16 @@
 """A first-time user in a real browser: from a table that is wrong to a run that is done, by mouse and by keyboard alone."""
 
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from rcsc.commands import run as rcsc
+from rcsc.commands.shared.cells import Drawn
 from rcsc.shell.opening import Opening
-from tests.studio.driven import Seat, dock, seated
+from tests.studio.driven import HIGH, WIDE, Seat, dock, seated
+from tests.studio.served import page, serving
 
 pytestmark = pytest.mark.needs("chromium")
 OVERLAP = ("< 2500 || tick             | 400 ", "       || tick             | 400 ")
@@ -96,3 +99,29 @@ def _looked_back(seat: Seat, last: int) -> None:
     assert seat.tick() < last
     seat.press("e")
     seat.wait(f"{now} === {last} && !{shown}.includes('line start')")
+
+
+def test_the_paper_s_part_reaches_the_pallet_and_is_looked_at_in_a_file(tmp_path: Path) -> None:
+    system = Path(__file__).parents[2] / "tables" / "system.toml"
+
+    async def inside() -> tuple[list[str], str]:
+        async with page(server) as one:
+            await one.heard("run.state", open=True)
+            await one.ask("run.go")
+            await one.heard("run.state", ended="cycle 2073: the script is at its end")
+            rows = [row["state"] for row in (await one.heard("run.rows", over=True))["rows"]]
+            last = (await one.heard("run.state", going=False))["tick"]
+            return rows, (await one.ask("share.moment", tick=last, around=3))["text"]
+
+    opening = Opening(system, plant="kinematic", script="make_boxt")
+    with serving(opening, drawer=Drawn(system)) as server:
+        rows, text = asyncio.run(inside())
+    assert len(rows) == 27
+    assert set(rows) == {"done"}
+    file = tmp_path / "pallet.html"
+    file.write_text(text, encoding="utf-8")
+    with Seat(WIDE, HIGH) as seat:
+        seat.open(file.as_uri())
+        assert seat.value("document.querySelector('#cell svg').getBoundingClientRect().height") > 100
+        assert seat.reads("#cell figcaption").startswith("drawn of tick ")
+        assert not seat.said
