@@ -408,8 +408,8 @@ class TestExecutorsThatAreSpoilt:
         return dock / "system.toml"
 
     def test_a_line_that_is_missing(self, dock: Path) -> None:
-        matched = "    return _GOTO__LINE[s.stage * 32"
-        path = self.spoilt(dock, "drive", (matched, f"    if s.waited == 9:\n        return -1\n{matched}"))
+        begun = '    """The line of table goto that matches admitted inputs: its position; -1 none, -2 several."""\n'
+        path = self.spoilt(dock, "drive", (begun, f"{begun}    if s.waited == 9:\n        return -1\n"))
         outcome = run(Episode(executor="python", orders=(UNDOCK,)), path)
         [finding] = outcome.findings
         assert (finding.property, outcome.end) == ("no state-table error", "state-table error")
