@@ -34,6 +34,8 @@ PROVER = threading.RLock()
 """Whoever proves in this process holds it: the solvers know one thread at a time."""
 MOST_OPEN = 32
 """Questions of one page that may be unanswered."""
+MOST_UNREAD = 4 * MOST_OPEN
+"""Answers and refusals that may wait for a page; one that asks on and takes none of them is given up."""
 DEEPEST_MESSAGE = 12
 
 
@@ -307,6 +309,8 @@ class Hub:
         kind = fields.text("kind")
         if number in client.open:
             raise Malformed(f"question {number} is open already")
+        if client.waiting >= MOST_UNREAD:
+            raise Malformed(f"{MOST_UNREAD} answers were not taken")
         if len(client.open) + client.waiting >= MOST_OPEN:
             client.answer(_refused(number, Code.STUDIO, f"more than {MOST_OPEN} questions at once", ()))
             return

@@ -8,6 +8,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
@@ -22,6 +23,8 @@ from rcsc.studio.hub import PROVER
 from rcsc.studio.tables.document import Document
 from rcsc.studio.tables.shown import Json, Known, document
 
+OUTDATED = 0
+"""The version of what is known of a file whose text is the same, but not that of one that it uses."""
 PROOF = "proof"
 """The lane in which texts are looked at."""
 MOST_FILES = 2_000
@@ -51,6 +54,7 @@ class Desk:
         self._open: dict[str, Document] = {}
         self._known: dict[str, Known] = {}
         self._offered: dict[tuple[str, int, int], tuple[Repair, ...]] = {}
+        self._closed: dict[str, int] = {}  # the last version of each: a number never stands for two texts
 
     # --- what there is ---
 
@@ -94,15 +98,25 @@ class Desk:
         """
         with self._lock:
             if name not in self._open:
-                path = os.path.join(self.root, *name.split("/"))
-                inside = os.path.realpath(path).startswith(self.root + os.sep)
-                if not name.endswith(".rcs") or not inside or not os.path.isfile(path):
-                    raise Refused(Code.STUDIO, f"the project has no file `{name}`")
+                path = self._path(name)
                 if len(self._open) >= MOST_OPEN:
                     self._forget()
-                self._open[name] = Document.opened(os.path.realpath(path))
+                self._open[name] = Document.opened(path)
+                self._open[name].version += self._closed.get(name, 0)
                 self._look_soon(name)
             return self._open[name]
+
+    def _path(self, name: str) -> str:
+        """Where a file is, by the one name that it has here: under two of them it would have two texts.
+
+        Raises:
+            Refused: The project has no such file.
+        """
+        path = os.path.join(self.root, *name.split("/"))
+        odd = "\0" in name or not name.endswith(".rcs")
+        if odd or name.startswith("../") or self._name(path) != name or not os.path.isfile(path):
+            raise Refused(Code.STUDIO, f"the project has no file `{name}`")
+        return os.path.realpath(path)
 
     def _forget(self) -> None:
         """Close a file that has nothing to lose.
@@ -113,9 +127,16 @@ class Desk:
         idle = next((name for name, each in self._open.items() if not each.dirty), None)
         if idle is None:
             raise Refused(Code.STUDIO, f"{MOST_OPEN} files are open and not saved", "save some of them")
-        file = self._open.pop(idle).file
+        gone = self._open.pop(idle)
+        self._closed[idle] = gone.version
         self._known.pop(idle, None)
-        self._do(PROOF, lambda: self.workspace.close(file))
+        self._do(PROOF, lambda: self._let_go(idle, gone.file))
+
+    def _let_go(self, name: str, file: str) -> None:
+        """Forget the text of a file that was closed, in the lane `proof`; not where it is open again."""
+        with self._lock:
+            if name not in self._open:
+                self.workspace.close(file)
 
     def named(self, path: str) -> str:
         """The name of a file of the project by its path.
@@ -152,6 +173,7 @@ class Desk:
                 made = make(found)
             finally:
                 if found.version != before:
+                    self._outdate(name)
                     self._look_soon(name)
                 self.show(name)
             return {"version": found.version, "made": made}
@@ -165,43 +187,70 @@ class Desk:
 
     # --- what is known ---
 
+    def _outdate(self, name: str) -> None:
+        """Let nothing be known of the open files that use one whose text is another now."""
+        changed = self._open[name].file
+        for each, known in list(self._known.items()):
+            if each != name and each in self._open and changed in known.files:
+                self._known[each] = replace(known, version=OUTDATED)
+                self.show(each)
+
+    def look_again(self, name: str) -> None:
+        """Look at a file again if others wrote into files that it uses, and that are not open."""
+        self._do(PROOF, lambda: self._look_if_outdated(name))
+
+    def _look_if_outdated(self, name: str) -> None:
+        with self._lock:
+            known, found = self._known.get(name), self._open.get(name)
+        if known is None or found is None or self.workspace.answered(os.path.normpath(found.file)):
+            return
+        with self._lock:
+            self._known[name] = replace(known, version=OUTDATED)
+            self.show(name)
+        self._look_at(name)
+
     def _look_soon(self, name: str) -> None:
         self._do(PROOF, lambda: self._look(name))
 
     def _look(self, name: str) -> None:
         """Look at a file as it is now, in the lane `proof`; other files that use it, too, where they are open."""
-        for each in [name, *self._open]:
-            known = self._known.get(each)
-            if each != name and (known is None or self._uses(each, name) is False):
-                continue
-            self._look_at(each, again=each != name)
-
-    def _uses(self, user: str, name: str) -> bool:
+        self._look_at(name)
         with self._lock:
-            if user not in self._open or name not in self._open:
-                return False
-            path, wanted = self._open[user].file, self._open[name].file
-        return any(os.path.realpath(each) == wanted for each in self.workspace.reading(path).loaded.files)
+            outdated = [each for each in self._open if each in self._known and not self._sure(each)]
+        for each in outdated:
+            self._look_at(each)
 
-    def _look_at(self, name: str, *, again: bool) -> None:
+    def _sure(self, name: str) -> bool:
+        """Whether what is known of an open file is of its text as it is."""
+        known = self._known.get(name)
+        return known is not None and known.version == self._open[name].version
+
+    def _look_at(self, name: str) -> None:
         with self._lock:
             found = self._open.get(name)
-            known = self._known.get(name)
-            if found is None or (known is not None and known.version == found.version and not again):
+            if found is None or self._sure(name):
                 return
-            version, text, file = found.version, found.text, found.file
+            texts = {each.file: (each.version, each.text) for each in self._open.values()}
+        version, file = found.version, found.file
         began = time.perf_counter()
         try:
             with PROVER:
-                self.workspace.open(file, text)
+                for path, (_, text) in texts.items():
+                    self.workspace.open(path, text)
                 answer = self.workspace.check(file, lambda: found.version == version)
-                program = self.workspace.reading(os.path.normpath(file)).nearest
+                reading = self.workspace.reading(os.path.normpath(file))
         except OutdatedError:
             return  # what changed it has the new text looked at
+        files = frozenset(map(os.path.realpath, reading.loaded.sources))
         with self._lock:
-            self._known[name] = Known(version, answer, program, time.perf_counter() - began)
+            now = {each.file: each.version for each in self._open.values() if each.file in files}
+            same = all(path in texts and texts[path][0] == each for path, each in now.items())
             self._offered = {key: each for key, each in self._offered.items() if key[0] != name}
             if name in self._open:
+                seconds = time.perf_counter() - began
+                self._known[name] = Known(
+                    version if same else OUTDATED, answer, reading.nearest, seconds, files
+                )
                 self.show(name)
 
     def known(self, name: str, version: int) -> Known:
@@ -211,12 +260,22 @@ class Desk:
             Refused: It is another one by now.
         """
         self.at(name, version)
-        self._look_at(name, again=False)
-        known = self._known.get(name)
-        self.at(name, version)
-        if known is None or known.version != version:
-            raise Refused(Code.STUDIO, CHANGED)
-        return known
+        self._look_if_outdated(name)
+        self._look_at(name)
+        return self.still_known(name, version)
+
+    def still_known(self, name: str, version: int) -> Known:
+        """What is known of the text that a page has seen, and of all that it uses as that is now.
+
+        Raises:
+            Refused: One of them is another by now.
+        """
+        with self._lock:
+            self.at(name, version)
+            known = self._known.get(name)
+            if known is None or not self._sure(name):
+                raise Refused(Code.STUDIO, "a text was changed meanwhile: nothing was done")
+            return known
 
     def checked(self, name: str, version: int) -> Checked:
         """The program of the text that a page has seen, in the lane `proof`.

@@ -23,6 +23,8 @@ MOST_BYTES = 2 * MIB
 """Of a file that is opened."""
 MOST_STEPS = 1_000
 """Steps that can be undone."""
+MOST_KEPT = 8 * MOST_BYTES
+"""Characters of steps that can be undone; the last one is always kept."""
 TYPING_S = 1.5
 """Letters that are typed within so long of each other are undone together."""
 BOM = b"\xef\xbb\xbf"
@@ -130,7 +132,7 @@ class Document:
             self._done[-1] = Step(last.start, last.old, last.new + made.new, what)
         else:
             self._done.append(made)
-            del self._done[:-MOST_STEPS]
+            del self._done[: _too_many(self._done)]
         self._typed_s = now if _typed(made) else 0.0
         self._undone.clear()
         self._set(text)
@@ -179,6 +181,20 @@ class Document:
 
     # --- the disk ---
 
+    def _raw(self, text: str) -> bytes:
+        return (BOM if self.disk.startswith(BOM) else b"") + text.replace("\n", self.end).encode()
+
+    def bytes_of(self, text: str) -> int:
+        """How long the file would be with a text.
+
+        Raises:
+            Refused: No file can hold it.
+        """
+        try:
+            return len(self._raw(text))
+        except UnicodeEncodeError as error:
+            raise Refused(Code.STUDIO, "the text has half a character, which no file can hold") from error
+
     def on_disk(self) -> str:
         """How the disk is: `same` as known here, `changed` by others, or `gone`."""
         try:
@@ -195,6 +211,8 @@ class Document:
         Raises:
             Refused: Others changed the file meanwhile, or it cannot be written.
         """
+        if os.path.realpath(self.file) != self.file:  # it was none when it was opened, and may lead anywhere
+            raise Refused(Code.STUDIO, f"{os.path.basename(self.file)} is a link now: nothing was written")
         disk = self.on_disk()
         if disk != "same" and not over:
             how = "was changed on disk since it was read" if disk == "changed" else "is no longer on disk"
@@ -206,7 +224,7 @@ class Document:
         laid_out = formatted(Source(self.file, self.text), "\n")
         if laid_out is not None:
             self.replace(laid_out, "lay out")
-        raw = (BOM if self.disk.startswith(BOM) else b"") + self.text.replace("\n", self.end).encode()
+        raw = self._raw(self.text)
         try:
             write_atomically(Path(self.file), raw)
         except OSError as error:
@@ -232,6 +250,17 @@ def plain(text: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def _too_many(steps: Sequence[Step]) -> int:
+    """How many of the first steps are to be forgotten."""
+    kept, left = 0, MOST_KEPT
+    for each in reversed(steps[-MOST_STEPS:]):
+        left -= len(each.old) + len(each.new)
+        if left < 0 and kept:
+            break
+        kept += 1
+    return len(steps) - kept
+
+
 def _typed(made: Step) -> bool:
     return not made.old and len(made.new) == 1 and made.new not in "\n|"
 
@@ -244,6 +273,8 @@ def _joins(last: Step, made: Step) -> bool:
 
 
 def _read(file: str) -> bytes:
+    if os.path.realpath(file) != file:
+        raise Refused(Code.STUDIO, f"{os.path.basename(file)} is a link now, to another file")
     try:
         return content(Path(file), MOST_BYTES)
     except OSError as error:

@@ -16,6 +16,8 @@ from rcsc.studio.tables.desk import Desk
 from rcsc.studio.tables.document import MOST_BYTES, Document, plain
 
 MOST_EDITS = 1_000
+MOST_NEW = 200
+"""Lines that a paste may add: each is read back from the text."""
 MOST_LINES = 1_000_000
 """Lines and columns of a text that a page may name."""
 
@@ -56,6 +58,7 @@ class Tables:
         if disk == "changed" and not found.dirty:
             self._desk.change(name, lambda each: each.take_disk())
             disk = "same"
+        self._desk.look_again(name)
         return self._desk.show(name) | {"disk": disk}
 
     def _changed(self, ask: Ask, make: Callable[[Document], tuple[str, str]]) -> Json:
@@ -66,8 +69,8 @@ class Tables:
         def change(found: Document) -> object:
             self._desk.at(name, version)
             text, what = make(found)
-            if len(text) > MOST_BYTES:
-                raise Refused(Code.STUDIO, f"a text of more than {MOST_BYTES} characters")
+            if found.bytes_of(text) > MOST_BYTES:
+                raise Refused(Code.STUDIO, f"a text of more than {MOST_BYTES} bytes")
             return found.replace(text, what)
 
         return self._desk.change(name, change)
@@ -91,6 +94,9 @@ class Tables:
         what = "write a cell" if len(rows) == 1 and len(rows[0]) == 1 else "paste"
 
         def make(found: Document) -> tuple[str, str]:
+            many, _ = _lines_of(found.text, table)
+            if line > many or line + len(rows) > many + MOST_NEW:
+                raise Refused(Code.STUDIO, f"table `{table}` has {many} lines, and takes {MOST_NEW} at once")
             text = _longer(found.text, table, line + len(rows))
             changes = [
                 (cells.Place(line + down, column + right), new)

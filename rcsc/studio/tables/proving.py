@@ -78,7 +78,7 @@ class Proof:
         [file] = files
 
         def make(found: Document) -> object:
-            self._desk.at(name, version)
+            self._desk.still_known(name, version)
             return found.replace(found.edited(chosen.edits), chosen.title)
 
         return self._desk.change(file, make)
@@ -129,7 +129,7 @@ class Graphs:
     def __init__(self, desk: Desk) -> None:
         """Args: desk: The open files."""
         self._desk = desk
-        self._kept: dict[tuple[str, int, str, str], tuple[Derived, Chart]] = {}
+        self._kept: dict[tuple[str, int, str, str], tuple[Program, Derived, Chart]] = {}
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
@@ -177,24 +177,18 @@ class Graphs:
     def _derived(self, ask: Ask, name: str, version: int, table_name: str) -> tuple[Derived, Chart]:
         state = ask.body.text("state", "")
         key = (name, version, table_name, state)
-        self._desk.at(name, version)
-        if key not in self._kept:
-            checked = self._desk.checked(name, version)
-            program, table = _table_of(checked.reading.program, table_name, ask)
+        checked = self._desk.checked(name, version)
+        program, table = _table_of(checked.reading.program, table_name, ask)
+        if key not in self._kept or self._kept[key][0] is not program:  # files that it uses may have changed
+            file = _file_of(checked.reading.loaded.files, table)
             with PROVER:
-                derived = derive(
-                    program,
-                    table,
-                    _file_of(checked.reading.loaded.files, table),
-                    self._desk.workspace.options,
-                    state,
-                )
+                derived = derive(program, table, file, self._desk.workspace.options, state)
             if isinstance(derived, Diagnostic):
                 raise Refused(derived.code, derived.message, *derived.help)
-            self._kept[key] = derived, folded(derived.graph)
+            self._kept[key] = program, derived, folded(derived.graph)
             for old in list(self._kept)[:-MOST_GRAPHS]:
                 del self._kept[old]
-        return self._kept[key]
+        return self._kept[key][1:]
 
     def _draw(self, ask: Ask) -> Json:
         """Add a line that leads from a state to another; its name, and where it stands."""

@@ -28,12 +28,14 @@ class Known:
         version: Of the document that has it.
         program: What it resolves to, or what is left of it.
         seconds: How long it took.
+        files: The real paths of all that was read for it.
     """
 
     version: int
     answer: Answer
     program: Program | None
     seconds: float
+    files: frozenset[str]
 
 
 def document(name: str, open_file: Document, known: Known | None) -> Json:

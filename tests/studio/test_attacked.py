@@ -1,0 +1,230 @@
+"""What a page, or somebody beside it, may try with open files: nothing hangs, grows, leaves the project, or is said of an older text."""
+
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rcsc.diagnostics.source import Source
+from rcsc.editor.repairs import formatted
+from rcsc.host.files.read import Malformed
+from rcsc.shell.reload.refusal import Refused
+from rcsc.studio.hub import MOST_OPEN, MOST_UNREAD, Client, Hub
+from rcsc.studio.tables import desk
+from rcsc.studio.tables.document import MOST_BYTES, MOST_KEPT, Document
+from tests.studio.tabled import Bench, rows
+
+WORDS = "enum mode { off, on, stuck }\n"
+TABLE = """use words
+
+input now : mode
+output out : int 0 .. 3
+table t {
+  | line | now    || out |
+  |------|--------||-----|
+  | a    | off    || 1   |
+  | b    | /= off || 2   |
+}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "rcsc.toml").touch()
+    (tmp_path / "words.rcs").write_text(WORDS)
+    (tmp_path / "t.rcs").write_text(TABLE)
+    return tmp_path
+
+
+@pytest.fixture
+def bench(folder: Path) -> Bench:
+    return Bench(folder / "system.toml")
+
+
+def state(doc: Any) -> str:
+    return str(doc["tables"][0]["standing"]["state"])
+
+
+def edit(text: str, line: int = 0, start: int = 0, end: int = 0) -> dict[str, Any]:
+    return {
+        "edits": [
+            {"start_line": line, "start_column": start, "end_line": line, "end_column": end, "text": text}
+        ]
+    }
+
+
+# --- nothing is said of an older text --------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["of", "off }", "off, on, stuck } ?? {", "", "aus, off"])
+def test_users_of_a_file_that_changes_are_stale_at_once_and_looked_at_again(text: str, bench: Bench) -> None:
+    """Whether the used file still parses or not; and proved again when it is as it was."""
+    assert state(bench.open("t.rcs")) == "proved"
+    bench.open("words.rcs")
+    version = bench.doc("words.rcs")["version"]
+    bench.ask("tables.edit", file="words.rcs", version=version, **edit(text, 0, 12, 15))
+    shown = bench.told["tables.file/t.rcs"]
+    assert (state(shown), shown["known"]) == ("stale", False)
+    now = bench.doc("t.rcs")
+    assert now["known"]
+    assert (state(now) == "proved") == (text == "aus, off")
+    bench.ask("tables.undo", file="words.rcs")
+    assert not bench.told["tables.file/t.rcs"]["known"]
+    assert state(bench.doc("t.rcs")) == "proved"
+
+
+@pytest.mark.parametrize("text", ["enum mode { of, on, stuck }\n", "enum {\n", None])
+def test_a_used_file_that_others_change_on_disk_is_seen_when_its_user_is_asked_for(
+    text: str | None, folder: Path, bench: Bench
+) -> None:
+    doc = bench.open("t.rcs")
+    assert state(doc) == "proved"
+    words = folder / "words.rcs"
+    words.unlink() if text is None else words.write_text(text)
+    with pytest.raises(Refused, match="not in order"):
+        bench.ask("proof.filter", file="t.rcs", version=doc["version"], table="t", condition="now = on")
+    words.write_text(WORDS)
+    assert state(bench.open("t.rcs")) == "proved"
+    words.unlink() if text is None else words.write_text(text)
+    assert state(bench.open("t.rcs")) != "proved"
+
+
+def test_a_check_that_outlives_a_text_it_used_is_not_shown_as_known(bench: Bench) -> None:
+    """The used file changes while its user is looked at."""
+    bench.open("words.rcs")
+    bench.ask("tables.open", file="t.rcs")
+    check = bench.desk.workspace.check
+
+    def slow(*given: Any) -> Any:
+        bench.desk.workspace.check = check  # type: ignore[method-assign]  # once
+        answer = check(*given)
+        bench.ask("tables.edit", file="words.rcs", version=1, **edit("of", 0, 12, 15))
+        return answer
+
+    bench.desk.workspace.check = slow  # type: ignore[method-assign,assignment]  # a text that changes then
+    bench.desk._look_at("t.rcs")
+    assert not bench.told["tables.file/t.rcs"]["known"]
+    assert state(bench.doc("t.rcs")) != "proved"
+
+
+def test_a_version_never_stands_for_two_texts(
+    folder: Path, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file is let go for others, changed by somebody, and opened again: what a page has seen is another text."""
+    monkeypatch.setattr(desk, "MOST_OPEN", 1)
+    before = bench.open("t.rcs")
+    bench.open("words.rcs")
+    (folder / "t.rcs").write_text(TABLE.replace("/= off", "on    "))
+    with pytest.raises(Refused, match="meanwhile"):
+        bench.ask("tables.line", file="t.rcs", version=before["version"], table="t", at=0)
+    after = bench.open("t.rcs")
+    assert after["version"] > before["version"]
+    assert state(after) == "failed"
+
+
+def test_a_graph_follows_the_files_that_its_table_uses(tmp_path: Path) -> None:
+    (tmp_path / "rcsc.toml").touch()
+    words = "enum mode { idle, busy, done }\n"
+    (tmp_path / "words.rcs").write_text(words)
+    (tmp_path / "t.rcs").write_text(
+        "use words\n\nstate cur : mode = idle\ntable t {\n  | line | cur || procedures |\n  |---|---||---|\n"
+        "  | a | idle || cur := busy |\n  | b | /= idle || cur := idle |\n}\n"
+    )
+    bench = Bench(tmp_path / "system.toml")
+    doc = bench.open("t.rcs")
+    asked = {"file": "t.rcs", "version": doc["version"], "table": "t"}
+    assert "done" in bench.ask("graph.show", **asked)["states"]
+    bench.open("words.rcs")
+    bench.change("tables.edit", "words.rcs", **edit("over", 0, 24, 28))
+    bench.look()
+    assert "over" in bench.ask("graph.show", **asked)["states"]
+
+
+# --- nothing hangs, nor grows without bound --------------------------------------------------
+
+
+@pytest.mark.parametrize(("line", "many"), [(999_999, 1), (3, 1), (0, 5_000), (1_000_000, 1)])
+def test_a_paste_far_below_a_table_is_refused(line: int, many: int, bench: Bench) -> None:
+    doc = bench.open("t.rcs")
+    with pytest.raises(Refused, match="has 2 lines"):
+        bench.change("tables.cells", "t.rcs", table="t", line=line, column=0, rows=rows(*[["on"]] * many))
+    assert bench.doc("t.rcs")["text"] == doc["text"]
+
+
+def test_what_can_be_undone_is_bounded_by_what_it_holds(folder: Path) -> None:
+    found = Document.opened(os.path.realpath(folder / "t.rcs"))
+    for at in range(40):
+        found.replace(f"# {at}" + "xy"[at % 2] * (MOST_BYTES - 10), "paste")
+    held = sum(len(each.old) + len(each.new) for each in found._done)
+    assert MOST_KEPT // 2 < held <= MOST_KEPT
+    last = found.text
+    found.undo()
+    found.redo()
+    assert found.text == last
+
+
+def test_a_page_that_asks_on_and_takes_no_answer_is_given_up() -> None:
+    hub, client = Hub(lambda work: work()), Client(lambda: None)
+    hub.enter(client)
+    for number in range(1, MOST_UNREAD + 1):
+        hub.ask(client, {"id": number, "kind": "nobody.answers"})
+    assert client.waiting == MOST_UNREAD > MOST_OPEN
+    with pytest.raises(Malformed):
+        hub.ask(client, {"id": MOST_UNREAD + 1, "kind": "nobody.answers"})
+
+
+# --- nothing leaves the project, nothing is lost ---------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["./t.rcs", "a/../t.rcs", "t.rcs/", "//t.rcs", "t\0.rcs", "again.rcs"])
+def test_a_file_has_one_name(name: str, folder: Path, bench: Bench) -> None:
+    """Under a second one it would have a second text."""
+    (folder / "a").mkdir()
+    (folder / "again.rcs").symlink_to("t.rcs")
+    with pytest.raises(Refused, match="no file"):
+        bench.ask("tables.open", file=name)
+
+
+@pytest.mark.parametrize("how", ["file", "folder"])
+def test_a_file_that_becomes_a_link_is_neither_read_nor_written(
+    how: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    (tmp_path / "rcsc.toml").touch()
+    (tmp_path / "in").mkdir()
+    inside = tmp_path / "in" / "words.rcs"
+    inside.write_text(WORDS)
+    outside = tmp_path_factory.mktemp("outside") / "words.rcs"
+    outside.write_text(WORDS)  # the very same, so that the disk looks as it was
+    bench = Bench(tmp_path / "system.toml")
+    bench.open("in/words.rcs")
+    doc = bench.change("tables.edit", "in/words.rcs", **edit("# mine\n"))
+    if how == "file":
+        inside.unlink()
+        inside.symlink_to(outside)
+    else:
+        shutil.rmtree(inside.parent)
+        inside.parent.symlink_to(outside.parent)
+    for kind, more in (("save", {}), ("save", {"over": True}), ("take", {})):
+        with pytest.raises(Refused, match="link"):
+            bench.ask(f"tables.{kind}", file="in/words.rcs", **more)
+    assert outside.read_text() == WORDS
+    assert bench.doc("in/words.rcs")["text"] == doc["text"]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize(
+    "more", ["\ud800", "# \udfff\n", "é" * (MOST_BYTES // 2), "# \n" * (MOST_BYTES // 3)]
+)
+def test_a_text_that_no_file_could_hold_is_never_taken(
+    more: str, end: str, folder: Path, bench: Bench
+) -> None:
+    """Else it could not be saved, or not be opened again."""
+    (folder / "t.rcs").write_text(TABLE, newline=end)
+    doc = bench.open("t.rcs")
+    with pytest.raises(Refused):
+        bench.change("tables.edit", "t.rcs", **edit(more))
+    assert bench.doc("t.rcs")["text"] == doc["text"]
+    assert formatted(Source("", doc["text"]), "\n")
+    bench.ask("tables.save", file="t.rcs")
