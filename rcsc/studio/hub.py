@@ -146,13 +146,15 @@ class Concern(Protocol):
 
 
 class Lane:
-    """One thread that does what it is given, in order of when it is due, until the process ends."""
+    """One thread that does what it is given, in order of when it is due, until it is ended."""
 
     def __init__(self, name: str) -> None:
         self._changed = threading.Condition()
         self._work: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
-        threading.Thread(target=self._run, name=name, daemon=True).start()
+        self._ended = False
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
 
     def do(self, work: Callable[[], None], after_s: float = 0.0) -> None:
         """Have something done after all that is due before.
@@ -165,17 +167,29 @@ class Lane:
             heapq.heappush(self._work, (time.monotonic() + after_s, next(self._numbers), work))
             self._changed.notify()
 
-    def _next(self) -> Callable[[], None]:
+    def end(self) -> None:
+        """Begin nothing more; what is being done goes on to its end."""
+        with self._changed:
+            self._ended = True
+            self._changed.notify()
+
+    def ended(self, within_s: float) -> bool:
+        """Wait for the end of what is being done, at most so many seconds; whether it has come."""
+        self._thread.join(within_s)
+        return not self._thread.is_alive()
+
+    def _next(self) -> Callable[[], None] | None:
         with self._changed:
             while True:
+                if self._ended:
+                    return None
                 wait_s = self._work[0][0] - time.monotonic() if self._work else None
                 if wait_s is not None and wait_s <= 0:
                     return heapq.heappop(self._work)[2]
                 self._changed.wait(wait_s)
 
     def _run(self) -> None:
-        while True:
-            work = self._next()
+        while (work := self._next()) is not None:
             try:
                 work()
             except Exception:  # noqa: BLE001  # the next in the lane must be done all the same
@@ -291,6 +305,12 @@ class Hub:
             self.leave(client)
         for concern in self._concerns:
             concern.close()
+        for lane in self._lanes.values():
+            lane.end()
+
+    def ended(self, within_s: float) -> bool:
+        """Wait for the end of what is being done after `close`, in each lane at most so many seconds; whether it has come."""
+        return all(lane.ended(within_s) for lane in list(self._lanes.values()))
 
     # --- questions ---
 

@@ -39,6 +39,9 @@ def serving(
         server.stop()
         thread.join(PATIENCE_S)
         assert not thread.is_alive()
+        assert server.hub.ended(PATIENCE_S), (
+            "a thread that still proves would ask the solver beside the next test"
+        )
 
 
 async def until(holds: Callable[[], object]) -> None:
