@@ -28,9 +28,10 @@ from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
-from tests.bench import drawn, executors, families, loop
-from tests.bench.families import Fault
-from tests.bench.peers import PEERS, python_bitset
+from tests.bench import drawn, executors, loop
+from tests.bench.made import families
+from tests.bench.made.families import Fault
+from tests.bench.made.peers import PEERS, python_bitset
 from tests.bench.proofs import compiled, limited
 
 REPO = Path(__file__).parents[2]

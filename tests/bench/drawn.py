@@ -20,8 +20,9 @@ from rcsc.host.files import write_atomically
 from rcsc.lang.model import Program, Table
 from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
-from tests.bench import executors, families
-from tests.bench.peers import installed
+from tests.bench import executors
+from tests.bench.made import families
+from tests.bench.made.peers import installed
 from tests.bench.proofs import compiled, limited
 
 if TYPE_CHECKING:

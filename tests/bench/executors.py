@@ -27,7 +27,7 @@ from rcsc.lang.project import load
 from rcsc.lang.resolve import compile_text, resolve
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
-from tests.bench import families
+from tests.bench.made import families
 
 INPUTS = 512
 DRAWN = 8192

@@ -18,9 +18,9 @@ from rcsc.lang.syntax.parse import parse
 from rcsc.solvers.options import Options
 from rcsc.table.certificate import program_certificate
 from rcsc.table.decide import prove_table
-from tests.bench import families
-from tests.bench.families import Fault
-from tests.bench.peers import installed
+from tests.bench.made import families
+from tests.bench.made.families import Fault
+from tests.bench.made.peers import installed
 
 SIZES = ((16, 7), (64, 7), (256, 7), (256, 20), (1024, 20), (1024, 50), (4096, 20))
 LARGE = ((16384, 20), (16384, 50))

@@ -20,7 +20,7 @@ from rcsc.testing.agree import NONE, SEVERAL, AgreementCount, line_number, run_l
 from rcsc.testing.executors.symbols import symbols_of
 from rcsc.testing.matchers.matcher import Checked, check_matcher
 from tests.bench.executors import c_counts
-from tests.bench.families import Fault, box, linear
+from tests.bench.made.families import Fault, box, linear
 from tests.emit.test_agreement import executors_of
 from tests.support.programs.stages import emitted, program_of
 

@@ -9,7 +9,7 @@ from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Settings
 from rcsc.host.memory import last_work, uncollected
 from rcsc.table.decide import prove_table
-from tests.bench import families
+from tests.bench.made import families
 from tests.support.programs.stages import BOXES, program_of
 
 

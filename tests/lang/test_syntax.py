@@ -25,7 +25,7 @@ from rcsc.lang.syntax.parse import MOST_ERRORS, made_tables, parse
 from rcsc.lang.syntax.rows import PIECES, Side
 from rcsc.lang.syntax.spell import spell_expr
 from rcsc.solvers.options import Options
-from tests.bench import families
+from tests.bench.made import families
 from tests.support.programs.arbitrary import expressions, files, tables
 from tests.support.programs.stages import program_of, reported, shipped
 from tests.support.programs.texts import parted_and_broken

@@ -1,1 +1,1 @@
-"""What is shown of a run to people: pages, pictures, exports."""
+"""What is shown to people: of a run, pages, pictures, exports; of what rcsc costs, the drawing."""

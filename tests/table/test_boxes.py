@@ -25,7 +25,7 @@ from rcsc.table.program import prove_program
 from rcsc.table.regions import holes, partition
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
-from tests.bench import families
+from tests.bench.made import families
 from tests.support.programs.stages import BOXES, drawn_program, program_of
 from tests.support.programs.texts import table as table_text
 

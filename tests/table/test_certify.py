@@ -28,7 +28,7 @@ from rcsc.lang.resolve import compile_text
 from rcsc.solvers.options import Options
 from rcsc.solvers.smtlib import cvc5_says
 from rcsc.table.program import prove_program
-from tests.bench import families
+from tests.bench.made import families
 from tests.certificates import Attack, signed, wrong_with
 from tests.support.programs.examples import EXTERN, RICH
 from tests.support.programs.stages import program_of, shipped

@@ -68,7 +68,7 @@ from rcsc.table.regions.region import (
 )
 from rcsc.table.regions.splitting import Tree
 from rcsc.table.verdict import Gap, Overlap
-from tests.bench import families
+from tests.bench.made import families
 from tests.support.programs.stages import BOXES, verdict_of
 from tests.support.programs.stages import program_of as compiled
 
