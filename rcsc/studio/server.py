@@ -25,6 +25,8 @@ HEARTBEAT_S = 20.0
 """After which a page that does not answer is given up."""
 GOODBYE_S = 0.4
 """A page that does not answer is waited for no longer when the studio ends."""
+LAST_S = 3.0
+"""What is being done in a lane when the studio ends is waited for no longer."""
 TYPES = {
     ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".json": "application/json", ".svg": "image/svg+xml",
 }  # fmt: skip
@@ -114,6 +116,9 @@ class Server:
             for talk in self._talks:
                 talk.cancel()
             await runner.cleanup()
+            await asyncio.to_thread(
+                self.hub.ended, LAST_S
+            )  # who ends while a process begins leaves that without a parent
 
     # --- requests ---
 
