@@ -193,17 +193,27 @@ def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
     Raises:
         NotConfirmedError: They are not, or the solver gave up.
     """
-    if not all(_impossible(question) for question in _questions(asked, clauses)):
-        raise NotConfirmedError
+    left = _not_refuted(_questions(asked, clauses))
+    if left:  # what Z3 gives up may be refuted at once in a solver of its own, whose terms were made in another order
+        again = (question for at, question in enumerate(_questions(asked, clauses)) if at in left)
+        if _not_refuted(again):
+            raise NotConfirmedError
 
 
-def _impossible(question: Solver) -> bool:
-    """Return whether Z3 refutes the question; asked once more where it gave up, for it keeps what it learnt until then.
+def _not_refuted(questions: Iterable[Solver]) -> set[int]:
+    """Return the positions of the questions that Z3 gave up.
 
-    A question of a tool changer's level was given up after 80 million steps, and refuted by 13 thousand more.
+    Raises:
+        NotConfirmedError: It answers one.
     """
-    answer = question.check()
-    return (question.check() if answer is Answer.UNKNOWN else answer) is Answer.UNSATISFIABLE
+    left = set[int]()
+    for at, question in enumerate(questions):
+        answer = question.check()
+        if answer is Answer.SATISFIABLE:
+            raise NotConfirmedError
+        if answer is Answer.UNKNOWN:
+            left.add(at)
+    return left
 
 
 def _questions(asked: Confirmation, clauses: Sequence[Clause]) -> Iterable[Solver]:
