@@ -52,11 +52,6 @@ PARTS = (
         },
         {"from 'three'": "from './three.module.js'"},
     ),
-    Part(
-        "@dagrejs/dagre", "3.1.3", "MIT",
-        "sha512-X4aUTwOReZvthaZWOVHqlJ52/ZdhZFEM4+Lh/uR4XooUSLE6p71bcy7MPGzYnNUcNh+nj+i/qJQpCMIdQnSmrg==",
-        {"LICENSE": "dagre/LICENSE", "dist/dagre.esm.js": "dagre/dagre.js"},
-    ),
 )  # fmt: skip
 
 
