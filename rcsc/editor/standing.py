@@ -15,6 +15,7 @@ from rcsc.editor.values import Standing, State
 from rcsc.lang.model import Standing as Declared
 
 BEING_PROVED = Standing(State.STALE, "it is being proved as it is now")
+GIVEN_UP = Standing(State.FAILED, "a bug in rcsc: nothing is proved of it as it is now")
 NEVER_LOOKED_AT = Standing(State.STALE, "the program that it belongs to is not in order")
 
 

@@ -1,5 +1,6 @@
 """What an editor is answered: plain frozen values, with places as lines and columns."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -183,6 +184,7 @@ class Answer:
         tables: Those that the file itself declares, in order.
         whole: Whether the text is in order, so that `rcsc check` comes to verdicts.
         final: Whether nothing is left open that takes longer; what is, is not told as yet, and its table is stale.
+        texts: The texts that it points into, by path: what stands at a place now may be another's.
     """
 
     file: str
@@ -190,3 +192,4 @@ class Answer:
     tables: tuple[Grid, ...]
     whole: bool
     final: bool = True
+    texts: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)

@@ -5,7 +5,9 @@ Nothing is kept on disk, and the cache of earlier runs is not asked: what is typ
 """
 
 import os
+import sys
 import time
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -13,7 +15,7 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Severity, WitnessColumn, sort_key
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, WitnessColumn, sort_key
 from rcsc.diagnostics.report import TableReport, resting
 from rcsc.diagnostics.source import Source, Span
 from rcsc.driver.proofs import table_report
@@ -22,7 +24,7 @@ from rcsc.editor.memo import Memo, OutdatedError
 from rcsc.editor.places import Area, Lines, difference
 from rcsc.editor.recovery import Rest, rest_of
 from rcsc.editor.repairs import with_proposal, with_spelling
-from rcsc.editor.standing import BEING_PROVED, standing
+from rcsc.editor.standing import BEING_PROVED, GIVEN_UP, standing
 from rcsc.editor.values import Answer, Finding, Repair, Standing, Witness, WitnessLine
 from rcsc.editor.written import WrittenTable, tables_of
 from rcsc.host.memory import uncollected
@@ -210,6 +212,26 @@ class Workspace:
                 return self._answer(path, checked)
             return _answer(path, checked, final=False)
 
+    def given_up(self, file: str, error: Exception) -> Answer:
+        """The answer where a bug in rcsc came in the way of one: a finding that says so, and tables that nobody has proved.
+
+        Args:
+            file: As for `check`; its text, which may be at fault, is only split into tables.
+            error: Is printed, too.
+        """
+        traceback.print_exception(error, file=sys.stderr)
+        path = os.path.normpath(os.path.abspath(file))
+        told = Diagnostic(
+            Code.INTERNAL,
+            f"a bug in rcsc: {type(error).__name__} as it looked at this file",
+            Label(Span(path, 0, 0)),
+            help=("undo the last change and make it in another way; please report it with the text",),
+        )
+        texts = {path: self._overlay.get(os.path.realpath(path), "")}
+        files = _Files({path: Source(path, texts[path])})
+        tables = tuple(grids(path, files.of(path), None, lambda _: GIVEN_UP))
+        return Answer(path, (_finding(files, told, meanwhile=False),), tables, whole=False, texts=texts)
+
     def _answer(self, path: str, checked: Checked) -> Answer:
         known = self._answers.get(path)
         if known is None or known[0] is not checked:
@@ -305,7 +327,13 @@ class Workspace:
     def repairs(self, finding: Finding) -> tuple[Repair, ...]:
         """Repairs of a finding, each made and checked: with it the finding is gone, and no other has come."""
         checked = next(
-            (c for c in self._checked.values() if finding.told in (*c.diagnostics, *c.meanwhile)), None
+            (
+                each
+                for path, each in self._checked.items()
+                if finding.told in (*each.diagnostics, *each.meanwhile)
+                and each.reading is self.reading(path)  # in an older text the same stood elsewhere
+            ),
+            None,
         )
         if checked is None or not finding.mendable:
             return ()
@@ -435,7 +463,8 @@ def _answer(path: str, checked: Checked, *, final: bool = True) -> Answer:
         return standing(report, inside, broken)
 
     tables = tuple(grids(path, files.of(path), reading.nearest, standing_of))
-    return Answer(path, findings, tables, reading.program is not None, final)
+    texts = {file: source.text for file, source in reading.sources.items()}
+    return Answer(path, findings, tables, reading.program is not None, final, texts)
 
 
 def _first(error: Finding) -> str:

@@ -1,5 +1,6 @@
 """A repair, applied, is a text of which a check that knows nothing of it says what the repair says."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -186,3 +187,24 @@ def test_a_repair_that_does_not_mend_is_not_offered(monkeypatch: pytest.MonkeyPa
     ):
         monkeypatch.setattr(module, "with_proposal", lambda _source, _proposal, text=wrong: text)
         assert mended(Workspace(), "/nowhere/a.rcs", written) == []
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_repair_is_of_the_text_as_it_is_not_of_an_older_one(what: str, tmp_path: Path) -> None:
+    """A file that two use was checked for the first of them before it was typed into, and for the other since."""
+    text = text_of(WRONG[what])
+    for name in ("one", "other"):
+        (tmp_path / f"{name}.rcs").write_text("use t\n")
+    used, other = str(tmp_path / "t.rcs"), str(tmp_path / "other.rcs")
+    offered = 0
+    for line in re.findall(r"^  \| [a-z]+ .*\n", text, re.MULTILINE)[1:]:
+        known, new = Workspace(), Workspace()
+        known.open(used, text)
+        known.check(str(tmp_path / "one.rcs"))
+        for workspace in (known, new):
+            workspace.open(used, text.replace(line, f"  # a remark, that moves what is below\n{line}"))
+        found, _ = (workspace.check(other).findings for workspace in (known, new))
+        now = [(known.repairs(each), new.repairs(each)) for each in found]
+        assert all(of_known == of_new for of_known, of_new in now)
+        offered += sum(len(each) for each, _ in now)
+    assert offered

@@ -25,7 +25,7 @@ from rcsc.editor.places import Edit, Lines, difference
 from rcsc.editor.recovery import declarations
 from rcsc.editor.repairs import formatted
 from rcsc.editor.server.convert import Converter
-from rcsc.editor.server.session import Session
+from rcsc.editor.server.session import Session, current
 from rcsc.editor.standing import BEING_PROVED
 from rcsc.editor.values import Grid
 from rcsc.editor.written import joined_cells, table_of
@@ -94,8 +94,9 @@ def _names(server: LanguageServer, session: Session) -> None:
         return await session.reading(_prepare, session, params)
 
     @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
+    @current
     async def renaming(params: types.RenameParams) -> types.WorkspaceEdit | None:
-        edit, told = await session.reading(_rename, session, params)
+        edit, told = await session.editing(_rename, session, params)
         if told:
             server.window_show_message(types.ShowMessageParams(types.MessageType.Warning, told))
         return edit
@@ -394,18 +395,21 @@ def _colours(session: Session, path: str) -> types.SemanticTokens:
 
 def _layout(server: LanguageServer, session: Session) -> None:
     @server.feature(types.TEXT_DOCUMENT_FORMATTING)
+    @current
     async def whole(params: types.DocumentFormattingParams) -> list[types.TextEdit]:
-        return await session.reading(_formatting, session, params.text_document)
+        return await session.editing(_formatting, session, params.text_document)
 
     @server.feature(types.TEXT_DOCUMENT_RANGE_FORMATTING)
+    @current
     async def part(params: types.DocumentRangeFormattingParams) -> list[types.TextEdit]:
-        return await session.reading(_formatting, session, params.text_document, params.range)
+        return await session.editing(_formatting, session, params.text_document, params.range)
 
     @server.feature(
         types.TEXT_DOCUMENT_ON_TYPE_FORMATTING, types.DocumentOnTypeFormattingOptions("|", ["\n"])
     )
+    @current
     async def typed(params: types.DocumentOnTypeFormattingParams) -> list[types.TextEdit]:
-        return await session.reading(_on_type, session, params)
+        return await session.editing(_on_type, session, params)
 
     for command, act in (
         ("rcsc.nextCell", keys.next_cell), ("rcsc.previousCell", keys.previous_cell), ("rcsc.addRow", keys.add_row),
@@ -454,8 +458,9 @@ def _key(server: LanguageServer, session: Session, command: str, act: "keys.Act"
     """Register a command that changes a table around a place: the edits, and where the cursor is then; null outside tables."""
 
     @server.command(command)
+    @current
     async def pressed(uri: str, position: types.Position) -> dict[str, object] | None:
-        return await session.reading(_pressed, session, uri, position, act)
+        return await session.editing(_pressed, session, uri, position, act)
 
 
 def _pressed(

@@ -3,12 +3,8 @@
 In: requests. Out: the protocol's answers. One that is outdated is told so, and asked again by the client.
 """
 
-from collections.abc import Awaitable, Callable
-from functools import wraps
-from typing import ParamSpec, TypeVar
-
 from lsprotocol import types
-from pygls.exceptions import JsonRpcContentModified, JsonRpcException
+from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 
 from rcsc.editor.lenses import Shown, drawn, mended, proved_anew, witness_run
@@ -16,33 +12,18 @@ from rcsc.editor.memo import OutdatedError
 from rcsc.editor.names.about import share_text
 from rcsc.editor.places import Lines, difference
 from rcsc.editor.server.convert import Converter
-from rcsc.editor.server.session import Session
+from rcsc.editor.server.session import Session, current
 from rcsc.editor.values import Answer, Finding, Grid
 
 MOST_ACTIONS = 12
 """Repairs offered at one place: each is checked first."""
 FIX_ALL = "source.fixAll.rcsc"
-P = ParamSpec("P")
-T = TypeVar("T")
 
 
 class CancelledError(JsonRpcException):
     """The server gives an answer up that is outdated; the client asks again."""
 
     CODE = -32802
-
-
-def current(ask: Callable[P, Awaitable[T]]) -> Callable[P, Awaitable[T]]:
-    """Tell the client that an answer is outdated, where it is."""
-
-    @wraps(ask)
-    async def asked(*args: P.args, **kwargs: P.kwargs) -> T:
-        try:
-            return await ask(*args, **kwargs)
-        except OutdatedError as outdated:
-            raise JsonRpcContentModified("the text has changed meanwhile") from outdated
-
-    return asked
 
 
 def register(server: LanguageServer, session: Session) -> None:
@@ -54,8 +35,7 @@ def register(server: LanguageServer, session: Session) -> None:
 
 def converter_of(session: Session, answer: Answer) -> Converter:
     """Places of all texts that an answer points into."""
-    reading = session.workspace.reading(answer.file)
-    return session.converter({file: source.text for file, source in reading.sources.items()})
+    return session.converter(answer.texts)
 
 
 def by_file(answer: Answer) -> dict[str, list[Finding]]:
@@ -185,23 +165,27 @@ def _lenses(server: LanguageServer, session: Session) -> None:
         return list(_shares(converter_of(session, answer), answer, params.range))
 
     @server.command("rcsc.prove")
+    @current
     async def prove(uri: str, table: str) -> dict[str, object]:
         reading = session.workspace.reading(session.path(uri))
         return _show(server, session, await session.proving(proved_anew, reading, table, session.options))
 
     @server.command("rcsc.graph")
+    @current
     async def graph(uri: str, table: str, *more: str) -> dict[str, object]:
         form = more[0] if more else ""
         reading = session.workspace.reading(session.path(uri))
         return _show(server, session, await session.proving(drawn, reading, table, session.options, form))
 
     @server.command("rcsc.witness")
+    @current
     async def witness(uri: str, table: str, *more: int) -> dict[str, object]:
         which = int(more[0]) if more else 0
         path = session.path(uri)
         return _show(server, session, await session.proving(_witness, session, path, table, which))
 
     @server.command("rcsc.status")
+    @current
     async def status(uri: str) -> dict[str, object]:
         return status_of(session, await session.final(session.path(uri)))
 

@@ -10,7 +10,10 @@ import os
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import wraps
 from typing import ParamSpec, TypeVar
+
+from pygls.exceptions import JsonRpcContentModified
 
 from rcsc.editor.memo import OutdatedError
 from rcsc.editor.names.find import Names
@@ -24,6 +27,19 @@ RESTS_S = 0.08
 """How long keys rest before anything is checked, in seconds."""
 P = ParamSpec("P")
 T = TypeVar("T")
+
+
+def current(ask: Callable[P, Awaitable[T]]) -> Callable[P, Awaitable[T]]:
+    """Tell the client that an answer is outdated, where it is."""
+
+    @wraps(ask)
+    async def asked(*args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            return await ask(*args, **kwargs)
+        except OutdatedError as outdated:
+            raise JsonRpcContentModified("the text has changed meanwhile") from outdated
+
+    return asked
 
 
 @dataclass(slots=True)
@@ -107,8 +123,7 @@ class Session:
         Raises:
             OutdatedError: A text has changed meanwhile.
         """
-        turn = self.turn
-        return await self.proving(self.workspace.glance, path, lambda: self.turn == turn)
+        return await self._asked(self.workspace.glance, path)
 
     async def final(self, path: str) -> Answer:
         """The answer to a file as it is now, with all that it leaves open for a moment.
@@ -116,8 +131,19 @@ class Session:
         Raises:
             OutdatedError: A text has changed meanwhile.
         """
+        return await self._asked(self.workspace.check, path)
+
+    async def _asked(self, ask: Callable[[str, Callable[[], bool]], Answer], path: str) -> Answer:
+        """Ask for an answer; a bug that comes in its way is one, so that whoever waits is told, and the next file is asked for."""
         turn = self.turn
-        return await self.proving(self.workspace.check, path, lambda: self.turn == turn)
+        try:
+            return await self.proving(ask, path, lambda: self.turn == turn)
+        except OutdatedError:
+            raise
+        except Exception as error:  # it is told, and the next text is looked at all the same
+            if self.turn != turn:
+                raise OutdatedError from error
+            return self.workspace.given_up(path, error)
 
     async def proving(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Ask for something that may have to be proved; one after another.
@@ -125,11 +151,26 @@ class Session:
         Raises:
             OutdatedError: A text has changed meanwhile.
         """
-        return await asyncio.get_running_loop().run_in_executor(self._proves, lambda: ask(*args, **kwargs))
+        return await self._of_one_text(self._proves, lambda: ask(*args, **kwargs))
 
     async def reading(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Ask for something that needs no proof."""
+        """Ask for something that needs no proof, and that no harm comes of where a text has changed meanwhile."""
         return await asyncio.get_running_loop().run_in_executor(self._reads, lambda: ask(*args, **kwargs))
+
+    async def editing(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Ask for edits that need no proof.
+
+        Raises:
+            OutdatedError: A text has changed meanwhile: they are of another one.
+        """
+        return await self._of_one_text(self._reads, lambda: ask(*args, **kwargs))
+
+    async def _of_one_text(self, worker: ThreadPoolExecutor, ask: Callable[[], T]) -> T:
+        turn = self.turn
+        answer = await asyncio.get_running_loop().run_in_executor(worker, ask)
+        if self.turn != turn:  # after the worker has looked a last time, too
+            raise OutdatedError
+        return answer
 
     def is_told(self, answer: Answer) -> bool:
         """Whether the client has this answer already, for this version; from now on it has."""
