@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import TimeoutError as NotYet
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -55,8 +54,14 @@ class Build:
 
     def begin(self) -> None:
         """Compile, and open the system."""
-        with suppress(CancelledError):  # the studio ends
+        try:
             self._compile(lambda work: self._waited(work, self._told))
+        except CancelledError:
+            return  # the studio ends
+        except BaseException as error:
+            why = f"its tables were not proved: {str(error) or type(error).__name__}"
+            self._hub.do(RUN, lambda: self._live.close_because(why))
+            raise
 
     def close(self) -> None:
         """Kill the process of the proof under way."""

@@ -148,7 +148,9 @@ class Concern(Protocol):
 class Lane:
     """One thread that does what it is given, in order of when it is due, until it is ended."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, failed: Callable[[BaseException], None]) -> None:
+        """Args: name: Of the thread; failed: Takes what a piece of work raises."""
+        self._failed = failed
         self._changed = threading.Condition()
         self._work: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
@@ -160,7 +162,7 @@ class Lane:
         """Have something done after all that is due before.
 
         Args:
-            work: Without arguments; what it raises is printed.
+            work: Without arguments.
             after_s: So many seconds from now at the earliest.
         """
         with self._changed:
@@ -192,8 +194,8 @@ class Lane:
         while (work := self._next()) is not None:
             try:
                 work()
-            except Exception:  # noqa: BLE001  # the next in the lane must be done all the same
-                traceback.print_exc(file=sys.stderr)
+            except BaseException as error:  # noqa: BLE001  # of somebody's plant, too: the next in the lane must be done
+                self._failed(error)
 
 
 @dataclass(slots=True)
@@ -245,6 +247,7 @@ class Hub:
         self._handlers: dict[str, tuple[Concern, Handler]] = {}
         self._lanes: dict[str, Lane] = {}
         self._clients: list[Client] = []
+        self._wrong: Json = None
 
     def add(self, concerns: Sequence[Concern]) -> None:
         """Have concerns answer from now on.
@@ -258,7 +261,7 @@ class Hub:
                     raise ValueError(f"a second handler, or another's name: {kind}")
                 self._handlers[kind] = concern, handler
             if concern.lane not in self._lanes:
-                self._lanes[concern.lane] = Lane(f"studio {concern.lane}")
+                self._lanes[concern.lane] = Lane(f"studio {concern.lane}", self._failed)
             self._concerns.append(concern)
 
     def begin(self) -> None:
@@ -275,6 +278,12 @@ class Hub:
         text = message(event=kind, body=body)
         self._onto_server(lambda: self._spread(kind, text))
 
+    def _failed(self, error: BaseException) -> None:
+        """Tell every page of what went wrong where none had asked, and those that come later."""
+        _, text, helps = _reason(error)
+        self._wrong = {"text": text, "wrong": True, "helps": list(helps)}
+        self.tell("said", self._wrong)
+
     def _spread(self, kind: str, text: str) -> None:
         for client in self._clients:
             client.event(kind, text)
@@ -284,6 +293,8 @@ class Hub:
     def enter(self, client: Client) -> None:
         """Let a page in, and greet it: an event `NAME.hello` of each concern."""
         self._clients.append(client)
+        if self._wrong is not None:
+            client.event("said", message(event="said", body=self._wrong))
         for concern in self._concerns:
             self._lanes[concern.lane].do(partial(self._greet, client, concern))
 
@@ -358,7 +369,8 @@ class Hub:
 
 
 def _close(client: Client, number: int, text: str) -> None:
-    client.open.pop(number, None)
+    if client.open.pop(number, None) is None:
+        return  # it was answered, before its handler raised
     client._events.pop(f"#{number}", None)  # noqa: SLF001  # progress after the answer would be news of nothing
     client.answer(text)
 
@@ -371,17 +383,24 @@ def _answered(number: int, ask: Ask, how: Callable[[], Json]) -> str | None:
         return None if answer is LATER else message(id=number, answer=answer)
     except CancelledError:
         return message(id=number, cancelled=True)
-    except (CodedError, Refused) as error:
-        return _refused(number, error.code, getattr(error, "shown", str(error)), error.helps)
-    except Malformed as error:
-        return _refused(number, Code.STUDIO, str(error), ())
-    except WorkerEndedError as error:
-        return _refused(number, Code.WORKER_ENDED, str(error), ())
-    except Exception as error:  # noqa: BLE001  # a bug in one answer must not end the studio
-        traceback.print_exc(file=sys.stderr)
-        return _refused(
-            number, Code.INTERNAL, f"a bug in rcsc: {type(error).__name__}", ("please report it",)
-        )
+    except BaseException as error:  # noqa: BLE001  # a bug in one answer must not end the studio
+        code, text, helps = _reason(error)
+        return _refused(number, code, text, helps)
+
+
+def _reason(error: BaseException) -> tuple[Code, str, Sequence[str]]:
+    """Say in words what was raised: a refusal as it says itself; a bug is printed, too."""
+    match error:
+        case CodedError() | Refused():
+            return error.code, getattr(error, "shown", str(error)), error.helps
+        case Malformed():
+            return Code.STUDIO, str(error), ()
+        case WorkerEndedError():
+            return Code.WORKER_ENDED, str(error), ()
+        case _:
+            traceback.print_exception(error, file=sys.stderr)
+            helps = ("please report it, with what is printed where `rcsc studio` runs",)
+            return Code.INTERNAL, f"a bug in rcsc: {type(error).__name__}", helps
 
 
 def _refused(number: int, code: Code, text: str, helps: Sequence[str]) -> str:

@@ -325,6 +325,7 @@ def test_the_keys_of_a_plant_are_checked_with_their_lines(what: str, dock: Path)
     ("line", "message"),
     [
         ("1 / 0", "the plant failed in cycle 3: ZeroDivisionError: division by zero (base.py, line 28)"),
+        ("raise SystemExit(0)", "the plant failed in cycle 3: SystemExit: 0 (base.py, line 28)"),
         ("self.bumper = 2", "the plant's `bumper` is `2`, which is no bool, in cycle 3"),
         ("self.lateral = None", "the plant's `lateral` is `None`, which is no number, in cycle 3"),
         (

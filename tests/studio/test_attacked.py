@@ -109,6 +109,31 @@ def test_a_check_that_outlives_a_text_it_used_is_not_shown_as_known(bench: Bench
     assert state(bench.doc("t.rcs")) != "proved"
 
 
+@pytest.mark.parametrize("where", ["check", "reading"])
+def test_a_bug_in_the_way_of_a_text_is_told_and_the_next_text_is_looked_at(
+    where: str, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Instead of that it is being proved, for ever; files that use it are looked at, too."""
+    assert state(bench.open("t.rcs")) == "proved"
+    bench.open("words.rcs")
+    does = getattr(bench.desk.workspace, where)
+
+    def fails(file: str, *more: Any) -> Any:
+        if "bug" in bench.desk.opened("words.rcs").text and file.endswith("words.rcs"):
+            raise RecursionError
+        return does(file, *more)
+
+    monkeypatch.setattr(type(bench.desk.workspace), where, lambda _, *given: fails(*given))
+    shown = bench.change("tables.edit", "words.rcs", **edit("# a bug, and a table\ntable w {\n}\n"))
+    assert shown["known"]
+    assert [each["code"] for each in shown["findings"]] == ["RCS902"]
+    assert state(shown) == "failed"
+    assert bench.told["tables.file/t.rcs"]["known"]
+    bench.ask("tables.undo", file="words.rcs", version=shown["version"])
+    assert not bench.doc("words.rcs")["findings"]
+    assert state(bench.doc("t.rcs")) == "proved"
+
+
 def test_a_version_never_stands_for_two_texts(
     folder: Path, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,6 +16,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.lang.interpret import initial
 from rcsc.run.log.read import read
 from rcsc.run.log.ticks import frames
+from rcsc.run.system import System
 from rcsc.shell.commands import Commands
 from rcsc.shell.opening import Opening, opened
 from rcsc.shell.reload.refusal import Refused as Refusal
@@ -203,6 +204,67 @@ def test_a_run_whose_system_goes_away_is_answered(dock: Path) -> None:
         assert (await other.heard("run.state", going=False, tick=0))["open"]
 
     studio(dock, work)
+
+
+def test_a_run_that_a_bug_ends_is_answered_and_runs_no_more(
+    dock: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And the page says so, instead of that it runs."""
+    count = History.add
+
+    def fails(history: History, system: System, ran: Any) -> None:
+        if system.tick == 7:
+            raise ZeroDivisionError
+        count(history, system, ran)
+
+    monkeypatch.setattr(History, "add", fails)
+
+    async def work(one: Page, other: Page) -> None:
+        number = await one.send("run.type", line="step 20")
+        with pytest.raises(Refused, match="a bug in rcsc: ZeroDivisionError"):
+            await one.answer(number)
+        state = await other.heard("run.state", going=False, tick=7)
+        assert "ZeroDivisionError" in state["ended"]
+        await one.ask("run.type", line="step 2")
+
+    studio(dock, work)
+
+
+@pytest.mark.parametrize("where", ["compile", "open"])
+def test_a_system_that_a_bug_keeps_from_being_opened_says_so(
+    where: str, dock: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Instead of that it is being proved, for ever."""
+
+    def fails(*_: Any) -> Any:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(
+        *(
+            ("rcsc.studio.build.executor", fails)
+            if where == "compile"
+            else ("rcsc.studio.runs.live.opened", fails)
+        )
+    )
+
+    async def inside() -> None:
+        async with page(server) as one:
+            assert "ZeroDivisionError" in (await one.heard("said", wrong=True))["text"]
+            await until(lambda: "ZeroDivisionError" in one.events.get("run.state", {}).get("text", ""))
+
+    with serving(Opening(dock)) as server:
+        asyncio.run(inside())
+
+
+def test_a_log_that_is_none_is_told_to_every_page(dock: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(b"no log")
+
+    async def work(one: Page, other: Page) -> None:
+        for each in (one, other):
+            assert "holds no run" in (await each.heard("said", wrong=True))["text"]
+
+    studio(dock, work, logs=(broken,))
 
 
 def test_a_clock_is_kept(dock: Path) -> None:

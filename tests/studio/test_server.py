@@ -187,6 +187,47 @@ def test_what_is_no_question_ends_the_talk_and_nothing_else(said: str | bytes) -
     run(work)
 
 
+@pytest.mark.parametrize("raised", [ZeroDivisionError, KeyboardInterrupt, SystemExit, RecursionError])
+@pytest.mark.parametrize("where", ["begin", "greeting", "later", "handler"])
+def test_whatever_is_raised_is_told_to_every_page_and_ends_no_lane(
+    where: str, raised: type[BaseException]
+) -> None:
+    """Where none had asked, pages that come later are told, too."""
+
+    class Fails(Echo):
+        def begin(self) -> None:
+            if where == "begin":
+                raise raised
+
+        def greeting(self) -> Any:
+            if where == "greeting":
+                raise raised
+            return {"warm": True}
+
+        def _bug(self, _: Ask) -> Any:
+            raise raised
+
+    async def inside() -> None:
+        async with page(server) as one:
+            if where == "later":
+                server.hub.do("echo", raise_it)
+            if where == "handler":
+                with pytest.raises(Refused, match=f"a bug in rcsc: {raised.__name__}"):
+                    await one.ask("echo.bug")
+            else:
+                said = await one.heard("said", wrong=True)
+                assert said["text"] == f"a bug in rcsc: {raised.__name__}"
+                async with page(server) as other:
+                    assert (await other.heard("said"))["text"] == said["text"]
+            assert await one.ask("echo.say", text="still here") == "still here"
+
+    def raise_it() -> None:
+        raise raised
+
+    with serving(others=[Fails()]) as server:
+        asyncio.run(inside())
+
+
 def test_a_question_is_cancelled_by_its_page_and_when_the_page_goes() -> None:
     echo = Echo()
 

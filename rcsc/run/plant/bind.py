@@ -216,7 +216,7 @@ def _told(what: str) -> Iterator[None]:
     """
     try:
         yield
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise PlantFailed(f"{what}: {raised(error)}") from error
 
 
@@ -457,7 +457,7 @@ def _constructed(page: Document, spec: PlantSpec, of: type, seed: int) -> Any:
     try:
         parameters = inspect.signature(of).parameters
         return of(seed=seed) if "seed" in parameters else of()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         page.wrong(
             spec.path,
             f"`{of.__name__}()` failed: {raised(error)}",

@@ -156,6 +156,9 @@ class Live:
         except CodedError as error:
             self.close_because(error.shown, *error.helps)
             return
+        except BaseException as error:
+            self.close_because(f"a bug in rcsc: {type(error).__name__}")
+            raise
         system = commands.session.system
         self.history.begin(system)
         system.watch.append(self.history.add)
@@ -381,6 +384,10 @@ class Live:
                 self._end(f"cycle {system.tick}: {over}")
         except Refused as refused:
             self._end(str(refused), refused=refused)
+        except BaseException as error:
+            why = f"cycle {system.tick}: a bug in rcsc: {type(error).__name__}"
+            self._end(why, refused=Refused(Code.INTERNAL, why))
+            raise
 
     def _end(self, why: str, *, hand: bool = False, refused: Refused | None = None) -> None:
         """End the run under way, and say why."""

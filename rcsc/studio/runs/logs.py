@@ -47,7 +47,7 @@ class Logs:
     def begin(self) -> None:
         """Show the first log that the user named, if any."""
         for path in self._given[:1]:
-            self._show(self._called(path), read(path))
+            self._show(self._called(path), _read(path))
 
     def _list(self, _: Ask) -> Json:
         found = sorted(self._found().items(), key=lambda one: -one[1].stat().st_mtime)
@@ -62,10 +62,7 @@ class Logs:
         if path is None:
             raise Refused(Code.STUDIO, f"there is no log `{name}`")
         ask.progress(f"reading {name}")
-        try:
-            log = read(path)
-        except UnreadableLog as error:
-            raise Refused(Code.LOG_UNREADABLE, str(error)) from error
+        log = _read(path)
         ask.check()
         self._show(name, log)
         return {"name": name}
@@ -84,6 +81,18 @@ class Logs:
         whole = path.resolve()
         within = next((folder for folder in self._folders if whole.is_relative_to(folder)), None)
         return str(path if within is None else whole.relative_to(within))
+
+
+def _read(path: Path) -> Log:
+    """Read a log.
+
+    Raises:
+        Refused: It is none.
+    """
+    try:
+        return read(path)
+    except UnreadableLog as error:
+        raise Refused(Code.LOG_UNREADABLE, str(error)) from error
 
 
 def _logs(top: Path) -> Iterator[Path]:

@@ -238,19 +238,19 @@ class Desk:
                 for path, (_, text) in texts.items():
                     self.workspace.open(path, text)
                 answer = self.workspace.check(file, lambda: found.version == version)
-                reading = self.workspace.reading(os.path.normpath(file))
+                nearest = self.workspace.reading(os.path.normpath(file)).nearest
         except OutdatedError:
             return  # what changed it has the new text looked at
-        files = frozenset(map(os.path.realpath, reading.loaded.sources))
+        except Exception as error:  # noqa: BLE001  # it is told, and the next text is looked at all the same
+            answer, nearest = self.workspace.given_up(file, error), None
+        files = frozenset(map(os.path.realpath, answer.texts))
         with self._lock:
             now = {each.file: each.version for each in self._open.values() if each.file in files}
             same = all(path in texts and texts[path][0] == each for path, each in now.items())
             self._offered = {key: each for key, each in self._offered.items() if key[0] != name}
             if name in self._open:
                 seconds = time.perf_counter() - began
-                self._known[name] = Known(
-                    version if same else OUTDATED, answer, reading.nearest, seconds, files
-                )
+                self._known[name] = Known(version if same else OUTDATED, answer, nearest, seconds, files)
                 self.show(name)
 
     def known(self, name: str, version: int) -> Known:
