@@ -49,10 +49,13 @@ class Bench:
         self.look()
         return self.told[f"tables.file/{file}"]
 
+    def now(self, kind: str, file: str, **body: Any) -> Any:
+        """An answer about a file as it is."""
+        return self.ask(kind, file=file, version=self.told[f"tables.file/{file}"]["version"], **body)
+
     def change(self, kind: str, file: str, **body: Any) -> Any:
         """Change a file as it is; how it is then."""
-        version = self.told[f"tables.file/{file}"]["version"]
-        self.ask(kind, file=file, version=version, **body)
+        self.now(kind, file, **body)
         return self.doc(file)
 
 

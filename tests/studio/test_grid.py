@@ -156,3 +156,75 @@ def _arrow(seat: Seat) -> None:
     seat.value("document.querySelector('.graph-place [data-state=fault]').focus()")
     seat.press("ctrl+z")
     seat.until("#said", "undone: draw an arrow from fault to operation_enabled")
+
+
+def test_keys_that_are_quicker_than_answers_undo_one_step_each(drive: Path) -> None:
+    """The second and the third are about the text that those before them leave, and none is refused."""
+    with seated(Opening(drive / "system.toml", alone=True)) as seat:
+        seat.click(seat.button("Tables"))
+        seat.wait("document.querySelector('.table-choice')?.options.length")
+        seat.choose(".table-choice", "drive ")
+        seat.until(".standing", "✓ proved")
+        many = lines(seat)
+        seat.click("(" + cell(1, 0) + ")")
+        for more in range(1, 5):
+            seat.press("alt+enter")
+            seat.wait(
+                f"document.querySelectorAll('.sheet tr[data-row]').length === {many + more} "
+                f"&& document.activeElement.dataset.line === '{1 + more}'"
+            )
+        seat.value(
+            "(() => { for (let at = 0; at < 4; at += 1) document.activeElement.dispatchEvent("
+            "new KeyboardEvent('keydown', { key: 'z', ctrlKey: true, bubbles: true, cancelable: true })); })()"
+        )
+        seat.wait(f"document.querySelectorAll('.sheet tr[data-row]').length === {many}")
+        seat.until(".standing", "✓ proved")
+        assert "Not done" not in seat.reads("#said")
+
+
+def test_a_file_that_others_write_while_it_is_changed_here_is_told_as_the_page_is_looked_at(
+    drive: Path,
+) -> None:
+    """Before anybody tries to save it; nothing of either is lost."""
+    file = drive / "gallery" / "cia402" / "drive.rcs"
+    with seated(Opening(drive / "system.toml", alone=True)) as seat:
+        seat.click(seat.button("Tables"))
+        seat.wait("document.querySelector('.table-choice')?.options.length")
+        seat.choose(".table-choice", "drive ")
+        seat.until(".standing", "✓ proved")
+        many = lines(seat)
+        seat.click("(" + cell(1, 0) + ")")
+        seat.press("alt+enter")
+        seat.wait(f"document.querySelectorAll('.sheet tr[data-row]').length === {many + 1}")
+        others = "# theirs\n" + file.read_text()
+        file.write_text(others)
+        assert not seat.reads(".conflict")
+        seat.value("dispatchEvent(new Event('focus'))")
+        seat.until(".conflict", "was changed on disk, and here")
+        assert (lines(seat), file.read_text()) == (many + 1, others)
+        seat.click(seat.button("Take what is on disk"))
+        seat.wait(f"document.querySelectorAll('.sheet tr[data-row]').length === {many}")
+        seat.wait("!document.querySelector('.conflict').innerText")
+        file.unlink()
+        seat.value("dispatchEvent(new Event('focus'))")
+        seat.until(".conflict", "is no longer on disk")
+        seat.click(seat.button("Write over it"))
+        seat.wait("!document.querySelector('.conflict').innerText")
+    assert file.read_text() == others
+
+
+def test_what_breaks_in_the_page_is_told_and_keeps_no_view_from_its_events(drive: Path) -> None:
+    with seated(Opening(drive / "system.toml", alone=True)) as seat:
+        for number, how in enumerate(
+            ("setTimeout(() => { throw new Error('ouch 0'); })", "void Promise.reject(new Error('ouch 1'))")
+        ):
+            seat.value(f"{how}, 0")
+            seat.until("#said", f"a bug in this page: ouch {number}")
+        heard = seat.value(
+            "import('./bus.js').then(({ Bus }) => { const bus = new Bus(), heard = []; "
+            "bus.on('x', () => { throw new Error('ouch 3'); }); bus.on('x', (said) => heard.push(said)); "
+            "bus.tell('x', 7); return heard; })"
+        )
+        assert heard == [7]
+        seat.until("#said", "a bug in this page: ouch 3")
+        seat.said.clear()

@@ -181,9 +181,9 @@ def edited_at_random(shipped: Path, count: int) -> None:
             (shipped / file).write_text(original)
             done += 1
         while grid.told[f"tables.file/{file}"]["undo"]:
-            grid.ask("tables.undo", file=file)
+            grid.now("tables.undo", file)
         while text.told[f"tables.file/{file}"]["undo"]:
-            text.ask("tables.undo", file=file)
+            text.now("tables.undo", file)
         assert grid.doc(file)["text"] == original
     assert 0 < right < count
 
@@ -199,7 +199,7 @@ def test_a_cell_says_what_was_typed(bench: Bench) -> None:
     assert witness["columns"] == ["off", "5"]
     assert witness["regions"] == ["now = off", "w >= 5"]
     assert {name: each["failed"] for name, each in witness["rows"].items()} == {"a": [1], "b": [0]}
-    assert doc["tables"][0]["rows"][0]["share"] == (5, 30)
+    assert doc["tables"][0]["rows"][0]["share"] == {"text": "16.7 %", "of": "5 of 30 inputs"}
 
 
 @pytest.mark.parametrize("typed", ["a | b", "# no", "1 || 2", "\x00", "\u202e", "é" * 5000])
@@ -229,7 +229,7 @@ def test_a_pasted_rectangle_adds_the_lines_that_it_needs(bench: Bench) -> None:
     assert [row[1:] for row in matrix(doc, "t")[1]] == block
     assert state(doc) == "proved"
     assert doc["undo"] == "paste"
-    assert len(matrix((bench.ask("tables.undo", file="t.rcs"), bench.doc("t.rcs"))[1], "t")[1]) == 2
+    assert len(matrix((bench.now("tables.undo", "t.rcs"), bench.doc("t.rcs"))[1], "t")[1]) == 2
     with pytest.raises(Refused):
         bench.change("tables.cells", "t.rcs", table="t", line=0, column=1, rows=rows(["1", "2", "3"]))
 
@@ -269,16 +269,16 @@ def test_typing_is_undone_by_words_and_everything_can_be_undone(bench: Bench) ->
     bench.change("tables.column", "t.rcs", table="t", at=1, heading="w", action=False)
     texts = [bench.doc("t.rcs")["text"]]
     while bench.doc("t.rcs")["undo"]:
-        bench.ask("tables.undo", file="t.rcs")
+        bench.now("tables.undo", "t.rcs")
         texts.append(bench.doc("t.rcs")["text"])
     assert len(texts) <= 6
     assert texts[-1] == begun
     assert not bench.doc("t.rcs")["dirty"]
     for text in texts[-2::-1]:
-        bench.ask("tables.redo", file="t.rcs")
+        bench.now("tables.redo", "t.rcs")
         assert bench.doc("t.rcs")["text"] == text
     with pytest.raises(Refused):
-        bench.ask("tables.redo", file="t.rcs")
+        bench.now("tables.redo", "t.rcs")
 
 
 @pytest.mark.parametrize(("end", "mark"), [("\n", b""), ("\r\n", b""), ("\r\n", b"\xef\xbb\xbf")])
@@ -299,7 +299,7 @@ def test_a_file_is_written_as_fmt_would(end: str, mark: bytes, folder: Path) -> 
     ran = CliRunner().invoke(commands, ["fmt", "--check", str(file)])
     assert ran.exit_code == 0, ran.output
     assert not bench.doc("t.rcs")["dirty"]
-    bench.ask("tables.undo", file="t.rcs")
+    bench.now("tables.undo", "t.rcs")
     assert bench.doc("t.rcs")["text"] == doc["text"]
 
 
@@ -311,9 +311,9 @@ def test_what_others_wrote_is_not_overwritten_unseen(folder: Path, bench: Bench)
     with pytest.raises(Refused, match="changed on disk"):
         bench.ask("tables.save", file="t.rcs")
     assert file.read_text() == TABLE.format(low="<= 4")
-    bench.ask("tables.take", file="t.rcs")
+    bench.now("tables.take", "t.rcs")
     assert bench.doc("t.rcs")["text"] == TABLE.format(low="<= 4")
-    bench.ask("tables.undo", file="t.rcs")
+    bench.now("tables.undo", "t.rcs")
     assert bench.doc("t.rcs")["text"] == doc["text"]
     file.write_text("# others again\n")
     bench.ask("tables.save", file="t.rcs", over=True)
@@ -583,7 +583,7 @@ def test_bad_messages_are_refused_and_change_nothing(bench: Bench) -> None:
             assert bench.doc("t.rcs")["text"] == doc["text"]
         else:
             doc = bench.doc("t.rcs")
-            bench.ask("tables.undo", file="t.rcs") if doc["undo"] else None
+            bench.now("tables.undo", "t.rcs") if doc["undo"] else None
             doc = bench.doc("t.rcs")
 
 
@@ -607,7 +607,7 @@ def test_two_pages_see_the_same(shipped: Path) -> None:
                 assert state(seen[0]) == "failed"
                 with pytest.raises(Exception, match="meanwhile"):
                     await two.ask("tables.line", file=file, version=first["version"], table="drive", at=0)
-                await two.ask("tables.undo", file=file)
+                await two.ask("tables.undo", file=file, version=version)
                 after = await one.heard(f"tables.file/{file}", version=version + 1, known=True)
                 assert after["text"] == first["text"]
 

@@ -76,7 +76,9 @@ export class Bus {
   /** Tell everybody on this page. */
   tell(kind, ...said) {
     this.#latest.set(kind, said);
-    for (const handler of this.#handlers.get(kind) ?? []) handler(...said);
+    for (const handler of this.#handlers.get(kind) ?? []) {
+      try { handler(...said); } catch (error) { reportError(error); } // the other views must hear of it all the same
+    }
   }
 
   latest(kind) {

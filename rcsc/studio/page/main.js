@@ -1,6 +1,6 @@
 // The page's frame: the views in one pane or two, what is said, the keys, and the theme.
 
-import { Bus, make } from "./bus.js";
+import { Bus, make, Refusal } from "./bus.js";
 import { sharing } from "./share.js";
 import { BELOW, VIEWS } from "./views.js";
 
@@ -89,6 +89,17 @@ if (VIEWS.length > 1) {
 }
 
 // --- what is said ---
+
+let breaks = false; // saying it may break, too
+function broken(error) {
+  if (!error || breaks || error.message === "cancelled") return;
+  breaks = true;
+  if (error instanceof Refusal) bus.say(error.message, { wrong: true, helps: error.helps });
+  else bus.say(`a bug in this page: ${error.message ?? error}`, { wrong: true, helps: ["load the page again: texts and run are kept", "please report it"] });
+  breaks = false;
+}
+addEventListener("error", ({ error }) => broken(error));
+addEventListener("unhandledrejection", ({ reason }) => broken(reason));
 
 let clearing = 0;
 bus.on("said", ({ text, wrong, helps }) => {

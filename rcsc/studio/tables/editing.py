@@ -63,17 +63,24 @@ class Tables:
 
     def _changed(self, ask: Ask, make: Callable[[Document], tuple[str, str]]) -> Json:
         """Let a file's text be another one; `make` says which, and what that is called."""
-        name = ask.body.text("file")
-        version = ask.body.whole("version", 1, 2**53)
 
         def change(found: Document) -> object:
-            self._desk.at(name, version)
             text, what = make(found)
             if found.bytes_of(text) > MOST_BYTES:
                 raise Refused(Code.STUDIO, f"a text of more than {MOST_BYTES} bytes")
             return found.replace(text, what)
 
-        return self._desk.change(name, change)
+        return self._done(ask, change)
+
+    def _done(self, ask: Ask, change: Callable[[Document], object]) -> Json:
+        """Do something with the text that the page has seen, and with no other."""
+        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+
+        def of_that(found: Document) -> object:
+            self._desk.at(name, version)
+            return change(found)
+
+        return self._desk.change(name, of_that)
 
     def _edit(self, ask: Ask) -> Json:
         """Make edits of the text, as they are typed."""
@@ -137,10 +144,10 @@ class Tables:
         )
 
     def _undo(self, ask: Ask) -> Json:
-        return self._desk.change(ask.body.text("file"), lambda found: found.undo())
+        return self._done(ask, Document.undo)
 
     def _redo(self, ask: Ask) -> Json:
-        return self._desk.change(ask.body.text("file"), lambda found: found.redo())
+        return self._done(ask, Document.redo)
 
     def _save(self, ask: Ask) -> Json:
         """Write a file; says whether it was laid out."""
@@ -148,7 +155,7 @@ class Tables:
         return self._desk.change(ask.body.text("file"), lambda found: found.save(over=over))
 
     def _take(self, ask: Ask) -> Json:
-        return self._desk.change(ask.body.text("file"), lambda found: found.take_disk())
+        return self._done(ask, Document.take_disk)
 
 
 class _Row:

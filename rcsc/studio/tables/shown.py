@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from rcsc.editor.grid import grids
+from rcsc.editor.names.about import share_text
 from rcsc.editor.places import Area, Lines, Units
 from rcsc.editor.standing import BEING_PROVED
 from rcsc.editor.values import Answer, Finding, Grid, GridRow, Repair, Witness
@@ -84,10 +85,19 @@ def _row(row: GridRow) -> Json:
         "stub": row.stub.text,
         "cells": [cell.text for cell in row.cells],
         "default": row.default,
-        "share": row.share,
+        "share": None if row.share is None else _share(*row.share),
         "line": row.area.start.line,
         "past": row.area.end.line,
     }
+
+
+def _share(count: int, whole: int) -> Json:
+    """A share in words; more inputs than a number of JavaScript tells apart are counted to the last one."""
+    return {"text": share_text(count, whole), "of": f"{count:,} of {_inputs(whole)}"}
+
+
+def _inputs(count: int) -> str:
+    return "1 input" if count == 1 else f"{count:,} inputs"
 
 
 def _place(area: Area, lines: Lines) -> list[list[int]]:
@@ -139,7 +149,7 @@ def _witness(witness: Witness, program: Program | None, table: Grid | None) -> J
         "values": witness.values,
         "lines": [line.name for line in witness.lines],
         "region": witness.region,
-        "inputs": witness.inputs,
+        "inputs": None if witness.inputs is None else _inputs(witness.inputs),
         "columns": [],
         "regions": [],
         "rows": {},

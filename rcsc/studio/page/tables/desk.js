@@ -19,6 +19,7 @@ export class Desk {
   #bus;
   #heard = new Set();
   #stop = null;
+  #last = null; // what was asked last that may change the text
   #types = new Map(); // heading -> { type, unit }, of the last text that was looked at
 
   constructor(bus) {
@@ -62,7 +63,11 @@ export class Desk {
         this.#selected();
         this.tell();
       }
-      await this.#bus.ask("tables.open", { file });
+      const { disk, dirty } = await this.#bus.ask("tables.open", { file });
+      if (file !== this.file) return;
+      const before = this.conflict;
+      this.conflict = disk === "same" ? "" : disk === "gone" ? `${file} is no longer on disk.` : dirty ? `${file} was changed on disk, and here.` : "";
+      if (this.conflict !== before) this.tell();
     } catch (error) {
       this.#refused(error);
     }
@@ -70,13 +75,23 @@ export class Desk {
 
   /** Ask something about the text as it is here. */
   async ask(kind, body = {}, options = {}) {
+    const answer = this.#asked(kind, body, options);
+    if (kind.startsWith("tables.")) this.#last = answer.catch(() => {});
+    return answer;
+  }
+
+  #asked(kind, body, options) {
     return this.#bus.ask(kind, { file: this.file, version: this.doc?.version ?? 0, table: this.table, ...body }, options);
   }
 
   /** The same; where it is refused it is said, and undefined returned. */
   async try(kind, body = {}, options = {}) {
+    return this.#said(this.ask(kind, body, options));
+  }
+
+  async #said(answer) {
     try {
-      return await this.ask(kind, body, options);
+      return await answer;
     } catch (error) {
       this.#refused(error);
       return undefined;
@@ -84,13 +99,20 @@ export class Desk {
   }
 
   async undo() {
-    const done = await this.try("tables.undo");
+    const done = await this.#next("tables.undo");
     if (done) this.#bus.say(`undone: ${done.made}`);
   }
 
   async redo() {
-    const done = await this.try("tables.redo");
+    const done = await this.#next("tables.redo");
     if (done) this.#bus.say(`done again: ${done.made}`);
+  }
+
+  /** Ask about the text as what was asked before leaves it: keys are quicker than answers. */
+  #next(kind) {
+    const answer = Promise.resolve(this.#last).then(() => this.#said(this.#asked(kind)));
+    this.#last = answer.catch(() => {});
+    return answer;
   }
 
   async save(over = false) {

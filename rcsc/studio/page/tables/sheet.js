@@ -3,13 +3,6 @@
 import { make } from "../bus.js";
 import { spoken } from "./desk.js";
 
-const SHARE = (share) => {
-  if (!share) return "";
-  const [of, all] = share;
-  const percent = all ? (100 * of) / all : 0;
-  return `${percent === 0 || percent >= 10 ? percent.toFixed(0) : percent.toPrecision(2)} %`;
-};
-
 export class SheetGrid {
   #desk; #bus; #root; #table; #cells = []; #shape = ""; #at = { line: 0, column: -1 }; #anchor = null; #editing = null; #shownWitness = null;
   #repairs = new Map(); // by version and finding
@@ -111,8 +104,8 @@ export class SheetGrid {
       const line_ = cells[0].parentElement;
       line_.dataset.name = row.name;
       const share = line_.querySelector(".share");
-      share.textContent = SHARE(row.share);
-      share.title = row.share ? `${row.share[0].toLocaleString("en")} of ${row.share[1].toLocaleString("en")} inputs` : "";
+      share.textContent = row.share?.text ?? "";
+      share.title = row.share?.of ?? "";
       const out = filter && !filter.can.includes(row.name) && !filter.unknown.includes(row.name);
       line_.hidden = Boolean(out);
       line_.classList.toggle("unknown", Boolean(filter?.unknown.includes(row.name)));
@@ -168,7 +161,7 @@ export class SheetGrid {
     one.witnesses.forEach((witness, at) => {
       const key = `${one.id} ${at}`;
       const pressed = key === this.#shownWitness;
-      const region = witness.region.length ? `Region: ${witness.region.join(", ")}${witness.inputs === null ? "" : `; ${witness.inputs === 1 ? "1 input" : `${witness.inputs.toLocaleString("en")} inputs`}`}; what is not named is free.` : "";
+      const region = witness.region.length ? `Region: ${witness.region.join(", ")}${witness.inputs === null ? "" : `; ${witness.inputs}`}; what is not named is free.` : "";
       box.append(" ", make("button", { type: "button", class: "small", "aria-pressed": pressed, onclick: () => { this.#shownWitness = pressed ? "" : key; this.draw(); } },
         `${pressed ? "Hide" : "Show"} ${one.witnesses.length > 1 ? `input ${at + 1}` : "the input"}`));
       if (pressed) {
