@@ -267,6 +267,24 @@ def test_a_log_that_is_none_is_told_to_every_page(dock: Path, tmp_path: Path) ->
     studio(dock, work, logs=(broken,))
 
 
+def test_bounds_and_values_are_told_to_the_last_digit(dock: Path, tmp_path: Path) -> None:
+    """A number of JavaScript tells no two apart beyond 2^53."""
+    shutil.copytree(dock.parent, tmp_path / "dock")
+    most = 2**62 - 1
+    file = tmp_path / "dock" / "drive.rcs"
+    huge = f"state huge : int {-most} .. {most} = {most}\n"
+    file.write_text(
+        edited(file.read_text(), ("state new_command : bool\n", f"state new_command : bool\n{huge}"))
+    )
+
+    async def work(one: Page, _: Page) -> None:
+        values = await one.ask("time.values", level="drive", tick=0)
+        huge = next(each for each in values if each["name"] == "huge")
+        assert (huge["text"], huge["range"]) == (str(most), f"{-most} .. {most}")
+
+    studio(tmp_path / "dock" / "system.toml", work)
+
+
 def test_a_clock_is_kept(dock: Path) -> None:
     """At real time cycles come no faster than the clock; on any machine they may come more slowly."""
 

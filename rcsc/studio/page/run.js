@@ -329,7 +329,7 @@ function valuesTab(bus) {
       const set = () => { editing = null; bus.try("run.type", { line: `${level}.${one.name} = ${value.value}` }).then((answer) => { if (!answer) ask(); }); };
       value.addEventListener("change", set);
       return make("tr", { class: one.changed ? "changed" : "" }, make("td", { class: "code" }, one.name), make("td", {}, value), make("td", { class: "soft" }, one.unit),
-        make("td", {}, one.changed ? "changed" : ""), make("td", { class: "soft" }, one.kind), make("td", { class: "soft" }, one.low === null || one.members.length || one.type === "bool" ? "" : `${one.low} .. ${one.high}`),
+        make("td", {}, one.changed ? "changed" : ""), make("td", { class: "soft" }, one.kind), make("td", { class: "soft" }, one.range),
         make("td", { class: "soft doc" }, one.doc));
     }));
   }
@@ -373,9 +373,9 @@ function scriptTab(bus) {
   } }, level, fields, make("button", {}, "Order"));
   function draw() {
     const of = orders.find(({ level: name }) => name === level.value);
-    fields.replaceChildren(...(of?.fields ?? []).flatMap(({ name, command, members, text, unit, low, high }) => {
+    fields.replaceChildren(...(of?.fields ?? []).flatMap(({ name, command, members, text, unit, range }) => {
       const one = members.length ? make("select", {}, members.map((word) => make("option", { selected: word === text && !command }, word)))
-        : make("input", { value: text, size: "6", title: low === null ? "" : `${low} .. ${high}`, spellcheck: "false" });
+        : make("input", { value: text, size: "6", title: range, spellcheck: "false" });
       Object.assign(one.dataset, { field: name, initial: text, ...(command ? { command: "yes" } : {}) });
       return [make("label", {}, make("span", { class: "soft" }, command ? "" : `${name} `), one, unit ? make("span", { class: "soft" }, ` ${unit}`) : "")];
     }));

@@ -19,6 +19,7 @@ from rcsc.run.levels import RunningLevel
 from rcsc.run.orders.operator import Operator
 from rcsc.run.orders.roles import Served, field_of, served
 from rcsc.run.orders.together import Together
+from rcsc.run.signature import Leaf
 from rcsc.run.system import System
 from rcsc.shell.commands import Commands, Output, RunOrder
 from rcsc.shell.opening import Opening, opened
@@ -434,8 +435,14 @@ def _field(to: Served, at: int) -> dict[str, Any]:
     members = ["false", "true"] if leaf.c_type == "bool" else list(leaf.members)
     return {
         "name": field_of(leaf), "command": at == to.command, "members": members, "text": leaf.shown(leaf.initial), "unit": leaf.unit,
-        "low": leaf.low, "high": leaf.high,
+        "range": range_of(leaf),
     }  # fmt: skip
+
+
+def range_of(leaf: Leaf) -> str:
+    """The declared range in words, for a number of JavaScript cannot hold every bound; empty where it has none to tell."""
+    told = leaf.low is not None and not leaf.members and leaf.c_type != "bool"
+    return f"{leaf.low} .. {leaf.high}" if told else ""
 
 
 def operator_of(system: System) -> Operator | None:

@@ -17,7 +17,7 @@ from rcsc.run.signature import Signature, Values, number_word
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import PROVER, Ask, Handler, Json
 from rcsc.studio.runs.history import History
-from rcsc.studio.runs.live import LANE, Live
+from rcsc.studio.runs.live import LANE, Live, range_of
 from rcsc.studio.runs.shown import moment
 from rcsc.studio.runs.why import why
 
@@ -360,5 +360,5 @@ def _leaf(sign: Signature, at: int) -> dict[str, Any]:
     kind = "choice" if leaf.members else "bool" if leaf.c_type == "bool" else number_word(leaf)
     return {
         "name": leaf.name, "kind": leaf.kind, "type": kind, "members": list(leaf.members), "unit": leaf.unit,
-        "low": leaf.low, "high": leaf.high, "doc": leaf.doc,
+        "range": range_of(leaf), "doc": leaf.doc,
     }  # fmt: skip
