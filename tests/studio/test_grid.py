@@ -1,10 +1,13 @@
 """The grid and the graph in a real browser, by keys: cells, rectangles, lines, undo, the text of the same file, a filter, an arrow."""
 
+import json
+import random
 import shutil
 from pathlib import Path
 
 import pytest
 
+from rcsc.commands import run as rcsc
 from rcsc.shell.opening import Opening
 from tests.studio.driven import Seat, seated
 
@@ -228,3 +231,55 @@ def test_what_breaks_in_the_page_is_told_and_keeps_no_view_from_its_events(drive
         assert heard == [7]
         seat.until("#said", "a bug in this page: ouch 3")
         seat.said.clear()
+
+
+LIT = """JSON.stringify([document.querySelector('.table-choice').selectedOptions[0].text.split(" ").at(-1),
+  [...document.querySelectorAll('.sheet tr.now')].map(({ dataset }) => dataset.name),
+  [...new Set([...document.querySelectorAll('.graph-place .row.now')].map(({ dataset }) => dataset.line))],
+  document.querySelector('.graph-words').innerText.split(" · ")[0]])"""
+"""The table of the grid, its lit lines, the lit lines of the graph, and what that says of its state."""
+
+
+def test_grid_and_graph_follow_a_level_through_its_tables(tmp_path: Path) -> None:
+    log, said = tmp_path / "boxt.mcap", tmp_path / "boxt.json"
+    assert rcsc(["run", "make_boxt", "--plant", "kinematic", "--log", str(log)]) == 0
+    assert rcsc(["log", str(log), "--json", str(said)]) == 0
+    cycles = {each["tick"]: each["levels"] for each in json.loads(said.read_text())["cycles"]}
+    places = random.Random(20)  # noqa: S311  # the same places each time
+    seen = set()
+    with seated(Opening(REPO / "tables" / "system.toml", alone=True), logs=(log,)) as seat:
+        seat.until(".view-run .ended", log.name)
+        seat.press("2", "o", "3")
+        seat.wait("document.querySelector('.table-choice')?.options.length")
+        seat.wait("document.querySelector('.graph-place svg')")
+        for level in ("task", "primitive"):
+            seat.choose(".table-choice", f"▶ {level} ")
+            for _ in range(8):
+                of = cycles[_somewhere(seat, places)][level]
+                where = f"{level} is in {of['cur_state']}, line {of['line']}"
+                wanted = json.dumps([of["table"], [of["line"]], [of["line"]], where], separators=(",", ":"))
+                seat.wait(f"({LIT}) === {json.dumps(wanted)}")
+                seen.add((level, of["table"]))
+        assert len(seen) > 3, "few tables were met: the test shows little"
+        seat.click("(" + cell(0, 0) + ")")
+        seat.press("f2")  # who edits a table stays at it
+        stays = "document.querySelector('.table-choice').value"
+        seat.wait(f"{stays}.endsWith(' {of['table']}')")
+        for _ in range(8):
+            _somewhere(seat, places)
+        assert seat.settled(stays).endswith(f".rcs {of['table']}")
+        seat.press("escape", "escape", "w")
+        seat.wait(f"{stays} === ' primitive'")
+
+
+def _somewhere(seat: Seat, places: random.Random) -> int:
+    """Click somewhere into the time line; the tick."""
+    left, top, width = seat.value(
+        "(({ left, top, width }) => [left, top, width])(document.querySelector('#time [role=slider]').getBoundingClientRect())"
+    )
+    before = seat.tick()
+    x = left + places.uniform(0.05, 0.95) * width
+    seat.mouse("mousePressed", x, top + 8)
+    seat.mouse("mouseReleased", x, top + 8, 0)
+    seat.wait(f"Number(document.querySelector('#time [role=slider]').ariaValueNow) !== {before}")
+    return seat.tick()

@@ -100,6 +100,8 @@ export class Bus {
 
   /** Have keys do something everywhere: `?`, `ctrl+enter`, `g r` (one after the other). */
   key(keys, what, run, where = "Studio") {
+    const taken = this.keys.find((one) => one.keys.split(", ").some((key) => keys.split(", ").includes(key)));
+    if (taken) throw new Error(`${keys} means already: ${taken.what}`);
     this.keys.push({ keys, what, run, where });
   }
 

@@ -16,6 +16,7 @@ export class Desk {
   doc = null; // as the server told it last
   table = ""; // the name of the table that is shown
   condition = null; // { text, can, unknown, every } of the filter
+  follows = ""; // the level whose table is shown as it runs; empty where one is chosen, or changed
   #bus;
   #heard = new Set();
   #stop = null;
@@ -25,7 +26,11 @@ export class Desk {
   constructor(bus) {
     this.#bus = bus;
     bus.on("tables.hello", ({ files }) => this.#greeted(files));
-    bus.on("selection", (now, changed) => { if (changed?.has("level") || changed?.has("table")) this.#follow(now); });
+    bus.on("selection", (now, changed) => {
+      if (changed?.has("table") && now.table !== this.table) this.#go(now);
+      else if (changed?.has("level") && this.follows) this.follow(now.level);
+    });
+    bus.on("moment", () => this.#moved());
     addEventListener("focus", () => { if (this.file) this.open(this.file, this.table); });
   }
 
@@ -38,6 +43,20 @@ export class Desk {
 
   tell() {
     if (this.doc) for (const handler of this.#heard) handler(this);
+  }
+
+  /** Show at every tick the table that a level runs then; none, to stay at the one that is shown. */
+  follow(level) {
+    if (level === this.follows) return;
+    this.follows = level;
+    if (level) this.#bus.select({ level });
+    this.#moved();
+    this.tell();
+  }
+
+  /** The levels that run the table that is shown, at the tick that is shown. */
+  get running() {
+    return !this.doc ? [] : (this.#bus.latest("moment")?.levels ?? []).filter(({ level, table }) => table === this.table && this.#home(level, table)?.file === this.file);
   }
 
   get shown() {
@@ -73,8 +92,9 @@ export class Desk {
     }
   }
 
-  /** Ask something about the text as it is here. */
+  /** Ask something about the text as it is here; what is changed stays in view. */
   async ask(kind, body = {}, options = {}) {
+    if (kind.startsWith("tables.") || kind === "graph.draw") this.follow("");
     const answer = this.#asked(kind, body, options);
     if (kind.startsWith("tables.")) this.#last = answer.catch(() => {});
     return answer;
@@ -166,7 +186,7 @@ export class Desk {
   }
 
   #selected() {
-    this.#bus.select({ table: this.table });
+    if (this.#bus.selection.table !== this.table) this.#bus.select({ table: this.table, line: "" }); // a line is one of its table
   }
 
   #greeted(files) {
@@ -180,11 +200,24 @@ export class Desk {
     this.tell();
   }
 
-  #follow({ level, table }) {
-    if (!table || table === this.table) return;
+  /** The file in which a level has a table. */
+  #home(level, table) {
     const named = this.files.filter(({ tables }) => tables.includes(table));
-    const found = named.find(({ levels }) => levels.includes(level)) ?? named.find(({ levels }) => levels.length) ?? named[0];
-    if (found) this.open(found.file, table);
+    return named.find(({ levels }) => levels.includes(level)) ?? named.find(({ levels }) => levels.length) ?? named[0];
+  }
+
+  #go({ level, table }) {
+    const found = table && this.#home(level, table);
+    if (!found) return;
+    this.follow("");
+    this.open(found.file, table);
+  }
+
+  #moved() {
+    const ran = this.follows && this.#bus.latest("moment")?.levels.find(({ level }) => level === this.follows);
+    if (!ran?.table) return;
+    const found = this.#home(ran.level, ran.table);
+    if (found && (found.file !== this.file || ran.table !== this.table)) this.open(found.file, ran.table);
   }
 
   #refused(error) {

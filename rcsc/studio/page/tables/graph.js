@@ -153,7 +153,7 @@ export function mount(root, bus) {
 
   function marks() {
     const { line, table } = bus.selection;
-    const levels = (bus.latest("moment")?.levels ?? []).filter((level) => level.table === desk.table);
+    const levels = desk.running;
     const now = new Set(levels.flatMap((level) => level.lines ?? []));
     const chosen = table === desk.table ? line : "";
     for (const row of place.querySelectorAll(".row[data-line]")) {
@@ -215,6 +215,7 @@ export function mount(root, bus) {
   // --- drawing an arrow ---
 
   function begin(name) {
+    desk.follow(""); // the table stays while an arrow of it is drawn
     from = name;
     hint = `An arrow from ${name}: go to the state where it ends, and press Enter; Escape leaves it.`;
     place.classList.add("choosing");

@@ -33,7 +33,12 @@ export function mount(root, bus) {
     make("div", { class: "bar" }, standing, make("form", { class: "filter-form", onsubmit: (event) => { event.preventDefault(); desk.filter(filter.value); } }, filter, filtered)),
     conflict, sheetPlace, textPlace, elsewhere, adding);
 
-  choice.addEventListener("change", () => { const [file, table] = choice.value.split(" "); desk.open(file, table); });
+  choice.addEventListener("change", () => {
+    const [file, table] = choice.value.split(" ");
+    desk.follow(file ? "" : table);
+    if (file) desk.open(file, table);
+  });
+  for (const place of [sheetPlace, textPlace]) place.addEventListener("focusin", ({ target }) => { if (target.matches("input, textarea")) desk.follow(""); });
   filter.addEventListener("keydown", (event) => { if (event.key === "Escape") { filter.value = ""; desk.filter(""); } });
   const sheet = new SheetGrid(sheetPlace, bus, desk);
   new TextView(textPlace, bus, desk);
@@ -52,7 +57,8 @@ export function mount(root, bus) {
     const { doc, shown, files } = desk;
     const key = JSON.stringify([files, doc?.tables.map(({ name }) => name)]);
     if (key !== listed) { listed = key; choose(choice, desk); }
-    choice.value = `${desk.file} ${desk.table}`;
+    for (const one of choice.querySelectorAll("[data-level]")) one.textContent = `▶ ${one.dataset.level} runs${desk.follows === one.dataset.level ? ` ${desk.table}` : " …"}`;
+    choice.value = desk.follows ? ` ${desk.follows}` : `${desk.file} ${desk.table}`;
     undo.disabled = !doc.undo;
     redo.disabled = !doc.redo;
     undo.title = doc.undo ? `Undo: ${doc.undo} (ctrl+z)` : "Nothing is left to undo";
@@ -88,6 +94,7 @@ export function mount(root, bus) {
   bus.key("ctrl+s", "Write the file, laid out", () => desk.save(), "Tables");
   bus.key("ctrl+z", "Undo the last change of the file", () => desk.undo(), "Tables");
   bus.key("ctrl+y", "Do again what was undone", () => desk.redo(), "Tables");
+  bus.key("w", "Watch the level chosen: its table as it runs; or stay at this one", () => desk.follow(desk.follows ? "" : bus.selection.level || (bus.latest("moment")?.levels[0]?.level ?? "")), "Tables");
   bus.key("/", "Filter lines by a condition", () => { filter.focus(); filter.select(); }, "Tables");
   const none = () => {};
   for (const [keys, what] of [["enter", "Edit the cell; when edited write it, and go down"], ["tab", "Write the cell, and go right"], ["escape", "Leave the cell as it was"],
@@ -107,7 +114,9 @@ function choose(choice, desk) {
   const known = new Set([...groups.values()].flat().map(({ file, table }) => `${file} ${table}`));
   const fresh = own.filter((table) => !known.has(`${desk.file} ${table}`)).map((table) => ({ file: desk.file, table }));
   if (fresh.length) groups.set("New", fresh);
-  choice.replaceChildren(...[...groups].map(([name, every]) => make("optgroup", { label: name },
+  const levels = [...new Set(desk.files.flatMap((one) => one.levels))];
+  const running = levels.length ? [make("optgroup", { label: "As it runs" }, levels.map((level) => make("option", { value: ` ${level}`, "data-level": level })))] : [];
+  choice.replaceChildren(...running, ...[...groups].map(([name, every]) => make("optgroup", { label: name },
     every.map(({ file, table }) => make("option", { value: `${file} ${table}` }, `${table} (${file})`)))));
 }
 

@@ -240,10 +240,10 @@ export class SheetGrid {
   }
 
   #lit() {
-    const moment = this.#bus.latest("moment");
-    const lines = new Set((moment?.levels ?? []).filter(({ table }) => table === this.#desk.table).flatMap((level) => level.lines ?? []));
+    const lines = new Set(this.#desk.running.flatMap((level) => level.lines ?? []));
     for (const row of this.#table.tBodies[0]?.rows ?? []) {
       const is = lines.has(row.dataset.name);
+      if (is && this.#desk.follows && !row.classList.contains("now")) row.scrollIntoView({ block: "nearest" });
       row.classList.toggle("now", is);
       const stub = row.querySelector("th.stub");
       if (stub) stub.dataset.now = is ? "runs" : "";
