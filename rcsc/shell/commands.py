@@ -5,6 +5,7 @@ In: a line. Out: what to show; a refusal where it is not done.
 
 import re
 from collections.abc import Callable, Iterator
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
@@ -307,6 +308,11 @@ class Commands:
             word in self._words or _SHOW.match(text) or _SET.match(text)
         )
 
+    def proves_together(self, line: str) -> bool:
+        """Whether a line has the levels proved together before it does anything, which may take minutes."""
+        word, _, rest = line.partition("#")[0].strip().partition(" ")
+        return word.casefold() == "reload" and "proved" in _flags(rest)[1]
+
     def stepped(self, alone: str = "") -> Output:
         """What `step` shows, or `step LEVEL`."""
         if alone:
@@ -361,10 +367,8 @@ class Commands:
         return [self.session.freeze(rest, on=False)]
 
     def _reload(self, rest: str) -> Output:
-        words, flags = rest.split(), set[str]()
-        while words and words[-1].casefold() in {"anyway", "proved"}:
-            flags.add(words.pop().casefold())
-        name = self._named(" ".join(words))
+        place, flags = _flags(rest)
+        name = self._named(place)
         return self.session.reload(name, anyway="anyway" in flags, prove="proved" in flags)
 
     def _diff(self, rest: str) -> Output:
@@ -409,6 +413,14 @@ class Commands:
         _nothing("quit", rest)
         self.over = True
         return []
+
+
+def _flags(rest: str) -> tuple[str, AbstractSet[str]]:
+    """The level that `reload` is of, and how."""
+    words, flags = rest.split(), set[str]()
+    while words and words[-1].casefold() in {"anyway", "proved"}:
+        flags.add(words.pop().casefold())
+    return " ".join(words), flags
 
 
 def _at(level: RunningLevel) -> str:

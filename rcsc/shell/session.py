@@ -31,6 +31,7 @@ from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.reload.reload import Origin, Reloaded, program_of, reload
 from rcsc.shell.stops import Stops, reached, stands
 from rcsc.shell.typed_names import NamedLine
+from rcsc.solvers.smt import spent
 
 if TYPE_CHECKING:
     from rcsc.shell.reload.sources import KeptSources
@@ -421,6 +422,8 @@ class Session:
             for level in self.levels
         }
         known = together(self.plant, name, runs, self._compiled, prove=prove)
+        if spent():
+            raise Refused(Code.SHELL_RELOAD, f"level `{name}` keeps its tables: their proof was given up")
         return old, reloaded, replace(judged, notes=(*judged.notes, known))
 
     def _compiled(self, name: str) -> bool:

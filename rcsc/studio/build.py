@@ -15,14 +15,15 @@ from typing import Any, TypeVar
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.driver.compile import compile_system
+from rcsc.host.cache import open_cache
 from rcsc.host.children import WorkerEndedError, answer, executor, kill
 from rcsc.host.children import run as run_program
-from rcsc.studio.hub import Ask, CancelledError, Handler, Hub, Json
+from rcsc.shell.reload.composed import prove_levels
+from rcsc.studio.hub import LATER, TOLD_S, Ask, CancelledError, Handler, Hub, Json
 from rcsc.studio.runs.live import LANE as RUN
 from rcsc.studio.runs.live import Live
 
 LANE = "prove"
-TOLD_S = 0.5
 FOUND = Path(".rcsc-cache") / "found"
 """Where findings are kept as logs, beside the system."""
 _COMMAND = "from rcsc.commands import main; main()"
@@ -47,6 +48,20 @@ class Build:
     def handlers(self) -> Mapping[str, Handler]:
         """By kind."""
         return {"build.open": self._open, "build.prove": self._prove}
+
+    def prove_first(self, ask: Ask, then: Callable[[], Json]) -> Json:
+        """Prove the levels together, beside them; then have something done in the lane `run`, and answer with that. From any lane."""
+
+        def proved() -> Json:
+            try:
+                self._job(ask, ("proving the levels together", proved_together, (self._path,)))
+            finally:
+                self._told("")
+            self._hub.do(RUN, lambda: ask.done(then))
+            return LATER
+
+        self._hub.do(LANE, lambda: ask.done(proved))
+        return LATER
 
     def greeting(self) -> Json:
         """What is being done, and what the last compilation found."""
@@ -160,6 +175,17 @@ def compiled(path: Path) -> dict[str, Any]:
         return report_to_json(compile_system(path).report, "compile")
     except CodedError as error:
         return {"ok": False, "diagnostics": [], "tables": [], "why": error.shown}
+
+
+def proved_together(path: Path) -> None:
+    """Prove a system's levels together, and keep what was found where the next that asks looks for it.
+
+    Raises:
+        Refused: The description is not in order.
+    """
+    cache = open_cache(path.parent)
+    if cache is not None:
+        prove_levels(path, cache)
 
 
 def commanded(arguments: tuple[str, ...]) -> tuple[int | None, str]:

@@ -17,7 +17,8 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Protocol, TypeAlias
@@ -27,11 +28,14 @@ from rcsc.diagnostics.codes import Code
 from rcsc.host.children import WorkerEndedError
 from rcsc.host.files.read import CheckedFields, Malformed
 from rcsc.shell.reload.refusal import Refused
+from rcsc.solvers.smt import until
 
 Json: TypeAlias = Any
 """What JSON can hold."""
 PROVER = threading.RLock()
 """Whoever proves in this process holds it: the solvers know one thread at a time."""
+TOLD_S = 0.5
+"""A page is told so often how long a proof takes."""
 MOST_OPEN = 32
 """Questions of one page that may be unanswered."""
 MOST_UNREAD = 4 * MOST_OPEN
@@ -84,6 +88,38 @@ class Ask:
         """
         if self._over.is_set():
             raise CancelledError
+
+    @contextmanager
+    def proving(self, what: str) -> Iterator[None]:
+        """Inside, the solvers are this thread's, and the page is told how long it takes; once it wants no answer, nothing more is asked.
+
+        The answers of the solvers are `unknown` then: who uses them calls `check` before anything is kept of it.
+
+        Args:
+            what: In words.
+
+        Raises:
+            CancelledError: Nobody waits for the answer any more.
+        """
+        over, begun_s = threading.Event(), time.monotonic()
+
+        def tell() -> None:
+            while not over.wait(TOLD_S) and not self.cancelled:
+                self._told({"text": f"{what}, {time.monotonic() - begun_s:.0f} s", "done": 0, "of": 0})
+
+        teller = threading.Thread(target=tell, daemon=True)
+        teller.start()
+        try:
+            while not PROVER.acquire(timeout=TOLD_S):
+                self.check()
+            try:
+                with until(lambda: self.cancelled):
+                    yield
+            finally:
+                PROVER.release()
+        finally:
+            over.set()
+            teller.join()
 
     @property
     def cancelled(self) -> bool:

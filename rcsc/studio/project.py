@@ -41,6 +41,7 @@ def concerns(
     folders = tuple(dict.fromkeys((Path.cwd(), opening.path.resolve().parent)))
     kept = Logs(folders, tuple(logs), lambda name, log: hub.do(LANE, lambda: time.show(name, log)))
     build = Build(opening.path, hub, live)
+    live.prove_first = build.prove_first
     desk = Desk(opening.path, hub.tell, hub.do)
     cell = Cell(time, hub.tell, drawer)
     return (

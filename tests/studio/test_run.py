@@ -3,7 +3,8 @@
 import asyncio
 import itertools
 import shutil
-from collections.abc import Awaitable, Callable
+import time
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from rcsc.run.system import System
 from rcsc.shell.commands import Commands
 from rcsc.shell.opening import Opening, opened
 from rcsc.shell.reload.refusal import Refused as Refusal
+from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.studio.runs.history import History
 from rcsc.studio.runs.live import Live
 from rcsc.studio.runs.shown import moment
@@ -307,7 +309,8 @@ REFUSED: tuple[tuple[str, dict[str, Any]], ...] = (
     ("run.type", {"line": "x" * 5000}),
     ("run.type", {"line": "quit"}),
     ("run.type", {"line": "clear"}),
-    ("run.type", {"line": "reload drive proved"}),
+    ("run.type", {"line": "reload nobody proved"}),
+    ("run.type", {"line": "reload nobody # proved"}),
     ("run.rate", {"rate": "fast"}),
     ("time.moment", {}),
     ("time.moment", {"tick": -1}),
@@ -519,6 +522,12 @@ OTHERWISE = (
     "| < command.target_mm  | < 2500 || tick             | 300 ",
 )
 
+UNKEPT = (
+    "report.ref_command_echo := command.input_command",
+    "report.ref_command_echo := stop",
+)
+"""What the supervisor assumes of the drive's report is not so any more; each table is proved all the same."""
+
 
 async def speed(one: Page, tick: int) -> str:
     values = await one.ask("time.values", level="drive", tick=tick)
@@ -537,13 +546,9 @@ def test_reload_is_gated_by_the_proof(dock: Path) -> None:
             await one.ask("run.type", line="reload drive")
         assert refused.value.code == "RCS733"
         assert (await other.ask("run.type", line="step"))["shown"][0].startswith("cycle 4")
-        source.write_text(text.replace("# A drive", "# The drive"), encoding="utf-8")
-        answer = await one.ask("run.type", line="reload drive")
-        assert (
-            "reload" in str(answer)
-            or "runs its new tables" in str(answer)
-            or "nothing changed" in str(answer)
-        )
+        source.write_text(f"# Speeds are of the wheels.\n{text}", encoding="utf-8")
+        answer = await one.ask("run.type", line="reload drive # not proved")
+        assert "`drive` runs its new tables from cycle 5 on" in answer["shown"][-1]
         assert (await other.ask("run.type", line="step"))["shown"][0].startswith("cycle 5")
         assert [
             level["tick"] for level in [await one.ask("time.moment", tick=tick) for tick in range(6)]
@@ -553,6 +558,101 @@ def test_reload_is_gated_by_the_proof(dock: Path) -> None:
         studio(dock, work)
     finally:
         source.write_text(text, encoding="utf-8")
+
+
+@pytest.fixture
+def edit(dock: Path) -> Iterator[Callable[[tuple[str, str]], None]]:
+    """Edits the drive's tables as they were, which are put back."""
+    source = dock.parent / "drive.rcs"
+    text = source.read_text(encoding="utf-8")
+
+    def write(edit: tuple[str, str]) -> None:
+        source.write_text(edited(text, edit), encoding="utf-8")
+
+    yield write
+    source.write_text(text, encoding="utf-8")
+
+
+async def told(one: Page, line: str) -> tuple[str, list[str]]:
+    """The code and the lines of what a line is answered; no code where it is done."""
+    try:
+        return "", (await one.ask("run.type", line=line))["shown"]
+    except Refused as refused:
+        return refused.code, str(refused).splitlines()
+
+
+def test_reload_proved_has_the_levels_proved_together_first(
+    dock: Path, edit: Callable[[tuple[str, str]], None]
+) -> None:
+    """What is proved of the levels together is said; what is not stays out, whatever else was said."""
+    kept = f"level `drive` is proved together with its neighbours, as the files of {dock} stand"
+
+    async def work(one: Page, other: Page) -> None:
+        await one.ask("run.type", line="order supervisor undock")
+        await one.ask("run.type", line="run 20")
+        edit(OTHERWISE)
+        proving = asyncio.create_task(told(one, "reload drive proved"))
+        await until(lambda: one.progress)
+        assert (await told(other, "step"))[1][0].startswith("cycle 21")
+        assert not proving.done(), "the levels waited for the proof"
+        code, said = await proving
+        assert code == Code.SHELL_OTHERWISE.value
+        assert kept in said
+        code, said = await told(one, "reload drive anyway PROVED # now")
+        assert kept in said
+        assert "  speed_mm_s: 400 -> 300" in said
+        assert "`drive` runs its new tables" in said[-1]
+        edit(UNKEPT)
+        code, said = await told(one, "reload drive anyway proved")
+        assert code == Code.SHELL_NOT_COMPOSED.value
+        assert said[1] == "not proved: the report echoes the command that it answers: `report`"
+        assert (await told(one, "reload drive"))[0] == Code.SHELL_NOT_COMPOSED.value
+
+    studio(dock, work)
+
+
+@pytest.mark.parametrize("line", ["diff drive", "reload drive anyway", "reload drive anyway proved"])
+def test_tables_are_not_taken_where_nobody_waits_for_it(
+    dock: Path, edit: Callable[[tuple[str, str]], None], line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cancelled at any question of the proof, or left by its page: the level keeps its tables, and the next line is done."""
+    asked = []
+
+    def slow(solver: Solver, *assuming: Term) -> Answer:
+        asked.append(time.monotonic())
+        time.sleep(0.02)
+        return check(solver, *assuming)
+
+    check = Solver.check
+
+    async def begun(page: Page, questions: int) -> int:
+        """Ask, and wait until a proof is so far."""
+        asked.clear()
+        page.progress.clear()
+        number = await page.send("run.type", line=line)
+        beside = line.endswith("proved")  # it asks nothing in this process
+        await until(lambda: page.progress if beside else len(asked) >= questions)
+        return number
+
+    async def work(one: Page, other: Page) -> None:
+        await one.ask("run.type", line="order supervisor undock")
+        await one.ask("run.type", line="run 20")
+        edit(OTHERWISE)
+        monkeypatch.setattr(Solver, "check", slow)
+        for questions in (1, 40, 100):
+            number = await begun(one, questions)
+            await one.socket.send_json({"id": number, "cancel": True})
+            assert await one.answer(number) == {"id": number, "cancelled": True}
+            assert len(asked) < questions + 20
+            assert (await told(other, "undo 99"))[1] == ["only 20 cycles can be undone"]
+        await begun(other, 1)
+        await other.socket.close()
+        assert (await told(one, "undo 99"))[1] == ["only 20 cycles can be undone"]
+        assert len(asked) < 20
+        monkeypatch.undo()
+        assert (await told(one, "diff drive"))[1][-1].startswith("`reload drive anyway` takes it")
+
+    studio(dock, work)
 
 
 def test_tables_that_are_not_proved_open_no_run_and_say_why(dock: Path, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """A first-time user in a real browser: from a table that is wrong to a run that is done, by mouse and by keyboard alone."""
 
 import asyncio
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -100,6 +101,28 @@ def _looked_back(seat: Seat, last: int) -> None:
     assert seat.tick() < last
     seat.press("e")
     seat.wait(f"{NOW} === {last} && !{shown}.includes('line start')")
+
+
+def never(_: Path) -> None:
+    """A proof that does not end."""
+    time.sleep(3600)
+
+
+def test_what_takes_long_says_so_and_is_cancelled_by_a_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rcsc.studio.build.proved_together", never)
+    with seated(Opening(dock(tmp_path / "dock"))) as seat:
+        seat.until("#state", "paused at cycle 0")
+        seat.press("c")
+        seat.write("reload drive proved")
+        seat.press("enter")
+        seat.until("#said", "reload drive proved: proving the levels together, 1 s")
+        seat.press("escape", "s")
+        seat.until("#state", "paused at cycle 1")  # the levels do not wait for it
+        seat.press(".")
+        seat.until(".transcript .wrong", "cancelled")
+        seat.wait("document.querySelector('#said').innerText === ''")
 
 
 def test_the_paper_s_part_reaches_the_pallet_and_is_looked_at_in_a_file(tmp_path: Path) -> None:

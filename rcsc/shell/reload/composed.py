@@ -5,6 +5,7 @@ are what is proved: nothing is claimed while a level runs other tables than its 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 from rcsc.compose.proof.standing import Known, KnownSystem
 from rcsc.diagnostics.codes import Code
@@ -48,7 +49,7 @@ def together(
     edited = [spec.name for spec in plant.system.levels if runs[spec.name] != held_by(plant, spec)]
     cache = open_cache(plant.path.parent)
     if prove and not edited and cache is not None:
-        _prove(plant, cache)
+        prove_levels(plant.path, cache)
     known_system = None if cache is None or edited else known(plant.path, cache)
     verdict = Known.UNKNOWN if known_system is None else known_system.of_level(level)
     if known_system is not None and verdict is Known.NOT_PROVED:
@@ -68,12 +69,16 @@ def together(
     return f"level `{level}` is not known to be proved together with its neighbours: {why}"
 
 
-def _prove(plant: Origin, cache: Cache) -> None:
-    """Prove what no earlier run did, and cache it."""
+def prove_levels(path: Path, cache: Cache) -> None:
+    """Prove of a system's levels together what no earlier run did, and cache it.
+
+    Raises:
+        Refused: The description is not in order.
+    """
     from rcsc.compose.proof.system import NoProgramError, prove_transition_systems, transition_systems
 
     try:
-        systems = transition_systems(plant.path)
+        systems = transition_systems(path)
     except (BadDescription, NoProgramError) as error:
         raise Refused(Code.BAD_SYSTEM, str(error)) from error
     prove_transition_systems(systems, None, 1, tuple(systems), None, cache)

@@ -13,3 +13,7 @@ class Refused(Exception):  # noqa: N818  # what happened, not an error of ours
     def __init__(self, code: Code, message: str, *helps: str) -> None:
         super().__init__(message)
         self.code, self.helps = code, helps
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Come whole out of another process."""
+        return Refused, (self.code, str(self), *self.helps)

@@ -105,15 +105,20 @@ export class Bus {
     this.keys.push({ keys, what, run, where });
   }
 
-  /** Say something in the line below; `wrong` where it went wrong. */
-  say(text, { wrong = false, helps = [] } = {}) {
-    this.tell("said", { text, wrong, helps });
+  /** Say something in the line below; `wrong` where it went wrong, `cancel` where it is under way. */
+  say(text, { wrong = false, helps = [], cancel = null } = {}) {
+    this.tell("said", { text, wrong, helps, cancel });
   }
 
   /** Ask, and say it where it is refused; undefined then. */
-  async try(kind, body, options) {
+  try(kind, body, options) {
+    return this.told(this.ask(kind, body, options));
+  }
+
+  /** The answer; undefined where it is refused, which is said. */
+  async told(answer) {
     try {
-      return await this.ask(kind, body, options);
+      return await answer;
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
       this.say(error.message, { wrong: true, helps: error.helps });
@@ -122,11 +127,21 @@ export class Bus {
   }
 }
 
-/** Do a line as the shell does it; what takes long says so. Returns the lines that the shell shows, or undefined where it is refused. */
-export async function doLine(bus, line) {
-  const late = setTimeout(() => bus.say(`${line}: under way`), 500);
-  const answer = await bus.try("run.type", { line });
-  clearTimeout(late);
-  if (bus.latest("said")?.text === `${line}: under way`) bus.say(answer ? answer.shown.join("\n") || `${line}: done` : "", {});
-  return answer;
+/** Do a line as the shell does it; what takes long says so, and can be cancelled. The promise is refused as `ask` is. */
+export async function typeLine(bus, line) {
+  let last = "";
+  const stop = new AbortController(), cancel = () => stop.abort();
+  const tell = (how) => bus.say((last = `${line}: ${how}`), { cancel });
+  const late = setTimeout(() => tell("under way"), 500);
+  try {
+    const answer = await bus.ask("run.type", { line }, { signal: stop.signal, progress: ({ text }) => { clearTimeout(late); tell(text); } });
+    if (last) bus.say(answer.shown.join("\n") || `${line}: done`);
+    return answer;
+  } finally {
+    clearTimeout(late);
+    if (last && bus.latest("said").text === last) bus.say("");
+  }
 }
+
+/** The same; undefined where it is refused, which is said. */
+export const doLine = (bus, line) => bus.told(typeLine(bus, line));

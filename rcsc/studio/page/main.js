@@ -101,14 +101,16 @@ function broken(error) {
 addEventListener("error", ({ error }) => broken(error));
 addEventListener("unhandledrejection", ({ reason }) => broken(reason));
 
-let clearing = 0;
-bus.on("said", ({ text, wrong, helps }) => {
+let clearing = 0, under = null; // what a click would cancel
+bus.on("said", ({ text, wrong, helps, cancel }) => {
   const line = page("said");
+  if (cancel && cancel === under) return line.firstChild.replaceWith(text); // the button stays where it is
+  under = cancel;
   line.className = wrong ? "wrong" : "";
-  line.replaceChildren(wrong ? make("strong", {}, "Not done: ") : "", text, ...helps.map((help) => make("span", { class: "help" }, ` Help: ${help}`)),
+  line.replaceChildren(...(wrong ? [make("strong", {}, "Not done: ")] : []), text, ...helps.map((help) => make("span", { class: "help" }, ` Help: ${help}`)), cancel ? make("button", { type: "button", title: "Give up what is under way: .", onclick: cancel }, "Cancel") : "",
     make("button", { type: "button", class: "close", "aria-label": "Dismiss", onclick: () => line.replaceChildren() }, "×"));
   clearTimeout(clearing);
-  if (!wrong) clearing = setTimeout(() => line.replaceChildren(), 6000);
+  if (!wrong && !cancel) clearing = setTimeout(() => line.replaceChildren(), 6000);
 });
 
 function stated() {
@@ -170,6 +172,7 @@ function listKeys() {
 page("help").addEventListener("click", listKeys);
 bus.key("?", "List the keys", listKeys);
 bus.key("escape", "Leave a field: keys mean what they say here again", () => {});
+bus.key(".", "Cancel what is under way in the line below", () => bus.latest("said")?.cancel?.());
 bus.key("t", "Light, dark, or as the system has it", nextTheme);
 
 sharing(bus, page("share"), page("sharing"));

@@ -1,6 +1,6 @@
 // The run: every level beside the others, what is done to it, and why a line did not match.
 
-import { doLine, make } from "./bus.js";
+import { doLine, make, typeLine } from "./bus.js";
 import { changes, exchanges, short } from "./exchanges.js";
 import { lookAt } from "./moments.js";
 
@@ -271,7 +271,7 @@ function consoleTab(bus) {
     at = past.length;
     line.value = "";
     if (typed === "clear") return text.replaceChildren();
-    try { said(typed, (await bus.ask("run.type", { line: typed })).shown); }
+    try { said(typed, (await typeLine(bus, typed)).shown); }
     catch (error) { said(typed, [error.message, ...(error.helps ?? []).map((help) => `help: ${help}`)], true); }
     return undefined;
   } }, line, make("button", {}, "Do"));

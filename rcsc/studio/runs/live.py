@@ -4,7 +4,6 @@ In: questions of kind `run.*`. Out: answers, and `run.state` to every page whene
 that a pause is heard between two of them; nothing here waits for a page, and a page that goes leaves the levels as they are.
 """
 
-import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
@@ -43,11 +42,6 @@ WATCHED_RATE = 4.0
 MOST_MARKS = 2000
 _LOOKING = ("?", "help", "show", "lines", "levels", "buffers", "breaks", "faults", "diff", "expect")
 """Commands that change nothing, and leave no mark on the time line."""
-
-_PROVED = re.compile(r"^\s*reload\b.*\bproved\b", re.IGNORECASE)
-_PROVE_FIRST = (
-    "have the levels proved together first, which may be cancelled; `reload LEVEL` then knows what was proved",
-)
 
 
 @dataclass(slots=True)
@@ -94,6 +88,7 @@ class Live:
         history: What the run did.
         why: Why nothing is open; empty where something is.
         opened: Called with each system that was opened, before its first cycle.
+        prove_first: Has the levels proved together beside them, and then something done in this lane.
     """
 
     name, lane = "run", LANE
@@ -118,6 +113,7 @@ class Live:
         self.history = History()
         self.why = "its tables are being proved and compiled"
         self.opened: list[Callable[[Session], None]] = []
+        self.prove_first: Callable[[Ask, Callable[[], Json]], Json] = lambda _, then: then()
         self.marks: list[Mark] = []
         self._going: Going | None = None
         self._ended = ""
@@ -277,14 +273,19 @@ class Live:
                 "that is of a terminal",
                 "close the page, or press Ctrl-C where `rcsc studio` runs",
             )
-        if _PROVED.search(line):
-            raise Refused(
-                Code.STUDIO, "that proof takes minutes, and the levels would wait for it", *_PROVE_FIRST
-            )
+        if commands.proves_together(line):
+            return self.prove_first(ask, lambda: self._do(ask, line))
+        return self._do(ask, line)
+
+    def _do(self, ask: Ask, line: str) -> Json:
+        commands = self._open_commands()
         tick = commands.session.system.tick
         try:
-            with PROVER if commands.proves(line) else nullcontext():
+            with ask.proving("proving") if commands.proves(line) else nullcontext():
                 shown = commands.do(line)
+        except Refused:
+            ask.check()  # what was given up is no reason
+            raise
         finally:
             self.history.settle(commands.session.system)
             self._forget_marks(commands.session.changes)
@@ -292,7 +293,7 @@ class Live:
         if (
             line.split()[:1]
             and not line.strip().endswith("?")
-            and line.split()[0].casefold() not in (*_LOOKING, "undo")
+            and line.split(maxsplit=1)[0].casefold() not in (*_LOOKING, "undo")
         ):
             self._mark(tick, "hand", line.strip())
         return {"shown": shown}
