@@ -246,7 +246,7 @@ class Workspace:
             OutdatedError: Nobody does any more.
         """
         self.memo.go_on = go_on
-        with uncollected(), smt.until(lambda: not go_on()):
+        with uncollected(), smt.until(lambda: not go_on(), breaks_off=True):
             yield
         if not go_on():
             raise OutdatedError

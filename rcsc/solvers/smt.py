@@ -7,6 +7,7 @@ In: terms built by the functions here. Out: `Answer`s. A time-out, exhausted mem
 import signal
 import struct
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -90,17 +91,38 @@ class _Until(Budget):
 
 
 _budgets: list[Budget] = []
+WATCH_S = 0.02
+"""A question that nobody waits for any more is broken off within so long, and what Z3 takes to hear of it."""
+_asking = threading.Event()
+"""Whether Z3 is at a question."""
 
 
 @contextmanager
-def until(over: Callable[[], bool]) -> Iterator[None]:
-    """Inside, nothing more is asked once something is over; every answer is then `UNKNOWN`."""
-    ending = _Until(sys.maxsize, over)
+def until(over: Callable[[], bool], *, breaks_off: bool = False) -> Iterator[None]:
+    """Inside, nothing more is asked once something is over; every answer is then `UNKNOWN`.
+
+    Args:
+        over: Whether it is.
+        breaks_off: Whether the question under way is broken off, too; `over` is then asked in another thread as well.
+    """
+    ending, left = _Until(sys.maxsize, over), threading.Event()
+    watcher = threading.Thread(target=_watch, args=(over, left), daemon=True) if breaks_off else None
     _budgets.append(ending)
+    if watcher is not None:
+        watcher.start()
     try:
         yield
     finally:
+        left.set()
+        if watcher is not None:
+            watcher.join()  # whoever asks next is not broken off
         _budgets.remove(ending)
+
+
+def _watch(over: Callable[[], bool], left: threading.Event) -> None:
+    while not left.wait(WATCH_S):
+        if _asking.is_set() and over():
+            _z3().main_ctx().interrupt()  # where no question is under way by now, nothing comes of it
 
 
 @contextmanager
@@ -351,7 +373,7 @@ class Solver:
             answer, why = self._answer(assuming)
         except (z3.Z3Exception, MemoryError) as error:
             answer, why = z3.unknown, str(error)
-        if "interrupted" in why:  # Z3 takes Ctrl-C for itself
+        if "interrupted" in why and not spent():  # Z3 takes Ctrl-C for itself
             raise KeyboardInterrupt
         if answer == z3.unsat and self._remembers:
             self.refuted.append(all_of([*(term for terms in self._added for term in terms), *assuming]))
@@ -367,7 +389,11 @@ class Solver:
         while True:
             counted = self._count()
             used_s, passed_s = time.thread_time(), time.monotonic()
-            answer = self._solver.check(*assuming)
+            _asking.set()
+            try:
+                answer = self._solver.check(*assuming)
+            finally:
+                _asking.clear()
             signal.siginterrupt(signal.SIGINT, True)  # Z3 leaves it so that Ctrl-C ends no wait for a worker
             if answer != z3.unknown:
                 self._charge(counted)

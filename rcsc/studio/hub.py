@@ -113,7 +113,7 @@ class Ask:
             while not PROVER.acquire(timeout=TOLD_S):
                 self.check()
             try:
-                with until(lambda: self.cancelled):
+                with until(lambda: self.cancelled, breaks_off=True):
                     yield
             finally:
                 PROVER.release()

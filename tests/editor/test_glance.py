@@ -1,5 +1,6 @@
 """A glance says nothing that a check takes back, and what nobody waits for ends."""
 
+import threading
 import time
 from functools import partial
 from pathlib import Path
@@ -9,9 +10,11 @@ import pytest
 from rcsc.editor import Workspace
 from rcsc.editor.memo import OutdatedError
 from rcsc.editor.values import Answer, State
+from rcsc.lang.model import Int
 from rcsc.solvers import smt
-from rcsc.solvers.options import Options
+from rcsc.solvers.options import Limits, Options
 from rcsc.solvers.smt import Answer as Solved
+from rcsc.solvers.smt import Solver
 
 REPO = Path(__file__).parents[2]
 HARD = str(REPO / "tables/primitive/gothru.rcs")
@@ -62,6 +65,29 @@ def test_what_a_glance_leaves_open_is_neither_told_nor_kept(monkeypatch: pytest.
     assert answer == Workspace().check(file)
     assert said(glance) <= said(answer)
     assert workspace.glance(file) is answer
+
+
+def test_a_question_under_way_is_broken_off_when_nobody_waits_for_it() -> None:
+    """However long it may take; the next is answered, and only what watches its end breaks anything off."""
+    over = threading.Event()
+    solver = Solver(Limits(steps=2**32 - 1, cpu_s=86_400.0))
+    kind = Int(0, 0)
+    a, b, c = (smt.variable(name, kind) for name in "abc")
+    cubes = [smt.integer_operation("*", each, smt.integer_operation("*", each, each)) for each in (a, b, c)]
+    solver.add(
+        smt.equal(smt.integer_operation("+", *cubes[:2]), cubes[2], kind)
+    )  # Fermat has an answer, Z3 none
+    for each in (a, b, c):
+        solver.add(smt.at_most(smt.literal(kind, 1), each, kind))
+    threading.Timer(0.5, over.set).start()
+    with smt.until(over.is_set, breaks_off=True):
+        assert solver.check() is Solved.UNKNOWN
+        assert over.is_set()
+    easy = Solver(Limits())
+    easy.add(smt.equal(a, b, kind))
+    assert easy.check() is Solved.SATISFIABLE
+    with smt.until(lambda: False, breaks_off=True):
+        assert easy.check() is Solved.SATISFIABLE
 
 
 @pytest.mark.parametrize(

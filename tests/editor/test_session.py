@@ -176,3 +176,41 @@ def test_a_bug_in_the_way_of_one_file_is_told_and_the_others_are_looked_at(
     assert [each.code for each in of_bad[-1].findings] == ["RCS401"]
     assert [each.code for each in next(one for one in told if one.file == good).findings] == ["RCS401"]
     assert "RecursionError" in capsys.readouterr().err
+
+
+def test_a_key_is_looked_at_at_once_and_keys_that_come_faster_when_they_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a rest of an hour the first answer comes all the same; what is typed meanwhile has the last text alone looked at."""
+    path = tmp_path / "t.rcs"
+    monkeypatch.setattr("rcsc.editor.server.session.RESTS_S", 3600.0)
+    heard: asyncio.Queue[Answer] = asyncio.Queue()
+    glanced: list[str] = []
+
+    async def typed() -> list[str]:
+        session = Session(heard.put)
+        glance = session.workspace.glance
+
+        def counted(file: str, go_on: Callable[[], bool]) -> Answer:
+            glanced.append(session.workspace.overlay[os.path.realpath(file)])
+            return glance(file, go_on)
+
+        monkeypatch.setattr(type(session.workspace), "glance", lambda _, file, go_on: counted(file, go_on))
+        for version in (1, 2, 3):
+            session.open(path.as_uri(), f"{TABLE}# {version}\n", version)
+            answer = await asyncio.wait_for(heard.get(), 60)
+            assert answer.texts == {str(path): f"{TABLE}# {version}\n"}
+        monkeypatch.setattr("rcsc.editor.server.session.RESTS_S", 0.2)
+        for version in range(4, 40):
+            session.open(path.as_uri(), f"{TABLE}# {version}\n", version)
+        assert session._waiting is not None
+        await session._waiting
+        session.stop()
+        return glanced
+
+    assert [text.removeprefix(TABLE) for text in asyncio.run(typed())] == [
+        "# 1\n",
+        "# 2\n",
+        "# 3\n",
+        "# 39\n",
+    ]

@@ -92,7 +92,9 @@ def test_reload_proved_takes_nothing_that_stays_undecided(
 ) -> None:
     commands = alone(system, "python")
     edit_file(system.with_name("upper.rcs"), SLOWER)
-    monkeypatch.setattr(composed, "prove_levels", lambda *_: None)  # as if the solver gave up: nothing is kept
+    monkeypatch.setattr(
+        composed, "prove_levels", lambda *_: None
+    )  # as if the solver gave up: nothing is kept
     error = refused(commands, "reload upper proved")
     assert error.code is Code.SHELL_NOT_COMPOSED
     assert f": `rcsc prove {system}` decides it" in str(error)

@@ -24,7 +24,7 @@ from rcsc.editor.workspace import Workspace
 from rcsc.solvers.options import Options
 
 RESTS_S = 0.08
-"""How long keys rest before anything is checked, in seconds."""
+"""How long keys rest before anything is looked at that may take longer than a moment, in seconds."""
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -70,6 +70,7 @@ class Session:
     _proves: ThreadPoolExecutor = field(init=False)
     _reads: ThreadPoolExecutor = field(init=False)
     _waiting: "asyncio.Task[None] | None" = None
+    _looked: bool = True
 
     def __post_init__(self) -> None:
         self.workspace = Workspace(self.options)
@@ -99,21 +100,29 @@ class Session:
         self.changed(path)
 
     def changed(self, path: str) -> None:
-        """Have what is open checked once keys rest, this file first."""
+        """Have what is open checked: this file is looked at at once, or when keys rest that come faster than they are looked at."""
         self.turn += 1
         if self._waiting is not None:
             self._waiting.cancel()
         order = sorted(self.uris, key=lambda each: each != path)
-        self._waiting = asyncio.get_running_loop().create_task(self._check(order))
+        check = self._check(order, 0.0 if self._looked else RESTS_S)
+        self._looked = False
+        self._waiting = asyncio.get_running_loop().create_task(check)
 
-    async def _check(self, order: list[str]) -> None:
-        await asyncio.sleep(RESTS_S)
+    async def _check(self, order: list[str], rests_s: float) -> None:
+        await asyncio.sleep(rests_s)
+        for path in order[:1]:
+            await self._tell(self.answer(path))
+        self._looked = True
+        await asyncio.sleep(RESTS_S - rests_s)
+        for path in order[1:]:
+            await self._tell(self.answer(path))
         for path in order:
-            with contextlib.suppress(OutdatedError):
-                await self.listens(await self.answer(path))
-        for path in order:
-            with contextlib.suppress(OutdatedError):
-                await self.listens(await self.final(path))
+            await self._tell(self.final(path))
+
+    async def _tell(self, asked: Awaitable[Answer]) -> None:
+        with contextlib.suppress(OutdatedError):
+            await self.listens(await asked)
 
     # --- answers ---
 
