@@ -201,7 +201,8 @@ export function mount(root, bus) {
       stage.hidden = true;
       return said("This browser cannot draw in space (WebGL).");
     }
-    note.textContent = now === "space" ? `a square of the floor is ${GRID_M * 1000} mm; drag to turn, wheel to go nearer` : how.value === "space" && state.space ? "a log holds no poses: drawn of what buffers say" : "";
+    note.title = now === "space" ? "Drag to turn, wheel to go nearer" : "";
+    note.textContent = now === "space" ? `squares of ${GRID_M * 1000} mm` : how.value === "space" && state.space ? "a log holds no poses: drawn of what buffers say" : "";
     note.title = note.textContent;
     said("");
     size();

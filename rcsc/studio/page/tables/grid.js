@@ -18,7 +18,7 @@ export function mount(root, bus) {
   const sheetPlace = make("div", { class: "grid-place" }), textPlace = make("div", { class: "text-place" });
   const elsewhere = make("div", { class: "elsewhere" });
   const modes = ["Grid", "Text", "Both"].map((name) => button(name, `Show ${name.toLowerCase()}`, () => mode(name), { "data-mode": name }));
-  const filter = make("input", { class: "filter", "aria-label": "Lines that can match where this condition holds", placeholder: "lines that can match where … (a condition)", spellcheck: "false" });
+  const filter = make("input", { class: "filter", "aria-label": "Lines that can match where this condition holds", placeholder: "lines that can match where …", spellcheck: "false" });
   const filtered = make("span", { class: "soft", role: "status" });
   const adding = columnForm(() => sheet);
   const more = make("details", { class: "more" }, make("summary", {}, "Table"), make("div", { class: "menu" },
