@@ -3,10 +3,10 @@
 In: a file as it is read, and a table's name. Out: texts for people, or the text of the file. Proving anew asks no memory.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from rcsc.diagnostics.diagnostic import Diagnostic, WitnessColumn
+from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.driver.proofs import table_report
 from rcsc.editor.places import Lines
 from rcsc.editor.standing import standing
@@ -15,8 +15,17 @@ from rcsc.graph.derive import derive
 from rcsc.graph.drawing import svg
 from rcsc.graph.formats.choice import FORMS
 from rcsc.graph.layout import NoLayoutError
-from rcsc.lang.interpret import evaluate, execute, holds, initial, matching_lines
-from rcsc.lang.model import Bool, Enum, Int, Line, Program, Scalar, Table, Value, spell
+from rcsc.lang.interpret import (
+    UNDEFINED,
+    ExternError,
+    answering,
+    evaluate,
+    execute,
+    holds,
+    initial,
+    matching_lines,
+)
+from rcsc.lang.model import Bool, Enum, Int, Line, LineName, Procedure, Program, Scalar, Table, Value, spell
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
 
@@ -99,22 +108,28 @@ def witness_run(checked: Checked, name: str, which: int = 0) -> Shown:
     if not columns:
         return Shown(title, "text", f"no finding of table `{name}` has a witness")
     program, table = found
-    return Shown(title, "text", "\n".join(_run(program, table, columns[which % len(columns)])))
+    column = columns[which % len(columns)]
+    values = tuple(zip(column.variables, column.values, strict=True))
+    return Shown(title, "text", "\n".join(run_at(program, table, values)))
 
 
-def _run(program: Program, table: Table, column: WitnessColumn) -> Iterator[str]:
+def run_at(program: Program, table: Table, values: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Yield what the interpreter says of one look of a table: what comes of it, and of each line.
+
+    Args:
+        program: The table's.
+        table: In which nothing need be proved.
+        values: Name and text of the variables that are known; the others are as a program begins with them.
+    """
     kinds = {str(each.name): each.type for each in program.variables}
-    now = initial(program)
-    now |= {
-        name: value_of(kinds[name], text) for name, text in zip(column.variables, column.values, strict=True)
-    }
-    yield "input: " + ", ".join(
-        f"{name} = {text}" for name, text in zip(column.variables, column.values, strict=True)
-    )
-    matching = set(matching_lines(table, now))
-    yield f"{len(matching)} of {len(table.lines)} lines match" + (
-        f"; DEFAULT `{table.default.name}` runs" if not matching and table.default is not None else ""
-    )
+    now = initial(program) | {name: value_of(kinds[name], text) for name, text in values}
+    yield "input: " + ", ".join(f"{name} = {text}" for name, text in values)
+    try:
+        matching = matching_lines(table, now)
+    except UNDEFINED as error:
+        yield f"the table ends the cycle here: {error}"
+        return
+    yield f"{len(matching)} of {len(table.lines)} lines match: {_comes_of(table, matching)}"
     for line in table.lines:
         if line.name in matching:
             yield f"line `{line.name}` matches, and would set: {_does(program, line, now, kinds)}"
@@ -122,15 +137,32 @@ def _run(program: Program, table: Table, column: WitnessColumn) -> Iterator[str]
             yield f"line `{line.name}` does not: {_first_that_fails(table, line, now)}"
 
 
+def _comes_of(table: Table, matching: Sequence[LineName]) -> str:
+    if len(matching) == 1:
+        return f"line `{matching[0]}` runs"
+    if not matching and table.default is not None:
+        return f"DEFAULT `{table.default.name}` runs"
+    return "a STATE-TABLE error, and no line runs"
+
+
 def _does(program: Program, line: Line, now: Mapping[str, Value], kinds: Mapping[str, Scalar]) -> str:
     after = dict(now)
-    execute(program, [action.statement for action in line.actions], after, {})
+    try:
+        with answering(_not_called):
+            execute(program, [action.statement for action in line.actions], after, {})
+    except (*UNDEFINED, ExternError) as error:
+        return f"nothing that can be told here: {error}"
     changed = [
         f"{name} := {spell(kinds[name], value)}"
         for name, value in after.items()
         if name in kinds and value != now[name]
     ]
     return ", ".join(changed) or "nothing that it does not have already"
+
+
+def _not_called(procedure: Procedure, _: list[Value]) -> tuple[Value, ...]:
+    """Refuse: somebody's own program is not run to look at a table."""
+    raise ExternError(f"`{procedure.name}` is an extern procedure, and is not called")
 
 
 def _first_that_fails(table: Table, line: Line, now: Mapping[str, Value]) -> str:

@@ -401,6 +401,63 @@ def test_the_published_acquire_is_mended_by_its_repairs_alone(shipped: Path) -> 
     ]
 
 
+@pytest.mark.parametrize(
+    "file",
+    [
+        "examples/acquire_published.rcs",
+        *(f"gallery/{name}/published.rcs" for name in ("lm_fsm", "packml", "elevator")),
+    ],
+)
+def test_an_input_that_shows_a_finding_is_run(file: str, shipped: Path) -> None:
+    """The interpreter finds the lines that the prover named; a gap and an overlap are what the robot would end with."""
+    bench = Bench(shipped / "system.toml")
+    doc = bench.open(file)
+    ran = 0
+    for finding in doc["findings"]:
+        for at, witness in enumerate(finding["witnesses"] if finding["code"] in {"RCS401", "RCS402"} else ()):
+            told = bench.now("proof.run", file, finding=finding["id"], input=at)
+            matching = [line.split("`")[1] for line in told["lines"] if "` matches, and would set: " in line]
+            assert matching == witness["lines"]
+            assert len(matching) != 1
+            assert told["comes"].startswith(
+                f"{len(matching)} of {len(told['lines'])} lines match: a STATE-TABLE error"
+            )
+            ran += 1
+    assert ran
+    with pytest.raises(Refused, match="no such input"):
+        bench.now("proof.run", file, finding=0, input=99)
+
+
+EXTERNAL = """input now : bool
+input w : int 0 .. 9
+output out : int 0 .. 3
+extern procedure theirs writes out
+  python "somebody:does" c "does"
+procedure small { out := min(w, 3) }
+table t {
+  | line | now  | w   || procedures |
+  |------|------|-----||------------|
+  | a    |      | < 5 || theirs     |
+  | b    | true |     || small      |
+}
+"""
+
+
+def test_what_is_run_at_an_input_calls_nobody_s_program(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    called: list[str] = []
+    monkeypatch.setattr("rcsc.lang.interpret.importlib.import_module", called.append)
+    (folder / "t.rcs").write_text(EXTERNAL)
+    bench = Bench(folder / "system.toml")
+    finding = next(each for each in bench.open("t.rcs")["findings"] if each["code"] == "RCS402")
+    a, b = bench.now("proof.run", "t.rcs", finding=finding["id"], input=0)["lines"]
+    assert a.startswith("line `a` matches")
+    assert a.endswith("`theirs` is an extern procedure, and is not called")
+    assert b.startswith("line `b` matches, and would set: ")
+    assert not called
+
+
 def test_a_repair_of_another_text_is_refused(shipped: Path) -> None:
     file = "examples/acquire_published.rcs"
     bench = Bench(shipped / "system.toml")

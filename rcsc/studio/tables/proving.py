@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.editor.lenses import run_at
 from rcsc.editor.values import Repair
 from rcsc.graph.chart import sheet
 from rcsc.graph.composites import Chart, collapsed, folded
@@ -46,7 +47,12 @@ class Proof:
     @property
     def handlers(self) -> Mapping[str, Handler]:
         """By kind."""
-        return {"proof.repairs": self._repairs, "proof.repair": self._repair, "proof.filter": self._filter}
+        return {
+            "proof.repairs": self._repairs,
+            "proof.repair": self._repair,
+            "proof.run": self._run,
+            "proof.filter": self._filter,
+        }
 
     def greeting(self) -> Json:
         """Nothing."""
@@ -82,6 +88,18 @@ class Proof:
             return found.replace(found.edited(chosen.edits), chosen.title)
 
         return self._desk.change(file, make)
+
+    def _run(self, ask: Ask) -> Json:
+        """Run a table for one look at an input that shows a finding, by the interpreter: nothing need be proved or compiled for it."""
+        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+        number, at = ask.body.whole("finding", 0, 1_000_000), ask.body.whole("input", 0, 1_000_000)
+        findings = self._desk.known(name, version).answer.findings
+        if number >= len(findings) or at >= len(findings[number].witnesses):
+            raise Refused(Code.STUDIO, "there is no such input any more")
+        witness = findings[number].witnesses[at]
+        program, table = _table_of(self._desk.checked(name, version).reading.program, witness.table, ask)
+        _, comes, *lines = run_at(program, table, witness.values)
+        return {"comes": comes, "lines": lines}
 
     def _filter(self, ask: Ask) -> Json:
         """Say which lines of a table can match where a condition holds."""

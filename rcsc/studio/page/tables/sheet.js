@@ -167,6 +167,8 @@ export class SheetGrid {
       if (pressed) {
         more.push(make("div", { class: "witness-more code" }, `Input: ${witness.values.map(([name, text]) => `${name} = ${text}`).join(", ")}`));
         if (region) more.push(make("div", { class: "region-words" }, region));
+        const run = make("div", { class: "witness-run" });
+        more.push(make("button", { type: "button", class: "small", title: "What the table does at this input: each line, and why it does not match", onclick: () => this.#run(one, at, run) }, "Run the table at it"), run);
       }
     });
     const notes = one.notes.map((note) => make("div", { class: "soft" }, ...spoken(note)));
@@ -179,6 +181,15 @@ export class SheetGrid {
       this.#offer(one, place);
     } else for (const help of one.help) box.append(make("div", { class: "help" }, "Help: ", ...spoken(help)));
     return box;
+  }
+
+  /** One look of the table, as the interpreter runs it; no cycle of the level is said to come to it. */
+  async #run(one, at, place) {
+    const ran = await this.#desk.try("proof.run", { finding: one.id, input: at, version: this.#desk.doc.version });
+    if (!ran) return;
+    place.replaceChildren(make("p", {}, make("strong", {}, ...spoken(ran.comes)), make("span", { class: "soft" },
+      ". The interpreter ran the table for one look at this input; what that does not name is as a run begins. Whether a run comes to it is for `rcsc prove` to find.")),
+    make("ul", {}, ...ran.lines.map((line) => make("li", {}, ...spoken(line)))));
   }
 
   async #offer(one, place) {
