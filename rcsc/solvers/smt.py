@@ -90,11 +90,18 @@ class _Until(Budget):
         return self.over()
 
 
-_budgets: list[Budget] = []
+class _Thread(threading.local):
+    """What a thread's questions may cost: what one gives up is not given up by another."""
+
+    def __init__(self) -> None:
+        self.budgets: list[Budget] = []
+
+
+_own = _Thread()
 WATCH_S = 0.02
 """A question that nobody waits for any more is broken off within so long, and what Z3 takes to hear of it."""
-_asking = threading.Event()
-"""Whether Z3 is at a question."""
+_asking: set[int] = set()
+"""Threads whose question Z3 is at."""
 
 
 @contextmanager
@@ -106,8 +113,12 @@ def until(over: Callable[[], bool], *, breaks_off: bool = False) -> Iterator[Non
         breaks_off: Whether the question under way is broken off, too; `over` is then asked in another thread as well.
     """
     ending, left = _Until(sys.maxsize, over), threading.Event()
-    watcher = threading.Thread(target=_watch, args=(over, left), daemon=True) if breaks_off else None
-    _budgets.append(ending)
+    watcher = (
+        threading.Thread(target=_watch, args=(over, left, threading.get_ident()), daemon=True)
+        if breaks_off
+        else None
+    )
+    _own.budgets.append(ending)
     if watcher is not None:
         watcher.start()
     try:
@@ -116,12 +127,12 @@ def until(over: Callable[[], bool], *, breaks_off: bool = False) -> Iterator[Non
         left.set()
         if watcher is not None:
             watcher.join()  # whoever asks next is not broken off
-        _budgets.remove(ending)
+        _own.budgets.remove(ending)
 
 
-def _watch(over: Callable[[], bool], left: threading.Event) -> None:
+def _watch(over: Callable[[], bool], left: threading.Event, asker: int) -> None:
     while not left.wait(WATCH_S):
-        if _asking.is_set() and over():
+        if asker in _asking and over():
             _z3().main_ctx().interrupt()  # where no question is under way by now, nothing comes of it
 
 
@@ -129,16 +140,16 @@ def _watch(over: Callable[[], bool], left: threading.Event) -> None:
 def together(steps: int) -> Iterator[Budget]:
     """Inside, all questions of all solvers take at most so many steps."""
     budget = Budget(steps)
-    _budgets.append(budget)
+    _own.budgets.append(budget)
     try:
         yield budget
     finally:
-        _budgets.remove(budget)
+        _own.budgets.remove(budget)
 
 
 def spent() -> bool:
     """Whether no question is asked any more, so that none need be made."""
-    return any(budget.spent for budget in _budgets)
+    return any(budget.spent for budget in _own.budgets)
 
 
 def troubles() -> tuple[type[BaseException], ...]:
@@ -368,7 +379,7 @@ class Solver:
             return Answer.UNKNOWN
         z3 = _z3()
         self.queries += 1
-        self._give(min([self._steps, *(budget.left for budget in _budgets)]))
+        self._give(min([self._steps, *(budget.left for budget in _own.budgets)]))
         try:
             answer, why = self._answer(assuming)
         except (z3.Z3Exception, MemoryError) as error:
@@ -389,11 +400,11 @@ class Solver:
         while True:
             counted = self._count()
             used_s, passed_s = time.thread_time(), time.monotonic()
-            _asking.set()
+            _asking.add(threading.get_ident())
             try:
                 answer = self._solver.check(*assuming)
             finally:
-                _asking.clear()
+                _asking.discard(threading.get_ident())
             signal.siginterrupt(signal.SIGINT, True)  # Z3 leaves it so that Ctrl-C ends no wait for a worker
             if answer != z3.unknown:
                 self._charge(counted)
@@ -417,12 +428,12 @@ class Solver:
 
     def _count(self) -> int:
         """Steps that Z3 has counted so far, where anybody wants to know."""
-        return int(self._solver.statistics().get_key_value("rlimit count")) if _budgets else 0
+        return int(self._solver.statistics().get_key_value("rlimit count")) if _own.budgets else 0
 
     def _charge(self, before: int) -> None:
         """Takes what a question cost from all budgets; not what an attempt cost that only the clock ended."""
         used = self._count() - before
-        for budget in _budgets:
+        for budget in _own.budgets:
             budget.left -= used
 
     def _wait(self) -> None:

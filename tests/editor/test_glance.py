@@ -90,6 +90,26 @@ def test_a_question_under_way_is_broken_off_when_nobody_waits_for_it() -> None:
         assert easy.check() is Solved.SATISFIABLE
 
 
+def test_what_one_thread_gives_up_another_asks() -> None:
+    """Nor is a question of this thread broken off by the end of another's."""
+    given_up, left = threading.Event(), threading.Event()
+
+    def gives_up() -> None:
+        with smt.until(lambda: True, breaks_off=True):
+            given_up.set()
+            left.wait()
+
+    other = threading.Thread(target=gives_up)
+    other.start()
+    given_up.wait()
+    try:
+        for _ in range(50):
+            assert Solver(Limits()).check() is Solved.SATISFIABLE
+    finally:
+        left.set()
+        other.join()
+
+
 @pytest.mark.parametrize(
     "name", ["gallery/tcas/published.rcs", "examples/grip.rcs", "examples/acquire_published.rcs"]
 )
