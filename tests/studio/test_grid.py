@@ -1,15 +1,20 @@
 """The grid and the graph in a real browser, by keys: cells, rectangles, lines, undo, the text of the same file, a filter, an arrow."""
 
+import asyncio
 import json
 import random
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
+from aiohttp import web
 
 from rcsc.commands import run as rcsc
 from rcsc.shell.opening import Opening
-from tests.studio.driven import Seat, seated
+from rcsc.studio.hub import PROVER
+from tests.studio.driven import HIGH, WIDE, Seat, dock, seated
+from tests.studio.served import serving
 
 pytestmark = pytest.mark.needs("chromium")
 REPO = Path(__file__).parents[2]
@@ -283,3 +288,58 @@ def _somewhere(seat: Seat, places: random.Random) -> int:
     seat.mouse("mouseReleased", x, top + 8, 0)
     seat.wait(f"Number(document.querySelector('#time [role=slider]').ariaValueNow) !== {before}")
     return seat.tick()
+
+
+AREA = "document.querySelector('.text-area')"
+
+
+def test_what_is_typed_without_a_connection_is_kept_and_sent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cut before a key, and between a key and its answer; nothing typed is lost, none comes twice."""
+    sockets: list[web.WebSocketResponse] = []
+    drive = dock(tmp_path / "dock").parent / "drive.rcs"
+
+    class Socket(web.WebSocketResponse):
+        async def prepare(self, request: web.BaseRequest) -> Any:
+            sockets.append(self)
+            return await super().prepare(request)
+
+    monkeypatch.setattr("rcsc.studio.server.web.WebSocketResponse", Socket)
+    with serving(Opening(drive.parent / "system.toml")) as server, Seat(WIDE, HIGH) as seat:
+        loop = server._loop
+        assert loop is not None
+
+        def cut() -> None:
+            asyncio.run_coroutine_threadsafe(sockets[-1].close(), loop)
+            seat.until("#state", "no connection")
+
+        seat.enter(server.address)
+        seat.until("#state", "paused at cycle 0")
+        seat.press("2")
+        seat.choose(".table-choice", "goto ")
+        seat.click(seat.button("Text"))
+        seat.wait(f"{AREA}.value.includes('table goto')")
+        seat.value(f"({AREA}.focus(), {AREA}.setSelectionRange(0, 0))")
+        seat.write("# one")
+        with monkeypatch.context() as patch:
+            patch.setattr("rcsc.studio.server.MOST_PAGES", 0)
+            cut()
+            seat.write(" two")
+            seat.until("#said", "what is typed stays here")
+            assert str(seat.value(f"{AREA}.value")).startswith("# one two")
+        seat.until("#state", "paused at cycle 0")
+        seat.write(" three")
+        with PROVER:  # edits are taken, and their answers wait
+            seat.write(" four")
+            with monkeypatch.context() as patch:
+                patch.setattr("rcsc.studio.server.MOST_PAGES", 0)
+                cut()
+                seat.write(" five")
+        seat.until("#state", "paused at cycle 0")
+        seat.write("\n")
+        seat.press("ctrl+s")
+        seat.until("#said", "is written")
+        assert drive.read_text(encoding="utf-8").startswith("# one two three four five\n")
+        assert str(seat.value(f"{AREA}.value")).startswith("# one two three four five\n")
+        seat.said.clear()

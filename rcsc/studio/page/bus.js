@@ -7,11 +7,11 @@
 
 export { make } from "./make.js";
 
-/** The server, or the page, did not do what was asked; `code` is what `rcsc explain` knows, `helps` are sentences. */
+/** The server, or the page, did not do what was asked; `code` is what `rcsc explain` knows, `helps` are sentences; `lost` where nobody knows whether it was done. */
 export class Refusal extends Error {
-  constructor({ code = "", text, helps = [] }) {
+  constructor({ code = "", text, helps = [], lost = false }) {
     super(text);
-    Object.assign(this, { code, helps });
+    Object.assign(this, { code, helps, lost });
   }
 }
 
@@ -34,7 +34,7 @@ export class Bus {
     });
     socket.addEventListener("message", (event) => this.#take(JSON.parse(event.data)));
     socket.addEventListener("close", () => {
-      for (const [, asked] of this.#open) asked.reject(new Refusal({ text: "no connection to the studio" }));
+      for (const [, asked] of this.#open) asked.reject(new Refusal({ text: "no connection to the studio", lost: true }));
       this.#open.clear();
       this.tell("connection", false);
       setTimeout(() => this.connect(), this.#retry);
@@ -55,7 +55,7 @@ export class Bus {
 
   /** Ask the server; the promise is refused with a `Refusal`. `signal` cancels. */
   ask(kind, body = {}, { progress, signal } = {}) {
-    if (this.#socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Refusal({ text: "no connection to the studio" }));
+    if (this.#socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Refusal({ text: "no connection to the studio", lost: true }));
     const id = ++this.#number;
     const answer = new Promise((resolve, reject) => this.#open.set(id, { resolve, reject, progress }));
     this.#socket.send(JSON.stringify({ id, kind, body }));

@@ -3,7 +3,7 @@
 import { make, Refusal } from "../bus.js";
 
 export class TextView {
-  #desk; #bus; #area; #gutter; #sent = null; #version = 0; #base = "";
+  #desk; #bus; #area; #gutter; #sent = null; #sending = null; #lost = null; #version = 0; #base = "";
 
   constructor(root, bus, desk) {
     this.#desk = desk;
@@ -32,16 +32,26 @@ export class TextView {
     if (!doc) return;
     if (this.file !== file) {
       Object.assign(this, { file });
-      this.#sent = null;
+      this.#sent = this.#lost = null;
       this.#base = this.#area.value = doc.text;
-    } else if (this.#sent === null) {
-      const mine = this.#area.value;
-      if (doc.text !== this.#base) this.#put(mine === this.#base ? doc.text : merged(this.#base, mine, doc.text));
+      this.#version = doc.version;
+    } else if (this.#sent === null && doc.version !== this.#version) {
+      if (doc.text === this.#lost) this.#base = this.#lost; // it was taken before the connection went
+      this.#lost = null;
+      this.#put(this.#together(doc.text));
       this.#base = doc.text;
+      this.#version = doc.version; // of the base: while an edit is under way neither is known
     }
-    this.#version = doc.version;
     this.#lines();
     if (this.#sent === null && this.#area.value !== this.#base) this.#send();
+  }
+
+  /** What others made of the text, with what is typed here and not sent. */
+  #together(theirs, base = this.#base) {
+    const mine = this.#area.value;
+    const both = mine === base ? theirs : merged(base, mine, theirs);
+    if (both === theirs && mine !== base && mine !== theirs) this.#bus.say("others changed the same letters: what was typed here is not taken", { wrong: true });
+    return both;
   }
 
   /** Another text, the cursor where it was in what did not change. */
@@ -55,29 +65,40 @@ export class TextView {
     this.#area.scrollTop = scrollTop;
   }
 
-  async #send() {
-    if (this.#sent !== null || this.#area.value === this.#base) return;
+  #send() {
+    if (this.#sent === null && this.#area.value !== this.#base) this.#sending = this.#sends();
+  }
+
+  async #sends() {
     const text = this.#area.value;
     const { start, end, put } = change(this.#base, text);
     const [start_line, start_column] = place(this.#base, start), [end_line, end_column] = place(this.#base, end);
+    let gone = false;
     this.#sent = text;
     performance.mark("studio.key");
     try {
       await this.#bus.ask("tables.edit", { file: this.file, version: this.#version, edits: [{ start_line, start_column, end_line, end_column, text: put }] });
       this.#base = text;
+      this.#lost = null;
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
-      if (!error.message.includes("meanwhile")) {
+      gone = error.lost;
+      if (gone) this.#lost ??= text; // what is asked without a connection was never sent
+      else if (!error.message.includes("meanwhile")) {
         this.#bus.say(error.message, { wrong: true, helps: error.helps });
-        this.#area.value = this.#base;
+        this.#put(this.#together(this.#base, text)); // what was typed after it stays
       }
+    } finally {
+      this.#sent = null;
     }
-    this.#sent = null;
-    this.take();
+    if (!gone) this.take();
+    else this.#bus.say("no connection to the studio: what is typed stays here, and is sent when it is back", { wrong: true });
   }
 
+  /** Undo after what is under way: keys are quicker than answers. */
   async #undo(what) {
-    if (this.#sent === null) await what();
+    while (this.#sent !== null) await this.#sending;
+    await what();
   }
 
   #key(event) {
