@@ -293,6 +293,27 @@ def _somewhere(seat: Seat, places: random.Random) -> int:
 AREA = "document.querySelector('.text-area')"
 
 
+def test_a_text_that_is_written_as_it_is_typed_is_written_whole(drive: Path) -> None:
+    """The second letter waits for the answer to the first, and the file for both."""
+    with seated(Opening(drive / "system.toml", alone=True)) as seat:
+        seat.press("2")
+        seat.choose(".table-choice", "drive ")
+        seat.click(seat.button("Text"))
+        seat.wait(f"{AREA}.value.includes('table drive')")
+        seat.value(
+            f"(() => {{ const area = {AREA}; area.focus(); area.setSelectionRange(0, 0);"
+            "for (const each of ['# one', ' two\\n']) {"
+            "area.setRangeText(each, area.selectionStart, area.selectionEnd, 'end');"
+            "area.dispatchEvent(new InputEvent('input', { bubbles: true })); }"
+            "const save = { key: 's', ctrlKey: true, bubbles: true, cancelable: true };"
+            "area.dispatchEvent(new KeyboardEvent('keydown', save)); })()"
+        )
+        seat.until("#said", "is written")
+        assert (
+            (drive / "gallery" / "cia402" / "drive.rcs").read_text(encoding="utf-8").startswith("# one two\n")
+        )
+
+
 def test_what_is_typed_without_a_connection_is_kept_and_sent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,6 +16,7 @@ export class Desk {
   doc = null; // as the server told it last
   table = ""; // the name of the table that is shown
   condition = null; // { text, can, unknown, every } of the filter
+  settled = async () => {}; // waits until all that is typed is sent, or cannot be; of the view of the text
   follows = ""; // the level whose table is shown as it runs; empty where one is chosen, or changed
   #bus;
   #heard = new Set();
@@ -130,12 +131,19 @@ export class Desk {
 
   /** Ask about the text as what was asked before leaves it: keys are quicker than answers. */
   #next(kind) {
-    const answer = Promise.resolve(this.#last).then(() => this.#said(this.#asked(kind)));
+    this.follow("");
+    const answer = this.#ready().then(() => this.#said(this.#asked(kind)));
     this.#last = answer.catch(() => {});
     return answer;
   }
 
+  async #ready() {
+    await this.#last;
+    await this.settled();
+  }
+
   async save(over = false) {
+    await this.#ready(); // what was typed before it is written, too
     try {
       const { made } = await this.ask("tables.save", { over });
       this.#bus.say(made ? `${this.file} is written, laid out` : `${this.file} is written as it is: a text that does not parse is not laid out`);
@@ -150,7 +158,7 @@ export class Desk {
 
   async take() {
     this.conflict = "";
-    await this.try("tables.take");
+    await this.#next("tables.take");
     this.tell();
   }
 

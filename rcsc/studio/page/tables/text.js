@@ -18,9 +18,10 @@ export class TextView {
     this.#area.addEventListener("beforeinput", (event) => {
       if (!event.inputType.startsWith("history")) return;
       event.preventDefault();
-      if (event.inputType === "historyUndo") this.#undo(() => desk.undo());
-      else this.#undo(() => desk.redo());
+      if (event.inputType === "historyUndo") desk.undo();
+      else desk.redo();
     });
+    desk.settled = () => this.#settled();
     for (const kind of ["keyup", "click"]) this.#area.addEventListener(kind, () => this.#selects());
     desk.on(() => this.take());
     bus.on("selection", (now, changed) => { if (changed?.has("line")) this.#show(now); });
@@ -95,20 +96,20 @@ export class TextView {
     else this.#bus.say("no connection to the studio: what is typed stays here, and is sent when it is back", { wrong: true });
   }
 
-  /** Undo after what is under way: keys are quicker than answers. */
-  async #undo(what) {
+  /** Wait for what is under way: keys are quicker than answers. */
+  async #settled() {
     while (this.#sent !== null) await this.#sending;
-    await what();
   }
 
   #key(event) {
     const ctrl = event.ctrlKey || event.metaKey;
     if (ctrl && event.key.toLowerCase() === "z") {
       event.preventDefault();
-      this.#undo(() => (event.shiftKey ? this.#desk.redo() : this.#desk.undo()));
+      if (event.shiftKey) this.#desk.redo();
+      else this.#desk.undo();
     } else if (ctrl && event.key.toLowerCase() === "y") {
       event.preventDefault();
-      this.#undo(() => this.#desk.redo());
+      this.#desk.redo();
     }
   }
 
