@@ -39,7 +39,7 @@ def concerns(
     live = Live(opening, hub.tell, lambda work, after_s: hub.do(LANE, work, after_s), rate)
     time = TimeLine(live, hub.tell)
     folders = tuple(dict.fromkeys((Path.cwd(), opening.path.resolve().parent)))
-    kept = Logs(folders, tuple(logs), lambda name, log: hub.do(LANE, lambda: time.show(name, log)))
+    kept = Logs(folders, tuple(logs), lambda *shown: hub.do(LANE, lambda: time.show(*shown)))
     build = Build(opening.path, hub, live)
     live.prove_first = build.prove_first
     desk = Desk(opening.path, hub.tell, hub.do)

@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+import json
 import shutil
 import time
 from collections.abc import Awaitable, Callable, Iterator
@@ -691,3 +692,50 @@ def test_a_proof_that_is_cancelled_ends(dock: Path) -> None:
         await other.heard("build.state", doing="")
 
     studio(dock, work)
+
+
+def test_what_a_campaign_found_opens_as_a_run_that_says_what_it_breaks(
+    dock_compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the tick in which it broke; whatever else lies beside a log is no finding, and hides no log."""
+    folder = tmp_path / "dock"
+    shutil.copytree(dock_compiled, folder)
+    base = folder / "base.py"
+    text = base.read_text(encoding="utf-8").replace("import Fault, Range", "import Fault, Property, Range")
+    wall = "\n    def stays_in_the_hall(self) -> Property:\n        return self.travelled < 1.0\n"
+    base.write_text(text + wall, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert rcsc(["campaign", "dock", "--no-compile", "--workers", "1", "--episodes", "8"]) == 1
+    kept, spoilt, *_ = sorted((tmp_path / "campaign").iterdir())
+    facts = json.loads((kept / "finding.json").read_text())
+
+    async def work(one: Page, other: Page) -> None:
+        async def told() -> dict[str, str]:
+            return {each["name"]: each["finding"] for each in await one.ask("log.list")}
+
+        name, beside = (f"campaign/{each.name}/log.mcap" for each in (kept, spoilt))
+        assert facts["property"] in (await told())[name]
+        assert facts["said"] in (await told())[name]
+        await one.ask("log.open", name=name)
+        finding = (await other.heard("time.state", source="log", name=name))["finding"]
+        assert (finding["tick"], finding["text"]) == (facts["tick"], (await told())[name])
+        [mark] = (await one.ask("time.tracks", era=-1, since=-1))["marks"]
+        assert (mark["tick"], mark["kind"]) == (facts["tick"], "finding")
+        for odd in (
+            "", "[]", "{", "null", "[" * 100_000,
+            json.dumps(facts | {"tick": "0"}), json.dumps(facts | {"tick": True}), json.dumps(facts | {"said": None}),
+        ):  # fmt: skip
+            (spoilt / "finding.json").write_text(odd)
+            assert (await told())[beside] == ""
+            await one.ask("log.open", name=beside)
+            assert (await other.heard("time.state", source="log", name=beside))["finding"] is None
+            await one.ask("time.live")
+            await other.heard("time.state", source="live")
+        (spoilt / "finding.json").write_text(json.dumps(facts | {"tick": 10**9}))
+        await one.ask("log.open", name=beside)
+        assert (await other.heard("time.state", source="log", name=beside))["finding"] is None
+        (spoilt / "log.mcap").write_bytes(b"none")
+        (spoilt / "finding.json").unlink()
+        assert (await told())[beside] == ""
+
+    studio(folder / "system.toml", work)

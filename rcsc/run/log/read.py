@@ -198,6 +198,26 @@ def read(path: Path) -> Log:
         raise UnreadableLog(f"`{path}` holds no run that rcsc recorded{why and f': {why}'}") from error
 
 
+def finding_at_the_head(path: Path) -> LoggedFinding | None:
+    """What a log is kept for, as its beginning says; its runs are not read, nor looked at.
+
+    Raises:
+        UnreadableLog: It cannot be read.
+    """
+    record: McapRecord
+    try:
+        for record in records(path, ChainCheck()):
+            if isinstance(record, Metadata) and record.name == FINDING:
+                return finding_of(record.metadata)
+            if isinstance(record, Message):
+                return None
+    except OSError as error:
+        raise UnreadableLog(f"`{path}` cannot be read: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise UnreadableLog(f"`{path}` holds no finding that rcsc recorded") from error
+    return None
+
+
 @dataclass(slots=True)
 class _Reading:
     """What was read so far."""

@@ -3,6 +3,7 @@
 import { doLine, make, typeLine } from "./bus.js";
 import { changes, exchanges, short } from "./exchanges.js";
 import { lookAt } from "./moments.js";
+import { spoken } from "./tables/desk.js";
 
 const RATES = [["4 times the clock", "4"], ["real time", "1"], ["20 times", "20"], ["as fast as it goes", ""], ["a quarter", "0.25"], ["a tenth", "0.1"]];
 
@@ -64,7 +65,7 @@ function toolbar(bus, drawer) {
     undo.disabled = !of.open || log || !of.undo;
     if (document.activeElement !== rate) rate.value = of.rate ? String(of.rate) : "";
     live.hidden = !log;
-    said.textContent = log ? `${run.finding ? `finding: ${run.finding.text}; ` : ""}log ${run.name}, ${run.text}` : of.ended ?? "";
+    said.replaceChildren(...(log ? [...spoken(run.finding ? `finding: ${run.finding.text}; ` : ""), `log ${run.name}, ${run.text}`] : [of.ended ?? ""]));
     said.title = said.textContent;
     past();
   });
@@ -399,7 +400,7 @@ function scriptTab(bus) {
 }
 
 function foundTab(bus) {
-  const logs = make("ul"), text = make("pre", { class: "code", hidden: true }), doing = make("span", { class: "soft", role: "status" });
+  const logs = make("div"), text = make("pre", { class: "code", hidden: true }), doing = make("span", { class: "soft", role: "status" });
   let cancel = null;
   const stop = make("button", { type: "button", hidden: true, onclick: () => cancel?.abort() }, "Cancel");
   async function job(kind, body, done) {
@@ -412,9 +413,12 @@ function foundTab(bus) {
   }
   async function list() {
     const found = await bus.try("log.list") ?? [];
-    logs.replaceChildren(...found.map(({ name, bytes, changed_s: when }) => make("li", {}, make("button", { type: "button", onclick: () => job("log.open", { name }, () => bus.say(`${name} is shown to everybody`)) }, name),
-      make("span", { class: "soft" }, ` ${bytes >= 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(bytes / 1e3)} kB`}, ${new Date(when * 1000).toLocaleString()}`))));
-    if (!found.length) logs.replaceChildren(make("li", { class: "soft" }, "no logs here: `rcsc run --log`, `rcsc prove --log` and campaigns write them"));
+    const named = ({ name, bytes, changed_s: when, finding }) => make("li", {}, make("button", { type: "button", onclick: () => job("log.open", { name }, () => bus.say(`${name} is shown to everybody`)) }, name),
+      make("span", { class: "soft" }, ` ${bytes >= 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(bytes / 1e3)} kB`}, ${new Date(when * 1000).toLocaleString()}`),
+      finding ? make("div", { class: "breaks" }, ...spoken(finding)) : null);
+    const part = (title, some) => (some.length ? [make("h3", {}, title), make("ul", {}, some.map(named))] : []);
+    logs.replaceChildren(...part("Findings: runs that break something", found.filter(({ finding }) => finding)), ...part("Runs that were kept", found.filter(({ finding }) => !finding)));
+    if (!found.length) logs.replaceChildren(make("p", { class: "soft" }, "no logs here: `rcsc run --log`, `rcsc prove --log` and campaigns write them"));
   }
   const prove = make("button", { type: "button", onclick: () => job("build.prove", {}, (answer) => {
     text.hidden = false;
@@ -426,7 +430,7 @@ function foundTab(bus) {
   bus.on("build.hello", (state) => bus.tell("build.state", state));
   bus.on("build.state", (state) => { if (!cancel) doing.textContent = state.doing; });
   return { root: make("div", { class: "column" }, make("div", { class: "bar" }, again, prove, make("button", { type: "button", onclick: list }, "List logs again"), stop, doing),
-    make("div", { class: "scroll" }, text, make("h3", {}, "Runs that were kept: open one on the time line"), logs)), shown: list, focus: () => prove.focus() };
+    make("div", { class: "scroll" }, text, logs)), shown: list, focus: () => prove.focus() };
 }
 
 export { lookAt };

@@ -4,6 +4,7 @@ In: questions of kind `log.*`. Out: which logs there are, and one of them as the
 list, and nothing else is read. Reading has a lane of its own, for it takes seconds.
 """
 
+import contextlib
 import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -12,6 +13,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.run.log.read import Log, UnreadableLog, read
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import Ask, Handler, Json
+from rcsc.studio.runs.kept import KeptFinding, finding_in, glance
 
 LANE = "log"
 MOST_LOGS = 200
@@ -27,9 +29,12 @@ class Logs:
     name, lane = "log", LANE
 
     def __init__(
-        self, folders: tuple[Path, ...], given: tuple[Path, ...], show: Callable[[str, Log], None]
+        self,
+        folders: tuple[Path, ...],
+        given: tuple[Path, ...],
+        show: Callable[[str, Log, KeptFinding | None], None],
     ) -> None:
-        """Args: folders: Where logs are looked for; given: Logs that the user named; show: Takes one that was read."""
+        """Args: folders: Where logs are looked for; given: Logs that the user named; show: Takes one that was read, and what it breaks."""
         self._folders, self._given, self._show = folders, given, show
 
     @property
@@ -47,14 +52,27 @@ class Logs:
     def begin(self) -> None:
         """Show the first log that the user named, if any."""
         for path in self._given[:1]:
-            self._show(self._called(path), _read(path))
+            self._open_at(self._called(path), path)
 
-    def _list(self, _: Ask) -> Json:
-        found = sorted(self._found().items(), key=lambda one: -one[1].stat().st_mtime)
-        return [
-            {"name": name, "bytes": path.stat().st_size, "changed_s": path.stat().st_mtime}
-            for name, path in found[:MOST_LOGS]
-        ]
+    def _list(self, ask: Ask) -> Json:
+        """The latest logs, each with what it breaks."""
+        found = []
+        for name, path in self._found().items():
+            with contextlib.suppress(OSError):  # it went meanwhile
+                found.append((path.stat(), name, path))
+        found.sort(key=lambda one: -one[0].st_mtime)
+        told = []
+        for stat, name, path in found[:MOST_LOGS]:
+            ask.check()
+            told.append(
+                {
+                    "name": name,
+                    "bytes": stat.st_size,
+                    "changed_s": stat.st_mtime,
+                    "finding": glance(path),
+                }
+            )
+        return told
 
     def _open(self, ask: Ask) -> Json:
         name = ask.body.text("name")
@@ -62,10 +80,13 @@ class Logs:
         if path is None:
             raise Refused(Code.STUDIO, f"there is no log `{name}`")
         ask.progress(f"reading {name}")
-        log = _read(path)
-        ask.check()
-        self._show(name, log)
+        self._open_at(name, path, ask.check)
         return {"name": name}
+
+    def _open_at(self, name: str, path: Path, check: Callable[[], None] = lambda: None) -> None:
+        log = _read(path)
+        check()
+        self._show(name, log, finding_in(path, log))
 
     def _found(self) -> dict[str, Path]:
         """Every log by how it is called: its path in the first of the folders that has it, or as the user gave it."""

@@ -17,6 +17,7 @@ from rcsc.run.signature import Signature, Values, number_word
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import PROVER, Ask, Handler, Json
 from rcsc.studio.runs.history import History
+from rcsc.studio.runs.kept import KeptFinding
 from rcsc.studio.runs.live import LANE, Live, range_of
 from rcsc.studio.runs.shown import moment
 from rcsc.studio.runs.why import why
@@ -38,11 +39,13 @@ class Source:
         name: How it is called; empty for the live one.
         history: Its ticks.
         log: Where it is a file's.
+        finding: What it is kept for.
     """
 
     name: str
     history: History
     log: Log | None = None
+    finding: KeptFinding | None = None
 
 
 Stand = tuple[str, str, str]
@@ -119,7 +122,7 @@ class TimeLine:
             return {"source": "live"}
         log = self._log.log
         assert log is not None
-        finding = log.finding
+        finding = self._log.finding
         return {
             "source": "log",
             "name": self._log.name,
@@ -128,12 +131,12 @@ class TimeLine:
             "tick_ms": log.tick_ms,
             "levels": [_named(level) for level in log.levels],
             "text": log.checked.text,
-            "finding": None if finding is None else _finding(log),
+            "finding": None if finding is None else finding.shown(),
         }
 
-    def show(self, name: str, log: Log) -> None:
-        """Have everybody look at a log."""
-        self._log = Source(name, History([log]), log)
+    def show(self, name: str, log: Log, finding: KeptFinding | None = None) -> None:
+        """Have everybody look at a log, and at what it breaks."""
+        self._log = Source(name, History([log]), log, finding)
         self._tell("time.state", self.state())
 
     def _to_live(self, _: Ask) -> Json:
@@ -212,8 +215,8 @@ class TimeLine:
     def _marks(self) -> Iterator[Any]:
         if self._log is None:
             yield from self.live.marks
-        elif self._log.log is not None and self._log.log.finding is not None:
-            yield _Marked(self._log.log.finding.broken_at, "finding", self._log.log.finding.obligation)
+        elif self._log.finding is not None:
+            yield _Marked(self._log.finding.tick, "finding", self._log.finding.text)
 
     # --- values ---
 
@@ -336,22 +339,6 @@ def _named(level: LoggedLevel) -> dict[str, Any]:
         "period_ms": level.level.period_ms,
         "tables": tables,
         "program": level.sign.program,
-    }
-
-
-def _finding(log: Log) -> Json:
-    finding = log.finding
-    assert finding is not None
-    return {
-        "level": finding.level,
-        "table": finding.table,
-        "text": finding.obligation,
-        "tick": finding.broken_at,
-        "wrong": [
-            {"tick": tick, "level": level, "text": told.wrong}
-            for (tick, level), told in finding.cycles.items()
-            if told.wrong
-        ],
     }
 
 
