@@ -5,9 +5,10 @@ is no value (`rcsc.run.unset`): the curve has a gap there.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from rcsc.diagnostics.codes import Code
+from rcsc.run.description import BadDescription, description
 from rcsc.run.log.export import unset
 from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.signature import Value
@@ -58,15 +59,24 @@ class Plots:
         return history
 
     def _names(self, _: Ask) -> Json:
-        """Every variable by its whole name, and the graphs that the system's description shows: `a`, or `a over b`."""
+        """Every variable by its whole name, and those that the system's description shows, by set."""
         log = self._history().logs[-1]
         names = [
             {"name": f"{logged.name}.{leaf.name}", "unit": leaf.unit, "kind": leaf.kind}
             for logged in log.levels
             for leaf in logged.sign.leaves
         ]
-        shown = log.system().displays
-        return {"names": names, "displays": {name: list(graphs) for name, graphs in shown.items()}}
+        known = {each["name"] for each in names}
+        return {"names": names, "displays": self._displays(known)}
+
+    def _displays(self, known: Collection[str]) -> dict[str, list[str]]:
+        """What the studio's system shows, as far as the run has it: a log may be of another system, and holds no displays."""
+        try:
+            sets = description(self._time.live.opening.path).displays
+        except (BadDescription, OSError):
+            return {}
+        there = {name: [each for each in shown if each in known] for name, shown in sets.items()}
+        return {name: shown for name, shown in there.items() if shown}
 
     def _curves(self, ask: Ask) -> Json:
         """Of each of some variables where it changed: `[tick, value]`, null for what nobody has set."""

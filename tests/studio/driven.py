@@ -100,10 +100,12 @@ class Seat(Browser):
         return int(self._tell("Runtime.getHeapUsage")["usedSize"])
 
     def choose(self, selector: str, begins: str) -> None:
-        """Choose what begins with a text, as who opens a list and takes it."""
+        """Choose what begins with a text, once it is there, as who opens a list and takes it."""
+        found = f"document.querySelector({json.dumps(selector)})"
+        self.wait(f"[...{found}?.options ?? []].some(({{ text }}) => text.startsWith({json.dumps(begins)}))")
         self.value(
             f"((one) => {{ one.value = [...one.options].find(({{ text }}) => text.startsWith({json.dumps(begins)})).value;"
-            f" one.dispatchEvent(new Event('change', {{ bubbles: true }})); }})(document.querySelector({json.dumps(selector)}))"
+            f" one.dispatchEvent(new Event('change', {{ bubbles: true }})); }})({found})"
         )
 
     def go_to(self, text: str, kind: str = "BUTTON", most: int = 120) -> None:

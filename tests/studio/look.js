@@ -1,4 +1,5 @@
-// What is wrong with how a page looks: text that is cut, what sticks out, and text that is too faint (WCAG 2.2, 1.4.3).
+// What is wrong with how a page looks: text that is cut, what sticks out, and text that is too faint (WCAG 2.2, 1.4.3); words of empty
+// fields, too.
 
 (() => {
   const wrong = [];
@@ -38,6 +39,13 @@
     if (!width || !height || style.display === "inline") { if (!texts(element)) continue; }
     if ((right > innerWidth + 1 || left < -1) && !inside(element.parentElement, "overflowX")) wrong.push(`sticks out sideways: ${called(element)}`);
     if ((bottom > innerHeight + 1 || top < -1) && !inside(element.parentElement, "overflowY")) wrong.push(`sticks out downwards: ${called(element)}`);
+    if (element.placeholder && !element.value && !element.disabled) {
+      pixel.font = style.font;
+      const [room, wants] = [element.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight), pixel.measureText(element.placeholder).width];
+      if (element.tagName === "INPUT" && wants > room + 1) wrong.push(`text is cut: ${called(element)} ${element.placeholder}, ${Math.ceil(wants)} > ${Math.floor(room)}`);
+      const paper = behind(element), faint = ratio(over(colour(getComputedStyle(element, "::placeholder").color), paper), paper);
+      if (faint < 4.5 - 0.005) wrong.push(`too faint: ${called(element)} ${element.placeholder}, ${faint.toFixed(2)}`);
+    }
     if (!texts(element)) continue;
     if (style.display !== "inline" && element.scrollWidth > element.clientWidth + 1 && !inside(element, "overflowX") && !(style.textOverflow === "ellipsis" && told(element)))
       wrong.push(`text is cut: ${called(element)}, ${element.scrollWidth} > ${element.clientWidth}`);

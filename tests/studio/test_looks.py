@@ -19,12 +19,15 @@ WRONG = {
     "text is cut": "<div style='width:50px;overflow:hidden;white-space:nowrap'>a long text that is cut here</div>",
     "text is cut: button": "<button style='width:30px;overflow:hidden;white-space:nowrap'>a long button</button>",
     "too faint": "<p style='color:#999'>faint</p>",
+    "text is cut: input. «» so many words": "<input style='width:50px' placeholder='so many words'>",
+    "too faint: input. «» faint": "<style>::placeholder { color: #bbb }</style><input placeholder='faint'>",
     "too faint: p. «dark": "<div style='background:#000'><p style='background:rgba(255,255,255,.2);color:#333'>dark on dark</p></div>",
     "sticks out sideways": "<div style='position:absolute;left:1200px;width:200px'>out of it</div>",
     "sticks out downwards": "<div style='position:absolute;top:900px'>below</div>",
 }
 RIGHT = (
     "<p>fine</p>", "<div style='width:50px;overflow:auto;white-space:nowrap'>a long text that is scrolled</div>",
+    "<input style='width:200px' placeholder='few words'>", "<input value='1' style='width:50px' placeholder='so many words'>",
     "<p style='color:#767676'>just dark enough</p>",
     "<p title='a long text' style='width:50px;overflow:hidden;white-space:nowrap;text-overflow:ellipsis'>a long text</p>",
 )  # fmt: skip
@@ -32,8 +35,11 @@ RIGHT = (
 
 @pytest.fixture(scope="module")
 def seat(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Seat]:
-    """The robot that docks, at the end of its script."""
+    """The robot that docks, with graphs that it shows, at the end of its script."""
     system = dock(tmp_path_factory.mktemp("looks") / "dock")
+    text = system.read_text(encoding="utf-8")
+    shows = 'other = ["drive.waited", "drive.travelled_mm"]'
+    system.write_text(text.replace("[displays]\n", f"[displays]\n{shows}\n"), encoding="utf-8")
     assert rcsc(["compile", str(system)]) == 0
     with seated(Opening(system, script="dock.csv")) as one:
         one.until("#state", "paused at cycle 0")
@@ -60,6 +66,51 @@ def test_every_view_can_be_read_in_both_themes(seat: Seat, theme: str) -> None:
         assert seat.settled(LOOK) == [], f"{dialog}, {theme}"
         seat.press("escape")
         seat.wait(f"!document.querySelector('#{dialog}').open")
+
+
+def test_the_levels_have_the_room_of_an_empty_console(seat: Seat) -> None:
+    seat.click("#views button[data-view=run]")
+    seat.click("#tab-console")
+    high = "document.querySelector('{}').clientHeight"
+    assert seat.value(f"{high.format('.cards')} / {high.format('.view-run')}") > 0.6
+
+
+def test_curves_are_those_that_the_system_shows_until_others_are_chosen(seat: Seat) -> None:
+    seat.click("#views button[data-view=plots]")
+    seat.wait("document.querySelectorAll('.graph .plot canvas').length === 2")
+    seat.until(".graph:nth-child(2) .legend", "drive.travelled_mm")
+    seat.choose("select[aria-label='Graphs that the system shows']", "way")
+    seat.wait("document.querySelectorAll('.graph').length === 5")
+    for left in (4, 3, 2, 1, 0):
+        seat.click(".graph button[aria-label^=Remove]")
+        seat.wait(f"document.querySelectorAll('.graph').length === {left}")
+    seat.until(".view-plots .closed", "or choose what the system shows")
+    top = "document.querySelector('{}').getBoundingClientRect()"
+    assert (
+        seat.value(f"{top.format('.view-plots .closed')}.top - {top.format('.view-plots .bar')}.bottom") < 30
+    )
+    again(seat)
+    seat.until(".view-plots .closed", "or choose what the system shows")
+    assert seat.value("document.querySelectorAll('.graph').length") == 0
+
+
+@pytest.mark.parametrize("first", VIEWS)
+def test_each_view_opens_first_and_after_others(seat: Seat, first: str) -> None:
+    """What a view hears as it is made was told long before, where it is not the first."""
+    seat.click(f"#views button[data-view={first}]")
+    again(seat)
+    for view in (first, *VIEWS):
+        seat.click(f"#views button[data-view={view}]")
+        seat.wait(f"document.querySelector('.view-{view}')?.childElementCount")
+        assert seat.settled(LOOK) == [], view
+    assert seat.said == []
+
+
+def again(seat: Seat) -> None:
+    """Load the page anew, as who presses F5."""
+    seat.value("(document.documentElement.dataset.ready = 'old', location.reload())")
+    seat.wait("document.documentElement.dataset.ready === 'yes'")
+    seat.until("#state", "cycle")
 
 
 def test_what_is_wrong_is_seen(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from rcsc.commands import run as rcsc
 from rcsc.commands.shared.cells import Drawn
+from rcsc.run.description import description
 from rcsc.run.log.export import valued
 from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import read
@@ -233,8 +234,14 @@ def test_curves_are_the_values_of_every_tick_with_gaps_where_nobody_set_one(tmp_
     async def work(one: Page) -> None:
         nonlocal gaps
         await one.heard("time.state", source="log")
-        names = [entry["name"] for entry in (await one.ask("plot.names"))["names"]]
+        told = await one.ask("plot.names")
+        names = [entry["name"] for entry in told["names"]]
         assert set(names) == set(known)
+        assert (
+            told["displays"]
+            == {name: list(graphs) for name, graphs in description(SHIPPED).displays.items()}
+            != {}
+        )
         for first in range(0, len(names), 16):
             answer = await one.ask("plot.curves", names=names[first : first + 16])
             for curve in answer["curves"]:

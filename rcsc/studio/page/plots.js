@@ -5,7 +5,7 @@ import { lookAt } from "./moments.js";
 import uPlot from "./vendor/uplot/uPlot.js";
 
 const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3], [4, 2], [1, 4]];
-const COLOURS = { light: ["#1560b7", "#b3261a", "#15703a", "#8a4bb0", "#8a5a00", "#4a5560"], dark: ["#6fb1f5", "#ff8f7d", "#63cf93", "#d3a2f2", "#ecbb59", "#b8c2ca"] };
+const COLOURS = ["--accent", "--bad", "--good", "--plum", "--warn", "--steel"];
 const EVERY_MS = 250;
 
 export function mount(root, bus) {
@@ -13,9 +13,9 @@ export function mount(root, bus) {
   const what = make("input", { list: "plot-words", class: "grow", "aria-label": "A variable, or one over another: a over b", placeholder: "a variable, or  a over b", spellcheck: "false" });
   const shows = make("select", { "aria-label": "Graphs that the system shows" });
   const list = make("div", { class: "graphs scroll" });
-  const empty = make("p", { class: "closed soft" }, "No graph yet. Name a variable above, or choose what the system shows.");
+  const empty = make("p", { class: "closed soft" }, "No graph yet: name a variable above.");
   root.append(make("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); add(what.value.trim()); } },
-    what, make("button", { type: "submit" }, "New graph"), shows), words, list, empty);
+    what, make("button", { type: "submit" }, "New graph"), shows), words, empty, list);
   const sheet = make("link", { rel: "stylesheet", href: "vendor/uplot/uPlot.css" });
   document.head.append(sheet);
 
@@ -92,6 +92,7 @@ export function mount(root, bus) {
       words.replaceChildren(...answer.names.map(({ name, unit }) => make("option", { value: name }, unit)));
       const sets = Object.keys(displays);
       shows.hidden = !sets.length;
+      empty.textContent = `No graph yet: name a variable above${sets.length ? ", or choose what the system shows" : ""}.`;
       shows.replaceChildren(make("option", { value: "" }, "the system shows"), ...sets.map((name) => make("option", { value: name }, name)));
       for (const graph of [...graphs]) if (![...graph.names, graph.over].filter(Boolean).every((name) => known.includes(name))) remove(graph);
       if (!graphs.length) remembered(sets);
@@ -102,10 +103,10 @@ export function mount(root, bus) {
   }
 
   function remembered(sets) {
-    let kept = [];
-    try { kept = JSON.parse(localStorage.getItem(store()) ?? "[]"); } catch { /* none */ }
-    for (const { names: several, over } of kept) if (several.every((name) => known.includes(name))) add(over ? `${several.join(" ")} over ${over}` : several.join(" "), true);
-    if (!graphs.length && sets.length) for (const text of displays[sets[0]]) add(text, true);
+    let kept = null;
+    try { kept = JSON.parse(localStorage.getItem(store())); } catch { /* none */ }
+    for (const { names: several, over } of kept ?? []) if (several.every((name) => known.includes(name))) add(over ? `${several.join(" ")} over ${over}` : several.join(" "), true);
+    if (!kept && sets.length) for (const text of displays[sets[0]]) add(text, true);
   }
   shows.addEventListener("change", () => { for (const text of displays[shows.value] ?? []) add(text); shows.value = ""; });
 
@@ -198,7 +199,7 @@ export function mount(root, bus) {
     };
   }
 
-  const colour = (at) => COLOURS[bus.latest("theme") === "dark" ? "dark" : "light"][at % 6];
+  const colour = (at) => getComputedStyle(document.documentElement).getPropertyValue(COLOURS[at % 6]);
 
   /** A curve over another variable: from each tick to the next, with nothing where either was not set. */
   function path(plot, graph) {

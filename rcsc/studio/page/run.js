@@ -56,6 +56,10 @@ function toolbar(bus, drawer) {
   const back = make("button", { type: "button", class: "back", hidden: true, onclick: () => bus.select({ tick: bus.latest("run").last, follow: true }) }, "Back to now");
   const live = make("button", { type: "button", hidden: true, onclick: () => bus.try("time.live") }, "Back to the live run");
   const said = make("span", { class: "grow soft ended", role: "status" });
+  const past = () => {
+    const run = bus.latest("run");
+    back.hidden = !run?.open || run.source === "log" || bus.selection.tick === run.last;
+  };
   bus.on("run", (run) => {
     const of = bus.latest("run.state");
     const log = run.source === "log";
@@ -69,10 +73,6 @@ function toolbar(bus, drawer) {
     said.title = said.textContent;
     past();
   });
-  const past = () => {
-    const run = bus.latest("run");
-    back.hidden = !run?.open || run.source === "log" || bus.selection.tick === run.last;
-  };
   bus.on("selection", past);
   bus.key("space", "Run, or pause", () => go.click(), "Run");
   bus.key("s", "One cycle of all levels", () => step.click(), "Run");
@@ -345,7 +345,7 @@ function valuesTab(bus) {
 
 function breaksTab(bus) {
   const list = make("ul"), faults = make("ul"), buffers = make("ul");
-  const what = make("input", { "aria-label": "A condition, or a line, to stop at", placeholder: "task.cur_state = state_3, or task.acquire.5", size: "44", spellcheck: "false", list: "run-words" });
+  const what = make("input", { "aria-label": "A condition, or a line, to stop at", title: "A condition, or a line: task.cur_state = state_3, or task.acquire.5", placeholder: "task.acquire.5, or x > 3", size: "44", spellcheck: "false", list: "run-words" });
   const type = (line) => doLine(bus, line);
   const add = make("form", { class: "bar", onsubmit: async (event) => { event.preventDefault(); if (await type(`break ${what.value}`)) what.value = ""; } }, what, make("button", {}, "Break there"));
   let before = "";

@@ -61,7 +61,7 @@ export class SheetGrid {
   #build({ columns, rows }) {
     const head = make("tr", { role: "row", class: "head" });
     head.append(make("th", { role: "columnheader", class: "stub corner", scope: "col", "data-line": "-1", "data-column": "-1", tabindex: "-1" }, "line"),
-      make("th", { role: "columnheader", class: "share", scope: "col", title: "Share of the inputs that the line matches" }, "share"),
+      make("th", { role: "columnheader", class: "share", scope: "col", title: "Share of the inputs in the declared ranges that the line matches, be they assumed away or not" }, "share"),
       make("th", { role: "columnheader", class: "tells", scope: "col" }));
     this.#cells = [[head.cells[0]]];
     columns.forEach((column, at) => {
