@@ -284,6 +284,7 @@ class Hub:
         self._lanes: dict[str, Lane] = {}
         self._clients: list[Client] = []
         self._wrong: Json = None
+        self._partings: list[str] = []
 
     def add(self, concerns: Sequence[Concern]) -> None:
         """Have concerns answer from now on.
@@ -345,6 +346,15 @@ class Hub:
             self._clients.remove(client)
         for ask in list(client.open.values()):
             ask.cancel()
+
+    def part(self, text: str) -> None:
+        """Have something said in words once the studio has ended, where it was started."""
+        self._partings.append(text)
+
+    @property
+    def partings(self) -> Sequence[str]:
+        """What is to be said once the studio has ended."""
+        return tuple(self._partings)
 
     def close(self) -> None:
         """Let every concern let go."""

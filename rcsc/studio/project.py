@@ -49,7 +49,7 @@ def concerns(
         time,
         kept,
         build,
-        Tables(desk),
+        Tables(desk, hub.part),
         Proof(desk),
         Graphs(desk),
         cell,

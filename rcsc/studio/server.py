@@ -5,7 +5,10 @@ the folder `page` and nothing else, and talks over one socket: questions and ans
 """
 
 import asyncio
+import contextlib
 import secrets
+import signal
+import threading
 from collections.abc import Awaitable, Callable, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -69,7 +72,7 @@ class Server:
         self._talks: set[asyncio.Task[None]] = set()
 
     def serve(self, concerns: Sequence[Concern], opened: Callable[[str], None]) -> None:
-        """Serve until `stop`, or an interrupt.
+        """Serve until `stop`, an interrupt, or, in the main thread, a signal that asks to end.
 
         Args:
             concerns: Who answers.
@@ -97,6 +100,7 @@ class Server:
 
     async def _serve(self, concerns: Sequence[Concern], opened: Callable[[str], None]) -> None:
         self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
+        _end_in_order(self._loop, self._over)
         self.hub.add(concerns)
         app = web.Application(middlewares=[self._guarded])
         app.on_response_prepare.append(self._headed)
@@ -141,7 +145,8 @@ class Server:
     # --- sockets ---
 
     async def _socket(self, request: web.Request) -> web.WebSocketResponse:
-        socket = web.WebSocketResponse(max_msg_size=MOST_BYTES, heartbeat=HEARTBEAT_S)
+        # What is compressed is sent in a task that nobody waits for: where the page has gone, its exception would be printed
+        socket = web.WebSocketResponse(max_msg_size=MOST_BYTES, heartbeat=HEARTBEAT_S, compress=False)
         if len(self._talks) >= MOST_PAGES:
             raise web.HTTPServiceUnavailable(text=f"{MOST_PAGES} pages are open\n")
         await socket.prepare(request)
@@ -169,6 +174,15 @@ class Server:
                 self.hub.ask(client, json_of(said.data, DEEPEST_MESSAGE, plain=False))
             except Malformed:
                 return
+
+
+def _end_in_order(loop: asyncio.AbstractEventLoop, over: asyncio.Event) -> None:
+    """Let a signal that asks the process to end set an event, where signals are heard: in the main thread, and not on every system."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for name in ("SIGTERM", "SIGHUP"):
+        with contextlib.suppress(AttributeError, NotImplementedError):
+            loop.add_signal_handler(getattr(signal, name), over.set)
 
 
 async def _send(socket: web.WebSocketResponse, client: Client, woken: asyncio.Event) -> None:

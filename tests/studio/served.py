@@ -112,13 +112,18 @@ class Page:
         await self.socket.close()
 
 
-@contextlib.asynccontextmanager
-async def page(server: Server) -> AsyncIterator[Page]:
+def page(server: Server) -> contextlib.AbstractAsyncContextManager[Page]:
     """One page of a server."""
-    origin = server.address.rpartition("/")[0].rpartition("/")[0]
+    return page_at(server.address)
+
+
+@contextlib.asynccontextmanager
+async def page_at(address: str, **options: Any) -> AsyncIterator[Page]:
+    """One page of the studio at an address; with options of its socket."""
+    origin = address.rpartition("/")[0].rpartition("/")[0]
     async with (
         aiohttp.ClientSession(headers={"Origin": origin}) as session,
-        session.ws_connect(f"{server.address}socket", max_msg_size=0) as socket,
+        session.ws_connect(f"{address}socket", max_msg_size=0, **options) as socket,
         Page(socket) as one,
     ):
         yield one

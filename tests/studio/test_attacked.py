@@ -1,7 +1,11 @@
 """What a page, or somebody beside it, may try with open files: nothing hangs, grows, leaves the project, or is said of an older text."""
 
+import asyncio
 import os
 import shutil
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +14,13 @@ import pytest
 from rcsc.diagnostics.source import Source
 from rcsc.editor.repairs import formatted
 from rcsc.host.files.read import Malformed
+from rcsc.lang.project import listed
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import MOST_OPEN, MOST_UNREAD, Client, Hub
 from rcsc.studio.tables import desk
 from rcsc.studio.tables.document import MOST_BYTES, MOST_KEPT, Document
+from tests.studio.driven import dock
+from tests.studio.served import page_at
 from tests.studio.tabled import Bench, rows
 
 WORDS = "enum mode { off, on, stuck }\n"
@@ -292,3 +299,64 @@ def test_a_text_that_no_file_could_hold_is_never_taken(
     assert bench.doc("t.rcs")["text"] == doc["text"]
     assert formatted(Source("", doc["text"]), "\n")
     bench.ask("tables.save", file="t.rcs")
+
+
+@pytest.mark.parametrize("how", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_what_nobody_saved_is_kept_when_the_studio_ends(how: str, tmp_path: Path) -> None:
+    """And it says where; the project itself stays as it was saved."""
+    system = dock(tmp_path / "dock")
+    before = (system.parent / "drive.rcs").read_bytes()
+    order = [
+        sys.executable,
+        "-c",
+        "import rcsc.commands; rcsc.commands.main()",
+        "studio",
+        str(system),
+        "--alone",
+    ]
+    with subprocess.Popen(order, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as studio:
+        assert studio.stdout
+        address = studio.stdout.readline().split()[-1]
+        asyncio.run(_typed(address, "# mine, \N{GREEK SMALL LETTER ALPHA}\n"))
+        studio.send_signal(getattr(signal, how))
+        said = studio.stdout.read()
+    assert studio.returncode == 0
+    assert said.startswith("the studio is closed\n")
+    [where] = [
+        line.partition("its text is kept in ")[2]
+        for line in said.splitlines()
+        if "drive.rcs was not saved" in line
+    ]
+    assert Path(where).read_bytes() == "# mine, \N{GREEK SMALL LETTER ALPHA}\n".encode() + before
+    assert (system.parent / "drive.rcs").read_bytes() == before
+    assert where not in listed([str(system.parent)])
+
+
+async def _typed(address: str, text: str) -> None:
+    async with page_at(address) as one:
+        await one.ask("tables.open", file="drive.rcs")
+        shown = await one.heard("tables.file/drive.rcs")
+        await one.ask("tables.edit", file="drive.rcs", version=shown["version"], **edit(text))
+
+
+def test_texts_that_are_kept_take_nobodys_place(
+    folder: Path, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two files of one name in two folders, one that cannot be kept, and one that has nothing to be kept."""
+    (folder / "b").mkdir()
+    (folder / "b" / "words.rcs").write_text(WORDS, newline="\r\n")
+    for name in ("t.rcs", "words.rcs", "b/words.rcs"):
+        bench.open(name)
+    for name in ("words.rcs", "b/words.rcs"):
+        bench.change("tables.edit", name, **edit(f"# {name}\n"))
+    said = bench.desk.keep_unsaved()
+    kept = {each.partition(" ")[0]: Path(each.rpartition(" kept in ")[2]) for each in said}
+    assert {name: path.read_bytes().decode() for name, path in kept.items()} == {
+        "words.rcs": f"# words.rcs\n{WORDS}",
+        "b/words.rcs": f"# b/words.rcs\n{WORDS}".replace("\n", "\r\n"),
+    }
+    monkeypatch.setattr(desk, "FOLDER", "t.rcs")  # a file where the folder would be
+    assert [each.partition(":")[0] for each in bench.desk.keep_unsaved()] == [
+        f"{name} was not saved, and could not be kept" for name in ("words.rcs", "b/words.rcs")
+    ]
+    assert (folder / "t.rcs").read_text() == TABLE

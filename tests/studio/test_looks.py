@@ -108,9 +108,58 @@ def test_each_view_opens_first_and_after_others(seat: Seat, first: str) -> None:
 
 def again(seat: Seat) -> None:
     """Load the page anew, as who presses F5."""
-    seat.value("(document.documentElement.dataset.ready = 'old', location.reload())")
+    seat.reload()
     seat.wait("document.documentElement.dataset.ready === 'yes'")
     seat.until("#state", "cycle")
+
+
+PRESSED = "[...document.querySelectorAll('button, summary, input[type=checkbox], [role=tab], td')].filter((one) => one.checkVisibility())"
+KEYS = (
+    *"[]{}mMnNfel0+-?xgrtc/jkuiops123456789", "left", "right", "up", "down", "home", "end", "pageup", "pagedown", "enter", "escape", "tab",
+    "shift+tab", "f2", "delete", "space", "ctrl+z", "ctrl+y", "ctrl+s", "ctrl+enter", "shift+up", "shift+down",
+)  # fmt: skip
+WRITTEN = (
+    "0",
+    "-",
+    "true",
+    "idle | 1",
+    "'",
+    "\u202e",
+    "x" * 300,
+    "999999999999999999999",
+    "task",
+    "set",
+    "halt",
+    "\t\t",
+    "é",
+    "5 mm",
+)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_whatever_is_pressed_written_and_clicked_raises_nothing(seed: int, tmp_path: Path) -> None:
+    """In any view, in any order, also while the tables are compiled: nothing is raised, and the page opens anew."""
+    hand = random.Random(seed)  # noqa: S311  # the same each time
+    with seated(Opening(dock(tmp_path / "dock"), script="dock.csv")) as one:
+        for _ in range(250):
+            match hand.randrange(6):
+                case 0:
+                    one.click(f"#views button[data-view={hand.choice(VIEWS)}]")
+                    one.wait("document.querySelector('main')")
+                case 1:
+                    one.write(hand.choice(WRITTEN))
+                case 2 | 3:
+                    one.press(hand.choice(KEYS))
+                case 4:
+                    one.mouse("mousePressed", x := hand.randrange(WIDE), y := hand.randrange(HIGH))
+                    one.mouse("mouseMoved", x + hand.randrange(-90, 90), y + hand.randrange(-90, 90))
+                    one.mouse("mouseReleased", x, y)
+                case _:
+                    one.value(f"{PRESSED}[Math.floor({hand.random()} * {PRESSED}.length)]?.click()")
+        assert one.said == []
+        one.reload()
+        one.wait("document.documentElement.dataset.ready === 'yes'")
+        one.wait("document.querySelector('#state').innerText")
 
 
 def test_what_is_wrong_is_seen(tmp_path: Path) -> None:

@@ -2,8 +2,10 @@
 
 import asyncio
 import contextlib
+import gc
 import http.client
 import json
+import secrets
 import socket
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -17,7 +19,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.shell.reload.refusal import Refused as Refusal
 from rcsc.studio.hub import MOST_OPEN, Ask, Client, Hub, message
 from rcsc.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
-from tests.studio.served import PATIENCE_S, Page, Refused, page, serving, until
+from tests.studio.served import PATIENCE_S, Page, Refused, page, page_at, serving, until
 
 
 class Echo:
@@ -290,6 +292,26 @@ def test_a_page_that_hangs_keeps_the_latest_only_and_holds_up_nobody() -> None:
             assert sorted(map(len, waiting)) == [0, 1]
 
     run(work)
+
+
+def test_a_page_that_goes_while_it_is_told_leaves_no_complaint(caplog: pytest.LogCaptureFixture) -> None:
+    """A browser offers to have messages compressed; what is compressed was sent in a task that nobody waited for."""
+    much = secrets.token_hex(2_000_000)  # which takes a while to compress
+
+    async def inside(server: Server) -> None:
+        for _ in range(12):
+            async with page_at(server.address, compress=15) as one:
+                await one.heard("echo.state", warm=True)
+                for at in range(4):
+                    server.hub.tell(f"echo.news/{at}", much)
+                await asyncio.sleep(0.02)
+                one.socket._response.close()  # without a word, as a tab that is closed
+                await asyncio.sleep(0.1)
+
+    with serving(others=[Echo()]) as server:
+        asyncio.run(inside(server))
+    gc.collect()
+    assert not caplog.messages
 
 
 def test_pages_are_counted() -> None:

@@ -51,7 +51,7 @@ class Browser:
         )  # fmt: skip
         os.close(orders)
         os.close(answers)
-        self._held, self._number = b"", 0
+        self._held, self._number, self._loads = b"", 0, 0
         self.said: list[str] = []
         targets = self._tell("Target.getTargets")["targetInfos"]
         page = next(target["targetId"] for target in targets if target["type"] == "page")
@@ -89,6 +89,15 @@ class Browser:
         assert not self._tell("Page.navigate", url=address).get("errorText")
         self.wait("document.readyState === 'complete'")
 
+    def reload(self) -> None:
+        """Loads the page anew, as who presses F5; a question whether to leave it is answered with yes."""
+        loads = self._loads
+        self._tell("Page.reload")
+        until = time.monotonic() + PATIENCE_S
+        while self._loads == loads:
+            assert time.monotonic() < until, "the page is not loaded anew"
+            self._note(self._answer())
+
     def value(self, expression: str) -> Any:
         """What an expression is; a promise is waited for."""
         found = self._tell("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
@@ -113,21 +122,30 @@ class Browser:
         """Writes what is seen, as PNG."""
         path.write_bytes(base64.b64decode(self._tell("Page.captureScreenshot")["data"]))
 
-    def _tell(self, method: str, **parameters: Any) -> dict[str, Any]:
+    def _order(self, method: str, **parameters: Any) -> int:
+        """Says what is to be done; by which number the answer will go."""
         self._number += 1
         order: dict[str, Any] = {"id": self._number, "method": method, "params": parameters}
         if hasattr(self, "_session"):
             order["sessionId"] = self._session
         os.write(self._orders, json.dumps(order).encode() + b"\0")
+        return self._number
+
+    def _tell(self, method: str, **parameters: Any) -> dict[str, Any]:
+        number = self._order(method, **parameters)
         while True:
             answer = self._answer()
-            if answer.get("id") == self._number:
+            if answer.get("id") == number:
                 assert "error" not in answer, f"{method}: {answer['error']}"
                 result: dict[str, Any] = answer["result"]
                 return result
             self._note(answer)
 
     def _note(self, event: dict[str, Any]) -> None:
+        if event.get("method") == "Page.javascriptDialogOpening":
+            self._order("Page.handleJavaScriptDialog", accept=True)
+        if event.get("method") == "Page.loadEventFired":
+            self._loads += 1
         if event.get("method") == "Runtime.exceptionThrown":
             self.said.append(str(event["params"]["exceptionDetails"]))
         if event.get("method") == "Log.entryAdded":

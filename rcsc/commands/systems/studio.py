@@ -1,5 +1,6 @@
 """`rcsc studio`: tables, proof, running levels and cell in one page."""
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -46,7 +47,8 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     """Open one page for SYSTEM: its tables, their proof, the levels as they run, and what stands outside them.
 
     SYSTEM is a system's description or a folder that has one; SCRIPT names a script of the system that is here. The page is for a
-    browser on this machine; its address has a token that nobody else knows. Ctrl-C ends it.
+    browser on this machine; its address has a token that nobody else knows. Ctrl-C ends it;
+    what was typed and not saved is kept, and it says where.
     """
     need("studio")
     from rcsc.studio.project import concerns  # of an extra
@@ -63,10 +65,9 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         if opens:
             click.launch(address)
 
-    try:
+    with contextlib.suppress(KeyboardInterrupt):
         server.serve(concerns(opening, server.hub, logs, drawer=_drawer(path)), told)
-    except KeyboardInterrupt:
-        click.echo("the studio is closed")
+    click.echo("\n".join(("the studio is closed", *server.hub.partings)))
     return 0
 
 

@@ -11,7 +11,7 @@ const EVERY_MS = 250;
 export function mount(root, bus) {
   const words = make("datalist", { id: "plot-words" });
   const what = make("input", { list: "plot-words", class: "grow", "aria-label": "A variable, or one over another: a over b", placeholder: "a variable, or  a over b", spellcheck: "false" });
-  const shows = make("select", { "aria-label": "Graphs that the system shows" });
+  const shows = make("select", { "aria-label": "Graphs that the system shows", hidden: true });
   const list = make("div", { class: "graphs scroll" });
   const empty = make("p", { class: "closed soft" }, "No graph yet: name a variable above.");
   root.append(make("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); add(what.value.trim()); } },

@@ -305,9 +305,10 @@ function valuesTab(bus) {
   const rows = make("tbody");
   const head = make("strong", {}, "");
   let asking = false, again = false, values = [], editing = null;
+  const chosen = () => bus.selection.level || bus.latest("run")?.levels?.[0]?.name;
   async function ask() {
     const run = bus.latest("run"), { tick } = bus.selection;
-    const level = bus.selection.level || run?.levels?.[0]?.name;
+    const level = chosen();
     if (!run?.open || tick === null || !root.isConnected) return;
     if (asking) { again = true; return; }
     asking = true;
@@ -319,6 +320,7 @@ function valuesTab(bus) {
   function draw(level) {
     if (editing?.isConnected && document.activeElement === editing) return;
     const run = bus.latest("run");
+    if (!run?.open) return;
     const settable = run.source === "live" && bus.selection.tick === run.last;
     const part = filter.value.toLowerCase();
     const shown = values.filter(({ name, changed: is }) => name.toLowerCase().includes(part) && (!changed.checked || is));
@@ -334,8 +336,8 @@ function valuesTab(bus) {
         make("td", { class: "soft doc" }, one.doc));
     }));
   }
-  filter.addEventListener("input", () => draw(bus.selection.level || bus.latest("run").levels[0].name));
-  changed.addEventListener("change", () => draw(bus.selection.level || bus.latest("run").levels[0].name));
+  filter.addEventListener("input", () => draw(chosen()));
+  changed.addEventListener("change", () => draw(chosen()));
   const root = make("div", { class: "column" }, make("div", { class: "bar" }, make("span", {}, "Level ", head), filter, make("label", { for: "only-changed" }, changed, " only what this tick changed")),
     make("div", { class: "scroll" }, make("table", { class: "values" }, make("thead", {}, make("tr", {}, ["Variable", "Value", "Unit", "", "Kind", "Range", ""].map((text) => make("th", {}, text)))), rows)));
   bus.on("moment", ask);

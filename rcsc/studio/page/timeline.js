@@ -232,8 +232,7 @@ export function mount(root, bus) {
   const here = () => bus.selection.tick ?? 0;
   const go = (tick) => lookAt(bus, tick);
   function change(step) {
-    const run = bus.latest("run");
-    const levels = bus.selection.level ? [bus.selection.level] : run.levels.map(({ name }) => name);
+    const levels = bus.selection.level ? [bus.selection.level] : (bus.latest("run")?.levels ?? []).map(({ name }) => name);
     const ticks = levels.flatMap((level) => {
       const { at } = standing(level, step > 0 ? here() : here() - 1);
       return [(tracks.levels.get(level) ?? [])[step > 0 ? at + 1 : at]?.[0]].filter((tick) => tick !== undefined);

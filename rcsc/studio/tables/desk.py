@@ -16,6 +16,7 @@ from rcsc.editor.memo import OutdatedError
 from rcsc.editor.values import Repair
 from rcsc.editor.workspace import Checked, Workspace
 from rcsc.editor.written import tables_of
+from rcsc.host.cache import FOLDER
 from rcsc.lang.project import listed, load, project_root
 from rcsc.run.description import BadDescription, description, places
 from rcsc.shell.reload.refusal import Refused
@@ -31,6 +32,8 @@ MOST_FILES = 2_000
 MOST_OPEN = 64
 """Files that are open at once."""
 CHANGED = "the text was changed meanwhile: nothing was done"
+UNSAVED = "unsaved"
+"""The folder, beside what else is kept, for texts that nobody had saved when the studio ended."""
 MOST_LISTED_BYTES = 300_000
 """Of a file whose tables are listed before it is opened."""
 
@@ -310,6 +313,21 @@ class Desk:
                 self._offered[key] = offered
             return offered
         return self._offered[key]
+
+    def keep_unsaved(self) -> list[str]:
+        """Keep every text that nobody saved, each in a file that takes no other's place; what was kept, and where, a sentence each."""
+        folder = Path(self.root, FOLDER, UNSAVED, f"{time.strftime('%Y-%m-%d_%H-%M-%S')}_{os.getpid()}")
+        said = []
+        for name, each in self.others():
+            if not each.dirty:
+                continue
+            try:
+                kept = each.keep(folder.joinpath(*name.split("/")[:-1]))
+            except OSError as error:
+                said.append(f"{name} was not saved, and could not be kept: {error.strerror}")
+            else:
+                said.append(f"{name} was not saved: its text is kept in {kept}")
+        return said
 
     def others(self) -> Iterator[tuple[str, Document]]:
         """Every open file."""

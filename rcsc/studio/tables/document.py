@@ -234,6 +234,17 @@ class Document:
         self.disk, self.saved = raw, self.text
         return laid_out is not None
 
+    def keep(self, folder: Path) -> Path:
+        """Write the text as it is into another folder; where it is then.
+
+        Raises:
+            OSError: It cannot be written.
+        """
+        path = folder / os.path.basename(self.file)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, self._raw(self.text))
+        return path
+
     def take_disk(self) -> bool:
         """Let the text be what is on disk, which can be undone; whether it changed.
 

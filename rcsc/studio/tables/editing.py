@@ -27,9 +27,9 @@ class Tables:
 
     name, lane = "tables", "tables"
 
-    def __init__(self, desk: Desk) -> None:
-        """Args: desk: The open files."""
-        self._desk = desk
+    def __init__(self, desk: Desk, part: Callable[[str], None]) -> None:
+        """Args: desk: The open files; part: Has something said once the studio has ended."""
+        self._desk, self._part = desk, part
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
@@ -48,7 +48,9 @@ class Tables:
         """Nothing is to be done."""
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Keep what nobody saved."""
+        for said in self._desk.keep_unsaved():
+            self._part(said)
 
     def _open(self, ask: Ask) -> Json:
         """Open a file; one that has no changes here is read again where others changed it."""

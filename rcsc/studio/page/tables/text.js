@@ -22,6 +22,7 @@ export class TextView {
       else desk.redo();
     });
     desk.settled = () => this.#settled();
+    addEventListener("beforeunload", (event) => { if (this.file && this.#area.value !== this.#base) event.preventDefault(); }); // typed, and not sent
     for (const kind of ["keyup", "click"]) this.#area.addEventListener(kind, () => this.#selects());
     desk.on(() => this.take());
     bus.on("selection", (now, changed) => { if (changed?.has("line")) this.#show(now); });
