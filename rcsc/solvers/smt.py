@@ -102,6 +102,10 @@ WATCH_S = 0.02
 """A question that nobody waits for any more is broken off within so long, and what Z3 takes to hear of it."""
 _asking: set[int] = set()
 """Threads whose question Z3 is at."""
+_broken: set[int] = set()
+"""Those of them whose question was broken off."""
+_breaking = threading.Lock()
+"""Held while a question is broken off: it ends for who asked it no sooner."""
 
 
 @contextmanager
@@ -132,8 +136,32 @@ def until(over: Callable[[], bool], *, breaks_off: bool = False) -> Iterator[Non
 
 def _watch(over: Callable[[], bool], left: threading.Event, asker: int) -> None:
     while not left.wait(WATCH_S):
-        if asker in _asking and over():
-            _z3().main_ctx().interrupt()  # where no question is under way by now, nothing comes of it
+        if asker not in _asking or not over():
+            continue
+        with _breaking:
+            if asker in _asking:
+                _broken.add(asker)
+                _z3().main_ctx().interrupt()
+
+
+@contextmanager
+def _under_way() -> Iterator[None]:
+    """Inside, the question of this thread may be broken off; after it Z3 is as it was.
+
+    Z3 keeps that it is to break off until a question begins, where none is under way: one that had just ended. Who next pushes, or asks
+    for a model, would have an exception for it.
+    """
+    asker = threading.get_ident()
+    _asking.add(asker)
+    try:
+        yield
+    finally:
+        with _breaking:
+            _asking.discard(asker)
+            broken = asker in _broken
+            _broken.discard(asker)
+        if broken:
+            _z3().Solver().check()
 
 
 @contextmanager
@@ -400,11 +428,8 @@ class Solver:
         while True:
             counted = self._count()
             used_s, passed_s = time.thread_time(), time.monotonic()
-            _asking.add(threading.get_ident())
-            try:
+            with _under_way():
                 answer = self._solver.check(*assuming)
-            finally:
-                _asking.discard(threading.get_ident())
             signal.siginterrupt(signal.SIGINT, True)  # Z3 leaves it so that Ctrl-C ends no wait for a worker
             if answer != z3.unknown:
                 self._charge(counted)

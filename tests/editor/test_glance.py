@@ -1,5 +1,6 @@
 """A glance says nothing that a check takes back, and what nobody waits for ends."""
 
+import itertools
 import threading
 import time
 from functools import partial
@@ -164,3 +165,25 @@ def test_nothing_is_asked_once_it_is_over() -> None:
     assert smt.unanswered() == before + 1
     assert solver.check() is Solved.SATISFIABLE
     assert smt.unanswered() == before + 1
+
+
+def test_a_question_that_ended_as_it_was_broken_off_leaves_the_solver_as_it_was(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Z3 hears of it a moment too late, again and again; who asks next is answered."""
+    monkeypatch.setattr(smt, "WATCH_S", 0.0)
+    turns, solver = itertools.count(1), Solver()
+    for _ in range(200):
+        broken, many = threading.Event(), smt.unanswered()
+
+        def over(broken: threading.Event = broken) -> bool:
+            if next(turns) % 7 == 0:
+                broken.set()
+            return broken.is_set()
+
+        with smt.until(over, breaks_off=True):
+            while smt.unanswered() == many:
+                solver.check()
+        solver.push()
+        assert solver.check() is Solved.SATISFIABLE
+        solver.pop()
