@@ -1,8 +1,12 @@
 """What can be said of a text that is not in order: what is broken is left out, and the rest is checked.
 
-In: files as read, with what is wrong with them. Out: a program of what is left, and what was left out. Left out are whole
-declarations, made blank where they stand, so that all places stay true: first those that do not parse, then, as long as names do
-not resolve, those with an error. A declaration is a piece of text from the word that begins it to the next.
+In: files as read, with what is wrong with them. Out: a program of what is left, and what was left out, made blank where it stands,
+so that all places stay true: first what does not parse, then, as long as names do not resolve, what has an error. That is the least
+that helps: a cell of a table, its row, its line, a line of a level, and at last the whole declaration, a piece of text from the word
+that begins it to the next. So a name that is half typed in a cell takes neither its table's columns nor the level that runs the table:
+
+    | a | m   |   becomes   | a |     |   of the table, which is harmed, nothing is told; all others are checked
+    | b | off |             | b | off |
 
 What is found in the rest is true of the rest. So that it is no nuisance either, nothing is told of a declaration that uses a name
 which what was left out may declare: of a broken table only its name, of anything else every word in it, and of a file that is
@@ -17,6 +21,7 @@ from dataclasses import dataclass
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source, Span
+from rcsc.editor.written import RowText, cells_of, tables_of
 from rcsc.lang.model import Program
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import resolve
@@ -35,6 +40,7 @@ _AFTER = re.compile(r"(?:\s*^[ \t]*#[^\r\n]*)*\s*\Z", re.MULTILINE)
 """Comments of what comes next, and blank lines."""
 _WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _COMMENT = re.compile(r"#[^\r\n]*")
+_BLANKS = re.compile(r"[ \t]*")
 _NOT_END = re.compile(r"[^\r\n]")
 
 
@@ -44,13 +50,15 @@ class Rest:
 
     Attributes:
         program: None where nothing that resolves is left.
-        left_out: What was left out.
+        left_out: What was left out: cells, rows, lines of a level, or whole declarations.
+        harmed: The declarations of which a part was left out; what they say now is not what they say in the text.
         wrong: What was found wrong in the rest on the way, beside what `rcsc check` says.
     """
 
     program: Program | None
     loaded: Loaded
     left_out: tuple[Span, ...]
+    harmed: tuple[Span, ...]
     wrong: tuple[Diagnostic, ...]
 
 
@@ -60,14 +68,42 @@ class _Pieces:
 
     Attributes:
         starts: Where each begins, first 0: what stands before the first.
+        lines: The rows of its tables by where they begin, those of headings and dashes left out; each with all rows of its line.
     """
 
     source: Source
     starts: Sequence[int]
+    lines: Mapping[int, tuple[RowText, tuple[RowText, ...]]]
 
     @classmethod
     def of(cls, source: Source) -> "_Pieces":
-        return cls(source, (0, *(found.start() for found in _BEGINS.finditer(source.text))))
+        begins = (found.start() for found in _BEGINS.finditer(source.text) if not _within_a_level(found))
+        lines = (line for table in tables_of(source.text) for part in table.parts for line in part.lines)
+        return cls(source, (0, *begins), {row.start: (row, line) for line in lines for row in line})
+
+    def parts(self, offset: int) -> Iterator[Span]:
+        """Yield what can be left out around an offset so that its declaration still stands, the least first.
+
+        In a table the text of a cell, then its row, then all rows of its line; not the cell that names the line, for a row without
+        a name goes on with the line above. In a level a line of text.
+        """
+        begin = self.source.text.rfind("\n", 0, offset) + 1
+        bar = begin + len(_BLANKS.match(self.source.text, begin)[0])  # type: ignore[index]  # it matches nothing, too
+        if bar in self.lines:
+            row, line = self.lines[bar]
+            for cell in cells_of(row).all[1:]:
+                if cell.text and cell.start <= offset <= cell.start + len(cell.text):
+                    yield Span(self.source.name, cell.start, cell.start + len(cell.text))
+            yield Span(self.source.name, row.start, row.past)
+            yield Span(self.source.name, line[0].start, line[-1].past)
+        elif self.begins(whole := self.around(offset)) == "level" and begin > whole.start:
+            end = self.source.text.find("\n", offset)
+            yield Span(self.source.name, begin, len(self.source.text) if end < 0 else end)
+
+    def begins(self, span: Span) -> str:
+        """The word with which a declaration begins; empty for what stands before the first."""
+        found = _BEGINS.match(self.source.text, span.start)
+        return "" if found is None else found["word"]
 
     def around(self, offset: int) -> Span:
         """The declaration in which an offset lies."""
@@ -85,11 +121,14 @@ class _Pieces:
 
     def uses(self, span: Span) -> bool:
         """Whether it uses a file, which may declare anything."""
-        begins = _BEGINS.match(self.source.text, span.start)
-        return begins is not None and begins["word"] == "use"
+        return self.begins(span) == "use"
 
     def declares(self, span: Span) -> frozenset[str]:
-        """The names that a declaration may declare."""
+        """The names that what is left out may declare: none in a part of a table."""
+        if span.start in self.lines or (
+            not self.begins(span) and self.begins(self.around(span.start)) == "table"
+        ):
+            return frozenset()
         begins = _BEGINS.match(self.source.text, span.start)
         if begins is not None and begins["word"] == "table" and begins["name"]:
             return frozenset({begins["name"]})
@@ -100,9 +139,8 @@ def declarations(source: Source) -> Iterator[tuple[str, str, Span, Span]]:
     """Yield the word, the name, all of it, and the place of the name, of what a text declares, whether it parses or not."""
     pieces = _Pieces.of(source)
     for found in _BEGINS.finditer(source.text):
-        inner = found["word"] == "table" and found["name"] in {None, "by"}
         name = _named(source.text, found)
-        if name is not None and not inner and found["word"] != "use":
+        if name is not None and not _within_a_level(found) and found["word"] != "use":
             whole = pieces.around(found.start("word"))
             end = found.start("word") + len(_AFTER.sub("", source.text[found.start("word") : whole.end]))
             yield (
@@ -111,6 +149,11 @@ def declarations(source: Source) -> Iterator[tuple[str, str, Span, Span]]:
                 Span(source.name, found.start("word"), end),
                 Span(source.name, *name[1]),
             )
+
+
+def _within_a_level(found: re.Match[str]) -> bool:
+    """Whether a word `table` is that of a level, which says what it tries, and declares none."""
+    return found["word"] == "table" and found["name"] in {None, "by"}
 
 
 def _named(text: str, found: re.Match[str]) -> tuple[str, tuple[int, int]] | None:
@@ -142,16 +185,23 @@ def rest_of(root: str, loaded: Loaded, wrong: Sequence[Diagnostic], overlay: Map
     for _ in range(MOST_ROUNDS):
         pieces |= {name: _Pieces.of(source) for name, source in current.sources.items() if name not in pieces}
         found.update(dict.fromkeys(_of_the_rest(told, pieces, out)))
-        new = [span for each in told if (span := _piece(each, pieces, out)) is not None and span not in out]
+        new = [span for each in told if (span := _least(each, pieces, out)) is not None and span not in out]
         if not new:
             break
         out.update(dict.fromkeys(new))
         current = load([root], overlay={**overlay, **_blanked(pieces, out)})
         program = _resolved(root, current)
         if isinstance(program, Program):
-            return Rest(program, current, tuple(out), tuple(found))
+            return Rest(program, current, tuple(out), _harmed(pieces, out), tuple(found))
         told = program
-    return Rest(None, current, tuple(out), tuple(found))
+    return Rest(None, current, tuple(out), (), tuple(found))
+
+
+def _harmed(pieces: Mapping[str, _Pieces], out: Iterable[Span]) -> tuple[Span, ...]:
+    """The declarations of which a part is left out."""
+    return tuple(
+        dict.fromkeys(whole for span in out if (whole := pieces[span.file].around(span.start)) != span)
+    )
 
 
 def _resolved(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
@@ -169,10 +219,19 @@ def _piece(diagnostic: Diagnostic, pieces: Mapping[str, _Pieces], out: Collectio
         return None
     cut = pieces[span.file]
     found = cut.around(span.start)
-    if not (found.start and diagnostic.code.value.startswith("RCS1") and cut.parses(found)):
+    harmed = any(each.file == span.file and found.start <= each.start < found.end for each in out)
+    if harmed or not (found.start and diagnostic.code.value.startswith("RCS1") and cut.parses(found)):
         return found
     before = cut.around(found.start - 1)
     return found if before in out else before
+
+
+def _least(diagnostic: Diagnostic, pieces: Mapping[str, _Pieces], out: Collection[Span]) -> Span | None:
+    """What is to be left out for an error: a part of its declaration, and all of it where no part helped."""
+    whole, span = _piece(diagnostic, pieces, out), diagnostic.primary.span
+    if whole is None or whole in out or not whole.start <= span.start < whole.end:
+        return whole
+    return next((part for part in pieces[span.file].parts(span.start) if part not in out), whole)
 
 
 def _of_the_rest(
@@ -182,9 +241,10 @@ def _of_the_rest(
     if not out or any(pieces[span.file].uses(span) for span in out):
         return
     missing = frozenset[str]().union(*(pieces[span.file].declares(span) for span in out))
+    untrue = {*out, *_harmed(pieces, out)}
     for each in told:
         piece = _piece(each, pieces, out)
-        if piece is not None and piece not in out and not pieces[piece.file].words(piece) & missing:
+        if piece is not None and piece not in untrue and not pieces[piece.file].words(piece) & missing:
             yield each
 
 

@@ -283,20 +283,28 @@ class Workspace:
             every = tuple(sorted({*reading.wrong, *found}, key=sort_key))
             return Checked(reading, every, (), reports)
         assert reading.rest is not None
-        found = () if reading.rest.program is None else self._proved(reading.rest.program, options)[0]
+        found = (
+            ()
+            if reading.rest.program is None
+            else self._proved(reading.rest.program, options, reading.rest.harmed)[0]
+        )
         more = {*reading.rest.wrong, *_serious(found)} - set(reading.wrong)
         return Checked(reading, reading.wrong, tuple(sorted(more, key=sort_key)), {})
 
     def _proved(
-        self, program: Program, options: Options
+        self, program: Program, options: Options, harmed: Sequence[Span] = ()
     ) -> tuple[tuple[Diagnostic, ...], dict[tuple[str, str], TableReport]]:
-        names = [table.name for table in program.tables]
+        """What is found in a program, and a report of each table; of a declaration that is not as it stands nothing."""
+        names = [table.name for table in program.tables if not _inside(table.span, harmed)]
         verdict = prove_program(program, options, only=names, known=self.memo)
         reports = {}
         for each in verdict.tables:
             report = resting(table_report(each, program), verdict.unproved, verdict.unsafe)
             reports[report.file, report.table] = report
-        return verdict.findings, reports
+        told = verdict.findings
+        if harmed:
+            told = tuple(each for each in told if not _inside(each.primary.span, harmed))
+        return told, reports
 
     def project(self, file: str) -> tuple[str, ...]:
         """The files that may belong with one: those of its project; without a project file those beside it alone.
@@ -382,6 +390,11 @@ def _key(diagnostic: Diagnostic) -> tuple[str, str]:
 
 def _messages(checked: Checked) -> set[str]:
     return {each.message for each in checked.diagnostics}
+
+
+def _inside(span: Span, wholes: Iterable[Span]) -> bool:
+    """Whether a place is in one of several declarations."""
+    return any(whole.file == span.file and whole.start <= span.start < whole.end for whole in wholes)
 
 
 def _serious(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:

@@ -12,6 +12,7 @@ from rcsc.editor import Workspace
 from rcsc.editor.memo import OutdatedError
 from rcsc.editor.standing import standing
 from rcsc.editor.values import Answer, State
+from rcsc.editor.written import cells_of, tables_of
 from rcsc.solvers.options import Options
 from tests.editor.random_edits import compared
 
@@ -91,6 +92,71 @@ def test_the_rest_of_a_half_written_file_is_checked() -> None:
     assert [len(each.witnesses) for each in answer.findings] == [0, 1]
     answer = asked(workspace, text(b="in {", low="4"))
     assert states(answer) == {"first": State.FAILED, "second": State.STALE}
+
+
+LEVEL = """
+state held : bool
+level only {{
+  period 40 [ms]
+  table by now {{
+    off : {off}
+    on : second
+  }}
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("b", "low", "off", "first"),
+    [
+        ("o", "3", "first", "first"),  # a name that is half typed
+        ("in {", "3", "first", "first"),  # a cell that does not parse
+        ("on | on", "3", "first", "first"),  # a row of other cells
+        ("o", "4", "first", "first"),  # of a table that is harmed nothing more is told: it would have a gap
+        ("on", "3", "fi", ""),  # a level that runs what is not there
+    ],
+)
+def test_what_is_half_typed_takes_no_more_than_its_place(b: str, low: str, off: str, first: str) -> None:
+    """The other table is checked, and the level that runs both of them stands."""
+    workspace = Workspace()
+    answer = asked(workspace, text(b=b, low=low, more="") + LEVEL.format(off=off))
+    told = {(first, False), ("second", True)} if low == "3" else {(first, False)}
+    assert {(each.table, each.meanwhile) for each in answer.findings} == told
+    assert State.PROVED not in states(answer).values()
+    nearest = workspace.reading("/nowhere/two.rcs").nearest
+    assert nearest is not None
+    assert [table.name for table in nearest.tables] == ["first", "second"]
+    assert [level.name for level in nearest.levels] == (["only"] if off == "first" else [])
+
+
+def test_in_every_shipped_file_a_half_typed_name_leaves_the_rest() -> None:
+    """One in each of two lines of a table of each file: everything that the file declares is there still."""
+    count = lost = 0
+    for file in sorted((REPO / "tables").rglob("*.rcs")):
+        path, written, workspace = str(file), file.read_text(encoding="utf-8"), Workspace()
+        whole = workspace.reading(path).program
+        for table in () if whole is None else list(tables_of(written))[:1]:
+            rows = [row for line in table.parts[0].lines[:2] for row in line[:1]]
+            for cell in [cell for row in rows for cell in cells_of(row).conditions[1:] if cell.text][:2]:
+                workspace.open(path, f"{written[: cell.start]}zz{written[cell.start + len(cell.text) :]}")
+                reading = workspace.reading(path)
+                if reading.program is not None:
+                    continue  # the cell stood alone
+                count += 1
+                assert whole is not None
+                named = {
+                    (kind, each.name)
+                    for kind in ("tables", "levels", "variables", "procedures")
+                    for each in getattr(whole, kind)
+                }
+                left = {
+                    (kind, each.name)
+                    for kind in ("tables", "levels", "variables", "procedures")
+                    for each in (() if reading.nearest is None else getattr(reading.nearest, kind))
+                }
+                lost += named != left
+    assert count > 80
+    assert lost <= 3, "those with a condition over several rows, of which one is gone"
 
 
 @pytest.mark.parametrize(
