@@ -122,6 +122,20 @@ def align(text: str, offset: int) -> list[Splice]:
     return [(start, end, new) for start, end, new in found if text[start:end] != new]
 
 
+def keep_aligned(text: str, offset: int) -> Moved | None:
+    """Align the table around an offset, which stays at its letter; None where nothing is to be aligned."""
+    splices = align(text, offset)
+    if not splices:
+        return None
+    moved = offset
+    for start, end, new in splices:
+        if end <= offset:
+            moved += len(new) - (end - start)
+        elif start < offset:
+            moved -= max(0, offset - start - len(new))
+    return Moved(spliced(text, splices), moved)
+
+
 def next_cell(text: str, offset: int) -> Moved | None:
     """Go to the next cell, in the next line after the last, in a new line after the last of all; None outside tables."""
     here = _Here.of(text, offset)

@@ -18,6 +18,7 @@ from rcsc.studio.share.sharing import Findings, Moments
 from rcsc.studio.tables.desk import Desk
 from rcsc.studio.tables.editing import Tables
 from rcsc.studio.tables.proving import Graphs, Proof
+from rcsc.studio.tables.writing import Writing
 
 
 def concerns(
@@ -52,6 +53,7 @@ def concerns(
         Tables(desk, hub.part),
         Proof(desk),
         Graphs(desk),
+        Writing(desk),
         cell,
         Plots(time),
         Moments(hub, time, cell),

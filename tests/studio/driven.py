@@ -19,7 +19,8 @@ MODIFIERS = {"alt": 1, "ctrl": 2, "meta": 4, "shift": 8}
 KEYS = {
     "enter": ("Enter", 13, "\r"), "tab": ("Tab", 9, ""), "escape": ("Escape", 27, ""), "space": (" ", 32, " "),
     "left": ("ArrowLeft", 37, ""), "up": ("ArrowUp", 38, ""), "right": ("ArrowRight", 39, ""), "down": ("ArrowDown", 40, ""),
-    "home": ("Home", 36, ""), "end": ("End", 35, ""), "f2": ("F2", 113, ""), "delete": ("Delete", 46, ""),
+    "home": ("Home", 36, ""), "end": ("End", 35, ""), "f2": ("F2", 113, ""), "f8": ("F8", 119, ""), "f12": ("F12", 123, ""),
+    "delete": ("Delete", 46, ""),
     "pageup": ("PageUp", 33, ""), "pagedown": ("PageDown", 34, ""),
 }  # fmt: skip
 """Keys with names: what the page calls one, its number, and what it types."""

@@ -8,6 +8,7 @@ from rcsc.studio.hub import Ask
 from rcsc.studio.tables.desk import Desk
 from rcsc.studio.tables.editing import Tables
 from rcsc.studio.tables.proving import Graphs, Proof
+from rcsc.studio.tables.writing import Writing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,6 +29,7 @@ class Bench:
             **Tables(self.desk, lambda _: None).handlers,
             **Proof(self.desk).handlers,
             **Graphs(self.desk).handlers,
+            **Writing(self.desk).handlers,
         }
 
     def ask(self, kind: str, **body: Any) -> Any:

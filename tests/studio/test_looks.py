@@ -56,6 +56,11 @@ def test_every_view_can_be_read_in_both_themes(seat: Seat, theme: str) -> None:
         seat.click(f"#views button[data-view={view}]")
         seat.wait(f"document.querySelector('.view-{view}')?.childElementCount")
         assert seat.settled(LOOK) == [], f"{view}, {theme}"
+    seat.click("#views button[data-view=tables]")
+    for mode in ("Text", "Both", "Grid"):
+        seat.click(seat.button(mode))
+        seat.wait(f"'{mode}' === 'Grid' || document.querySelector('.cm-line [class^=word-]')")
+        assert seat.settled(LOOK) == [], f"{mode}, {theme}"
     seat.click("#views button[data-view=run]")
     for tab in DRAWER:
         seat.click(f"#tab-{tab}")

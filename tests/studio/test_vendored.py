@@ -42,10 +42,11 @@ OUTSIDE = re.compile(
 
 
 @pytest.mark.parametrize(
-    "path", sorted(PAGE.glob("*.js")) + sorted(PAGE.glob("vendor/*/*.js")), ids=lambda path: path.name
+    "path", sorted(PAGE.rglob("*.js")), ids=lambda path: path.relative_to(PAGE).as_posix()
 )
 def test_no_script_asks_for_what_is_elsewhere(path: Path) -> None:
-    code = re.sub(r"^\s*(?://|\*|/\*).*$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    code = re.sub(r"^\s*/\*\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    code = re.sub(r"^\s*(?://|\*|/\*).*$", "", code, flags=re.MULTILINE)
     assert [found.group() for found in OUTSIDE.finditer(code)] == []
 
 

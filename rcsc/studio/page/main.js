@@ -149,8 +149,9 @@ const spoken = (event) => [event.ctrlKey && "ctrl", event.altKey && "alt", event
 const typed = (target) => target.closest?.("input:not([type=checkbox]):not([type=range]), textarea, select, [contenteditable], dialog[open], [data-keys=own]");
 let before = "";
 document.addEventListener("keydown", (event) => {
+  if (event.defaultPrevented) return;
   if (event.key === "Escape" && typed(event.target) && !event.target.closest("dialog")) event.target.blur(); // the keys are free again
-  if (event.defaultPrevented || ["Control", "Shift", "Alt", "Meta"].includes(event.key)) return;
+  if ( ["Control", "Shift", "Alt", "Meta"].includes(event.key)) return;
   const now = spoken(event);
   const free = !typed(event.target);
   const wanted = [before && `${before} ${now}`, now].filter(Boolean);

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
 from rcsc.editor.memo import OutdatedError
-from rcsc.editor.values import Repair
+from rcsc.editor.values import Answer, Repair
 from rcsc.editor.workspace import Checked, Workspace
 from rcsc.editor.written import tables_of
 from rcsc.host.cache import FOLDER
@@ -141,6 +141,11 @@ class Desk:
             if name not in self._open:
                 self.workspace.close(file)
 
+    def texts(self) -> dict[str, str]:
+        """The text of every open file, by its path."""
+        with self._lock:
+            return {each.file: each.text for each in self._open.values()}
+
     def named(self, path: str) -> str:
         """The name of a file of the project by its path.
 
@@ -266,6 +271,12 @@ class Desk:
         self._look_if_outdated(name)
         self._look_at(name)
         return self.still_known(name, version)
+
+    def answered(self, name: str) -> Answer | None:
+        """What is known of the text of an open file as it is; None while nobody has looked at it."""
+        with self._lock:
+            known = self._known.get(name) if name in self._open else None
+            return known.answer if known is not None and self._sure(name) else None
 
     def still_known(self, name: str, version: int) -> Known:
         """What is known of the text that a page has seen, and of all that it uses as that is now.

@@ -7,6 +7,7 @@ that the page has seen, so that nobody changes what he has not seen.
 from collections.abc import Callable, Mapping, Sequence
 
 from rcsc.diagnostics.codes import Code
+from rcsc.editor import keys
 from rcsc.editor.places import Area, Edit, Lines, Place, Units
 from rcsc.host.files.read import CheckedFields
 from rcsc.shell.reload.refusal import Refused
@@ -20,6 +21,14 @@ MOST_NEW = 200
 """Lines that a paste may add: each is read back from the text."""
 MOST_LINES = 1_000_000
 """Lines and columns of a text that a page may name."""
+KEYS: Mapping[str, tuple[keys.Act, str]] = {
+    "next": (keys.next_cell, "go to the next cell"),
+    "previous": (keys.previous_cell, "go to the cell before"),
+    "line": (keys.add_row, "insert a line"),
+    "column": (keys.insert_column, "insert a column"),
+    "align": (keys.keep_aligned, "align the columns"),
+}
+"""What keys do in tables of a text, and what that is called where it is undone."""
 
 
 class Tables:
@@ -37,7 +46,8 @@ class Tables:
         return {
             "tables.list": lambda _: self._desk.files(), "tables.open": self._open, "tables.edit": self._edit,
             "tables.cells": self._cells, "tables.line": self._line, "tables.delete": self._delete, "tables.column": self._column,
-            "tables.undo": self._undo, "tables.redo": self._redo, "tables.save": self._save, "tables.take": self._take,
+            "tables.key": self._key, "tables.undo": self._undo, "tables.redo": self._redo, "tables.save": self._save,
+            "tables.take": self._take,
         }  # fmt: skip
 
     def greeting(self) -> Json:
@@ -144,6 +154,28 @@ class Tables:
                 "insert a column",
             ),
         )
+
+    def _key(self, ask: Ask) -> Json:
+        """Do what a key does in a table of the text; where the cursor is then, null where it is in none."""
+        key, at = (
+            ask.body.text("key"),
+            Place(ask.body.whole("line", 0, MOST_LINES), ask.body.whole("column", 0, MOST_LINES)),
+        )
+        if key not in KEYS:
+            raise Refused(Code.STUDIO, f"no key is called `{key}`")
+        act, what = KEYS[key]
+        cursor: list[int] | None = None
+
+        def make(found: Document) -> tuple[str, str]:
+            nonlocal cursor
+            moved = act(found.text, Lines(found.text).offset(at, Units.UTF_16))
+            if moved is None:
+                return found.text, what
+            after = Lines(moved.text).place(moved.offset, Units.UTF_16)
+            cursor = [after.line, after.column]
+            return moved.text, what
+
+        return self._changed(ask, make) | {"cursor": cursor}
 
     def _undo(self, ask: Ask) -> Json:
         return self._done(ask, Document.undo)

@@ -22,6 +22,7 @@ export class Desk {
   #heard = new Set();
   #stop = null;
   #last = null; // what was asked last that may change the text
+  #repairs = new Map(); // by file, version and finding
   #types = new Map(); // heading -> { type, unit }, of the last text that was looked at
 
   constructor(bus) {
@@ -174,6 +175,22 @@ export class Desk {
       this.condition = { text, ...answer };
       this.tell();
     }
+  }
+
+  /** Offer the repairs of a finding in an element, as buttons that make them; each finding is asked about once. */
+  async offer(one, place) {
+    const { version } = this.doc;
+    const key = `${this.file} ${version} ${one.id}`;
+    place.replaceChildren(make("span", { class: "soft" }, "looking for repairs …"));
+    if (!this.#repairs.has(key)) {
+      if (this.#repairs.size > 200) this.#repairs.clear();
+      this.#repairs.set(key, this.ask("proof.repairs", { finding: one.id, version }).catch(() => []));
+    }
+    const offered = await this.#repairs.get(key);
+    place.replaceChildren(...offered.map((repair) => make("div", {},
+      make("button", { type: "button", class: "repair", onclick: () => this.try("proof.repair", { finding: one.id, repair: repair.id, version }) }, ...spoken(repair.title)),
+      make("span", { class: "soft" }, ...spoken(` ${repair.certain ? "Proved" : "Checked"}: ${[repair.proved, repair.clears ? "nothing is then wrong with the table" : ""].filter(Boolean).join("; ") || "the finding is gone, and no other comes"}.`)))));
+    if (!offered.length) for (const help of one.help) place.append(make("div", { class: "help" }, "Help: ", ...spoken(help)));
   }
 
   type(heading) {

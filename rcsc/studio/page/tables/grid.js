@@ -38,14 +38,15 @@ export function mount(root, bus) {
     desk.follow(file ? "" : table);
     if (file) desk.open(file, table);
   });
-  for (const place of [sheetPlace, textPlace]) place.addEventListener("focusin", ({ target }) => { if (target.matches("input, textarea")) desk.follow(""); });
+  for (const place of [sheetPlace, textPlace]) place.addEventListener("focusin", ({ target }) => { if (target.matches("input, [contenteditable]")) desk.follow(""); });
   filter.addEventListener("keydown", (event) => { if (event.key === "Escape") { filter.value = ""; desk.filter(""); } });
   const sheet = new SheetGrid(sheetPlace, bus, desk);
-  new TextView(textPlace, bus, desk);
+  const text = new TextView(textPlace, bus, desk);
 
   function mode(name) {
     root.dataset.mode = name;
     for (const one of modes) one.setAttribute("aria-pressed", one.dataset.mode === name);
+    text.marks();
     try { localStorage.setItem("studio.tables", name); } catch { /* a private window keeps nothing */ }
   }
   let kept = "Grid";
@@ -101,7 +102,11 @@ export function mount(root, bus) {
     ["f2", "Edit the cell"], ["alt+enter", "Insert a line below"], ["ctrl+delete", "Delete the selected lines"], ["delete", "Empty the selected cells"]]) {
     bus.keys.push({ keys: `In the grid: ${keys}`, what, run: none, where: "Tables" });
   }
-  return { shown: () => sheet.draw() };
+  for (const [keys, what] of [["tab", "In a row: the next cell, shift the one before; a line after the last"], ["ctrl+space", "What could stand here"], ["f8", "The next finding"],
+    ["ctrl+.", "All findings, with their repairs"], ["f12", "Where the name is declared"], ["ctrl+alt+enter", "In a row: insert a line below"], ["ctrl+alt+i", "In a row: insert a column"], ["ctrl+f", "Find and replace"]]) {
+    bus.keys.push({ keys: `In the text: ${keys}`, what, run: none, where: "Tables" });
+  }
+  return { shown: () => { sheet.draw(); text.marks(); } };
 }
 
 function choose(choice, desk) {

@@ -5,7 +5,6 @@ import { spoken } from "./desk.js";
 
 export class SheetGrid {
   #desk; #bus; #root; #table; #cells = []; #shape = ""; #at = { line: 0, column: -1 }; #anchor = null; #editing = null; #shownWitness = null;
-  #repairs = new Map(); // by version and finding
   #wanted = null;
   #named = "";
 
@@ -176,9 +175,9 @@ export class SheetGrid {
     else box.append(...notes);
     box.append(...more);
     if (one.mendable) {
-      const place = make("div", { class: "repairs" }, make("span", { class: "soft" }, "looking for repairs …"));
+      const place = make("div", { class: "repairs" });
       box.append(place);
-      this.#offer(one, place);
+      this.#desk.offer(one, place);
     } else for (const help of one.help) box.append(make("div", { class: "help" }, "Help: ", ...spoken(help)));
     return box;
   }
@@ -190,20 +189,6 @@ export class SheetGrid {
     place.replaceChildren(make("p", {}, make("strong", {}, ...spoken(ran.comes)), make("span", { class: "soft" },
       ". The interpreter ran the table for one look at this input; what that does not name is as a run begins. Whether a run comes to it is for `rcsc prove` to find.")),
     make("ul", {}, ...ran.lines.map((line) => make("li", {}, ...spoken(line)))));
-  }
-
-  async #offer(one, place) {
-    const { version } = this.#desk.doc;
-    const key = `${this.#desk.file} ${version} ${one.id}`;
-    if (!this.#repairs.has(key)) {
-      if (this.#repairs.size > 200) this.#repairs.clear();
-      this.#repairs.set(key, this.#desk.ask("proof.repairs", { finding: one.id, version }).catch(() => []));
-    }
-    const offered = await this.#repairs.get(key);
-    place.replaceChildren(...offered.map((repair) => make("div", {},
-      make("button", { type: "button", class: "repair", onclick: () => this.#desk.try("proof.repair", { finding: one.id, repair: repair.id, version }) }, ...spoken(repair.title)),
-      make("span", { class: "soft" }, ...spoken(` ${repair.certain ? "Proved" : "Checked"}: ${[repair.proved, repair.clears ? "nothing is then wrong with the table" : ""].filter(Boolean).join("; ") || "the finding is gone, and no other comes"}.`)))));
-    if (!offered.length) for (const help of one.help) place.append(make("div", { class: "help" }, "Help: ", ...spoken(help)));
   }
 
   #witness(shown, found) {

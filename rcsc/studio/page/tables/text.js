@@ -1,31 +1,28 @@
 // The same file as text: what is typed goes to the server as edits, one after the other; what others do comes in.
 
 import { make, Refusal } from "../bus.js";
+import { spoken } from "./desk.js";
+import { Editor } from "./editor.js";
 
 export class TextView {
-  #desk; #bus; #area; #gutter; #sent = null; #sending = null; #lost = null; #version = 0; #base = "";
+  #desk; #bus; #root; #editor; #sent = null; #sending = null; #lost = null; #version = 0; #base = ""; #told = ""; #coloured = "";
 
   constructor(root, bus, desk) {
     this.#desk = desk;
     this.#bus = bus;
-    this.#gutter = make("div", { class: "gutter", "aria-hidden": "true" });
-    this.#area = make("textarea", { class: "text-area", spellcheck: "false", autocomplete: "off", wrap: "off", "aria-label": "Text of the file" });
+    this.#root = root;
     root.classList.add("text-view");
-    root.append(this.#gutter, this.#area);
-    this.#area.addEventListener("input", () => { this.#lines(); this.#send(); });
-    this.#area.addEventListener("scroll", () => { this.#gutter.scrollTop = this.#area.scrollTop; });
-    this.#area.addEventListener("keydown", (event) => this.#key(event));
-    this.#area.addEventListener("beforeinput", (event) => {
-      if (!event.inputType.startsWith("history")) return;
-      event.preventDefault();
-      if (event.inputType === "historyUndo") desk.undo();
-      else desk.redo();
+    this.#editor = new Editor(root, {
+      typed: (bar) => { desk.follow(""); this.#send(); if (bar) this.#key("align"); },
+      moved: () => this.#selects(),
+      undo: () => desk.undo(), redo: () => desk.redo(),
+      offers: (place) => this.#asked("text.offers", place), about: (place) => this.#asked("text.about", place),
+      declared: () => this.#declared(), key: (key) => this.#key(key),
     });
     desk.settled = () => this.#settled();
-    addEventListener("beforeunload", (event) => { if (this.file && this.#area.value !== this.#base) event.preventDefault(); }); // typed, and not sent
-    for (const kind of ["keyup", "click"]) this.#area.addEventListener(kind, () => this.#selects());
+    addEventListener("beforeunload", (event) => { if (this.file && this.#editor.text !== this.#base) event.preventDefault(); }); // typed, and not sent
     desk.on(() => this.take());
-    bus.on("selection", (now, changed) => { if (changed?.has("line")) this.#show(now); });
+    bus.on("selection", (now, changed) => { if (changed?.has("line") || changed?.has("table")) this.#show(now); });
   }
 
   /** Take the server's text, unless something is typed that it has not. */
@@ -35,7 +32,8 @@ export class TextView {
     if (this.file !== file) {
       Object.assign(this, { file });
       this.#sent = this.#lost = null;
-      this.#base = this.#area.value = doc.text;
+      this.#base = doc.text;
+      this.#editor.begin(doc.text);
       this.#version = doc.version;
     } else if (this.#sent === null && doc.version !== this.#version) {
       if (doc.text === this.#lost) this.#base = this.#lost; // it was taken before the connection went
@@ -44,35 +42,29 @@ export class TextView {
       this.#base = doc.text;
       this.#version = doc.version; // of the base: while an edit is under way neither is known
     }
-    this.#lines();
-    if (this.#sent === null && this.#area.value !== this.#base) this.#send();
+    this.marks();
+    if (this.#sent === null && this.#editor.text !== this.#base) this.#send();
   }
 
   /** What others made of the text, with what is typed here and not sent. */
   #together(theirs, base = this.#base) {
-    const mine = this.#area.value;
+    const mine = this.#editor.text;
     const both = mine === base ? theirs : merged(base, mine, theirs);
     if (both === theirs && mine !== base && mine !== theirs) this.#bus.say("others changed the same letters: what was typed here is not taken", { wrong: true });
     return both;
   }
 
-  /** Another text, the cursor where it was in what did not change. */
   #put(text) {
-    if (text === this.#area.value) return;
-    const { selectionStart, selectionEnd, scrollTop, value } = this.#area;
-    const { start, end, put } = change(value, text);
-    const moved = (at) => (at <= start ? at : at >= end ? at + put.length - (end - start) : start + Math.min(put.length, at - start));
-    this.#area.value = text;
-    this.#area.setSelectionRange(moved(selectionStart), moved(selectionEnd));
-    this.#area.scrollTop = scrollTop;
+    const { text: now } = this.#editor;
+    if (text !== now) this.#editor.replace(change(now, text));
   }
 
   #send() {
-    if (this.#sent === null && this.#area.value !== this.#base) this.#sending = this.#sends();
+    if (this.#sent === null && this.#editor.text !== this.#base) this.#sending = this.#sends();
   }
 
   async #sends() {
-    const text = this.#area.value;
+    const { text } = this.#editor;
     const { start, end, put } = change(this.#base, text);
     const [start_line, start_column] = place(this.#base, start), [end_line, end_column] = place(this.#base, end);
     let gone = false;
@@ -102,37 +94,85 @@ export class TextView {
     while (this.#sent !== null) await this.#sending;
   }
 
-  #key(event) {
-    const ctrl = event.ctrlKey || event.metaKey;
-    if (ctrl && event.key.toLowerCase() === "z") {
-      event.preventDefault();
-      if (event.shiftKey) this.#desk.redo();
-      else this.#desk.undo();
-    } else if (ctrl && event.key.toLowerCase() === "y") {
-      event.preventDefault();
-      this.#desk.redo();
+  // --- what is asked about places ---
+
+  /** Ask about a place of the text as it is here, once the server has that; nothing where it has another by then. */
+  async #asked(kind, [line, column], more = {}) {
+    const { text } = this.#editor, { file } = this;
+    await this.#settled();
+    if (file !== this.file || this.#editor.text !== text || this.#base !== text) return null;
+    try {
+      return await this.#bus.ask(kind, { file, version: this.#version, line, column, ...more });
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      return null; // another text by now: whoever asked asks again
     }
   }
 
-  #lines() {
-    const { doc } = this.#desk;
-    const marks = new Map();
-    if (doc?.known) for (const one of doc.findings) if (one.area) marks.set(one.area[0][0], [...(marks.get(one.area[0][0]) ?? []), one]);
-    const many = this.#area.value.split("\n").length;
-    const shape = `${many} ${[...marks.keys()].join()}`;
-    if (this.#gutter.dataset.shape === shape) return;
-    this.#gutter.dataset.shape = shape;
-    this.#gutter.replaceChildren(...Array.from({ length: many }, (_, at) => {
-      const found = marks.get(at);
-      const worst = found?.some(({ severity }) => severity === "error") ? "error" : found ? "note" : "";
-      return make("div", { class: worst, title: found?.map(({ message }) => message).join("\n") }, found ? `${worst === "error" ? "✗" : "•"} ${at + 1}` : String(at + 1));
-    }), make("div", {}, " "));
-    this.#gutter.scrollTop = this.#area.scrollTop;
+  /** Do in a table what a key does there, and go where the cursor is then. */
+  async #key(key) {
+    const { text } = this.#editor;
+    const done = await this.#asked("tables.key", this.#editor.place, { key });
+    if (done?.cursor && this.#version === done.version && this.#editor.text === this.#base) this.#editor.go(done.cursor);
+    else if (key !== "align" && !done && this.#editor.text === text) this.#bus.say("the text was changed meanwhile: press the key again");
+  }
+
+  async #declared() {
+    const found = await this.#asked("text.declared", this.#editor.place);
+    if (!found) return this.#bus.say("nothing here is a name that is declared");
+    if (found.file !== this.file) await this.#desk.open(found.file);
+    this.#desk.follow("");
+    const there = () => {
+      if (this.file !== found.file || this.#desk.file !== found.file) return false;
+      this.#editor.go(found.start, found.end);
+      this.#editor.focus();
+      return true;
+    };
+    if (!there()) setTimeout(there, 300); // the file is told just after it is opened
+    return undefined;
+  }
+
+  // --- what is known of the text ---
+
+  /** Show findings and colours of the text as it is; of an older one nothing is shown. */
+  marks() {
+    const { doc, file } = this.#desk;
+    const here = doc?.known && doc.version === this.#version && this.#editor.text === this.#base;
+    const key = here ? `${file} ${doc.version} ${JSON.stringify(doc.findings.map(({ id, message }) => [id, message]))}` : "";
+    this.#root.dataset.known = here ? "yes" : "no";
+    if (key !== this.#told) {
+      this.#told = key;
+      this.#editor.found(here ? doc.findings.filter(({ area }) => area).map((one) => ({ ...one, tell: () => this.#words(one) })) : []);
+    }
+    if (here && this.#root.checkVisibility() && this.#coloured !== `${file} ${doc.version}`) this.#colours(`${file} ${doc.version}`);
+  }
+
+  async #colours(key) {
+    this.#coloured = key;
+    const found = await this.#asked("text.colours", [0, 0]);
+    if (found && `${this.file} ${this.#version}` === key && this.#editor.text === this.#base) this.#editor.coloured(found);
+    else if (this.#coloured === key) this.#coloured = "";
+  }
+
+  /** A finding in words, with the input that shows it and the repairs that are proved. */
+  #words(one) {
+    const box = make("div", { class: "told" }, ...spoken(one.message), " ", make("span", { class: "soft" }, `[${one.code}]`));
+    const [witness] = one.witnesses;
+    if (witness) {
+      box.append(make("div", { class: "code" }, `for instance ${witness.values.map(([name, text]) => `${name} = ${text}`).join(", ")}`));
+      if (witness.region.length) box.append(make("div", { class: "soft" }, `region: ${witness.region.join(", ")}`));
+    }
+    const place = make("div", { class: "repairs" });
+    box.append(place);
+    box.addEventListener("keydown", (event) => { if (event.target.matches("button") && /^( |Enter)$/.test(event.key)) event.stopPropagation(); }); // they press it
+    if (one.mendable) this.#desk.offer(one, place);
+    else for (const help of one.help) place.append(make("div", { class: "help" }, "Help: ", ...spoken(help)));
+    return box;
   }
 
   /** The cursor in a line of a table selects that line everywhere. */
   #selects() {
-    const [line] = place(this.#area.value, this.#area.selectionStart);
+    const [line] = this.#editor.place;
     for (const { name, rows } of this.#desk.doc?.tables ?? []) {
       const row = rows.find((one) => one.line <= line && line <= one.past);
       if (row) {
@@ -143,12 +183,10 @@ export class TextView {
   }
 
   #show({ table, line }) {
-    if (document.activeElement === this.#area || table !== this.#desk.table) return;
-    const row = this.#desk.shown?.rows.find(({ name }) => name === line);
-    if (!row) return;
-    const high = parseFloat(getComputedStyle(this.#area).lineHeight) || 16;
-    const top = row.line * high;
-    if (top < this.#area.scrollTop || top > this.#area.scrollTop + this.#area.clientHeight - 2 * high) this.#area.scrollTop = Math.max(0, top - this.#area.clientHeight / 3);
+    if (this.#editor.focused || table !== this.#desk.table) return;
+    const { rows } = this.#desk.shown ?? { rows: [] };
+    const row = line ? rows.find(({ name }) => name === line) : rows[0];
+    if (row && this.#desk.file === this.file) this.#editor.show(row.line);
   }
 }
 
