@@ -13,17 +13,20 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.driver.compile import compile_system
 from rcsc.host.cache import open_cache
 from rcsc.host.children import WorkerEndedError, answer, executor, kill
 from rcsc.host.children import run as run_program
 from rcsc.shell.reload.composed import prove_levels
+from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import LATER, TOLD_S, Ask, CancelledError, Handler, Hub, Json
 from rcsc.studio.runs.live import LANE as RUN
 from rcsc.studio.runs.live import Live
 
 LANE = "prove"
+NO_SYSTEM = "its tables belong to no system: a `system.toml` beside them says which levels run, and what lies between them"
 FOUND = Path(".rcsc-cache") / "found"
 """Where findings are kept as logs, beside the system."""
 _COMMAND = "from rcsc.commands import main; main()"
@@ -68,7 +71,10 @@ class Build:
         return self._said
 
     def begin(self) -> None:
-        """Compile, and open the system."""
+        """Compile, and open the system; where there are tables alone, say so."""
+        if not self._path.is_file():
+            self._hub.do(RUN, lambda: self._live.close_because(NO_SYSTEM))
+            return
         try:
             self._compile(lambda work: self._waited(work, self._told))
         except CancelledError:
@@ -89,6 +95,8 @@ class Build:
 
     def _open(self, ask: Ask) -> Json:
         """Compile what changed, and open the system anew."""
+        if not self._path.is_file():
+            raise Refused(Code.STUDIO, NO_SYSTEM)
         return self._compile(lambda work: self._job(ask, work))
 
     def _job(self, ask: Ask, work: tuple[str, Callable[..., T], tuple[Any, ...]]) -> T:
@@ -158,6 +166,8 @@ class Build:
 
     def _prove(self, ask: Ask) -> Json:
         """Prove the levels together; what fails is kept as logs."""
+        if not self._path.is_file():
+            raise Refused(Code.STUDIO, NO_SYSTEM)
         folder = self._path.parent / FOUND
         before = _logs(folder)
         arguments = ("prove", str(self._path), "--log", str(folder))

@@ -27,6 +27,7 @@ def concerns(
     logs: Sequence[Path] = (),
     rate: float | None = WATCHED_RATE,
     drawer: Drawer | None = None,
+    first: Path | None = None,
 ) -> Sequence[Concern]:
     """Return everything that answers.
 
@@ -36,6 +37,7 @@ def concerns(
         logs: That the user names; the first is shown at once.
         rate: How many times as fast as the clock the system runs at first; None for as fast as it goes.
         drawer: Draws a tick of the cell, where somebody can.
+        first: The file, or the folder, whose tables are shown first; else those of the system.
     """
     live = Live(opening, hub.tell, lambda work, after_s: hub.do(LANE, work, after_s), rate)
     time = TimeLine(live, hub.tell)
@@ -43,7 +45,7 @@ def concerns(
     kept = Logs(folders, tuple(logs), lambda *shown: hub.do(LANE, lambda: time.show(*shown)))
     build = Build(opening.path, hub, live)
     live.prove_first = build.prove_first
-    desk = Desk(opening.path, hub.tell, hub.do)
+    desk = Desk(opening.path, hub.tell, hub.do, first)
     cell = Cell(time, hub.tell, drawer)
     return (
         live,

@@ -1,5 +1,6 @@
 """`rcsc studio` as a user starts it: one address, a page behind it, and an end at Ctrl-C."""
 
+import asyncio
 import re
 import shutil
 import signal
@@ -12,6 +13,10 @@ from urllib.request import urlopen
 import pytest
 
 from rcsc.commands import run
+from rcsc.commands.shared.systems import tables_meant
+from rcsc.shell.opening import Opening
+from rcsc.studio.build import NO_SYSTEM
+from tests.studio.served import Page, Refused, page, serving, until
 
 DOCK = Path(__file__).parents[1] / "data" / "dock"
 COMMAND = (sys.executable, "-c", "from rcsc.commands import main; main()", "studio")
@@ -49,3 +54,65 @@ def test_what_is_not_in_order_is_not_served(
     (tmp_path / "system.toml").write_text("name = 3\n")
     assert run(["studio"]) == 1
     assert "the studio is at" not in capfd.readouterr().out
+
+
+# --- tables that belong to no system ---
+
+LONE = "input a : bool\ntable t {\n  | line | a ||\n  |------|---||\n  | x    |   ||\n}\n"
+
+
+def test_tables_that_belong_to_no_system_are_meant_by_their_file_or_their_folder(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for folder in ("lone", "empty", "dock"):
+        (tmp_path / folder).mkdir()
+    Path("lone/t.rcs").write_text(LONE)
+    shutil.copytree(DOCK, "dock", ignore=shutil.ignore_patterns("generated"), dirs_exist_ok=True)
+    Path("dock/beside.rcs").write_text(LONE)
+    nowhere, system = Path("lone/system.toml"), Path("dock/system.toml")
+    assert tables_meant("lone") == tables_meant("lone/t.rcs") == nowhere
+    assert tables_meant("dock/drive.rcs") == tables_meant("dock/words.rcs") == system.resolve()
+    assert tables_meant("dock/beside.rcs") == system
+    assert [tables_meant(each) for each in ("dock", "empty", "t.rcs", "make_boxt", None)] == [None] * 5
+    assert tables_meant(".") == tables_meant(None, (Path("run.mcap"),)) == Path("system.toml")
+    for command in ("studio", "run"):
+        assert run([command, "empty"]) == 2
+    monkeypatch.chdir("lone")
+    assert tables_meant(None) == Path("system.toml")
+    monkeypatch.chdir("../dock")
+    (tmp_path / "dock" / "empty").mkdir()
+    capfd.readouterr()
+    assert run(["studio", "empty"]) == run(["run", "empty"]) == 2
+    assert capfd.readouterr().err.count("the folder `empty` has no system.toml") == 2
+
+
+def test_tables_that_belong_to_no_system_are_proved_and_run_once_there_is_one(tmp_path: Path) -> None:
+    folder = tmp_path / "a robot, \N{GREEK SMALL LETTER ALPHA}"
+    shutil.copytree(DOCK, folder, ignore=shutil.ignore_patterns("generated", ".rcsc-cache"))
+    system = folder / "system.toml"
+    text = system.read_text(encoding="utf-8")
+    system.unlink()
+
+    async def work(one: Page) -> None:
+        state = await one.heard("run.state", open=False, why=NO_SYSTEM)
+        assert NO_SYSTEM in state["text"]
+        listed = await one.ask("tables.list")
+        assert [(each["file"], each["first"]) for each in listed] == [
+            ("drive.rcs", True), ("supervisor.rcs", False),
+        ]  # fmt: skip
+        await one.ask("tables.open", file="drive.rcs")
+        await until(lambda: one.events.get("tables.file/drive.rcs", {}).get("known"))
+        for kind in ("build.open", "build.prove", "run.go"):
+            with pytest.raises(Refused, match="belong to no system"):
+                await one.ask(kind)
+        system.write_text(text, encoding="utf-8")
+        assert (await one.ask("build.open"))["ok"]
+        await one.heard("run.state", open=True)
+
+    async def inside() -> None:
+        async with page(server) as one:
+            await work(one)
+
+    with serving(Opening(system), first=folder / "drive.rcs") as server:
+        asyncio.run(inside())

@@ -26,10 +26,13 @@ def serving(
     others: Sequence[Concern] = (),
     logs: Sequence[Path] = (),
     drawer: Drawer | None = None,
+    first: Path | None = None,
 ) -> Iterator[Server]:
     """A server with the studio's concerns for a system, or with others alone."""
     server, opened = Server(), threading.Event()
-    given = [*others] if opening is None else [*concerns(opening, server.hub, logs, None, drawer), *others]
+    given = (
+        [*others] if opening is None else [*concerns(opening, server.hub, logs, None, drawer, first), *others]
+    )
     thread = threading.Thread(target=server.serve, args=(given, lambda _: opened.set()), daemon=True)
     thread.start()
     assert opened.wait(PATIENCE_S)

@@ -1,5 +1,6 @@
 """What the commands about a system share: which one is meant, and its executors made."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -8,6 +9,7 @@ from rcsc.commands.shared.show import Output, show
 from rcsc.diagnostics.coded import CodedError
 from rcsc.host.described import nearest
 from rcsc.host.files.read import MOST_TOML_BYTES, Malformed, text, toml_of
+from rcsc.lang.project import SYSTEM_FILE
 
 PLACES = ("system.toml", "tables/system.toml")
 """Where a folder has its description."""
@@ -77,6 +79,44 @@ def meant(target: str | None, system: Path | None, script: str | None) -> tuple[
     return _with_script(system_path(system), target or script or "")
 
 
+def tables_meant(target: str | None, logs: Sequence[Path] = ()) -> Path | None:
+    """Where the description would be of tables that are meant, or of logs; None where a system is meant, or nothing that is there.
+
+    Args:
+        target: A file of tables, or a folder of them that has no description; None for this folder, where tables stand in it.
+        logs: That are to be looked at, whatever is here.
+    """
+    from rcsc.lang.project import listed, systems_above
+
+    path = Path(target or ".")
+    if path.suffix == ".rcs" and path.is_file():
+        real = path.resolve()
+        running = (each for each in systems_above(str(path)) if real in _files_of(each))
+        return next(running, path.parent / SYSTEM_FILE)
+    if not path.is_dir() or _described(path):
+        return None
+    # nobody named this folder: what is below it may be anybody's
+    here = any(path.glob("*.rcs")) or bool(logs) if target is None else bool(listed([target]))
+    return path / SYSTEM_FILE if here else None
+
+
+def _files_of(system: Path) -> set[Path]:
+    """Every file of the programs that a system runs; none where it is not in order."""
+    from rcsc.driver.compile import tables_in
+    from rcsc.lang.project import load
+    from rcsc.run.description import BadDescription
+
+    try:
+        roots = tables_in((), (system,))
+    except BadDescription:
+        return set()
+    return {Path(file).resolve() for file in load(list(roots)).files} if roots else set()
+
+
+def _described(folder: Path) -> bool:
+    return any((folder / name).is_file() for name in PLACES)
+
+
 def _is_system(path: Path, *, folder: bool) -> bool:
     """Whether a path is a system's; a script may be called as a folder that is none.
 
@@ -84,7 +124,7 @@ def _is_system(path: Path, *, folder: bool) -> bool:
         click.UsageError: It must be one, and is not there.
     """
     if path.is_dir():
-        described = any((path / name).is_file() for name in PLACES)
+        described = _described(path)
         if not described and (folder or path.parent != Path()):
             raise click.UsageError(f"the folder `{path}` has no system.toml")
         return described
@@ -109,6 +149,8 @@ def _with_script(path: Path, name: str) -> tuple[Path, str]:
     known = [
         file.stem for file in files if file.suffix == ".csv" or (file.suffix == ".toml" and _is_script(file))
     ]
+    if Path(name).is_dir():
+        raise click.UsageError(f"the folder `{name}` has no system.toml")
     helps = nearest(name, known) or ((f"those of `{path}` are {', '.join(known)}",) if known else ())
     raise click.UsageError("; ".join((f"there is no script `{name}`", *helps)))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from rcsc.commands.shared.extras import need
-from rcsc.commands.shared.systems import EXECUTOR, PLANT, SYSTEM, meant
+from rcsc.commands.shared.systems import EXECUTOR, PLANT, SYSTEM, meant, tables_meant
 from rcsc.run.description import description
 from rcsc.shell.opening import Opening
 
@@ -22,9 +22,10 @@ Examples:
   rcsc studio my_robot                the system in a folder, with its plant
   rcsc studio make_boxt               a script of the system that is here, row by row
   rcsc studio --plant mujoco          with another of its plants
-  rcsc studio --alone                 nothing outside the levels: what comes in is set by hand""",
+  rcsc studio --alone                 nothing outside the levels: what comes in is set by hand
+  rcsc studio tables/examples/grip.rcs    a table, with its proof and its graph; a folder of tables, too""",
 )
-@click.argument("target", metavar="[SYSTEM|SCRIPT]", required=False)
+@click.argument("target", metavar="[SYSTEM|SCRIPT|TABLES]", required=False)
 @SYSTEM
 @click.option("--script", default=None, metavar="SCRIPT",
               help="Who gives orders: a CSV or TOML file, or the name of one beside the system or in its scripts/.")  # fmt: skip
@@ -46,16 +47,18 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
 ) -> int:  # fmt: skip
     """Open one page for SYSTEM: its tables, their proof, the levels as they run, and what stands outside them.
 
-    SYSTEM is a system's description or a folder that has one; SCRIPT names a script of the system that is here. The page is for a
-    browser on this machine; its address has a token that nobody else knows. Ctrl-C ends it;
-    what was typed and not saved is kept, and it says where.
+    SYSTEM is a system's description or a folder that has one; SCRIPT names a script of the system that is here; TABLES is a file of
+    tables, or a folder of them that belongs to no system: nothing runs then. The page is for a browser on this machine; its address has
+    a token that nobody else knows. Ctrl-C ends it; what was typed and not saved is kept, and it says where.
     """
     need("studio")
     from rcsc.studio.project import concerns  # of an extra
     from rcsc.studio.server import Server
 
-    path, named = meant(target, system, script)
-    description(path)  # what is wrong with it is told here; what is wrong with its tables, in the page
+    tables = tables_meant(target, logs) if system is None and script is None else None
+    path, named = meant(target, system, script) if tables is None else (tables, "")
+    if path.is_file():
+        description(path)  # what is wrong with it is told here; what is wrong with its tables, in the page
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     opening = Opening(path, kind, plant or "", named, alone, seed)
     server = Server(port)
@@ -66,13 +69,16 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
             click.launch(address)
 
     with contextlib.suppress(KeyboardInterrupt):
-        server.serve(concerns(opening, server.hub, logs, drawer=_drawer(path)), told)
+        first = Path(target) if target is not None and tables is not None else None
+        server.serve(concerns(opening, server.hub, logs, drawer=_drawer(path), first=first), told)
     click.echo("\n".join(("the studio is closed", *server.hub.partings)))
     return 0
 
 
 def _drawer(path: Path) -> "Drawer | None":
     """Who draws the paper's cell; None where the system has none, or the extra `cell` is not installed."""
+    if not path.is_file():
+        return None
     try:
         from rcsc.commands.shared.cells import Drawn  # of an extra
     except ModuleNotFoundError:

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from rcsc.diagnostics.codes import Code
 from rcsc.editor.memo import OutdatedError
@@ -46,12 +47,24 @@ class Desk:
     """
 
     def __init__(
-        self, system: Path, tell: Callable[[str, Json], None], do: Callable[[str, Callable[[], None]], None]
+        self,
+        system: Path,
+        tell: Callable[[str, Json], None],
+        do: Callable[[str, Callable[[], None]], None],
+        first: Path | None = None,
     ) -> None:
-        """Args: system: The description; tell: As `Hub.tell`; do: Has something done in a lane."""
+        """Take what there is, and look at nothing yet.
+
+        Args:
+            system: The description; where there is none, the files are those around where it would be.
+            tell: As `Hub.tell`.
+            do: Has something done in a lane.
+            first: The file, or the folder, that stands before the system's.
+        """
         self.system = system.resolve()
         self.root = os.path.realpath(project_root(str(self.system)))
         self.workspace = Workspace()
+        self._first = None if first is None else first.resolve()
         self._tell, self._do = tell, do
         self._lock = threading.RLock()
         self._open: dict[str, Document] = {}
@@ -62,18 +75,26 @@ class Desk:
     # --- what there is ---
 
     def files(self) -> list[Json]:
-        """Every file that has tables, with their names, and the levels that run them; those of the system first."""
+        """Every file that has tables, with their names, and the levels that run them; what was asked for first, then the system's."""
         levels = self._levels()
-        found = []
+        found: list[dict[str, Any]] = []
         for path in listed([self.root])[:MOST_FILES]:
             names = [each.name for each in tables_of(_glance(path))]
             if names:
                 name = self._name(path)
                 found.append({"file": name, "tables": names, "levels": levels.get(name, [])})
         order = list(dict.fromkeys(level for each in levels.values() for level in each))
+        for each in found:
+            each["first"] = self._asked(each["file"])
         return sorted(
-            found, key=lambda each: (min(map(order.index, each["levels"]), default=len(order)), each["file"])
-        )
+            found,
+            key=lambda each: (
+                not each["first"], min(map(order.index, each["levels"]), default=len(order)), each["file"],
+            ),
+        )  # fmt: skip
+
+    def _asked(self, name: str) -> bool:
+        return self._first is not None and Path(self.root, name).is_relative_to(self._first)
 
     def _levels(self) -> dict[str, list[str]]:
         """By file the levels whose program has it, from the top down."""

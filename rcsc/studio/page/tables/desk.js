@@ -217,7 +217,7 @@ export class Desk {
   #greeted(files) {
     this.files = files;
     if (!this.file) {
-      const first = files.find(({ levels }) => levels.length) ?? files[0];
+      const first = files.find((each) => each.first) ?? files.find(({ levels }) => levels.length) ?? files[0];
       if (first) this.open(first.file, first.tables[0]);
     } else {
       this.open(this.file, this.table); // the connection was lost meanwhile
