@@ -1582,7 +1582,8 @@ class Code(StrEnum):
 
     A page of `rcsc studio` asked what no part of the studio answers, or with something missing, or more than may be asked at once; or
     it asked for what is not there now: a moment that is not kept, a line of another table, a run where none is open. The message says
-    which. Nothing was changed.
+    which. Nothing was changed. Where the studio itself is refused, the port that `--port` names is taken by another program, or may not
+    be used.
     """
     BAD_JOURNAL = """RCS741: a journal is not this campaign's
 

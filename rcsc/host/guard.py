@@ -3,6 +3,7 @@
 In: what a request says of itself. Out: why it is refused, or nothing. A server on the loopback interface is reached by every page
 that the user has open; these rules keep them out:
 
+- `Host`, `Origin` and `Sec-Fetch-Site` are there once at most, so that nobody reads another one than is judged here;
 - `Host` names this server by its loopback address: a foreign name that was made to resolve to 127.0.0.1 does not (DNS rebinding);
 - `Origin`, which a browser sends with what other pages start, is the page's own, and a WebSocket must have one;
 - `Sec-Fetch-Site` says that the page itself or the user asked;
@@ -20,6 +21,7 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
 }
 """Of every answer, beside the content security policy."""
+_ONCE = ("host", "origin", "sec-fetch-site")
 
 
 def policy(port: int) -> str:
@@ -40,6 +42,9 @@ def refusal(headers: Mapping[str, str], path: str, port: int, token: str) -> str
         port: Where the server listens.
         token: That the path must begin with.
     """
+    said = [name.lower() for name, _ in headers.items()]  # the names alone are told once each
+    if any(said.count(name) > 1 for name in _ONCE):
+        return "a header is there twice"
     host = headers.get("Host", "")
     if host not in {f"127.0.0.1:{port}", f"localhost:{port}"}:
         return "this is no name of the page's server"

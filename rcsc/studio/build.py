@@ -161,7 +161,10 @@ class Build:
         else:
             first = errors[0]["message"] if errors else report.get("why", "")
             more = f", and {len(errors) - 1} more" if len(errors) > 1 else ""
-            self._hub.do(RUN, lambda: self._live.close_because(f"its tables are not proved: {first}{more}"))
+            self._hub.do(
+                RUN,
+                lambda: self._live.close_because(f"its tables were not proved and compiled: {first}{more}"),
+            )
         return {"ok": report["ok"], "findings": report["diagnostics"]}
 
     def _prove(self, ask: Ask) -> Json:

@@ -6,15 +6,21 @@ the folder `page` and nothing else, and talks over one socket: questions and ans
 
 import asyncio
 import contextlib
+import logging
+import os
 import secrets
 import signal
+import sys
 import threading
+import traceback
 from collections.abc import Awaitable, Callable, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
 from aiohttp import WSMsgType, web
 
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
 from rcsc.host.files.read import MIB, Malformed, json_of
 from rcsc.host.guard import HEADERS, policy, refusal
 from rcsc.studio.hub import DEEPEST_MESSAGE, Client, Concern, Hub
@@ -36,6 +42,13 @@ TYPES = {
 """What files of a page there are."""
 
 _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class NoPort(CodedError):  # noqa: N818  # what happened, not an error of ours
+    """The port that was named cannot be listened at."""
+
+    code = Code.STUDIO
+    helps = ("name another one with --port, or none: then a free one is taken",)
 
 
 def page_files() -> dict[str, Traversable]:
@@ -79,7 +92,7 @@ class Server:
             opened: Called with the address when the server listens.
 
         Raises:
-            OSError: The port is taken.
+            NoPort: The port is taken, or may not be used.
         """
         asyncio.run(self._serve(concerns, opened))
 
@@ -106,10 +119,10 @@ class Server:
         app.on_response_prepare.append(self._headed)
         app.router.add_get("/{token}/socket", self._socket)
         app.router.add_get("/{token}/{name:.*}", self._file)
-        runner = web.AppRunner(app, access_log=None, shutdown_timeout=GOODBYE_S)
+        runner = web.AppRunner(app, access_log=None, logger=_silent(), shutdown_timeout=GOODBYE_S)
         await runner.setup()
         try:
-            await web.TCPSite(runner, ADDRESS, self._wanted).start()
+            await self._listen_on(web.TCPSite(runner, ADDRESS, self._wanted))
             self._port = runner.addresses[0][1]
             self.address = f"http://{ADDRESS}:{self._port}/{self._token}/"
             opened(self.address)
@@ -124,12 +137,28 @@ class Server:
                 self.hub.ended, LAST_S
             )  # who ends while a process begins leaves that without a parent
 
+    async def _listen_on(self, site: web.TCPSite) -> None:
+        """Raises: NoPort: It cannot."""
+        try:
+            await site.start()
+        except OSError as error:
+            why = os.strerror(error.errno) if error.errno else str(error)
+            raise NoPort(f"port {self._wanted} cannot be listened at: {why}") from error
+
     # --- requests ---
 
     @web.middleware
     async def _guarded(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
         reason = refusal(request.headers, request.path, self._port, self._token)
-        return web.Response(status=403, text=f"{reason}\n") if reason else await handler(request)
+        if reason:
+            return web.Response(status=403, text=f"{reason}\n")
+        try:
+            return await handler(request)
+        except (web.HTTPException, ConnectionError):  # a refusal, or who asked has gone
+            raise
+        except Exception as error:  # noqa: BLE001  # told here, without the address and its token
+            traceback.print_exception(error, file=sys.stderr)
+            return web.Response(status=500, text=f"a bug in rcsc: {type(error).__name__}\n")
 
     async def _headed(self, _: web.Request, response: web.StreamResponse) -> None:
         """Give every answer the headers, a refusal, too."""
@@ -174,6 +203,14 @@ class Server:
                 self.hub.ask(client, json_of(said.data, DEEPEST_MESSAGE, plain=False))
             except Malformed:
                 return
+
+
+def _silent() -> logging.Logger:
+    """What anybody on this machine sends that is no request is nothing to the user, who would have it printed."""
+    silent = logging.getLogger("rcsc.studio.server")
+    silent.propagate = False
+    silent.addHandler(logging.NullHandler())
+    return silent
 
 
 def _end_in_order(loop: asyncio.AbstractEventLoop, over: asyncio.Event) -> None:

@@ -4,6 +4,7 @@ import asyncio
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,19 @@ from tests.studio.served import Page, Refused, page, serving, until
 
 DOCK = Path(__file__).parents[1] / "data" / "dock"
 COMMAND = (sys.executable, "-c", "from rcsc.commands import main; main()", "studio")
+
+
+NO_REQUESTS = (
+    *(
+        b"\x16\x03\x01\x02\x00",
+        b"GET\r\n\r\n",
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost : x\r\n\r\n",
+    ),
+    *(b"GET /" + b"a" * 20_000, b"GET / HTTP/1.1\r\nX: " + b"a" * 20_000 + b"\r\n\r\n", b"\0" * 100),
+    b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\nContent-Length: 3\r\n\r\nzz",
+)
+"""Anybody on this machine may send such, as often as he likes: it is not printed where the studio runs."""
 
 
 def test_it_says_one_address_and_ends_at_an_interrupt(tmp_path: Path) -> None:
@@ -39,6 +53,10 @@ def test_it_says_one_address_and_ends_at_an_interrupt(tmp_path: Path) -> None:
             assert b"rcsc studio" in answer.read()
         with pytest.raises(HTTPError, match="403"):
             urlopen(found[1], timeout=60)  # noqa: S310
+        for no_request in NO_REQUESTS:
+            with socket.create_connection(("127.0.0.1", int(found[1].split(":")[2][:-1])), timeout=60) as one:
+                one.sendall(no_request)
+                assert one.recv(65_536).split()[1] == b"400"
         studio.send_signal(signal.SIGINT)  # while the tables are being compiled
         rest, errors = studio.communicate(timeout=120)
     assert (studio.returncode, rest, errors) == (0, "the studio is closed\n", "")

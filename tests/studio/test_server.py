@@ -15,10 +15,12 @@ from urllib.parse import urlsplit
 import aiohttp
 import pytest
 
+from rcsc.commands import run as rcsc
 from rcsc.diagnostics.codes import Code
 from rcsc.shell.reload.refusal import Refused as Refusal
 from rcsc.studio.hub import MOST_OPEN, Ask, Client, Hub, message
 from rcsc.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
+from tests.studio.driven import DOCK
 from tests.studio.served import PATIENCE_S, Page, Refused, page, page_at, serving, until
 
 
@@ -111,6 +113,48 @@ def test_only_its_own_page_is_let_in_and_nothing_leads_out_of_its_folder() -> No
             assert status(server, path)[0] in {400, 403, 404}, path
         assert status(server, "", "POST")[0] == 405
         assert status(server, "socket")[0] in {400, 403}  # without an upgrade it is no socket
+
+
+@pytest.mark.parametrize("name", ["Host", "Origin", "Sec-Fetch-Site", "HOST"])
+def test_what_says_who_asks_is_there_once(name: str) -> None:
+    """Of two, others may believe the second."""
+    with serving(others=[Echo()]) as server:
+        at = urlsplit(server.address)
+        own = {"Host": at.netloc, "Origin": f"http://{at.netloc}", "Sec-Fetch-Site": "same-origin"}
+        once = "".join(f"{key}: {value}\r\n" for key, value in own.items())
+        for more, codes in (("", {b"200"}), (f"{name}: {own[name.title()]}\r\n", {b"400", b"403"})):
+            answer = raw(server, f"GET {at.path} HTTP/1.1\r\n{once}{more}Connection: close\r\n\r\n".encode())
+            assert answer.split()[1] in codes, (more, answer)
+
+
+def raw(server: Server, said: bytes) -> bytes:
+    """All that comes back of some bytes, until the server ends it."""
+    port = urlsplit(server.address).port
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as one:
+        one.sendall(said)
+        return b"".join(iter(lambda: one.recv(65_536), b""))
+
+
+def test_a_bug_in_an_answer_is_told_without_the_address(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with serving(others=[Echo()]) as server:
+        monkeypatch.setitem(server._files, "main.js", object())
+        code, headers, body = status(server, "main.js")
+        assert (code, body) == (500, b"a bug in rcsc: AttributeError\n")
+        assert "default-src 'none'" in headers["Content-Security-Policy"]
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        said = capfd.readouterr().err
+        assert "AttributeError" in said
+        assert urlsplit(server.address).path.strip("/") not in said
+
+
+def test_a_port_that_is_taken_is_said(capfd: pytest.CaptureFixture[str]) -> None:
+    with serving(others=[Echo()]) as server:
+        port = urlsplit(server.address).port
+        assert rcsc(["studio", str(DOCK / "system.toml"), "--alone", "--port", str(port)]) == 1
+        assert f"port {port} cannot be listened at: Address already in use" in capfd.readouterr().err
+        assert status(server, "")[0] == 200
 
 
 def test_every_file_of_the_page_is_served_with_its_type() -> None:
