@@ -5,15 +5,16 @@ is no value (`rcsc.run.unset`): the curve has a gap there.
 """
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections import deque
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from rcsc.diagnostics.codes import Code
 from rcsc.run.description import BadDescription, description
-from rcsc.run.log.export import unset
-from rcsc.run.log.read import Log, LoggedLevel
+from rcsc.run.log.read import Log
 from rcsc.run.signature import Value
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import Ask, Handler, Json
+from rcsc.studio.runs.gaps import Gaps, gaps_of
 from rcsc.studio.runs.history import History
 from rcsc.studio.runs.live import LANE
 from rcsc.studio.runs.timeline import TimeLine
@@ -22,8 +23,6 @@ MOST_NAMES = 16
 """Variables of one question."""
 MOST_POINTS = 60_000
 """Of one answer's curve; of a longer one the end is shown, and the answer says from where."""
-LOOKED_AT = 20_000
-"""Ticks from the first in which is looked for what nobody has set."""
 
 
 class Plots:
@@ -34,7 +33,6 @@ class Plots:
     def __init__(self, time: TimeLine) -> None:
         """Args: time: Which run everybody looks at."""
         self._time = time
-        self._sets: tuple[object, int, dict[str, dict[int, list[int]]]] = (None, -1, {})
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
@@ -49,8 +47,7 @@ class Plots:
         """Nothing."""
 
     def close(self) -> None:
-        """Let go of what was found."""
-        self._sets = (None, -1, {})
+        """Nothing is held."""
 
     def _history(self) -> History:
         history = self._time.source.history
@@ -97,10 +94,11 @@ class Plots:
         if logged is None or variable not in logged.sign.index:
             raise Refused(Code.STUDIO, f"the run has no variable `{name}`")
         leaf = logged.sign.leaves[logged.sign.index[variable]]
+        spans = list(self._gaps(history, ask).spans(level, variable))
         changes: list[list[object]] = []
         for log in history.logs:
             ask.check()
-            changes += self._changes(history, log, level, variable)
+            changes += _changes(log, level, variable, spans)
         shown = changes[-MOST_POINTS:]
         return {
             "name": name,
@@ -110,32 +108,37 @@ class Plots:
             "changes": shown,
         }
 
-    def _changes(self, history: History, log: Log, level: str, variable: str) -> Iterator[list[object]]:
-        """Yield a tick and a value wherever it is another, in one of the run's logs."""
-        logged = next((one for one in log.levels if one.name == level), None)
-        at = None if logged is None else logged.sign.index.get(variable)
-        if logged is None or at is None:
-            yield [log.first, None]
-            return
-        gap_until = self._unset(history, log, logged).get(at, ())
-        last: object = _NOTHING
-        for tick, values in logged.track:
-            held = None if tick in gap_until else _number(values[at])
-            if held != last or type(held) is not type(last):
-                yield [tick, held]
-                last = held
+    def _gaps(self, history: History, ask: Ask) -> Gaps:
+        """What nobody has set; of a log it is found once."""
+        if history.gaps is None:
+            log = history.logs[0]
+            history.gaps = gaps_of(
+                log,
+                lambda tick: ask.progress(
+                    "looking for what nobody set", tick - log.first, log.last - log.first
+                ),
+            )
+        return history.gaps
 
-    def _unset(self, history: History, log: Log, logged: LoggedLevel) -> dict[int, range]:
-        """By leaf the ticks at the run's beginning in which nobody has set it."""
-        if log is not history.logs[0] or log.first != 0:
-            return {}
-        found: dict[int, range] = {}
-        for tick, by_level in zip(range(1, LOOKED_AT), unset(log), strict=False):
-            still = by_level.get(logged.name, frozenset())
-            if not still:
-                break
-            found |= {at: range(tick + 1) for at in still}
-        return found
+
+def _changes(
+    log: Log, level: str, variable: str, spans: Sequence[tuple[int, bool]]
+) -> Iterator[list[object]]:
+    """Yield a tick and a value wherever it is another, in one of a run's logs; none where nobody has set it."""
+    logged = next((one for one in log.levels if one.name == level), None)
+    at = None if logged is None else logged.sign.index.get(variable)
+    if logged is None or at is None:
+        yield [log.first, None]
+        return
+    coming, gap = deque(spans), False
+    last: object = _NOTHING
+    for tick, values in logged.track:
+        while coming and coming[0][0] <= tick:
+            gap = coming.popleft()[1]
+        held = None if gap else _number(values[at])
+        if held != last or type(held) is not type(last):
+            yield [tick, held]
+            last = held
 
 
 _NOTHING = object()

@@ -2,7 +2,7 @@
 
 import asyncio
 from array import array
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +19,12 @@ from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import read
 from rcsc.run.plant.space import FIXED, space_of
 from rcsc.shell.opening import Opening, opened
+from rcsc.studio.runs import history
 from rcsc.studio.scene import Poses
 from rcsc_cell.cell.arm import skeleton
 from rcsc_cell.cell.kinematic import Kinematic
 from rcsc_cell.cell.ready import plant
+from tests.studio.driven import dock
 from tests.studio.served import Page, Refused, page, serving
 from tests.support.cells import database
 
@@ -257,6 +259,62 @@ def test_curves_are_the_values_of_every_tick_with_gaps_where_nobody_set_one(tmp_
 
     talk(Opening(SHIPPED, plant="kinematic", script="make_boxt"), work, logs=(path,))
     assert gaps > 0, "nothing was unset: the test shows nothing"
+
+
+async def every_curve(one: Page) -> dict[str, list[Any]]:
+    names = [entry["name"] for entry in (await one.ask("plot.names"))["names"]]
+    parts = [names[first : first + 16] for first in range(0, len(names), 16)]
+    answers = [await one.ask("plot.curves", names=part) for part in parts]
+    return {curve["name"]: curve["changes"] for answer in answers for curve in answer["curves"]}
+
+
+@pytest.mark.parametrize(
+    "typed", [("step 50",), ("step 30", "undo 25", "step 45"), ("step 50", "undo 50", "step 50")]
+)
+def test_a_live_run_has_the_gaps_of_its_log(typed: Sequence[str], tmp_path: Path) -> None:
+    """What stands outside may publish just what a number begins with: it is set then."""
+    system, path = dock(tmp_path / "dock"), tmp_path / "run.mcap"
+    assert rcsc(["run", str(system), "--cycles", "50", "--log", str(path), "--quiet"]) in {0, 1}
+    curves: dict[str, dict[str, list[Any]]] = {}
+
+    async def live(one: Page) -> None:
+        for line in typed:
+            await one.ask("run.type", line=line)
+        curves["live"] = await every_curve(one)
+
+    async def logged(one: Page) -> None:
+        await one.heard("time.state", source="log")
+        curves["log"] = await every_curve(one)
+
+    opening = Opening(system, script="dock")
+    talk(opening, live)
+    talk(opening, logged, logs=(path,))
+    assert curves["live"] == curves["log"]
+    assert curves["live"]["drive.travelled_mm"][:3] == [[0, None], [2, 0], [5, 16]]
+
+
+def test_what_nobody_set_is_a_gap_whatever_is_done_to_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With other tables, after undo, and once the beginning of the run is let go."""
+    monkeypatch.setattr(history, "MOST_TICKS", 40)
+    system = dock(
+        tmp_path / "dock",
+        ("state waited", "state never : int -7 .. 7\nstate waited"),
+        ("status_report := failed", "status_report := failed\n  never := -7"),
+    )
+    drive = system.parent / "drive.rcs"
+
+    async def work(one: Page) -> None:
+        await one.ask("run.type", line="step 5")
+        drive.write_text(drive.read_text().replace("state never", "state other : int -7 .. 7\nstate never"))
+        for line in ("reload drive anyway", "step 5", "undo 3", "step 60"):
+            await one.ask("run.type", line=line)
+            [curve] = (await one.ask("plot.curves", names=["drive.never"]))["curves"]
+            assert {value for _, value in curve["changes"]} == {None}, line
+        assert (await one.heard("run.state", tick=67))["first"] > 0
+
+    talk(Opening(system, alone=True), work)
 
 
 def test_a_curve_that_is_none_is_refused_by_its_name(rover: Path) -> None:

@@ -70,15 +70,21 @@ def rows(log: Log) -> Rows:
 
 
 def unset(log: Log) -> Iterator[Mapping[str, frozenset[int]]]:
-    """Every tick with the places of the leaves that nobody has set by then, by level.
+    """Every tick's places of the leaves that nobody has set by then, by level.
 
     A log that begins within a run does not say what was set before: nothing is unset in it.
     """
+    yield from (now for tick, now in unset_from_first(log) if tick > log.first)
+
+
+def unset_from_first(log: Log) -> Iterator[tuple[int, Mapping[str, frozenset[int]]]]:
+    """The same with its tick, from the state on with which the log begins."""
     system = log.system()
     since = Unsets(system.wires, {spec.name: spec for spec in system.levels})
     if log.first == 0 and not (log.finding is not None and log.finding.restarted):
         begun = (_seen(level, level.track.ticks[0]) for level in log.levels)
         since.begin(begun, partial(_published_by, log, log.first))
+    yield log.first, dict(since.now)
     for tick in log.ticks:
         ran = [level for level in log.levels if level.track.ticks[max(0, level.track.place(tick))] == tick]
         for level in ran if since.now else ():
@@ -86,7 +92,7 @@ def unset(log: Log) -> Iterator[Mapping[str, frozenset[int]]]:
             if restart is not None and restart.begun is Begun.ANEW:
                 since.restarted(_seen(level, tick, restart.values))
         since.tick((_seen(level, tick) for level in ran), partial(_published_by, log, tick))
-        yield dict(since.now)
+        yield tick, dict(since.now)
 
 
 def _seen(level: LoggedLevel, tick: int, values: Values | None = None) -> LevelSeen:

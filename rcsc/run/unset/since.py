@@ -4,7 +4,7 @@ In: the description, each level's signature, and after each tick what ran. Out: 
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 from rcsc.run.description import LevelSpec, Wire
@@ -59,6 +59,22 @@ class Unsets:
             self._sources[level.name] = self._inputs(level)
             self.now[level.name] = self._as_at_first(level, _all_unset(level.sign))
         self._look_outside(published)
+
+    def adopt(self, levels: Iterable[LevelSeen]) -> None:
+        """Go on with levels that run other tables: what nobody had set is unset still, and so is what was not there."""
+        seen = tuple(levels)
+        before, self._signs = self._signs, {level.name: level.sign for level in seen}
+        for level in seen if self.now else ():
+            held, given = self.now.get(level.name, frozenset()), self._given.get(level.name)
+            old = before[level.name]
+            self._sources[level.name] = self._inputs(level)
+            self.now[level.name] = self._as_at_first(level, _carried(held, old, level.sign))
+            if given is not None:
+                self._given[level.name] = _carried(given, old, level.sign)
+
+    def copy(self) -> "Unsets":
+        """What is unset now, to be kept while this goes on."""
+        return replace(self, now=dict(self.now), _sources=dict(self._sources), _given=dict(self._given))
 
     def tick(self, ran: Iterable[LevelSeen], published: Published) -> None:
         """Take what a tick did.
@@ -138,6 +154,12 @@ class Unsets:
         return {
             at: (owner, other) for at, other in zip(places, self._signs[owner].record(variable), strict=False)
         }
+
+
+def _carried(places: frozenset[int], before: Signature, sign: Signature) -> frozenset[int]:
+    """Return what of other tables is unset where that was of the tables before."""
+    names = {sign.leaves[at].name: at for at in _all_unset(sign)}
+    return frozenset(at for name, at in names.items() if before.index.get(name) in {None, *places})
 
 
 def _all_unset(sign: Signature) -> frozenset[int]:

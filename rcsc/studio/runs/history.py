@@ -13,6 +13,7 @@ from rcsc.run.log.records import ChainCheck
 from rcsc.run.log.schema import system_facts
 from rcsc.run.signature import Values
 from rcsc.run.system import System
+from rcsc.studio.runs.gaps import Gaps
 
 MOST_TICKS = 200_000
 """Ticks that are kept: more than two hours at 40 ms; after them the older half is let go."""
@@ -25,19 +26,25 @@ class History:
     Attributes:
         logs: In order, the last still growing.
         era: How often ticks that were known were taken back or let go.
+        gaps: What nobody had set; of a log, once somebody asked.
     """
 
     logs: list[Log] = field(default_factory=list)
     era: int = 0
+    gaps: Gaps | None = None
 
     def begin(self, system: System) -> None:
         """Go on with levels as they are now, at first or after other tables were taken."""
         levels = tuple(_begun(level, system.tick) for level in system.levels)
+        self.gaps = self.gaps or Gaps()
+        self.gaps.begin(system)
         self.logs.append(Log(system_facts(system.description), {}, levels, {}, ChainCheck()))
 
     def add(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
         """Keep a tick; what `System.watch` calls."""
         log = self._fitting(system)
+        assert self.gaps is not None  # a log was begun
+        self.gaps.add(system, ran)
         if system.restarts:
             log = self._restarted(log, system)
         for level in ran:
@@ -53,6 +60,8 @@ class History:
         held = [log for log in self.logs if log.first <= system.tick]
         taken_back = len(held) < len(self.logs)
         self.logs[:] = held
+        if self.gaps is not None:
+            self.gaps.back_to(system.tick)
         log = self._fitting(system)
         levels = []
         for level in system.levels:
