@@ -6,7 +6,7 @@ runs it, or what is wrong.
 
 import os
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 from rcsc.diagnostics.codes import Code
@@ -23,12 +23,19 @@ class FoundTable:
 
     Attributes:
         root: Root file of the program; where there are several, one with the level that runs the table.
+        others: Where other tables of its name stand, which are not meant.
     """
 
     loaded: Loaded
     root: str
     program: Program
     table: Table
+    others: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """What names the table and no other."""
+        return f"{self.table.file}:{self.table.name}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,14 +118,14 @@ def _by_name(name: str, loaded: Loaded, preferred: Collection[str]) -> list[Foun
     every = _every(loaded)
     if isinstance(every, NotFound):
         return every
-    named = [entry for entry in every if entry.table.name == name]
-    named = [entry for entry in named if _run_here(entry)] or named  # an example is meant only by its file
+    called = [entry for entry in every if entry.table.name == name]
+    named = [entry for entry in called if _run_here(entry)] or called  # an example is meant only by its file
     if len(named) > 1:
         named = [entry for entry in named if os.path.realpath(entry.root) in preferred] or named
     if len(named) == 1:
-        return named
+        return [replace(named[0], others=tuple(entry.place for entry in called if entry is not named[0]))]
     if named:
-        names = tuple(f"`{entry.table.file}:{name}`" for entry in named)
+        names = tuple(f"`{entry.place}`" for entry in named)
         return _nothing(f"{len(named)} tables are called `{name}`", "", f"say which: {', '.join(names)}")
     near = get_close_matches(name, sorted({entry.table.name for entry in every}), 3, 0.5)
     helps = (f"near it: {', '.join(f'`{candidate}`' for candidate in near)}",) if near else ()

@@ -97,13 +97,21 @@ def test_every_table_of_the_system_comes_back_from_every_form_and_is_proved_the_
         assert verdict.diagnostics == (), name
 
 
-def test_a_name_of_several_tables_means_that_of_the_system_here(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_of_several_tables_means_that_of_the_system_here(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(ROOT)
     several = tables("acquire")
     assert isinstance(several, NotFound)
     assert "`tables/task/acquire.rcs:acquire`" in several.diagnostics[0].help[0]
     [meant] = found_tables("acquire")
     assert Path(meant.table.file) == Path("tables/task/acquire.rcs")
+    said = capsys.readouterr().err
+    assert said.startswith("note: `acquire` is `tables/task/acquire.rcs:acquire`;")
+    assert said.count(".rcs:acquire`") == len(meant.others) + 1 > 2
+    for alone in ("tables/task/acquire.rcs:acquire", "goto"):
+        assert found_tables(alone)
+        assert not capsys.readouterr().err
     monkeypatch.setattr("rcsc.commands.shared.systems.PLACES", ("tables/examples/later/last_echo.toml",))
     with pytest.raises(WrongError):
         found_tables("acquire")  # of a system that has no such table

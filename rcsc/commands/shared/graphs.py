@@ -42,7 +42,7 @@ class WrongError(Exception):
 
 
 def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
-    """The tables that are named.
+    """The tables that are named; where a name is that of several, which one is meant is said on standard error.
 
     Raises:
         UsageError: A file is named that is not there.
@@ -54,6 +54,10 @@ def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
     answer = tables(named, running=running, preferred=() if file else _of_system())
     if isinstance(answer, NotFound):
         raise WrongError(answer.diagnostics, answer.sources)
+    for entry in answer:
+        if entry.others:
+            also = ", ".join(f"`{place}`" for place in entry.others)
+            click.echo(f"note: `{named}` is `{entry.place}`; of that name there is also {also}", err=True)
     return answer
 
 
