@@ -360,3 +360,97 @@ def test_what_is_typed_without_a_connection_is_kept_and_sent(
         assert drive.read_text(encoding="utf-8").startswith("# one two three four five\n")
         assert str(seat.value(f"{EDITOR}.text")).startswith("# one two three four five\n")
         seat.said.clear()
+
+
+def _paste(seat: Seat, text: str) -> None:
+    seat.value(
+        f"(() => {{ const given = new DataTransfer(); given.setData('text/plain', {json.dumps(text)});"
+        " document.activeElement.dispatchEvent(new ClipboardEvent('paste', "
+        "{ clipboardData: given, bubbles: true, cancelable: true })); })()"
+    )
+
+
+def _texts(seat: Seat) -> list[list[str]]:
+    """The cells of every line, also of those that a filter hides."""
+    rows = "[...document.querySelectorAll('.sheet tr[data-row]')]"
+    found: list[list[str]] = seat.value(
+        f"{rows}.map((row) => [...row.querySelectorAll('[data-column]')].map((one) => one.dataset.text))"
+    )
+    return found
+
+
+WIDTHS = """input w : int 0 .. 9
+input on : bool
+output out : int 0 .. 9
+table t {
+  | line | w    | when            || out |
+  |------|------|-----------------||-----|
+  | a    | 0    |                 || 0   |
+  | b    | 1    |                 || 0   |
+  | c    | 2    | on              || 0   |
+  | d    | 2    | not on          || 0   |
+  | e    | > 2  |                 || 0   |
+}
+"""
+
+
+def test_what_a_spreadsheet_copied_comes_whole_and_as_often_as_there_is_room(tmp_path: Path) -> None:
+    (tmp_path / "rcsc.toml").touch()
+    (tmp_path / "t.rcs").write_text(WIDTHS)
+    with seated(Opening(tmp_path / "system.toml", alone=True)) as seat:
+        seat.press("2")
+        seat.choose(".table-choice", "t ")
+        seat.until(".standing", "✓ proved")
+        begun = _texts(seat)
+        seat.click("(" + cell(2, 1) + ")")
+        _paste(seat, '"on\r\nand w < 9"\t7\r\n"not\ton"\t8\r\n')  # cells with a line end, and with a tab
+        says(seat, 3, 2, "8")
+        assert [row[2:] for row in _texts(seat)[2:4]] == [["on and w < 9", "7"], ["not on", "8"]]
+        chosen = "[...document.querySelectorAll('.sheet .in-range')].map((one) => one.dataset.text)"
+        seat.wait(f"{chosen}.length === 4")  # what was pasted is selected
+        seat.press("escape", "ctrl+z")
+        says(seat, 2, 1, "on")
+        seat.click("(" + cell(0, 2) + ")")
+        seat.press("shift+down", "shift+down", "shift+down")
+        _paste(seat, "3\n4")
+        says(seat, 3, 2, "4")
+        assert [row[3] for row in _texts(seat)] == ["3", "4", "3", "4", "0"]
+        seat.press("escape", "ctrl+z")
+        says(seat, 3, 2, "0")
+        assert _texts(seat) == begun
+
+
+def test_lines_that_a_filter_hides_are_neither_emptied_nor_pasted_over(tmp_path: Path) -> None:
+    (tmp_path / "rcsc.toml").touch()
+    (tmp_path / "t.rcs").write_text(WIDTHS + WIDTHS[WIDTHS.index("table") :].replace("table t", "table u"))
+    with seated(Opening(tmp_path / "system.toml", alone=True)) as seat:
+        seat.press("2")
+        seat.choose(".table-choice", "t ")
+        seat.until(".standing", "✓ proved")
+
+        def filtered(condition: str) -> None:
+            seat.value("((one) => { one.focus(); one.value = ''; })(document.querySelector('.filter'))")
+            seat.write(condition)
+            seat.press("enter")
+
+        filtered("w = 0 or w > 2")
+        seat.wait("document.querySelectorAll('.sheet tr[data-row][hidden]').length === 3")
+        seat.click("(" + cell(0, 2) + ")")
+        _paste(seat, "5\n6")
+        says(seat, 4, 2, "6")
+        assert [row[3] for row in _texts(seat)] == ["5", "0", "0", "0", "6"]
+        seat.click("(" + cell(0, 2) + ")")
+        seat.press("shift+down", "delete")
+        says(seat, 4, 2, "")
+        assert [row[3] for row in _texts(seat)] == ["", "0", "0", "0", ""]
+        seat.press("alt+enter")
+        seat.wait(f"({HERE}) === '5,0' && document.querySelectorAll('.sheet tr[data-row]').length === 6")
+        filtered("w = = 0")
+        seat.until("#said", "is no condition")
+        assert lines(seat) == 6, "what is no condition hides nothing"
+        filtered("w = 0")
+        seat.until(".filter-form span", "of 6 lines can match")
+        seat.choose(".table-choice", "u ")
+        seat.wait("document.querySelector('.sheet').ariaLabel === 'Table u'")
+        assert seat.value("document.querySelector('.filter').value") == ""
+        assert lines(seat) == 5

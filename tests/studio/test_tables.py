@@ -234,6 +234,33 @@ def test_a_pasted_rectangle_adds_the_lines_that_it_needs(bench: Bench) -> None:
         bench.change("tables.cells", "t.rcs", table="t", line=0, column=1, rows=rows(["1", "2", "3"]))
 
 
+DEFAULT = TABLE.replace(
+    "  | b    | /= off |      || 2   |",
+    "  | b    | on     |      || 2   |\n  | rest | DEFAULT |     || 3   |",
+)
+
+
+@pytest.mark.parametrize(
+    ("line", "column", "block", "firsts"),
+    [
+        (1, 0, [["on", "1"], ["stuck", "2"], ["off", "3"]], ["off", "on", "stuck", "off", "DEFAULT"]),
+        (1, 0, [["on", "1"], ["stuck", "2"]], ["off", "on", "stuck", "DEFAULT"]),
+        (1, -1, [["b", "on"], ["c", "stuck"]], ["off", "on", "stuck", "DEFAULT"]),
+        (0, 0, [["off", ""], ["on", ""], ["stuck", ""], ["DEFAULT", ""]], ["off", "on", "stuck", "DEFAULT"]),
+        (1, 2, [["1"], ["2"]], ["off", "on", "DEFAULT"]),
+        (1, 0, [["", ""], ["", ""]], ["off", "", ""]),
+        (2, 0, [["stuck"]], ["off", "on", "stuck"]),
+    ],
+)
+def test_a_paste_that_begins_above_default_goes_before_it(
+    line: int, column: int, block: list[list[str]], firsts: list[str], folder: Path, bench: Bench
+) -> None:
+    (folder / "t.rcs").write_text(DEFAULT.format(low="    "))
+    bench.open("t.rcs")
+    doc = bench.change("tables.cells", "t.rcs", table="t", line=line, column=column, rows=rows(*block))
+    assert [row[1] for row in matrix(doc, "t")[1]] == firsts
+
+
 def test_lines_go_before_default_and_follow_new_names(shipped: Path) -> None:
     bench = Bench(shipped / "system.toml")
     doc = bench.open("gallery/etcs_modes/code.rcs")

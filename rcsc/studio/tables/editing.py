@@ -116,11 +116,14 @@ class Tables:
             many, _ = _lines_of(found.text, table)
             if line > many or line + len(rows) > many + MOST_NEW:
                 raise Refused(Code.STUDIO, f"table `{table}` has {many} lines, and takes {MOST_NEW} at once")
-            text = _longer(found.text, table, line + len(rows))
+            text = _longer(
+                found.text, table, line + len(rows) + _over_default(found.text, table, line, column, rows)
+            )
             changes = [
                 (cells.Place(line + down, column + right), new)
                 for down, row in enumerate(rows)
                 for right, new in enumerate(row)
+                if new is not None
             ]
             return cells.with_cells(text, table, changes), what
 
@@ -193,11 +196,14 @@ class Tables:
 
 
 class _Row:
-    """A row of cells that a page sent."""
+    """A row of cells that a page sent; None leaves a cell as it is."""
 
     def __init__(self, fields: CheckedFields) -> None:
-        """Args: fields: With a list `cells` of tables with a `text`."""
-        self.texts = [each.text("text") for each in fields.each("cells", cells.MOST_CELLS)]
+        """Args: fields: With a list `cells` of tables with a `text`, or without one."""
+        self.texts = [
+            each.text("text") if "text" in each.value else None
+            for each in fields.each("cells", cells.MOST_CELLS)
+        ]
 
 
 def _edit(file: str, lines: Lines, given: CheckedFields) -> Edit:
@@ -218,6 +224,18 @@ def _longer(text: str, table: str, least: int) -> str:
         if many >= least or many + default >= least + cells.MOST_CELLS:
             return text
         text = cells.with_line(text, table, many - default)
+
+
+def _over_default(text: str, table: str, line: int, column: int, rows: Sequence[Sequence[str | None]]) -> int:
+    """1 where a paste that begins above a DEFAULT line and brings none would write over it: its lines go before that one, else 0."""
+    many, default = _lines_of(text, table)
+    firsts = [row[-column] for row in rows if 0 <= -column < len(row)]
+    over = default and line < many - 1 < line + len(rows) and len(firsts) > many - 1 - line
+    return int(
+        bool(over)
+        and any(firsts)
+        and not any(first is None or first.startswith("DEFAULT") for first in firsts)
+    )
 
 
 def _lines_of(text: str, table: str) -> tuple[int, int]:

@@ -15,7 +15,7 @@ export class Desk {
   file = "";
   doc = null; // as the server told it last
   table = ""; // the name of the table that is shown
-  condition = null; // { text, can, unknown, every } of the filter
+  condition = null; // { text, of, can, unknown, every } of the filter: names of lines, `of` which they are
   settled = async () => {}; // waits until all that is typed is sent, or cannot be; of the view of the text
   follows = ""; // the level whose table is shown as it runs; empty where one is chosen, or changed
   #bus;
@@ -170,11 +170,10 @@ export class Desk {
       this.tell();
       return;
     }
+    const of = this.shown?.rows.map(({ name }) => name) ?? [];
     const answer = await this.try("proof.filter", { condition: text });
-    if (answer) {
-      this.condition = { text, ...answer };
-      this.tell();
-    }
+    this.condition = answer ? { text, of, ...answer } : null; // what is no condition hides nothing
+    this.tell();
   }
 
   /** Offer the repairs of a finding in an element, as buttons that make them; each finding is asked about once. */
@@ -254,4 +253,16 @@ export class Desk {
 /** A sentence with names between back quotes, these as code. */
 export function spoken(text) {
   return text.split(/`([^`]*)`/).map((piece, at) => (at % 2 ? make("code", {}, piece) : piece));
+}
+
+/** A heading that may be broken after `_` and `.`, as the text of the table breaks it. */
+export function breakable(text) {
+  return text.split(/(?<=[_.])(?=\w)/).flatMap((piece, at) => (at ? [make("wbr"), piece] : [piece]));
+}
+
+/** What a column is, as the style has it: a condition or an action, and the first of these. */
+export function kindOf(columns, at) {
+  const { kind } = columns[at];
+  const first = kind !== "condition" && (at === 0 || columns[at - 1].kind === "condition");
+  return `${kind === "condition" ? "condition" : "action"}${first ? " first" : ""}`;
 }

@@ -53,7 +53,7 @@ export function mount(root, bus) {
   try { kept = localStorage.getItem("studio.tables") ?? kept; } catch { /* as above */ }
   mode(["Grid", "Text", "Both"].includes(kept) ? kept : "Grid");
 
-  let listed = "";
+  let listed = "", filters = "";
   desk.on(() => {
     const { doc, shown, files } = desk;
     const key = JSON.stringify([files, doc?.tables.map(({ name }) => name)]);
@@ -77,6 +77,9 @@ export function mount(root, bus) {
     }
     told();
     const condition = desk.condition;
+    const of = `${desk.file} ${desk.table}`;
+    if (!condition && (of !== filters || document.activeElement !== filter)) filter.value = ""; // it says what is hidden, or is being typed
+    filters = of;
     filtered.textContent = condition ? `${condition.can.length} of ${shown?.rows.length ?? 0} lines can match${condition.unknown.length ? `, ${condition.unknown.length} not known` : ""}` : "";
     conflict.replaceChildren(...(desk.conflict ? [desk.conflict, " ", button("Take what is on disk", "It can be undone", () => desk.take()), " ",
       button("Write over it", "What others wrote is lost", () => desk.save(true))] : []));

@@ -1,7 +1,8 @@
 // A table as a grid that is edited in place. Cells are told by line and column from 0; column -1 is the line's name, line -1 the heading.
 
 import { make } from "../bus.js";
-import { spoken } from "./desk.js";
+import { cellsOf, filling, textOf } from "./clip.js";
+import { breakable, kindOf, spoken } from "./desk.js";
 
 export class SheetGrid {
   #desk; #bus; #root; #table; #cells = []; #shape = ""; #at = { line: 0, column: -1 }; #anchor = null; #editing = null; #shownWitness = null;
@@ -64,7 +65,7 @@ export class SheetGrid {
       make("th", { role: "columnheader", class: "tells", scope: "col" }));
     this.#cells = [[head.cells[0]]];
     columns.forEach((column, at) => {
-      const cell = make("th", { role: "columnheader", scope: "col", tabindex: "-1", "data-line": "-1", "data-column": at, class: this.#kind(columns, at) });
+      const cell = make("th", { role: "columnheader", scope: "col", tabindex: "-1", "data-line": "-1", "data-column": at, class: kindOf(columns, at) });
       this.#cells[0].push(cell);
       head.append(cell);
     });
@@ -72,7 +73,7 @@ export class SheetGrid {
     const body = make("tbody", {});
     rows.forEach((_, line) => {
       const stub = make("th", { role: "rowheader", scope: "row", class: "stub", tabindex: "-1", "data-line": line, "data-column": "-1" });
-      const cells = columns.map((column, at) => make("td", { role: "gridcell", tabindex: "-1", "data-line": line, "data-column": at, class: this.#kind(columns, at) }));
+      const cells = columns.map((column, at) => make("td", { role: "gridcell", tabindex: "-1", "data-line": line, "data-column": at, class: kindOf(columns, at) }));
       this.#cells.push([stub, ...cells]);
       body.append(make("tr", { role: "row", "data-row": line }, stub, make("td", { class: "share" }), make("td", { class: "tells" }), ...cells));
     });
@@ -80,12 +81,6 @@ export class SheetGrid {
     this.#table.setAttribute("aria-rowcount", rows.length + 1);
     this.#at = { line: Math.min(this.#at.line, rows.length - 1), column: Math.min(this.#at.column, columns.length - 1) };
     this.#anchor = null;
-  }
-
-  #kind(columns, at) {
-    const { kind } = columns[at];
-    const first = kind !== "condition" && (at === 0 || columns[at - 1].kind === "condition");
-    return `${kind === "condition" ? "condition" : "action"}${first ? " first" : ""}`;
   }
 
   #fill({ name, columns, rows }) {
@@ -105,7 +100,7 @@ export class SheetGrid {
       const share = line_.querySelector(".share");
       share.textContent = row.share?.text ?? "";
       share.title = row.share?.of ?? "";
-      const out = filter && !filter.can.includes(row.name) && !filter.unknown.includes(row.name);
+      const out = filter && filter.of.includes(row.name) && !filter.can.includes(row.name) && !filter.unknown.includes(row.name);
       line_.hidden = Boolean(out);
       line_.classList.toggle("unknown", Boolean(filter?.unknown.includes(row.name)));
     });
@@ -209,7 +204,7 @@ export class SheetGrid {
     line.append(make("th", { class: "stub", scope: "row" }, "this input"), make("td", { class: "share" }), make("td", { class: "tells", title: rest.join(", ") }, rest.length ? `and ${rest.length} more` : ""),
       ...shown.columns.map((column, at) => {
         const value = witness.columns[at] ?? "", region = witness.regions[at] ?? "";
-        return make("td", { class: `${this.#kind(shown.columns, at)}${region ? " region" : ""}`, title: region ? `region: ${region}` : "" },
+        return make("td", { class: `${kindOf(shown.columns, at)}${region ? " region" : ""}`, title: region ? `region: ${region}` : "" },
           value, region && region !== `${column.heading} = ${value}` ? make("span", { class: "type" }, `region: ${region.slice(column.heading.length + 1)}`) : "");
       }));
     shown.rows.forEach((row, at) => {
@@ -409,6 +404,7 @@ export class SheetGrid {
     }
   }
 
+  /** Write cells from a corner on; undefined leaves a cell as it is. */
   async write({ line, column }, rows) {
     performance.mark("studio.key");
     return this.#desk.try("tables.cells", { line, column, rows: rows.map((cells) => ({ cells: cells.map((text) => ({ text })) })) });
@@ -418,7 +414,14 @@ export class SheetGrid {
     const { top, low, left, right } = this.#range();
     const from = Math.max(0, left), down = Math.max(0, top);
     if (right < 0 || low < 0) return;
-    this.write({ line: down, column: from }, Array.from({ length: low - down + 1 }, () => Array(right - from + 1).fill("")));
+    this.write({ line: down, column: from }, this.#seen(down, this.lines.map(() => Array(right - from + 1).fill(""))));
+  }
+
+  /** The rows, with one that changes nothing for each line that the filter hides. */
+  #seen(top, rows) {
+    const every = [], waiting = [...rows];
+    for (let line = top; waiting.length; line += 1) every.push(this.#hidden(line) ? rows[0].map(() => undefined) : waiting.shift());
+    return every;
   }
 
   insertLine() {
@@ -452,33 +455,27 @@ export class SheetGrid {
   #clip(kind, event) {
     if (this.#editing || !this.#desk.shown) return;
     const { top, low, left, right } = this.#range();
-    if (kind === "paste") {
-      const text = event.clipboardData.getData("text/plain");
-      event.preventDefault();
-      const rows = text.replace(/\r\n?/g, "\n").replace(/\n$/, "").split("\n").map((row) => row.split("\t").map(unquoted));
-      const most = Math.max(...rows.map((row) => row.length));
-      if (most + left > this.#desk.shown.columns.length) {
-        this.#bus.say(`what was copied is ${most} columns wide: there is no room for it here`, { wrong: true });
-        return;
-      }
-      this.write({ line: top, column: left }, rows);
-      return;
-    }
-    const rows = [];
-    for (let line = top; line <= low; line += 1) if (!this.#hidden(line)) rows.push(this.#cells[line + 1].slice(left + 1, right + 2).map((cell) => cell.dataset.text ?? "").join("\t"));
-    event.clipboardData.setData("text/plain", rows.join("\n"));
     event.preventDefault();
+    if (kind === "paste") { this.#paste(event.clipboardData.getData("text/plain")); return; }
+    const rows = [];
+    for (let line = top; line <= low; line += 1) if (!this.#hidden(line)) rows.push(this.#cells[line + 1].slice(left + 1, right + 2).map((cell) => cell.dataset.text ?? ""));
+    event.clipboardData.setData("text/plain", textOf(rows));
     if (kind === "cut") this.#clear();
   }
-}
 
-/** A heading that may be broken after `_` and `.`, as the text of the table breaks it. */
-function breakable(text) {
-  return text.split(/(?<=[_.])(?=\w)/).flatMap((piece, at) => (at ? [make("wbr"), piece] : [piece]));
-}
-
-/** A cell as spreadsheets write it: in quotes where it holds some. */
-function unquoted(cell) {
-  const text = /^"[^]*"$/.test(cell) ? cell.slice(1, -1).replaceAll('""', '"') : cell;
-  return text.trim();
+  /** Write what was copied from the upper left corner of what is selected on, as often as that has room for it; then it is selected. */
+  async #paste(text) {
+    const { top, low, left, right } = this.#range();
+    const rows = filling(cellsOf(text), this.lines.length + (top < 0), right - left + 1);
+    const most = Math.max(...rows.map((row) => row.length));
+    if (most + left > this.#desk.shown.columns.length) {
+      this.#bus.say(`what was copied is ${most} columns wide: there is no room for it here`, { wrong: true });
+      return;
+    }
+    const every = this.#seen(top, rows), at = this.#at;
+    if (!await this.write({ line: top, column: left }, every) || this.#editing || at.line !== this.#at.line || at.column !== this.#at.column) return;
+    this.go({ line: top, column: left }, this.#table.contains(document.activeElement));
+    this.#anchor = { line: Math.min(top + every.length, this.#desk.shown.rows.length) - 1, column: left + most - 1 };
+    this.#ranged();
+  }
 }
