@@ -1,7 +1,7 @@
 """Where the parts of a folded graph stand, and the words in them: what a page draws.
 
 In: a `Chart`. Out: a `Sheet`: boxes, frames and arrows with places in pixels, and rows of text, wrapped. A label is a box of its own
-between the two halves of its arrow, so that the layout leads every arrow round every label.
+between the two halves of its arrow, so that the layout leads every arrow round every label (`curves`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,16 +9,19 @@ from dataclasses import dataclass
 
 from rcsc.graph import labels
 from rcsc.graph.composites import Chart, ChartArrow, Composite, Row, inside
+from rcsc.graph.curves import clear
 from rcsc.graph.drawing import folded as wrapped
 from rcsc.graph.drawing import plain
 from rcsc.graph.formats.state_graph import ANY, LINES, Edge
-from rcsc.graph.layout import Arrangement, Arrow, Frame, LayoutBox, Point, place
+from rcsc.graph.layout import Arrangement, Arrow, Frame, LayoutBox, Point
 
 LETTER_PX, TEXT_PX, BADGE_PX = 6.7, 15.0, 22.0
 """A letter of 11 px, a line of text, and the least badge with the name of a line."""
 _PAD_PX, _LEAST_PX, _MARGIN_PX = 8.0, 56.0, 16.0
 MOST_LETTERS, MOST_TEXTS = 34, 4
 """Of a row: letters of one of its texts, and texts; more is left to `whole`."""
+MOST_ALIKE = 6
+"""Lines on an arrow that each say what they ask and do, though another says it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +133,7 @@ def sheet(chart: Chart, shut: Sequence[str] = ()) -> Sheet:
     sized = [
         LayoutBox(name, box.width_px, box.height_px, round=False) for name, box in (boxes | named).items()
     ]
-    placed = place(sized, [*_halves(parts, opened, boxes)], _frames(opened, boxes, parts, chart))
+    placed = clear(sized, [*_halves(parts, opened, boxes)], _frames(opened, boxes, parts, chart))
     return _placed(placed, boxes, named, parts, opened)
 
 
@@ -166,9 +169,9 @@ def _boxes(chart: Chart, shut: Sequence[str]) -> Iterator[SheetBox]:
 
 
 def _words(kind: str, text: str, whole: str = "") -> SheetRow:
-    """A row of text alone, shortened where it is long."""
-    short = text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 1] + "…"
-    return SheetRow("", ((kind, short),), f"{text}\n{whole}" if whole else text)
+    """A row of text alone."""
+    texts = tuple((kind, piece) for piece in _short(text))
+    return SheetRow("", texts, f"{text}\n{whole}" if whole else text)
 
 
 def _staying(row: Row) -> SheetRow:
@@ -176,11 +179,16 @@ def _staying(row: Row) -> SheetRow:
     return SheetRow(row.line, (*_guard(edge, "stays"), *_does(edge)), _whole(row))
 
 
-def _leading(row: Row) -> SheetRow:
-    edge = row.edge
-    sources = _short(f"from {', '.join(row.sources)}") if row.sources else ()
-    texts = (*(("from", text) for text in sources), *_guard(edge, ""), *_does(edge))
-    return SheetRow(row.line, texts or (("guard", "always"),), _whole(row))
+def _leading(rows: Sequence[Row]) -> Iterator[SheetRow]:
+    """Yield the lines on an arrow; of many that ask and do the same, those after the first name it."""
+    first: dict[tuple[tuple[str, str], ...], str] = {}
+    for row in rows:
+        texts = (*_guard(row.edge, ""), *_does(row.edge)) or (("guard", "always"),)
+        like = first.setdefault(texts, row.line) if row.sources and len(rows) > MOST_ALIKE else row.line
+        said = f"from {', '.join(row.sources)}" if row.sources else ""
+        if like != row.line:
+            said, texts = f"{said}: as {like}", ()
+        yield SheetRow(row.line, (*(("from", text) for text in _short(said)), *texts), _whole(row))
 
 
 def _guard(edge: Edge, empty: str) -> Iterator[tuple[str, str]]:
@@ -219,8 +227,13 @@ def _short(text: str) -> tuple[str, ...]:
 
 
 def _cut(line: str) -> Iterator[str]:
-    """Yield a line that has no place to break in pieces."""
-    yield from (line[at : at + MOST_LETTERS] for at in range(0, len(line), MOST_LETTERS))
+    """Yield a line that has no place to break in pieces: after `_` or `.` where that leaves no short one."""
+    while len(line) > MOST_LETTERS:
+        at = max(line.rfind(sign, 0, MOST_LETTERS) for sign in "_.") + 1
+        at = at if at > MOST_LETTERS // 2 else MOST_LETTERS
+        yield line[:at]
+        line = line[at:]
+    yield line
 
 
 def _whole(row: Row) -> str:
@@ -268,8 +281,8 @@ def _drawn(boxes: Mapping[str, SheetBox], state: str) -> str:
 
 
 def _label(arrow: ChartArrow) -> SheetBox | None:
-    rows = [_leading(row) for row in arrow.rows if row.line or row.edge.shown or row.edge.decided]
-    return _sized("", "label", (), _stacked(rows, 2.0)) if rows else None
+    rows = [row for row in arrow.rows if row.line or row.edge.shown or row.edge.decided]
+    return _sized("", "label", (), _stacked([*_leading(rows)], 2.0)) if rows else None
 
 
 _Parts = Sequence[tuple[ChartArrow, SheetBox | None]]

@@ -102,7 +102,9 @@ def folded(graph: StateGraph) -> Chart:
     loops, arrows = _parted(edges)
     fans = _fans(arrows, graph)
     waiting = _waiting(loops, graph)
-    composites = _composites(graph, [*fans.values(), *waiting.values()])
+    composites = _composites(
+        graph, [*_saved(fans, arrows), *((states, len(states) - 1) for states in waiting.values())]
+    )
     stays: dict[str, list[Row]] = {}
     for (line, _), states in waiting.items():
         rows = [edge for edge in loops if edge.line == line and edge.source in states]
@@ -203,11 +205,20 @@ def _ordered(graph: StateGraph, states: Collection[str]) -> tuple[str, ...]:
     return tuple(state for state in graph.states if state in states)
 
 
-def _composites(graph: StateGraph, wanted: Sequence[tuple[str, ...]]) -> list[Composite]:
+def _saved(
+    fans: Mapping[str, tuple[str, ...]], arrows: Sequence[Edge]
+) -> Iterator[tuple[tuple[str, ...], int]]:
+    """Yield the states of each fan, and what it folds: arrows, and rows of one line that leaves several states."""
+    for target, states in fans.items():
+        own = [edge for edge in arrows if edge.target == target and edge.source in states]
+        yield states, len(states) - 1 + len(own) - len({(edge.line, edge.decided) for edge in own})
+
+
+def _composites(graph: StateGraph, wanted: Iterable[tuple[tuple[str, ...], int]]) -> list[Composite]:
     """Sets of states of which none is all, and no two cross; those that fold most are taken first."""
     worth: dict[tuple[str, ...], int] = {}
-    for states in wanted:
-        worth[states] = worth.get(states, 0) + len(states) - 1
+    for states, saved in wanted:
+        worth[states] = worth.get(states, 0) + saved
     taken: list[tuple[str, ...]] = []
     for states in sorted(worth, key=lambda each: (-worth[each], -len(each), graph.states.index(each[0]))):
         if len(states) < len(graph.states) and not any(_cross(set(states), set(other)) for other in taken):

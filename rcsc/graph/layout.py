@@ -82,13 +82,28 @@ class Arrangement:
     frames: Mapping[str, tuple[Point, Point]] = field(default_factory=dict)
 
 
-def place(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow], frames: Sequence[Frame] = ()) -> Arrangement:
+def place(
+    boxes: Sequence[LayoutBox],
+    arrows: Sequence[Arrow],
+    frames: Sequence[Frame] = (),
+    *,
+    straight: bool = False,
+) -> Arrangement:
     """The layout of the boxes and arrows, in ranks from top to bottom; a box is in one frame at most.
+
+    Args:
+        boxes: What is placed.
+        arrows: Between them.
+        frames: Around them.
+        straight: Whether arrows are straight pieces in place of curves.
 
     Raises:
         NoLayoutError: No layout program is there, or it failed.
     """
-    layout = json_of(_run(_text(boxes, arrows, frames)))
+    text = _text(boxes, arrows, frames)
+    layout = json_of(
+        _run(text.replace("compound=true;", "compound=true; splines=polyline;") if straight else text)
+    )
     left, bottom, right, top = (float(side) for side in layout["bb"].split(","))
 
     def point(text: str) -> Point:

@@ -21,6 +21,7 @@ REPO = Path(__file__).parents[2]
 SHIPPED = [
     "task/acquire", "task/move", "task/transfer", "emove/locate", "examples/acquire_published", "gallery/packml/unit",
     "gallery/linuxcnc_homing/homing", "gallery/cia402/drive", "gallery/rfc9293/tcp", "gallery/plcopen_safety/guard",
+    "gallery/ros2_lifecycle/published",
 ]  # fmt: skip
 
 
@@ -135,6 +136,50 @@ def test_the_orders_of_acquire_are_on_its_arrows() -> None:
     shut = collapsed(chart, [group.name])
     assert {"state_2", "state_3"}.isdisjoint(box.name for box in sheet(shut, [group.name]).boxes)
     assert ("d_state", ("state_5",)) in {(a.target, row.sources) for a in shut.arrows for row in a.rows}
+
+
+def test_the_failure_fan_of_cia_402_is_one_arrow() -> None:
+    """One line leaves six states: that folds more than as many lines that lead to one state."""
+    [graph] = graphs("gallery/cia402/drive")
+    chart = folded(graph)
+    [fan] = [arrow for arrow in chart.arrows if arrow.target == "fault_reaction_active"]
+    [group] = [each for each in chart.composites if each.name == fan.source]
+    assert set(graph.states) - set(group.states) == {"fault", "fault_reaction_active"}
+    assert [(row.line, row.sources) for row in fan.rows] == [("T13", ())]
+
+
+def test_a_fan_of_many_lines_is_legible() -> None:
+    """Its label is higher than the states beside it: the arrow to it ends at its border; lines that ask and do the same say it once."""
+    states = [f"s{at}" for at in range(30)]
+    goes = [
+        Edge(f"g{at}", state, states[(at + 1) % 30], "go", "speed(1)", shown="go")
+        for at, state in enumerate(states)
+    ]
+    fails = [
+        Edge(f"f{at}", state, "failed", "bad", "speed(0)", shown="bad") for at, state in enumerate(states)
+    ]
+    chart = folded(StateGraph("t", "now", (*goes, *fails), initial="s7", states=(*states, "failed")))
+    placed = sheet(chart)
+    check(placed)
+    [label] = [arrow.label for arrow in placed.arrows if arrow.target == "failed"]
+    assert label is not None
+    assert [row.texts for row in label.rows] == [
+        (("from", "from s0"), ("guard", "bad"), ("does", "/ speed = 0")),
+        *(((("from", f"from {state}: as f0"),)) for state in states[1:]),
+    ]
+    assert all("when bad" in row.whole for row in label.rows)
+
+
+@pytest.mark.parametrize("letters", [34, 35, 60, 100])
+def test_a_long_name_is_shown_whole(letters: int) -> None:
+    name = "the_valve_of_the_left_clamp_in_the_cell_" * 3
+    name = name[:letters]
+    box = next(
+        box for box in sheet(folded(StateGraph("t", "now", (), states=(name, "b")))).boxes if box.name == name
+    )
+    texts = [text for _, text in box.rows[0].texts]
+    assert "".join(texts) == name
+    assert all(text.endswith("_") for text in texts[:-1]), "broken within a word"
 
 
 NAMES = st.sampled_from(
