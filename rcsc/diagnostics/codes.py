@@ -1660,8 +1660,8 @@ class Code(StrEnum):
     GRAPH_NO_STATE = """RCS771: a table has no state to draw
 
     `rcsc graph` draws the values of one variable as states: `cur_state`, else the only enumeration that the table tests and keeps as
-    state. It has to be a `state` of few values: an enumeration, a boolean or up to 64 integers. Name it with `--state`, or draw which
-    line can match after which: `--lines`.
+    state; of several the only one that its lines write. It has to be a `state` of few values: an enumeration, a boolean or up to 64
+    integers. Name it with `--state`, or draw which line can match after which: `--lines`.
     """
     GRAPH_UNREADABLE = """RCS772: a graph cannot be read
 

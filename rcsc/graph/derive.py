@@ -10,6 +10,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.graph import labels
 from rcsc.graph.formats.state_graph import ANY, Edge, StateGraph
+from rcsc.lang.leaves import may_write
 from rcsc.lang.model import (
     Action,
     Assign,
@@ -98,6 +99,8 @@ def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic
         candidates = [v for v in fit if v.name == "cur_state"] or [
             v for v in fit if isinstance(v.type, Enum) and v.name in table.variables
         ]
+    if len(candidates) > 1:
+        candidates = _moved(program, table, candidates) or candidates
     if len(candidates) == 1:
         return candidates[0]
     several = f"several variables could be the state of table `{table.name}`: " + ", ".join(
@@ -110,6 +113,14 @@ def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic
     )
     helps = ("name one with `--state`: an enumeration, a boolean or a few integers",)
     return Diagnostic(Code.GRAPH_NO_STATE, several if candidates else none, Label(table.span), help=helps)
+
+
+def _moved(program: Program, table: Table, candidates: list[Variable]) -> list[Variable]:
+    """Those that some line of the table may write: what others write, such as a report, is no state of it."""
+    procedures = {str(each.name): each for each in program.procedures}
+    statements = [action.statement for line in table.every_line for action in line.actions]
+    written = may_write(statements, procedures)
+    return [v for v in candidates if v.name in written or f"{v.name}.next" in written]
 
 
 def _few(variable: Variable) -> bool:

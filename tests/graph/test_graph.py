@@ -507,6 +507,17 @@ def test_a_state_is_chosen_or_asked_for(tmp_path: Path) -> None:
         assert refused.code is Code.GRAPH_NO_STATE
 
 
+@pytest.mark.parametrize(
+    ("name", "state"), [("dock", "now"), ("undock", "now"), ("goto", "stage"), ("align", "stage")]
+)
+def test_of_several_the_state_is_what_the_lines_write(name: str, state: str) -> None:
+    """What a level below reports is an enumeration that is tested and kept, too, and no state of the table."""
+    files = (Path(__file__).parents[1] / "data" / "dock").glob("*.rcs")
+    found = [each for file in files if not isinstance(all_ := tables(str(file)), NotFound) for each in all_]
+    entry = next(each for each in found if each.table.name == name)
+    assert graph_of(entry).graph.state == state
+
+
 def test_a_solver_without_time_draws_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from rcsc.solvers.smt import Answer, Solver
 

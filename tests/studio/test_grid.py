@@ -454,3 +454,57 @@ def test_lines_that_a_filter_hides_are_neither_emptied_nor_pasted_over(tmp_path:
         seat.wait("document.querySelector('.sheet').ariaLabel === 'Table u'")
         assert seat.value("document.querySelector('.filter').value") == ""
         assert lines(seat) == 5
+
+
+def test_a_large_graph_begins_where_the_table_does_and_is_drawn_near_far_and_aside(tmp_path: Path) -> None:
+    """By keys, the wheel and the mouse: what is looked at stays where it is."""
+    (tmp_path / "rcsc.toml").touch()
+    names = [f"s{at}" for at in range(24)]
+    rows = [
+        f"| g{at} | {name} | true || s{(at + 5) % 24} |\n| w{at} | {name} | false || |\n"
+        for at, name in enumerate(names)
+    ]
+    (tmp_path / "t.rcs").write_text(
+        f"enum place {{ {', '.join(names)} }}\ninput go : bool\nstate now : place = s11\n"
+        f"table t {{\n| line | now | go || now |\n|-|-|-||-|\n{''.join(rows)}}}\n"
+    )
+    middle = (
+        "(({ left, top, width, height }) => [left + width / 2, top + height / 2])"
+        "(document.querySelector('.graph-place [data-state=s11]').getBoundingClientRect())"
+    )
+    with seated(Opening(tmp_path / "system.toml", alone=True)) as seat:
+        seat.press("3")
+        seat.wait("document.querySelector('.graph-place [data-state=s11]')")
+        view = seat.value(
+            "(({ left, top, right, bottom }) => [left, top, right, bottom])(document.querySelector('.graph-place').getBoundingClientRect())"
+        )
+
+        def seen() -> list[float]:
+            x, y = seat.value(middle)
+            assert view[0] < x < view[2]
+            assert view[1] < y < view[3]
+            return [x, y]
+
+        seen()
+        seat.value("document.querySelector('.graph-place [data-state=s11]').focus()")
+        at = seen()
+        for _ in range(4):
+            seat.press("+")
+        assert seen()[1] == pytest.approx(at[1], abs=3)  # it is not yet wider than the view
+        at = seen()
+        seat.value(
+            f"(([clientX, clientY]) => {{ for (let n = 0; n < 3; n += 1) document.querySelector('.graph-place').dispatchEvent("
+            f"new WheelEvent('wheel', {{ ctrlKey: true, deltaY: -100, clientX, clientY, cancelable: true }})); }})({middle})"
+        )
+        assert seen() == pytest.approx(at, abs=3)
+        left, top = view[0] + 5, view[1] + 90
+        assert not seat.value(f"document.elementFromPoint({left}, {top}).closest('[data-focus]')")
+        seat.mouse("mousePressed", left, top)
+        seat.mouse("mouseMoved", left, top - 60)
+        seat.mouse("mouseReleased", left, top - 60, 0)
+        assert seen() == pytest.approx([at[0], at[1] - 60], abs=3)
+        seat.press("f")
+        place = "document.querySelector('.graph-place')"
+        assert seat.value(
+            f"{place}.scrollWidth <= {place}.clientWidth && {place}.scrollHeight <= {place}.clientHeight"
+        )

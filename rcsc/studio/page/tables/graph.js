@@ -10,26 +10,32 @@ function put(kind, attributes = {}, ...inside) {
   made.append(...inside.filter((one) => one !== null && one !== undefined));
   return made;
 }
-const TEXT = 15, LEFT = 8;
+const TEXT = 15, LEFT = 8, LEAST = 0.05;
 
 export function mount(root, bus) {
   const desk = deskOf(bus);
   const words = make("span", { class: "graph-words" });
   const state = make("input", { class: "filter", size: "14", "aria-label": "Variable whose values are the states", placeholder: "state variable", spellcheck: "false" });
   const zooms = [["−", "Smaller", 1 / 1.25], ["+", "Larger", 1.25]].map(([text, what, by]) => make("button", { type: "button", title: what, "aria-label": what, onclick: () => zoom(by) }, text));
-  const fit = make("button", { type: "button", title: "Fit the graph into the view", onclick: () => fitted() }, "Fit");
+  const fit = make("button", { type: "button", title: "The whole graph in the view: f", onclick: () => fitted() }, "Fit");
   const all = make("button", { type: "button", title: "Shut or open every composite state", onclick: () => shutAll() }, "Shut all");
   const place = make("div", { class: "graph-place", "data-keys": "own", tabindex: "-1" });
   const whole = make("div", { class: "graph-whole", role: "status", "aria-live": "polite" });
-  root.append(make("div", { class: "bar" }, make("form", { onsubmit: (event) => { event.preventDefault(); ask(true); } }, state), all, ...zooms, fit, words), place, whole);
+  root.append(make("div", { class: "bar" }, make("form", { onsubmit: (event) => { event.preventDefault(); chosen.set(named, state.value.trim()); ask(true); } }, state), all, ...zooms, fit, words), place, whole);
 
   let shown = null, key = "", scale = 1, asking = null, from = null, hint = "", said = [];
   const shut = new Map(); // by file and table: a set
+  const chosen = new Map(); // by file and table: the state variable that was named
 
+  let named = "";
   const hidden = () => { const name = `${desk.file} ${desk.table}`; if (!shut.has(name)) shut.set(name, new Set()); return shut.get(name); };
 
   async function ask(force = false) {
     if (!root.isConnected || !desk.doc?.known || !desk.table) return;
+    if (named !== `${desk.file} ${desk.table}`) {
+      named = `${desk.file} ${desk.table}`;
+      state.value = chosen.get(named) ?? "";
+    }
     const now = JSON.stringify([desk.file, desk.doc.version, desk.table, [...hidden()], state.value]);
     if (now === key && !force) return;
     key = now;
@@ -46,7 +52,7 @@ export function mount(root, bus) {
       place.classList.remove("stale");
       shown = { ...answer, file: desk.file };
       draw();
-      if (other) { fitted(0.8); begun(); }
+      if (other) begun();
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
       if (signal.aborted || error.message.includes("meanwhile")) return;
@@ -166,7 +172,11 @@ export function mount(root, bus) {
       arrow.classList.toggle("now", lines.some((name) => now.has(name)));
     }
     const states = new Set(levels.map((level) => level.now?.[shown?.state]).filter(Boolean));
-    for (const box of shown?.boxes ?? []) place.querySelector(`.box[data-name="${CSS.escape(box.name)}"]`)?.classList.toggle("here", box.kind !== "any" && box.states.some((one) => states.has(one)));
+    for (const box of shown?.boxes ?? []) {
+      const one = place.querySelector(`.box[data-name="${CSS.escape(box.name)}"]`), is = box.kind !== "any" && box.states.some((each) => states.has(each));
+      if (is && desk.follows && !one?.classList.contains("here") && !place.contains(document.activeElement)) one?.scrollIntoView({ block: "nearest", inline: "nearest" });
+      one?.classList.toggle("here", is);
+    }
     const runs = levels.map((level) => `${level.level} is in ${level.now?.[shown?.state] ?? "?"}, line ${(level.lines ?? []).join(" and ") || "none"}`);
     if (shown) words.textContent = [...runs, ...said].join(" · ");
   }
@@ -195,22 +205,54 @@ export function mount(root, bus) {
     svg.setAttribute("width", shown.width * scale);
     svg.setAttribute("height", shown.height * scale);
   }
-  function zoom(by) {
-    scale = Math.max(0.2, Math.min(3, scale * by));
+  /** Larger or smaller; what stands at a point of the page stays there: what has the focus, or the middle. */
+  function zoom(by, at = null) {
+    const svg = place.querySelector("svg");
+    if (!svg) return;
+    const middle = (one) => { const { left, top, width, height } = one.getBoundingClientRect(); return [left + width / 2, top + height / 2]; };
+    const held = document.activeElement?.closest?.(".graph-place [data-focus]");
+    const [x, y] = at ?? middle(held && seen(held) ? held : place);
+    const [left, top] = corner(svg), before = scale;
+    scale = Math.max(LEAST, Math.min(3, scale * by));
     sized();
+    const [newLeft, newTop] = corner(svg);
+    place.scrollLeft += newLeft + ((x - left) / before) * scale - x;
+    place.scrollTop += newTop + ((y - top) / before) * scale - y;
   }
-  function fitted(least = 0.3) {
+  const corner = (one) => { const { left, top } = one.getBoundingClientRect(); return [left, top]; };
+  function seen(one) {
+    const box = one.getBoundingClientRect(), view = place.getBoundingClientRect();
+    return box.right > view.left && box.left < view.right && box.bottom > view.top && box.top < view.bottom;
+  }
+  /** The whole graph in the view. */
+  function fitted() {
     if (!shown || !place.clientWidth) return;
-    scale = Math.max(least, Math.min(1.2, (place.clientWidth - 4) / shown.width));
+    scale = Math.max(LEAST, Math.min(1.2, (place.clientWidth - 4) / shown.width, (place.clientHeight - 4) / shown.height));
     sized();
   }
 
-  /** Show where the table begins. */
+  /** Show where the table begins, in letters that can be read. */
   function begun() {
-    const first = shown.arrows.find(({ source }) => source === "")?.target ?? shown.boxes[0]?.name;
-    const box = shown.boxes.find(({ name }) => name === first);
-    if (box) place.scrollTo({ left: Math.max(0, (box.corner[0] + box.size[0] / 2) * scale - place.clientWidth / 2), top: 0 });
+    if (!place.clientWidth) return;
+    scale = Math.max(0.8, Math.min(1.2, (place.clientWidth - 4) / shown.width));
+    sized();
+    const box = shown.boxes.find(({ kind }) => kind === "begin") ?? shown.boxes[0];
+    if (box) place.scrollTo({ left: Math.max(0, (box.corner[0] + box.size[0] / 2) * scale - place.clientWidth / 2), top: Math.max(0, (box.corner[1] - 24) * scale) });
   }
+
+  place.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey) return; // without it the graph is scrolled
+    event.preventDefault();
+    zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15, [event.clientX, event.clientY]);
+  }, { passive: false });
+  place.addEventListener("pointerdown", (event) => { // the ground is dragged
+    if (event.button !== 0 || event.pointerType !== "mouse" || event.target.closest("[data-focus]")) return;
+    const [left, top] = [place.scrollLeft + event.clientX, place.scrollTop + event.clientY];
+    const move = ({ clientX, clientY }) => place.scrollTo(left - clientX, top - clientY);
+    place.classList.add("dragged");
+    addEventListener("pointermove", move);
+    addEventListener("pointerup", () => { removeEventListener("pointermove", move); place.classList.remove("dragged"); }, { once: true });
+  });
 
   // --- drawing an arrow ---
 
@@ -278,7 +320,7 @@ export function mount(root, bus) {
       done();
       if (from && focus.dataset.state) finish(focus.dataset.state);
       else focus.dispatchEvent(new MouseEvent("click", { bubbles: true }));
-    } else if (/^Arrow/.test(event.key) && focus && !event.ctrlKey) { done(); near(focus, event.key); } else if (event.ctrlKey && event.key.toLowerCase() === "z") { done(); if (event.shiftKey) desk.redo(); else desk.undo(); } else if (event.key === "+" || event.key === "-") { done(); zoom(event.key === "+" ? 1.25 : 0.8); }
+    } else if (/^Arrow/.test(event.key) && focus && !event.ctrlKey) { done(); near(focus, event.key); } else if (event.ctrlKey && event.key.toLowerCase() === "z") { done(); if (event.shiftKey) desk.redo(); else desk.undo(); } else if (event.key === "+" || event.key === "-") { done(); zoom(event.key === "+" ? 1.25 : 0.8); } else if (event.key === "f" && !event.ctrlKey) { done(); fitted(); }
   });
 
   /** Go to what is next in a direction; only to states while an arrow is drawn. */
@@ -297,7 +339,7 @@ export function mount(root, bus) {
   }
 
   desk.on(() => ask());
-  for (const [keys, what] of [["a", "Draw an arrow from the state, then choose where it ends"], ["arrows", "Go to what is next"], ["enter", "Select the line; shut or open a composite state"], ["+ and -", "Larger and smaller"]]) {
+  for (const [keys, what] of [["a", "Draw an arrow from the state, then choose where it ends"], ["arrows", "Go to what is next"], ["enter", "Select the line; shut or open a composite state"], ["+ and -, or ctrl and the wheel", "Larger and smaller"], ["f", "The whole graph in the view"]]) {
     bus.keys.push({ keys: `In the graph: ${keys}`, what, run: () => {}, where: "Graph" });
   }
   return { shown: () => { ask(); marks(); } };
