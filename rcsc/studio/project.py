@@ -4,9 +4,11 @@ In: what is to be opened. Out: the concerns, which may know each other.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rcsc.shell.opening import Opening
+from rcsc.shell.session import Session
 from rcsc.studio.build import Build
 from rcsc.studio.hub import Concern, Hub
 from rcsc.studio.plots import Plots
@@ -46,6 +48,7 @@ def concerns(
     build = Build(opening.path, hub, live)
     live.prove_first = build.prove_first
     desk = Desk(opening.path, hub.tell, hub.do, first)
+    live.opened.append(lambda session: _sees(session, desk))
     cell = Cell(time, hub.tell, drawer)
     return (
         live,
@@ -61,3 +64,8 @@ def concerns(
         Moments(hub, time, cell),
         Findings(desk),
     )
+
+
+def _sees(session: Session, desk: Desk) -> None:
+    """Have `reload` refuse what is on disk where a page shows another text of it."""
+    session.plant = replace(session.plant, unwritten=desk.unwritten)

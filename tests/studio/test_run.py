@@ -561,6 +561,35 @@ def test_reload_is_gated_by_the_proof(dock: Path) -> None:
         source.write_text(text, encoding="utf-8")
 
 
+def test_reload_takes_no_file_of_which_a_page_shows_another_text(dock: Path) -> None:
+    """What the page proves is not on disk: neither it nor the text before it is taken, and the reason says so."""
+    source = dock.parent / "drive.rcs"
+    text = source.read_text(encoding="utf-8")
+
+    async def work(one: Page, other: Page) -> None:
+        await one.ask("run.type", line="step 3")
+        files = [each["file"] for each in (await one.ask("tables.list"))]
+        own, above = (
+            next(each for each in files if each.endswith(name)) for name in ("drive.rcs", "supervisor.rcs")
+        )
+        for name in (own, above):
+            opened = await other.ask("tables.open", file=name)
+            edit = {"start_line": 0, "start_column": 0, "end_line": 0, "end_column": 0, "text": "# mine\n"}
+            await other.ask("tables.edit", file=name, version=opened["version"], edits=[edit])
+        for line in ("reload drive", "diff drive", "reload drive anyway"):
+            with pytest.raises(Refused, match=r"drive\.rcs is changed here and not written") as refused:
+                await one.ask("run.type", line=line)
+            assert "write the file first" in refused.value.helps[0]
+        await other.ask("tables.save", file=own)
+        answer = await one.ask("run.type", line="reload drive")
+        assert "`drive` runs its new tables from cycle 4 on" in answer["shown"][-1]
+
+    try:
+        studio(dock, work)
+    finally:
+        source.write_text(text, encoding="utf-8")
+
+
 @pytest.fixture
 def edit(dock: Path) -> Iterator[Callable[[tuple[str, str]], None]]:
     """Edits the drive's tables as they were, which are put back."""

@@ -4,7 +4,9 @@ In: a running level, the system's description and where it stands. Out: `Reloade
 old level runs on. Whether it is taken is for `gate` to judge.
 """
 
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -40,12 +42,14 @@ class Origin:
 
     Attributes:
         path: Its description; sources stand beside it.
+        unwritten: Gives the real paths of texts that somebody has changed and not written.
     """
 
     path: Path
     system: Description
     kind: Kind
     queries: Mapping[str, Query]
+    unwritten: Callable[[], AbstractSet[str]] = frozenset
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +115,7 @@ def reload(plant: Origin, spec: LevelSpec, old: RunningLevel) -> Reloaded:
         Refused: They are not proved, or the present state is not in what was proved.
     """
     source = source_of(plant, spec)
+    _written(plant, spec, source)
     sources = kept(source)
     with scratch("reload") as place:
         compiled = compile_(_settings(source), place, TARGETS, only_check=False)
@@ -129,6 +134,21 @@ def reload(plant: Origin, spec: LevelSpec, old: RunningLevel) -> Reloaded:
     carried = _carried(old, level)
     _in_proof(level, program)
     return Reloaded(level, program, digest, sources, carried)
+
+
+def _written(plant: Origin, spec: LevelSpec, source: Path) -> None:
+    """Refuse to take what is on disk where somebody sees another text of it."""
+    held = plant.unwritten()
+    if not held:
+        return
+    used = {os.path.realpath(file): file for file in load([str(source)]).files}
+    names = [os.path.basename(used[path]) for path in used if path in held]
+    if names:
+        raise _refused(
+            spec.name,
+            f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} changed here and not written",
+            "write the file first, or take the changes back: what is on disk is taken",
+        )
 
 
 def _settings(source: Path) -> Settings:

@@ -361,6 +361,10 @@ class Desk:
                 said.append(f"{name} was not saved: its text is kept in {kept}")
         return said
 
+    def unwritten(self) -> frozenset[str]:
+        """The real paths of texts that are changed here and not saved."""
+        return frozenset(os.path.realpath(each.file) for _, each in self.others() if each.dirty)
+
     def others(self) -> Iterator[tuple[str, Document]]:
         """Every open file."""
         with self._lock:
