@@ -6,12 +6,12 @@ Nothing is kept on disk, and the cache of earlier runs is not asked: what is typ
 
 import os
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from threading import Lock
 from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.codes import Code
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 BOM = "\ufeff"
 GLANCE_STEPS = 200_000
 """Steps of Z3 a question while somebody types: some hundredths of a second."""
-GLANCE_S = 0.1
-"""Processor time in which all questions of a glance have to be asked, in seconds, and that of the last."""
+GLANCE_S = 0.07
+"""Processor time of a glance, in seconds, from the text on: what is not found by then is left open, and the answer is put together."""
 _LEFT_OPEN = {Code.UNDECIDED}
 """Findings that a larger budget may take away."""
 
@@ -112,7 +112,7 @@ class Workspace:
         self.memo = Memo()
         self._overlay: Mapping[str, str] = {}
         self._readings: dict[str, Reading] = {}
-        self._reads = Lock()
+        self._reads = threading.Lock()
         self._checked: dict[str, Checked] = {}
         self._answers: dict[str, tuple[Checked, Answer]] = {}
 
@@ -191,6 +191,7 @@ class Workspace:
             OutdatedError: Nobody waits for the answer.
         """
         path = os.path.normpath(os.path.abspath(file))
+        over = _spent(GLANCE_S)
         with self._asking(go_on):
             reading = self.reading(path)
             known = self._checked.get(path)
@@ -201,8 +202,7 @@ class Workspace:
             options = replace(self.options, steps=steps, cpu_s=GLANCE_S, brief=True)
             self.memo.keeps_all = False
             try:
-                end_s = time.thread_time() + GLANCE_S
-                with smt.until(lambda: time.thread_time() >= end_s):
+                with smt.until(over, breaks_off=True):
                     checked = self._check(reading, options)
             finally:
                 self.memo.keeps_all = True
@@ -246,8 +246,11 @@ class Workspace:
             OutdatedError: Nobody does any more.
         """
         self.memo.go_on = go_on
-        with uncollected(), smt.until(lambda: not go_on(), breaks_off=True):
-            yield
+        try:
+            with uncollected(), smt.until(lambda: not go_on(), breaks_off=True):
+                yield
+        except smt.OverError as over:
+            raise OutdatedError from over
         if not go_on():
             raise OutdatedError
 
@@ -407,6 +410,13 @@ def _read(path: str, loaded: Loaded, overlay: Mapping[str, str]) -> Reading:
         return Reading(path, loaded, resolved, None, loaded.diagnostics)
     wrong = tuple(sorted({*loaded.diagnostics, *resolved}, key=sort_key))
     return Reading(path, loaded, None, rest_of(path, loaded, wrong, overlay), wrong)
+
+
+def _spent(seconds: float) -> Callable[[], bool]:
+    """Ask, in any thread, whether this one has used so much processor time from now on."""
+    clock = time.pthread_getcpuclockid(threading.get_ident())
+    end_s = time.clock_gettime(clock) + seconds
+    return lambda: time.clock_gettime(clock) >= end_s
 
 
 def _alike(before: Loaded, now: Loaded) -> bool:

@@ -17,6 +17,15 @@ def uncollected() -> Iterator[None]:
             gc.enable()
 
 
+def settled() -> None:
+    """Have the search for circles pass over all that there is now: for who works again and again on what stays, when nobody waits.
+
+    A search that meets all of a language server's programs takes longer than to answer a key.
+    """
+    gc.collect()
+    gc.freeze()
+
+
 @contextmanager
 def last_work() -> Iterator[None]:
     """As `uncollected`, for the last work of a process: what there is at its end is not looked at when the process ends, either."""

@@ -79,6 +79,8 @@ class Asker:
         if not obligations:
             return []
         self.tally.by_solver += len(obligations)
+        if smt.gives_up("what may fail"):
+            return [Failure(obligation, Discharge.OPEN) for obligation in obligations]
         try:
             return _Question(self, obligations, base(), wanted).answer()
         except smt.troubles():
@@ -88,6 +90,8 @@ class Asker:
         """Whether all of them are shown wherever `base` holds, by one question; left open is not shown."""
         if not obligations:
             return True
+        if smt.gives_up("whether all holds"):
+            return False
         try:
             return _Question(self, obligations, base(), lambda _: False).all_hold()
         except smt.troubles():

@@ -180,6 +180,22 @@ def spent() -> bool:
     return any(budget.spent for budget in _own.budgets)
 
 
+def gives_up(what: str) -> bool:
+    """Whether something is over (`until`): what takes long outside Z3 asks it, and what is then not looked for counts as left open.
+
+    Args:
+        what: What would be looked for.
+    """
+    if any(isinstance(budget, _Until) and budget.spent for budget in _own.budgets):
+        leave_open(what)
+        return True
+    return False
+
+
+class OverError(Exception):
+    """Something is over (`until`): what was being looked for was left open."""
+
+
 def troubles() -> tuple[type[BaseException], ...]:
     """Errors of Z3 and exhausted memory, also outside a check: nothing is proved then."""
     loaded = sys.modules.get("z3")

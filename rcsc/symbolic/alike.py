@@ -48,6 +48,8 @@ def alike(
     first, second = (table.lines[at] for at in pair)
     if _spelled(first) == _spelled(second):
         return Effects(same=True)
+    if smt.gives_up("whether two lines do the same"):
+        return Effects(same=None)
     try:
         return _Comparison(program, table, (first, second), where).effects(options)
     except (TooLongError, RecursionError):
@@ -156,6 +158,8 @@ def _here(program: Program, table: Table, conditions: Iterable[Expr], shared: Sh
 
 
 def _possible(nodes: list[Node], options: Options) -> Answer:
+    if smt.gives_up("whether anything is so"):
+        return Answer.UNKNOWN
     solver = Solver(options.limits)
     solver.add(*values.domain(values.variables(nodes).values()), *map(values.term_of, nodes))
     return solver.check()

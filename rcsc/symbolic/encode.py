@@ -141,6 +141,8 @@ def least_where(
     conditions: Iterable[Expr], variables: Iterable[Variable], shown: Iterable[Variable], options: Options
 ) -> dict[str, Value] | None:
     """The least values of the variables shown for which the conditions hold; None where there are none, or none is found."""
+    if smt.gives_up("the least input"):
+        return None
     frame, domain = declared(variables)
     solver = Solver(options.limits)
     try:

@@ -97,6 +97,10 @@ def confirm(
     """Compare the findings with Z3's answers: do two lines overlap, and is there a gap?"""
     if not worth_asking(table, options) or any(isinstance(finding, Undecided) for finding in findings):
         return Agreement.NOT_ASKED
+    if smt.gives_up(
+        "whether Z3 agrees"
+    ):  # before anything is put into its words, which takes longer than to ask
+        return Agreement.UNKNOWN
     if options.solver == "auto":
         options = replace(options, steps=min(options.steps, _STEPS))
     asked = TableSolver(program, table, options)

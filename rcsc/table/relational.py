@@ -8,6 +8,7 @@ one solver that is made when first needed; *unknown* is a finding, never a proof
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 
 from rcsc.lang.expressions.folding import fold
@@ -73,6 +74,24 @@ class Decided:
     findings: tuple[TableFinding, ...]
     certificate: Mapping[str, object] | None
     used: tuple[AssumptionName, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A finding, and the region around its input, where one is to be grown: that takes longest, and is done last."""
+
+    finding: TableFinding
+    grow: Callable[[], Region | None] | None = None
+
+    def grown(self) -> TableFinding:
+        """The finding with its region."""
+        match self.finding:
+            case Overlap() if self.grow is not None:
+                return replace(self.finding, region=self.grow())
+            case Gap() if self.grow is not None:
+                return replace(self.finding, regions=(self.grow(),))
+            case _:
+                return self.finding
 
 
 def decide(program: Program, table: Table, options: Options) -> Decided:
@@ -163,7 +182,9 @@ class _Decision:
         search = self.search(kept)
         if search.proved:
             kept, search = self.spared(search)
-        findings = (*self.overlaps(search), *self.gap(search), *self.dead(search))
+        found = [*self.overlaps(search), *self.gap(search)]
+        dead = self.dead(search)
+        findings: tuple[TableFinding, ...] = (*(each.grown() for each in found), *dead)
         if search.undecided:
             findings = (*findings, Undecided(f"{search.undecided} regions of the input space"))
         names = tuple(self.table.assumptions[at] for at in kept)
@@ -202,7 +223,7 @@ class _Decision:
             point = least(self.universe, [*pinned, *self.assumed], self.columns)
             if not isinstance(point, NoWitness):
                 return [Gap((self.snapshot(point),), (None,))]
-        return self.gap(Search())
+        return [each.finding for each in self.gap(Search())]
 
     def search(
         self, kept: Sequence[int], budget: int = 60_000, *, alone: bool = False, covering: bool = False
@@ -279,23 +300,27 @@ class _Decision:
             return self.asked.holds(*terms)
         return Answer.UNSATISFIABLE if isinstance(point, NoWitness) else Answer.SATISFIABLE
 
-    def overlaps(self, search: Search) -> list[TableFinding]:
+    def overlaps(self, search: Search) -> list[_Found]:
         """Every overlapping pair with its least witness."""
         pairs = set(search.overlaps)
         for seen in search.witnesses:
             pairs.update(combinations(self.matching(seen), 2))
         for asked in search.doubtful:
             pairs.update(self.others(asked, pairs))
-        findings: list[TableFinding] = []
+        found: list[_Found] = []
         if self.options.brief and len(pairs) > 1:
             smt.leave_open("where else two lines meet")
         for first, second in sorted(pairs):
-            grown = len(findings) < (1 if self.options.brief else _MOST_GROWN)
-            findings.append(self.overlap(first, second, grown=grown))
-        return findings
+            if found and smt.gives_up("which other lines overlap"):
+                break
+            grown = len(found) < (1 if self.options.brief else _MOST_GROWN)
+            found.append(self.overlap(first, second, grown=grown))
+        return found
 
     def others(self, asked: Question, known: AbstractSet[tuple[int, int]]) -> set[tuple[int, int]]:
         """Pairs besides those known that overlap in a region: which input the solver gave of it depends on its mood."""
+        if smt.gives_up("which other lines overlap"):
+            return set()
         z3 = self.asked
         region = [encode(condition, z3.frame) for condition in located(self.spelled(asked))]
         lines = combinations(asked.candidates, 2)
@@ -313,6 +338,8 @@ class _Decision:
 
     def covered(self, search: Search) -> bool:
         """Whether the solver refutes that there are inputs that no line matches where the tree did not look for them."""
+        if smt.gives_up("what no line matches"):
+            return False
         if not must_cover(self.table) and (search.undecided or len(self.clauses) <= _MOST_LINES_GROWN):
             return self.asked.holds(self.asked.none()) is Answer.UNSATISFIABLE
         return all(self.missed(asked) is Answer.UNSATISFIABLE for asked in search.doubtful)
@@ -328,7 +355,7 @@ class _Decision:
         names = set(matching_lines(self.table, snapshot))
         return [at for at, line in enumerate(self.table.lines) if line.name in names]
 
-    def overlap(self, first: int, second: int, *, grown: bool) -> TableFinding:
+    def overlap(self, first: int, second: int, *, grown: bool) -> _Found:
         """A pair of lines that overlaps, at its least input."""
         both = [self.line(first), self.line(second)]
         point = least(self.universe, [*both, *self.assumed], self.columns)
@@ -336,12 +363,12 @@ class _Decision:
             seen = [snapshot for snapshot in self.tried if {first, second} <= set(self.matching(snapshot))]
             witness = self.witness(seen, lambda z3: (z3.line(first), z3.line(second)))
             pair = f"lines `{self.table.lines[first].name}` and `{self.table.lines[second].name}`"
-            return Undecided(pair) if witness is None else Overlap(first, second, witness)
-        outside = some(negated(self.universe, line) for line in both)
-        region = self.around(point, [[outside]]) if grown else None
-        return Overlap(first, second, self.snapshot(point), region)
+            return _Found(Undecided(pair) if witness is None else Overlap(first, second, witness))
+        outside = [[some(negated(self.universe, line) for line in both)]]
+        grow = partial(self.around, point, outside) if grown else None
+        return _Found(Overlap(first, second, self.snapshot(point)), grow)
 
-    def gap(self, search: Search) -> list[TableFinding]:
+    def gap(self, search: Search) -> list[_Found]:
         """The least input that no line matches, if there is one; also where DEFAULT takes it."""
         if must_cover(self.table) and not search.gaps and not search.witnesses:
             return []
@@ -358,13 +385,14 @@ class _Decision:
             if len(settled) == len(points):
                 point = min(settled, key=lambda candidate: [candidate[column] for column in self.columns])
                 lines = [] if many else [[whole(line)] for line in self.clauses]
-                return [Gap((self.snapshot(point),), (None if many else self.around(point, lines),))]
+                grow = None if many else partial(self.around, point, lines)
+                return [_Found(Gap((self.snapshot(point),), (None,)), grow)]
         seen += [snapshot for snapshot in self.tried if not self.matching(snapshot)]
         if covered and not search.gaps and not seen:
             return []
         seen += [self.snapshot(point) for _, point in search.gaps]
         witness = self.witness(seen, lambda z3: (z3.none(),))
-        return [Undecided("what no line matches")] if witness is None else [Gap((witness,), (None,))]
+        return [_Found(Undecided("what no line matches") if witness is None else Gap((witness,), (None,)))]
 
     def dead(self, search: Search | None = None) -> list[TableFinding]:
         """Find the lines that no input matches, and whether only an assumption excludes them.
@@ -376,6 +404,8 @@ class _Decision:
         findings: dict[int, TableFinding] = {}
         near: Point = {}
         for at in order:
+            if smt.gives_up("which lines never match"):
+                break
             point = self.meeting(at, near)
             if not isinstance(point, NoWitness):
                 near = point
@@ -435,10 +465,21 @@ class _Decision:
         pairs = zip(self.variables, self.columns, strict=True)
         return {v.name: value_of_key(v.type, point[column]) for v, column in pairs}
 
-    def around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region:
-        """The widest box around the point in which, under the assumptions, none of `wrong` can hold.
+    def around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region | None:
+        """The widest box around the point in which, under the assumptions, none of `wrong` can hold; None where that is given up.
 
         Its ends are values that the assumptions allow: where they allow nothing, nothing holds.
+        """
+        try:
+            return self._around(point, wrong)
+        except smt.OverError:
+            return None
+
+    def _around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region:
+        """As `around`.
+
+        Raises:
+            smt.OverError: It is given up.
         """
         unwanted = [every(formulas) for formulas in wrong]
 
@@ -462,7 +503,13 @@ class _Decision:
         return told
 
     def empty(self, box: Mapping[int, Bounds], *formulas: Formula) -> bool:
-        """Whether no point of a box meets the assumptions and the formulas."""
+        """Whether no point of a box meets the assumptions and the formulas.
+
+        Raises:
+            smt.OverError: It is given up.
+        """
+        if smt.gives_up("the region around an input"):
+            raise smt.OverError
         atoms = [self.universe.atom(self.universe.single[c], (bounds,)) for c, bounds in box.items()]
         return find(self.universe, [*atoms, *self.assumed, *formulas]) is NoWitness.NONE
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 
+from rcsc.editor.server.serve import at_rest
 from rcsc.editor.server.session import Session
 from rcsc.editor.values import Answer
 from rcsc.editor.written import cells_of, dashes, tables_of
@@ -42,7 +43,7 @@ class Typist:
     """Types into one file, and waits for what is found."""
 
     def __init__(self, path: Path) -> None:
-        self.uri, self.session = path.as_uri(), Session(self._hear)
+        self.uri, self.session = path.as_uri(), Session(self._hear, rests=at_rest)
         self._version, self._heard = 0, asyncio.Queue[Answer]()
 
     async def _hear(self, answer: Answer) -> None:

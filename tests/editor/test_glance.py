@@ -11,6 +11,7 @@ import pytest
 from rcsc.editor import Workspace
 from rcsc.editor.memo import OutdatedError
 from rcsc.editor.values import Answer, State
+from rcsc.editor.workspace import GLANCE_S, Reading
 from rcsc.lang.model import Int
 from rcsc.solvers import smt
 from rcsc.solvers.options import Limits, Options
@@ -66,6 +67,49 @@ def test_what_a_glance_leaves_open_is_neither_told_nor_kept(monkeypatch: pytest.
     assert answer == Workspace().check(file)
     assert said(glance) <= said(answer)
     assert workspace.glance(file) is answer
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["emove/locate.rcs", "gallery/plcopen_safety/guard_code.rcs", "examples/approach.rcs", "task/move.rcs"],
+)
+def test_a_glance_whose_time_is_over_makes_no_question(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To put one into Z3's words takes longer than to ask it."""
+    made: list[Solver] = []
+    make = Solver.__init__
+
+    def counted(self: Solver, limits: Limits = Limits(), *, remembers: bool = False) -> None:
+        made.append(self)
+        make(self, limits, remembers=remembers)
+
+    monkeypatch.setattr(Solver, "__init__", counted)
+    workspace, file = Workspace(), str(REPO / "tables" / name)
+    with monkeypatch.context() as patch:
+        patch.setattr("rcsc.editor.workspace.GLANCE_S", 0.0)
+        assert not workspace.glance(file).final
+    assert not made
+    workspace.check(file)
+    assert made
+
+
+def test_what_it_takes_to_read_a_text_is_time_of_the_glance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a text that takes long to read the answer comes no later, and says no more than is known."""
+    file = str(REPO / "tables/task/acquire.rcs")
+    workspace = Workspace()
+    read = workspace.reading
+
+    def slowly(path: str) -> Reading:
+        end_s = time.thread_time() + 1.5 * GLANCE_S
+        while time.thread_time() < end_s:
+            pass
+        return read(path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Workspace, "reading", lambda _, path: slowly(path))
+        glance = workspace.glance(file)
+    assert not glance.final
+    assert {table.standing.state for table in glance.tables} == {State.STALE}
+    assert workspace.check(file) == Workspace().check(file)
 
 
 def test_a_question_under_way_is_broken_off_when_nobody_waits_for_it() -> None:

@@ -214,3 +214,24 @@ def test_a_key_is_looked_at_at_once_and_keys_that_come_faster_when_they_rest(
         "# 3\n",
         "# 39\n",
     ]
+
+
+def test_what_would_keep_a_key_waiting_is_done_once_all_is_answered(tmp_path: Path) -> None:
+    """And not while somebody types."""
+    path = tmp_path / "t.rcs"
+    done: list[str] = []
+
+    async def listens(answer: Answer) -> None:
+        done.append("final" if answer.final else "glance")
+
+    async def typed() -> None:
+        session = Session(listens, rests=lambda: done.append("rests"))
+        for version in range(5):
+            session.open(path.as_uri(), f"{TABLE}# {version}\n", version)
+        assert session._waiting is not None
+        await session._waiting
+        session.stop()
+
+    asyncio.run(typed())
+    assert done[-2:] == ["final", "rests"]
+    assert done.count("rests") == 1

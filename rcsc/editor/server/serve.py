@@ -18,11 +18,19 @@ from rcsc.editor.server import features, findings
 from rcsc.editor.server.findings import by_file, converter_of, status_of
 from rcsc.editor.server.session import Session
 from rcsc.editor.values import Answer
+from rcsc.host.memory import settled
+from rcsc.lang.syntax.parse import ready
 from rcsc.solvers.options import Options
 
 STATUS = "rcsc/status"
 """The notification that says the standing of each table of a file, after each check."""
 _WATCHED = "**/{*.rcs,rcsc.toml}"
+
+
+def at_rest() -> None:
+    """Do, while nobody types, what would keep a key waiting."""
+    ready()
+    settled()
 
 
 class Server(LanguageServer):
@@ -34,7 +42,7 @@ class Server(LanguageServer):
 
     def __init__(self, options: Options) -> None:
         super().__init__("rcsc", __version__, types.TextDocumentSyncKind.Full)
-        self.session = Session(self.told, options)
+        self.session = Session(self.told, options, rests=at_rest)
         self._shown: dict[str, set[str]] = {}
         _lifecycle(self)
         _texts(self)

@@ -54,6 +54,7 @@ class Session:
         versions: The version of each open file, as it counts them.
         shows: Whether it wants texts of lenses shown; one that shows them itself does not.
         turn: Rises with every change; an answer of an earlier turn is outdated.
+        rests: Called when all is answered, where proofs are made: for what would keep a key waiting.
     """
 
     listens: Callable[[Answer], Awaitable[None]]
@@ -64,6 +65,7 @@ class Session:
     versions: dict[str, int] = field(default_factory=dict)
     turn: int = 0
     shows: bool = True
+    rests: Callable[[], None] = lambda: None
     workspace: Workspace = field(init=False)
     _told: dict[str, tuple[Answer, int | None]] = field(default_factory=dict)
     _results: dict[str, tuple[Answer, int]] = field(default_factory=dict)
@@ -119,6 +121,8 @@ class Session:
             await self._tell(self.answer(path))
         for path in order:
             await self._tell(self.final(path))
+        with contextlib.suppress(OutdatedError):
+            await self.proving(self.rests)
 
     async def _tell(self, asked: Awaitable[Answer]) -> None:
         with contextlib.suppress(OutdatedError):

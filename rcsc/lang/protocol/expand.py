@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, TypeVar
 
 from rcsc.diagnostics.source import Source, Span
@@ -127,7 +127,11 @@ def condition(text: str, span: Span) -> tree.Expr:
 
 def _parsed(lines: Iterable[str], span: Span) -> Sequence[tree.Declaration]:
     """The declarations of a text, all of which stand at the given place."""
-    text = "\n".join(lines)
+    return _parsed_at("\n".join(lines), span)
+
+
+@lru_cache(maxsize=256)  # an editor asks for the same after each key
+def _parsed_at(text: str, span: Span) -> Sequence[tree.Declaration]:
     file = parse(Source("protocol", text))
     assert isinstance(file, tree.File), f"the protocol's own text is wrong: {text}"
     return tuple(_placed(declaration, span) for declaration in file.declarations)

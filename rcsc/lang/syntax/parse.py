@@ -89,6 +89,12 @@ def _tables() -> Tables:
     return Tables(grammar)
 
 
+def ready() -> None:
+    """Make what the first wrong text needs, which takes longer than to parse a hundred right ones."""
+    _parser()
+    _tables()
+
+
 def made_tables() -> Grammar:
     """The tables of the grammar, made by Lark."""
     return grammar_of_lark(_parser(), _digest())

@@ -17,6 +17,7 @@ from math import prod
 from typing import NamedTuple, TypeAlias
 
 from rcsc.lang.interval_sets import meet
+from rcsc.solvers import smt
 from rcsc.table.regions import points
 from rcsc.table.regions.atoms import Clauses, Universe
 from rcsc.table.regions.ends import Cut, Ends
@@ -113,9 +114,15 @@ class Tree:
                 self.root.known = OutsideAssumption(i)
 
     def run(self) -> Search:
-        """Decide every region, in preorder."""
+        """Decide every region, in preorder.
+
+        Raises:
+            smt.OverError: It is given up.
+        """
         stack = [self.root]
         while stack:
+            if smt.gives_up("how the lines share the inputs"):
+                raise smt.OverError("nobody waits for the answer")
             region = stack.pop()
             node, children = self._decide(region)
             self.search.nodes.append(node)
