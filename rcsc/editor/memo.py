@@ -12,6 +12,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.driver.proofs import moved
 from rcsc.lang.model import Program, Table
 from rcsc.solvers import smt
+from rcsc.symbolic.remembered import Answers
 from rcsc.table.verdict import TableVerdict
 
 T = TypeVar("T")
@@ -52,11 +53,13 @@ class Memo:
         go_on: Asked before each table; where it says no the proof ends with `OutdatedError`.
         keeps_all: Whether what was made with questions left open is kept, too: not where a larger budget may answer them.
         made: How many verdicts were made because none was known.
+        answers: Of Z3, to questions about lines and procedures: a changed line leaves most as they were.
     """
 
     go_on: Callable[[], bool] = lambda: True
     made: int = 0
     keeps_all: bool = True
+    answers: Answers = field(default_factory=Answers)
     _versions: list[_Versions] = field(default_factory=list)
     _program: Program | None = None
 
@@ -103,7 +106,7 @@ class Memo:
 
     def forget(self) -> None:
         """Forget every verdict."""
-        self._versions, self._program = [], None
+        self._versions, self._program, self.answers = [], None, Answers()
 
     def asked(self) -> None:
         """Go on only if somebody waits; what was proved since nobody did may be of questions left open, and is not kept.

@@ -33,6 +33,7 @@ from rcsc.lang.project import PROJECT_FILE, Loaded, load, project_root
 from rcsc.lang.resolve import resolve
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
+from rcsc.symbolic.remembered import remembering
 from rcsc.table.program import prove_program
 
 if TYPE_CHECKING:
@@ -247,7 +248,11 @@ class Workspace:
         """
         self.memo.go_on = go_on
         try:
-            with uncollected(), smt.until(lambda: not go_on(), breaks_off=True):
+            with (
+                uncollected(),
+                remembering(self.memo.answers),
+                smt.until(lambda: not go_on(), breaks_off=True),
+            ):
                 yield
         except smt.OverError as over:
             raise OutdatedError from over

@@ -18,11 +18,13 @@ from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic import trial, values
 from rcsc.symbolic.encode import Frame, least_witness
 from rcsc.symbolic.evaluation import Obligation
+from rcsc.symbolic.remembered import answered
 from rcsc.symbolic.values import Node
 
 MOST_CHOICES = 64
 """Choices of assumptions that are tried for the fewest; past them, one that has none to spare is taken."""
 Candidate = TypeVar("Candidate")
+Answered = TypeVar("Answered")
 
 MOST_UNKNOWN = 2
 """After so many questions without an answer, the rest of a run is not asked."""
@@ -57,6 +59,10 @@ class Failure:
     witness: tuple[tuple[Variable, Value], ...] = ()
 
 
+_Failed = tuple[int, Discharge, tuple[tuple[Variable, Value], ...]]
+"""An obligation that is not shown, by its position; its outcome; its witness."""
+
+
 @dataclass(slots=True)
 class Asker:
     """Asks for one program.
@@ -82,9 +88,17 @@ class Asker:
         if smt.gives_up("what may fail"):
             return [Failure(obligation, Discharge.OPEN) for obligation in obligations]
         try:
-            return _Question(self, obligations, base(), wanted).answer()
+            failed = self._failed(obligations, base(), [wanted(obligation) for obligation in obligations])
+            return [Failure(obligations[at], outcome, witness) for at, outcome, witness in failed]
         except smt.troubles():
             return [Failure(obligation, Discharge.OPEN) for obligation in obligations]
+
+    def _failed(
+        self, obligations: Sequence[Obligation], base: Sequence[Node], wanted: Sequence[bool]
+    ) -> "tuple[_Failed, ...]":
+        """As `unshown`, each obligation by its position."""
+        question = _Question(self, obligations, base, wanted)
+        return question.remembered("unshown", question.answer)
 
     def all_hold(self, obligations: Sequence[Obligation], base: Callable[[], Sequence[Node]]) -> bool:
         """Whether all of them are shown wherever `base` holds, by one question; left open is not shown."""
@@ -93,7 +107,8 @@ class Asker:
         if smt.gives_up("whether all holds"):
             return False
         try:
-            return _Question(self, obligations, base(), lambda _: False).all_hold()
+            question = _Question(self, obligations, base(), [False] * len(obligations))
+            return question.remembered("all hold", question.all_hold)
         except smt.troubles():
             return False
 
@@ -135,7 +150,7 @@ class _Question:
         asker: Asker,
         owed: Sequence[Obligation],
         base: Sequence[Node],
-        wanted: Callable[[Obligation], bool],
+        wanted: Sequence[bool],
     ) -> None:
         self.asker, self.owed, self.wanted = asker, owed, wanted
         self.bad = [values.both(obligation.path, values.negation(obligation.good)) for obligation in owed]
@@ -143,8 +158,8 @@ class _Question:
         self.variables = sorted(variables.values(), key=lambda node: self._place(node.name))
         self.reals = any(isinstance(node.kind, Real) for node in self.variables)
         self.known = list(base)
-        self.base = [*values.domain(self.variables), *map(values.term_of, base)]
-        self.failures: list[Failure] = []
+        self.base: list[Term] = []
+        self.failures: list[_Failed] = []
         self.unknown = 0
         self.solver: Solver | None = None
         self._last: tuple[Answer, trial.Point | None] = (Answer.UNKNOWN, None)
@@ -152,7 +167,18 @@ class _Question:
     def _place(self, name: str) -> tuple[int, str]:
         return self.asker.order.get(name, len(self.asker.order)), name
 
-    def answer(self) -> list[Failure]:
+    def remembered(self, what: str, ask: Callable[[], Answered]) -> Answered:
+        """Ask this, unless the same was answered before: the least witness depends on the order of the variables."""
+        names = tuple(node.name for node in self.variables)
+        key = (what, tuple(self.wanted), names)
+
+        def asked() -> Answered:
+            self.base = [*values.domain(self.variables), *map(values.term_of, self.known)]
+            return ask()
+
+        return answered(key, [*self.bad, *self.known], asked)
+
+    def answer(self) -> tuple[_Failed, ...]:
         """Return what is not shown, in the order owed."""
         for at in halved(range(len(self.owed)), self._hold):
             self._fail(at, *self._last)
@@ -160,7 +186,7 @@ class _Question:
             self.base.append(values.term_of(self.known[-1]))
             if self.solver is not None:
                 self.solver.add(self.base[-1])
-        return self.failures
+        return tuple(self.failures)
 
     def all_hold(self) -> bool:
         """Whether none of the obligations can fail."""
@@ -172,7 +198,7 @@ class _Question:
     def _hold(self, places: Sequence[int]) -> bool:
         """Whether these obligations need no further search: they hold, or are given up as open."""
         if self.unknown > MOST_UNKNOWN:
-            self.failures += [Failure(self.owed[at], Discharge.OPEN) for at in places]
+            self.failures += [(at, Discharge.OPEN, ()) for at in places]
             return True
         bad = values.any_of([self.bad[at] for at in places])
         tried = trial.witness([*self.known, bad], self.variables) if self.reals else None
@@ -206,10 +232,10 @@ class _Question:
     def _fail(self, at: int, answer: Answer, tried: trial.Point | None) -> None:
         if answer is Answer.UNKNOWN:
             self.unknown += 1
-            self.failures.append(Failure(self.owed[at], Discharge.OPEN))
+            self.failures.append((at, Discharge.OPEN, ()))
             return
-        witness = self._witness(self.bad[at], tried) if self.wanted(self.owed[at]) else ()
-        self.failures.append(Failure(self.owed[at], Discharge.FAILS, witness))
+        witness = self._witness(self.bad[at], tried) if self.wanted[at] else ()
+        self.failures.append((at, Discharge.FAILS, witness))
 
     def _witness(self, bad: Node, tried: trial.Point | None) -> tuple[tuple[Variable, Value], ...]:
         shown = [

@@ -25,5 +25,5 @@ Trusted, without `rcsc certify`: everything but `bits` and `trial`, whose result
 than `MOST_STEPS` is not followed, and the program is then not proved.
 
 Modules, in the order the data flows: `values`, `evaluation`, `execution`, `effect`, `alike` (two lines), then
-`encode`, `keyed`, `measured`, `bits`, `trial`.
+`encode`, `keyed`, `measured`, `bits`, `trial`, `remembered` (answers to questions asked before).
 """

@@ -22,6 +22,7 @@ from rcsc.symbolic.effect import Meaning, Shared, differences, value_after
 from rcsc.symbolic.encode import Frame, least_witness
 from rcsc.symbolic.evaluation import TooLongError
 from rcsc.symbolic.execution import Run
+from rcsc.symbolic.remembered import answered
 from rcsc.symbolic.values import Node
 
 
@@ -160,6 +161,10 @@ def _here(program: Program, table: Table, conditions: Iterable[Expr], shared: Sh
 def _possible(nodes: list[Node], options: Options) -> Answer:
     if smt.gives_up("whether anything is so"):
         return Answer.UNKNOWN
-    solver = Solver(options.limits)
-    solver.add(*values.domain(values.variables(nodes).values()), *map(values.term_of, nodes))
-    return solver.check()
+
+    def asked() -> Answer:
+        solver = Solver(options.limits)
+        solver.add(*values.domain(values.variables(nodes).values()), *map(values.term_of, nodes))
+        return solver.check()
+
+    return answered(("possible",), nodes, asked)

@@ -21,6 +21,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.operator_table import single
+from rcsc.solvers import smt
 from rcsc.solvers.search import lowest
 from rcsc.symbolic.values import Node, Shape, parts_first
 from rcsc.symbolic.values import variable as variable_of
@@ -40,6 +41,8 @@ def witness(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | No
     random = Random(0)  # noqa: S311  # a sample, not a secret
     best: Point | None = None
     for number in range(SAMPLES):
+        if smt.gives_up("what trial finds"):
+            break
         point = {variable.name: _pick(variable, number, random) for variable in variables}
         if _all_hold(order, conditions, point) and (best is None or _less(point, best, variables)):
             best = point
