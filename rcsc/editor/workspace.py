@@ -247,15 +247,12 @@ class Workspace:
             OutdatedError: Nobody does any more.
         """
         self.memo.go_on = go_on
-        try:
-            with (
-                uncollected(),
-                remembering(self.memo.answers),
-                smt.until(lambda: not go_on(), breaks_off=True),
-            ):
-                yield
-        except smt.OverError as over:
-            raise OutdatedError from over
+        with (
+            uncollected(),
+            remembering(self.memo.answers),
+            smt.until(lambda: not go_on(), breaks_off=True),
+        ):
+            yield
         if not go_on():
             raise OutdatedError
 

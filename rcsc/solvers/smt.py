@@ -192,10 +192,6 @@ def gives_up(what: str) -> bool:
     return False
 
 
-class OverError(Exception):
-    """Something is over (`until`): what was being looked for was left open."""
-
-
 def troubles() -> tuple[type[BaseException], ...]:
     """Errors of Z3 and exhausted memory, also outside a check: nothing is proved then."""
     loaded = sys.modules.get("z3")

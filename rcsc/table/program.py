@@ -220,8 +220,6 @@ def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVer
         ):
             return verdict
         possible = assumptions_satisfiable(program, table, options)
-    except smt.OverError as over:
-        return _left_open(table, Undecided(str(over)))
     except smt.troubles() as trouble:
         return _left_open(table, Undecided(f"{type(trouble).__name__}: {trouble}"))
     if not isinstance(possible, Answer):

@@ -76,6 +76,10 @@ class Decided:
     used: tuple[AssumptionName, ...]
 
 
+class _OverError(Exception):
+    """Nobody waits for the region that is grown (`smt.gives_up`)."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Found:
     """A finding, and the region around its input, where one is to be grown: that takes longest, and is done last."""
@@ -297,7 +301,8 @@ class _Decision:
         """Whether the formulas can hold together, without any assumption."""
         point = find(self.universe, formulas)
         if point is NoWitness.UNKNOWN:
-            return self.asked.holds(*terms)
+            given_up = smt.gives_up("whether the assumptions can hold together")
+            return Answer.UNKNOWN if given_up else self.asked.holds(*terms)
         return Answer.UNSATISFIABLE if isinstance(point, NoWitness) else Answer.SATISFIABLE
 
     def overlaps(self, search: Search) -> list[_Found]:
@@ -311,10 +316,8 @@ class _Decision:
         if self.options.brief and len(pairs) > 1:
             smt.leave_open("where else two lines meet")
         for first, second in sorted(pairs):
-            if found and smt.gives_up("which other lines overlap"):
-                break
             grown = len(found) < (1 if self.options.brief else _MOST_GROWN)
-            found.append(self.overlap(first, second, grown=grown))
+            found.append(self.overlap(first, second, search.overlaps.get((first, second)), grown=grown))
         return found
 
     def others(self, asked: Question, known: AbstractSet[tuple[int, int]]) -> set[tuple[int, int]]:
@@ -355,8 +358,10 @@ class _Decision:
         names = set(matching_lines(self.table, snapshot))
         return [at for at, line in enumerate(self.table.lines) if line.name in names]
 
-    def overlap(self, first: int, second: int, *, grown: bool) -> _Found:
-        """A pair of lines that overlaps, at its least input."""
+    def overlap(self, first: int, second: int, known: Point | None, *, grown: bool) -> _Found:
+        """A pair of lines that overlaps, at its least input; at the one that is known where nobody waits for the least."""
+        if known is not None and smt.gives_up("the least input"):
+            return _Found(Overlap(first, second, self.snapshot(known)))
         both = [self.line(first), self.line(second)]
         point = least(self.universe, [*both, *self.assumed], self.columns)
         if isinstance(point, NoWitness):
@@ -448,15 +453,20 @@ class _Decision:
         self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]
     ) -> Snapshot | None:
         """Return the least input for which the terms hold; where Z3 gives up, the least one known."""
-        z3 = self.asked
-        if seen:
-            few = replace(self.options, steps=min(self.options.steps, _STEPS_OF_LEAST))
-            z3 = TableSolver(self.program, self.table, few)
-        witness = z3.witness(*terms(z3))
+        witness = None if smt.gives_up("the least input") else self._least(seen, terms)
         if witness is None and seen:
             best = min(seen, key=lambda snapshot: [key_of(v.type, snapshot[v.name]) for v in self.variables])
             witness = {v.name: best[v.name] for v in self.variables}
         return witness
+
+    def _least(
+        self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]
+    ) -> Snapshot | None:
+        z3 = self.asked
+        if seen:
+            few = replace(self.options, steps=min(self.options.steps, _STEPS_OF_LEAST))
+            z3 = TableSolver(self.program, self.table, few)
+        return z3.witness(*terms(z3))
 
     # --- witnesses ---------------------------------------------------------------------
 
@@ -472,14 +482,14 @@ class _Decision:
         """
         try:
             return self._around(point, wrong)
-        except smt.OverError:
+        except _OverError:
             return None
 
     def _around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region:
         """As `around`.
 
         Raises:
-            smt.OverError: It is given up.
+            _OverError: It is given up.
         """
         unwanted = [every(formulas) for formulas in wrong]
 
@@ -506,10 +516,10 @@ class _Decision:
         """Whether no point of a box meets the assumptions and the formulas.
 
         Raises:
-            smt.OverError: It is given up.
+            _OverError: It is given up.
         """
         if smt.gives_up("the region around an input"):
-            raise smt.OverError
+            raise _OverError
         atoms = [self.universe.atom(self.universe.single[c], (bounds,)) for c, bounds in box.items()]
         return find(self.universe, [*atoms, *self.assumed, *formulas]) is NoWitness.NONE
 

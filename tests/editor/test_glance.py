@@ -17,6 +17,7 @@ from rcsc.solvers import smt
 from rcsc.solvers.options import Limits, Options
 from rcsc.solvers.smt import Answer as Solved
 from rcsc.solvers.smt import Solver
+from tests.bench.editor import keys
 
 REPO = Path(__file__).parents[2]
 HARD = str(REPO / "tables/primitive/gothru.rcs")
@@ -67,6 +68,30 @@ def test_what_a_glance_leaves_open_is_neither_told_nor_kept(monkeypatch: pytest.
     assert answer == Workspace().check(file)
     assert said(glance) <= said(answer)
     assert workspace.glance(file) is answer
+
+
+@pytest.mark.parametrize("name", ["task/clear.rcs", "task/move.rcs"])
+def test_a_glance_that_ends_anywhere_tells_what_it_has_found(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And nothing that the check takes back: overlaps before the regions around their inputs, which take longest."""
+    file = str(REPO / "tables" / name)
+    text = next(keys(Path(file).read_text()))
+    fresh = Workspace()
+    fresh.open(file, text)
+    wanted = said(fresh.check(file))
+    regions: list[bool] = []
+    for most in range(1, 600, 29):
+        left = list(range(most))
+        monkeypatch.setattr("rcsc.editor.workspace._spent", lambda _, left=left: lambda: not _one_less(left))
+        workspace = Workspace()
+        workspace.open(file, text)
+        glance = workspace.glance(file)
+        assert said(glance) <= wanted, most
+        if not left:
+            assert {table.standing.state for table in glance.tables} <= {State.STALE, State.FAILED}
+            regions += [bool(each.witnesses[0].region) for each in glance.findings if each.code == "RCS402"]
+    assert False in regions
 
 
 @pytest.mark.parametrize(
