@@ -4,7 +4,7 @@ In: a description's path, and which plant, script and executors. Out: the shell'
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.run.description import NO_DATA, BadDescription, Description, description
@@ -28,6 +28,7 @@ class Opening:
         script: Its name; empty where orders are given by hand.
         alone: Whether nothing stands outside the levels, and no database.
         seed: Of what is random in the plant.
+        ordered: Whether the script that the description names gives the orders where `script` names none, as in `rcsc run`.
     """
 
     path: Path
@@ -36,6 +37,7 @@ class Opening:
     script: str = ""
     alone: bool = False
     seed: int = 0
+    ordered: bool = False
 
 
 def opened(wanted: Opening) -> Commands:
@@ -46,11 +48,18 @@ def opened(wanted: Opening) -> Commands:
     """
     system = description(wanted.path)
     signs = signatures(system)
+    wanted = replace(wanted, script=_script(system, wanted))
     stage = Staged() if wanted.alone else _stage(system, signs, wanted)
     queries = silent_queries(system, signs) | dict(stage.queries)
     outside = standing(stage, system, signs) if wanted.script else stage.outside
     running = assemble(system, wanted.kind, queries, outside)
     return Commands(Session(running, Origin(wanted.path, system, wanted.kind, queries)))
+
+
+def _script(system: Description, wanted: Opening) -> str:
+    """Who gives the orders; empty for nobody."""
+    own = wanted.ordered and not wanted.alone and system.script is not None
+    return wanted.script or (str(system.script) if own else "")
 
 
 def _stage(system: Description, signs: Mapping[str, Signature], wanted: Opening) -> Staged:

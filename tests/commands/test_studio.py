@@ -17,7 +17,7 @@ from rcsc.commands import run
 from rcsc.commands.shared.systems import tables_meant
 from rcsc.shell.opening import Opening
 from rcsc.studio.build import NO_SYSTEM
-from tests.studio.served import Page, Refused, page, serving, until
+from tests.studio.served import Page, Refused, page, page_at, serving, until
 
 DOCK = Path(__file__).parents[1] / "data" / "dock"
 COMMAND = (sys.executable, "-c", "from rcsc.commands import main; main()", "studio")
@@ -62,6 +62,29 @@ def test_it_says_one_address_and_ends_at_an_interrupt(tmp_path: Path) -> None:
     assert (studio.returncode, rest, errors) == (0, "the studio is closed\n", "")
 
 
+@pytest.mark.parametrize(("options", "ordered"), [((), ["dock", "stop", "undock"]), (("--by-hand",), None)])
+def test_the_script_that_the_system_names_orders_it_as_in_a_run(
+    options: tuple[str, ...], ordered: list[str] | None, tmp_path: Path
+) -> None:
+    shutil.copytree(DOCK, tmp_path / "dock", ignore=shutil.ignore_patterns("generated", ".rcsc-cache"))
+
+    async def rows(address: str) -> list[str] | None:
+        async with page_at(address) as one:
+            assert (await one.heard("run.state", open=True))["title"] == "dock"
+            await one.ask("run.type", line="step 80")
+            said = one.events.get("run.rows")
+            return said and [row["text"] for row in said["rows"]]
+
+    with subprocess.Popen(
+        [*COMMAND, str(tmp_path / "dock"), *options], stdout=subprocess.PIPE, text=True, cwd=tmp_path
+    ) as studio:
+        try:
+            assert studio.stdout is not None
+            assert asyncio.run(rows(studio.stdout.readline().split()[-1])) == ordered
+        finally:
+            studio.send_signal(signal.SIGINT)
+
+
 def test_what_is_not_in_order_is_not_served(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -72,6 +95,7 @@ def test_what_is_not_in_order_is_not_served(
     (tmp_path / "system.toml").write_text("name = 3\n")
     assert run(["studio"]) == 1
     assert "the studio is at" not in capfd.readouterr().out
+    assert run(["studio", str(DOCK), "--script", "in", "--by-hand"]) == 2
 
 
 # --- tables that belong to no system ---

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     "studio",
     epilog="""\b
 Examples:
-  rcsc studio my_robot                the system in a folder, with its plant
+  rcsc studio my_robot                the system in a folder, with its plant and the script that it names
   rcsc studio make_boxt               a script of the system that is here, row by row
   rcsc studio --plant mujoco          with another of its plants
   rcsc studio --alone                 nothing outside the levels: what comes in is set by hand
@@ -28,9 +28,10 @@ Examples:
 @click.argument("target", metavar="[SYSTEM|SCRIPT|TABLES]", required=False)
 @SYSTEM
 @click.option("--script", default=None, metavar="SCRIPT",
-              help="Who gives orders: a CSV or TOML file, or the name of one beside the system or in its scripts/.")  # fmt: skip
+              help="Who gives orders: a CSV or TOML file, or the name of one here or in its scripts/; else its own.")  # fmt: skip
 @PLANT
 @EXECUTOR
+@click.option("--by-hand", is_flag=True, help="No script gives orders: they are typed.")
 @click.option("--alone", is_flag=True,
               help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
@@ -42,8 +43,8 @@ Examples:
 )
 @click.option("--open", "opens", is_flag=True, help="Open the page in this machine's browser.")
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
-    target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str, alone: bool, seed: int,
-    logs: tuple[Path, ...], port: int, opens: bool,
+    target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str, by_hand: bool, alone: bool,
+    seed: int, logs: tuple[Path, ...], port: int, opens: bool,
 ) -> int:  # fmt: skip
     """Open one page for SYSTEM: its tables, their proof, the levels as they run, and what stands outside them.
 
@@ -57,10 +58,12 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
 
     tables = tables_meant(target, logs) if system is None and script is None else None
     path, named = meant(target, system, script) if tables is None else (tables, "")
+    if by_hand and named:
+        raise click.UsageError(f"`{named}` gives orders, and --by-hand says that nobody does")
     if path.is_file():
         description(path)  # what is wrong with it is told here; what is wrong with its tables, in the page
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
-    opening = Opening(path, kind, plant or "", named, alone, seed)
+    opening = Opening(path, kind, plant or "", named, alone, seed, ordered=not by_hand)
     server = Server(port)
 
     def told(address: str) -> None:
