@@ -18,7 +18,14 @@ from rcsc.commands.group import commands
 from tests.picture import CHECK, PICTURE_OF, PICTURES, RUN, masked, printed
 
 REPO = Path(__file__).parents[2]
-GUIDES = ("README.md", "rcsc/README.md", "tables/README.md", "tables/system.md", "sim/README.md")
+GUIDES = (
+    "README.md",
+    "rcsc/README.md",
+    "tables/README.md",
+    "tables/system.md",
+    "tables/studio.md",
+    "sim/README.md",
+)
 TINY = {
     "rcsc run make_boxt": "rcsc run --no-compile --plant kinematic make_boxt",
     "rcsc run tests/data/dock --": "rcsc run --no-compile tests/data/dock --",

@@ -1,6 +1,7 @@
 """Every view in both themes, at the least size: nothing is cut, sticks out, or is too faint to be read; and scrubbing shows what was."""
 
 import random
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -71,6 +72,21 @@ def test_every_view_can_be_read_in_both_themes(seat: Seat, theme: str) -> None:
         assert seat.settled(LOOK) == [], f"{dialog}, {theme}"
         seat.press("escape")
         seat.wait(f"!document.querySelector('#{dialog}').open")
+
+
+def test_the_page_has_every_key_that_its_guide_names(seat: Seat) -> None:
+    guide = (Path(__file__).parents[2] / "tables" / "studio.md").read_text(encoding="utf-8")
+    guide = re.sub(r"^```.*?^```", "", guide, flags=re.MULTILINE | re.DOTALL)
+    seat.press("escape", "?")
+    seat.wait("document.querySelector('#keys').open")
+    listed = set(seat.value("[...document.querySelectorAll('#keys kbd')].map(({ innerText }) => innerText)"))
+    seat.press("escape")
+    named = {key for key in re.findall(r"`([^`\n]+)`", guide) if len(key) == 1} | {"space"}
+    assert len(named) > 20
+    assert named <= listed
+    chords = {key.lower() for key in re.findall(r"`((?:Ctrl|Alt|Shift|F\d+)[^ `]*)`", guide)} - {"shift"}
+    told = {each.rpartition(": ")[2] for each in listed}
+    assert chords <= told, chords - told
 
 
 def test_the_levels_have_the_room_of_an_empty_console(seat: Seat) -> None:
