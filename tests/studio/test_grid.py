@@ -162,6 +162,8 @@ def _arrow(seat: Seat) -> None:
     seat.value("document.querySelector('.graph-place [data-state=operation_enabled]').focus()")
     seat.press("enter")
     seat.until("#said", "leads from fault to operation_enabled")
+    seat.until(".graph-whole", "failed: ")  # the proof answers where the arrow was drawn
+    assert seat.reads(".graph-proof") == "✗ failed"
     seat.value("document.querySelector('.graph-place [data-state=fault]').focus()")
     seat.press("ctrl+z")
     seat.until("#said", "undone: draw an arrow from fault to operation_enabled")

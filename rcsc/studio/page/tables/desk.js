@@ -2,6 +2,8 @@
 
 import { make, Refusal } from "../bus.js";
 
+export const SIGNS = { proved: "✓", "rests on an assumption": "◑", stale: "…", failed: "✗" }; // beside the words
+
 const desks = new WeakMap();
 
 /** The desk of this page. */

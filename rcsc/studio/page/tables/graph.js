@@ -1,7 +1,7 @@
 // The graph of the table that is shown: states, composite states, and an arrow for each line; linked to the rows, and drawn in.
 
 import { make, Refusal } from "../bus.js";
-import { deskOf, spoken } from "./desk.js";
+import { deskOf, SIGNS, spoken } from "./desk.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 function put(kind, attributes = {}, ...inside) {
@@ -14,21 +14,26 @@ const TEXT = 15, LEFT = 8, LEAST = 0.05;
 
 export function mount(root, bus) {
   const desk = deskOf(bus);
-  const words = make("span", { class: "graph-words" });
+  const words = make("span", { class: "graph-words" }), proof = make("span", { class: "graph-proof standing" });
   const state = make("input", { class: "filter", size: "14", "aria-label": "Variable whose values are the states", placeholder: "state variable", spellcheck: "false" });
   const zooms = [["−", "Smaller", 1 / 1.25], ["+", "Larger", 1.25]].map(([text, what, by]) => make("button", { type: "button", title: what, "aria-label": what, onclick: () => zoom(by) }, text));
   const fit = make("button", { type: "button", title: "The whole graph in the view: f", onclick: () => fitted() }, "Fit");
   const all = make("button", { type: "button", title: "Shut or open every composite state", onclick: () => shutAll() }, "Shut all");
   const place = make("div", { class: "graph-place", "data-keys": "own", tabindex: "-1" });
   const whole = make("div", { class: "graph-whole", role: "status", "aria-live": "polite" });
-  root.append(make("div", { class: "bar" }, make("form", { onsubmit: (event) => { event.preventDefault(); chosen.set(named, state.value.trim()); ask(true); } }, state), all, ...zooms, fit, words), place, whole);
+  root.append(make("div", { class: "bar" }, make("form", { onsubmit: (event) => { event.preventDefault(); chosen.set(named, state.value.trim()); ask(true); } }, state), all, ...zooms, fit, proof, words), place, whole);
 
-  let shown = null, key = "", scale = 1, asking = null, from = null, hint = "", said = [];
+  let shown = null, key = "", scale = 1, asking = null, from = null, hint = "", said = [], drawn = null;
   const shut = new Map(); // by file and table: a set
   const chosen = new Map(); // by file and table: the state variable that was named
 
   let named = "";
   const hidden = () => { const name = `${desk.file} ${desk.table}`; if (!shut.has(name)) shut.set(name, new Set()); return shut.get(name); };
+
+  function tellBeside(...several) {
+    words.textContent = several.join(" · ");
+    words.title = several.join("\n");
+  }
 
   async function ask(force = false) {
     if (!root.isConnected || !desk.doc?.known || !desk.table) return;
@@ -42,7 +47,7 @@ export function mount(root, bus) {
     asking?.abort();
     asking = new AbortController();
     if (shown && (shown.file !== desk.file || shown.table !== desk.table)) { shown = null; place.replaceChildren(); }
-    if (!shown) words.textContent = "deriving the graph …";
+    if (!shown) tellBeside("deriving the graph …");
     const { signal } = asking;
     place.classList.add("stale");
     try {
@@ -56,11 +61,11 @@ export function mount(root, bus) {
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
       if (signal.aborted || error.message.includes("meanwhile")) return;
-      if (!desk.doc.whole && shown?.table === desk.table) { words.textContent = "The graph is of the last text that was in order."; return; }
+      if (!desk.doc.whole && shown?.table === desk.table) { tellBeside("The graph is of the last text that was in order."); return; }
       shown = null;
       place.classList.remove("stale");
       place.replaceChildren(make("p", { class: "soft no-graph" }, "No graph: ", ...spoken(error.message), ".", ...error.helps.map((help) => make("span", {}, " Help: ", ...spoken(help.replace("`--state`", "the field above")), "."))));
-      words.textContent = "";
+      tellBeside("");
     }
   }
 
@@ -79,7 +84,6 @@ export function mount(root, bus) {
     svg.append(over);
     place.replaceChildren(svg);
     said = [`states: values of ${shown.state}`, shown.everywhere && `on every arrow from a state also: ${shown.everywhere}`, ...shown.notes].filter(Boolean);
-    words.title = said.join("\n");
     all.disabled = !shown.composites.length;
     all.textContent = hidden().size ? "Open all" : "Shut all";
     if (held) place.querySelector(`[data-focus="${CSS.escape(held)}"]`)?.focus({ preventScroll: true });
@@ -178,7 +182,7 @@ export function mount(root, bus) {
       one?.classList.toggle("here", is);
     }
     const runs = levels.map((level) => `${level.level} is in ${level.now?.[shown?.state] ?? "?"}, line ${(level.lines ?? []).join(" and ") || "none"}`);
-    if (shown) words.textContent = [...runs, ...said].join(" · ");
+    if (shown) tellBeside(...runs, ...said);
   }
   bus.on("selection", (_, changed) => {
     marks();
@@ -277,8 +281,10 @@ export function mount(root, bus) {
     const done = await desk.try("graph.draw", { source, target });
     say(done ? `line ${done.line}: from ${source} to ${target}` : "no arrow was drawn");
     if (!done) return;
+    drawn = { text: `line ${done.line}: from ${source} to ${target}`, version: done.version };
+    proved();
     bus.select({ table: desk.table, line: done.line });
-    bus.say(`line ${done.line} leads from ${source} to ${target}: the proof answers in the table`);
+    bus.say(`line ${done.line} leads from ${source} to ${target}`);
   }
   function point(event) {
     const svg = place.querySelector("svg"), box = svg.getBoundingClientRect();
@@ -338,7 +344,18 @@ export function mount(root, bus) {
     best?.scrollIntoView({ block: "nearest", inline: "nearest" });
   }
 
-  desk.on(() => ask());
+  /** What is proved of the table; and, once, with the arrow that was drawn. */
+  function proved() {
+    const { state: now, why } = desk.shown?.standing ?? { state: "", why: "" };
+    proof.className = `graph-proof standing ${now.replaceAll(" ", "-")}`;
+    proof.replaceChildren(make("strong", {}, now && `${SIGNS[now] ?? ""} ${now}`));
+    proof.title = why;
+    if (!drawn || !desk.doc?.known || desk.doc.version < drawn.version) return;
+    say(`${drawn.text}\n${now}: ${why}`);
+    drawn = null;
+  }
+
+  desk.on(() => { proved(); ask(); });
   for (const [keys, what] of [["a", "Draw an arrow from the state, then choose where it ends"], ["arrows", "Go to what is next"], ["enter", "Select the line; shut or open a composite state"], ["+ and -, or ctrl and the wheel", "Larger and smaller"], ["f", "The whole graph in the view"]]) {
     bus.keys.push({ keys: `In the graph: ${keys}`, what, run: () => {}, where: "Graph" });
   }

@@ -1,11 +1,9 @@
 // Tables: a grid and the text of one file, with what is proved of it.
 
 import { make } from "../bus.js";
-import { deskOf, spoken } from "./desk.js";
+import { deskOf, SIGNS, spoken } from "./desk.js";
 import { SheetGrid } from "./sheet.js";
 import { TextView } from "./text.js";
-
-const SIGNS = { proved: "✓", "rests on an assumption": "◑", stale: "…", failed: "✗" };
 
 export function mount(root, bus) {
   const desk = deskOf(bus);
