@@ -55,7 +55,7 @@ def concerns(
         time,
         kept,
         build,
-        Tables(desk, hub.part),
+        Tables(desk, hub.part, lambda work, after_s: hub.do(Tables.lane, work, after_s)),
         Proof(desk),
         Graphs(desk),
         Writing(desk),

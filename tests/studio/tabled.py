@@ -26,7 +26,7 @@ class Bench:
         self._waiting: list[Callable[[], None]] = []
         self.desk = Desk(system, self.told.__setitem__, lambda _, work: self._waiting.append(work))
         self._handlers = {
-            **Tables(self.desk, lambda _: None).handlers,
+            **Tables(self.desk, lambda _: None, lambda *_: None).handlers,
             **Proof(self.desk).handlers,
             **Graphs(self.desk).handlers,
             **Writing(self.desk).handlers,

@@ -213,6 +213,34 @@ def test_a_graph_follows_the_files_that_its_table_uses(tmp_path: Path) -> None:
     assert "over" in bench.ask("graph.show", **asked)["states"]
 
 
+def test_what_another_editor_writes_is_seen_once_it_is_at_rest(folder: Path, bench: Bench) -> None:
+    """In an open file, and in one that it uses; a text that is changed here stays."""
+    bench.open("t.rcs")
+    written = folder / "t.rcs"
+
+    def seen() -> str:
+        bench.desk.look_at_disk()
+        return str(bench.doc("t.rcs")["text"])
+
+    assert seen() == seen() == TABLE
+    written.write_text("")  # an editor empties the file, and writes it then
+    assert seen() == TABLE
+    written.write_text(TABLE.replace("/= off", "on    "))
+    assert seen() == TABLE
+    assert "/= off" not in seen()
+    assert state(bench.doc("t.rcs")) == "failed"
+    bench.change("tables.undo", "t.rcs")
+    (folder / "words.rcs").write_text(WORDS.replace("off", "oft"))
+    seen()
+    seen()
+    assert {each["code"] for each in bench.doc("t.rcs")["findings"]} == {"RCS201"}
+    assert bench.doc("t.rcs")["dirty"]
+    written.write_text("# others\n")
+    assert seen() == seen() == TABLE
+    written.unlink()
+    assert seen() == seen() == TABLE
+
+
 # --- nothing hangs, nor grows without bound --------------------------------------------------
 
 

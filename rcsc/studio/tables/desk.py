@@ -4,13 +4,14 @@ In: changes, from the lane `tables`. Out: an event `tables.file/NAME` for every 
 lane `proof`. A text that changes while it is looked at is given up, and the new one looked at.
 """
 
+import contextlib
 import os
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from rcsc.diagnostics.codes import Code
 from rcsc.editor.memo import OutdatedError
@@ -27,6 +28,7 @@ from rcsc.studio.tables.shown import Json, Known, document
 
 OUTDATED = 0
 """The version of what is known of a file whose text is the same, but not that of one that it uses."""
+Mark: TypeAlias = tuple[int, int, int] | None
 PROOF = "proof"
 """The lane in which texts are looked at."""
 MOST_FILES = 2_000
@@ -70,6 +72,8 @@ class Desk:
         self._open: dict[str, Document] = {}
         self._known: dict[str, Known] = {}
         self._offered: dict[tuple[str, int, int], tuple[Repair, ...]] = {}
+        self._marks: dict[str, Mark] = {}
+        self._looked: dict[str, Mark] = {}
         self._closed: dict[str, int] = {}  # the last version of each: a number never stands for two texts
 
     # --- what there is ---
@@ -213,6 +217,33 @@ class Desk:
             shown = document(name, self._open[name], self._known.get(name))
         self._tell(f"tables.file/{name}", shown)
         return shown
+
+    def look_at_disk(self) -> None:
+        """Take what others wrote into open files that have no changes here, and look again at tables that use what they wrote.
+
+        A file is looked at once it is as it was the last time: an editor may write it piece by piece.
+        """
+        with self._lock:
+            known = {
+                name: self._known[name].files if name in self._known else frozenset() for name in self._open
+            }
+            using = {name: {each.file, *known[name]} for name, each in self._open.items()}
+        marks = {file: _mark(file) for files in using.values() for file in files}
+        rested = {
+            file for file, mark in marks.items() if self._marks.get(file) == mark != self._looked.get(file)
+        }
+        self._looked = {file: marks[file] if file in rested else self._looked.get(file) for file in marks}
+        self._marks = marks
+        for name, files in using.items():
+            if files & rested:
+                with contextlib.suppress(Refused):  # who looks at it is told
+                    self._take_written(name)
+
+    def _take_written(self, name: str) -> None:
+        found = self.opened(name)
+        if not found.dirty and found.on_disk() == "changed":
+            self.change(name, lambda each: each.take_disk())
+        self.look_again(name)
 
     # --- what is known ---
 
@@ -369,6 +400,15 @@ class Desk:
         """Every open file."""
         with self._lock:
             yield from list(self._open.items())
+
+
+def _mark(file: str) -> Mark:
+    """What is another where somebody wrote; None where there is no file."""
+    try:
+        stat = Path(file).stat()
+    except OSError:
+        return None
+    return stat.st_mtime_ns, stat.st_size, stat.st_ino
 
 
 def _glance(path: str) -> str:

@@ -16,6 +16,8 @@ from rcsc.studio.tables import cells
 from rcsc.studio.tables.desk import Desk
 from rcsc.studio.tables.document import MOST_BYTES, Document, plain
 
+LOOKED_S = 0.5
+"""So often is looked whether others wrote into the files that are open."""
 MOST_EDITS = 1_000
 MOST_NEW = 200
 """Lines that a paste may add: each is read back from the text."""
@@ -36,9 +38,20 @@ class Tables:
 
     name, lane = "tables", "tables"
 
-    def __init__(self, desk: Desk, part: Callable[[str], None]) -> None:
-        """Args: desk: The open files; part: Has something said once the studio has ended."""
-        self._desk, self._part = desk, part
+    def __init__(
+        self,
+        desk: Desk,
+        part: Callable[[str], None],
+        later: Callable[[Callable[[], None], float], None],
+    ) -> None:
+        """Take the open files.
+
+        Args:
+            desk: The open files.
+            part: Has something said once the studio has ended.
+            later: Has something done in this lane after so many seconds.
+        """
+        self._desk, self._part, self._later = desk, part, later
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
@@ -55,7 +68,11 @@ class Tables:
         return {"files": self._desk.files()}
 
     def begin(self) -> None:
-        """Nothing is to be done."""
+        """Look at the disk from now on, where another editor may write."""
+        try:
+            self._desk.look_at_disk()
+        finally:
+            self._later(self.begin, LOOKED_S)
 
     def close(self) -> None:
         """Keep what nobody saved."""
