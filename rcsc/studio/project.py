@@ -60,7 +60,7 @@ def concerns(
         Graphs(desk),
         Writing(desk),
         cell,
-        Plots(time),
+        Plots(time, hub),
         Moments(hub, time, cell),
         Findings(desk),
     )

@@ -325,7 +325,6 @@ REFUSED: tuple[tuple[str, dict[str, Any]], ...] = (
     ("time.find", {"tick": 0, "text": "9" * 5000}),
     ("time.find", {"tick": 0, "text": "drive.nothing = 3"}),
     ("time.tracks", {"era": "x", "since": -1}),
-    ("time.series", {"level": "drive", "name": "nothing"}),
     ("log.open", {"name": "/etc/passwd"}),
     ("log.open", {"name": "../../etc/passwd"}),
     ("log.open", {}),

@@ -13,9 +13,11 @@ from rcsc.run.description import Wire
 from rcsc.run.log.finding import LoggedCycle
 from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.log.states import failed_of, fault_of, line_of, refused_of
-from rcsc.run.signature import Leaf, Values
+from rcsc.run.signature import Leaf, Signature, Values
 
 NUMBER, COMMAND = "inc_command", "input_command"
+MOST_KNOWN = 64
+"""Programs of which is kept where their records lie."""
 ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
 
 
@@ -155,7 +157,7 @@ def tick_of(log: Log, tick: int, wires: Mapping[str, str]) -> LoggedTick:
         tick: Any; in one that the log does not have no level had a cycle.
         wires: The `other_ends` of its system.
     """
-    return LoggedTick(tick, tuple(_box(log, level, tick, wires) for level in log.levels))
+    return LoggedTick(tick, tuple(level_tick(log, level, tick, wires) for level in log.levels))
 
 
 def other_ends(wires: Iterable[Wire]) -> dict[str, str]:
@@ -167,7 +169,8 @@ def other_ends(wires: Iterable[Wire]) -> dict[str, str]:
     return others
 
 
-def _box(log: Log, level: LoggedLevel, tick: int, wires: Mapping[str, str]) -> LevelTick:
+def level_tick(log: Log, level: LoggedLevel, tick: int, wires: Mapping[str, str]) -> LevelTick:
+    """Return one level in a tick; arguments as those of `tick_of`."""
     at = level.track.place(tick)
     if at < 1 or level.track.ticks[at] != tick:
         return LevelTick(level.name, ran=False)
@@ -295,7 +298,7 @@ class _Cycle:
         """Return the leaves of a record that changed or are not initial; an array in it as one."""
         aside = {f"{record}.{name}" for name in but}
         arrays: dict[str, list[Leaf]] = {}
-        for at in self.logged.sign.record(record):
+        for at in _places(self.logged.sign, record):
             leaf = self.logged.sign.leaves[at]
             if leaf.name not in aside:
                 arrays.setdefault(leaf.name.partition("[")[0], []).append(leaf)
@@ -334,3 +337,17 @@ class _Cycle:
 
     def _word(self, values: Values, name: str) -> str:
         return self.logged.sign.leaves[self.logged.sign.index[name]].shown(self._value(values, name))
+
+
+_KNOWN: dict[int, tuple[Signature, dict[str, range]]] = {}
+"""By signature, which is kept so that its number stays its own, where the leaves of its records lie."""
+
+
+def _places(sign: Signature, record: str) -> range:
+    """Where the leaves of a record lie; asked again for every tick that is drawn."""
+    if id(sign) not in _KNOWN and len(_KNOWN) >= MOST_KNOWN:
+        _KNOWN.clear()
+    known = _KNOWN.setdefault(id(sign), (sign, {}))[1]
+    if record not in known:
+        known[record] = sign.record(record)
+    return known[record]

@@ -5,7 +5,7 @@ with how often something is set for the first time, not with the run.
 """
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -19,8 +19,6 @@ from rcsc.run.unset.since import LevelSeen, Unsets
 
 Names = Mapping[str, frozenset[str]]
 """By level."""
-_BREATH = 500
-"""Ticks of a log between two looks at whether anybody waits."""
 
 
 @dataclass(slots=True)
@@ -70,6 +68,16 @@ class Gaps:
                 last = not last
                 yield tick, last
 
+    def within(self, level: str, name: str, last: int) -> list[list[int]]:
+        """Return from which tick to which, at most to `last`, nobody has set a variable."""
+        found: list[list[int]] = []
+        for tick, unset in self.spans(level, name):
+            if unset and tick <= last:
+                found.append([tick, last])
+            elif not unset and found:
+                found[-1][1] = min(tick - 1, last)
+        return found
+
     def _keep(self, system: System, since: Unsets) -> None:
         self._stood.append(since)
         self.note(system.tick, since.now, {level.name: level.sign for level in system.levels})
@@ -82,22 +90,22 @@ class Gaps:
         )
 
 
-def gaps_of(log: Log, go_on: Callable[[int], None]) -> Gaps:
-    """Return what nobody has set in a log.
+def gaps_of(log: Log, piece: int) -> Iterator[Gaps | None]:
+    """Yield nothing after each piece of a log, and at last what nobody has set in it.
 
     Args:
         log: Whole, or a part.
-        go_on: Called with a tick every while; what it raises ends it.
+        piece: How many ticks are looked at in between.
     """
     gaps, last = Gaps(), dict[str, frozenset[int]]()
     signs = {level.name: level.sign for level in log.levels}
-    for count, (tick, now) in enumerate(unset_from_first(log)):
-        if count % _BREATH == 0:
-            go_on(tick)
+    for count, (tick, now) in enumerate(unset_from_first(log), start=1):
         if now != last:
             gaps.note(tick, now, signs)
             last = dict(now)
-    return gaps
+        if count % piece == 0:
+            yield None
+    yield gaps
 
 
 def _seen(level: RunningLevel, values: Values | None = None) -> LevelSeen:

@@ -4,6 +4,7 @@ In: a system, after each cycle. Out: `Log`s: one for as long as the levels run t
 (`Track`), so that waiting costs no memory; `undo` takes back what was kept.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from rcsc.run.adopt import Begun
@@ -13,7 +14,7 @@ from rcsc.run.log.records import ChainCheck
 from rcsc.run.log.schema import system_facts
 from rcsc.run.signature import Values
 from rcsc.run.system import System
-from rcsc.studio.runs.gaps import Gaps
+from rcsc.studio.runs.gaps import Gaps, gaps_of
 
 MOST_TICKS = 200_000
 """Ticks that are kept: more than two hours at 40 ms; after them the older half is let go."""
@@ -73,6 +74,13 @@ class History:
             levels.append(_settled(logged, level, system.tick))
         self.era += taken_back
         self.logs[-1] = replace(log, levels=tuple(levels))
+
+    def find_gaps(self, piece: int) -> Iterator[None]:
+        """Find what nobody had set in a log that was opened, and yield after each piece of so many ticks; a live run has it."""
+        for found in () if self.gaps is not None else gaps_of(self.logs[0], piece):
+            if found is None:
+                yield
+            self.gaps = found
 
     def ran_at(self, tick: int) -> Log:
         """Return the log that has the cycles of a tick; of the first tick there are none."""

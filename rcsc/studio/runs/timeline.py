@@ -5,30 +5,27 @@ page opened.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.model import Program
 from rcsc.run.log.queries import BadExpression, predicate
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.log.states import fault_of, line_of
-from rcsc.run.signature import Signature, Values, number_word
+from rcsc.run.signature import Signature, number_word
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import PROVER, Ask, Handler, Json
 from rcsc.studio.runs.history import History
 from rcsc.studio.runs.kept import KeptFinding
+from rcsc.studio.runs.lines import Lines
 from rcsc.studio.runs.live import LANE, Live, range_of
-from rcsc.studio.runs.shown import moment
+from rcsc.studio.runs.shown import Shown
 from rcsc.studio.runs.why import why
 
-MOST_CHANGES = 20_000
-"""Changes of lines that one answer has, of all levels."""
 MOST_MARKED = 1000
 LONGEST = 4000
 _BREATH = 2000
 """Ticks between two looks at whether a search is still wanted."""
-MOST_KNOWN = 50_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,39 +45,6 @@ class Source:
     finding: KeptFinding | None = None
 
 
-Stand = tuple[str, str, str]
-"""Table, line and fault of a level."""
-
-
-@dataclass(slots=True)
-class Lines:
-    """Which line each state of a level means, found once a state.
-
-    Attributes:
-        known: By signature and state; the signature is kept, so that its number stays its own.
-    """
-
-    known: dict[tuple[int, bytes], tuple[Signature, Stand]] = field(default_factory=dict)
-
-    def of(self, logged: LoggedLevel, content: bytes) -> Stand:
-        """Table, line and fault of a record."""
-        key = id(logged.sign), content
-        if key not in self.known:
-            if len(self.known) > MOST_KNOWN:
-                self.known.clear()
-            self.known[key] = logged.sign, _stand(logged, logged.track.layout.unpack(content))
-        return self.known[key][1]
-
-
-def _stand(logged: LoggedLevel, values: Values) -> Stand:
-    fault = fault_of(logged.sign, values)
-    return (
-        logged.sign.table_of(logged.level, values),
-        line_of(logged.sign, logged.level, values),
-        "" if fault == "none" else logged.sign.fault_text(values),
-    )
-
-
 class TimeLine:
     """Answers about the ticks of the run that everybody looks at; in the lane of the run."""
 
@@ -90,14 +54,14 @@ class TimeLine:
         """Args: live: The running system; tell: As `Hub.tell`."""
         self.live, self._tell = live, tell
         self._log: Source | None = None
-        self._lines = Lines()
+        self._lines, self._shown = Lines(), Shown()
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
         """By kind."""
         return {
             "time.tracks": self._tracks, "time.moment": self._moment, "time.values": self._values, "time.why": self._why,
-            "time.find": self._find, "time.live": self._to_live, "time.series": self._series,
+            "time.find": self._find, "time.live": self._to_live,
         }  # fmt: skip
 
     def greeting(self) -> Json:
@@ -164,14 +128,14 @@ class TimeLine:
             raise Refused(Code.STUDIO, f"the run has no level `{name}`") from error
 
     def _moment(self, ask: Ask) -> Json:
-        return moment(self._history(), self._tick(ask))
+        return self._shown.moment(self._history(), self._tick(ask))
 
     def _tracks(self, ask: Ask) -> Json:
         """Every change of a level's line after a tick; `era` says whether what the page has is still so."""
         history = self._history()
         since = ask.body.whole("since", -1, 2**53)
         known = since if ask.body.whole("era", -1, 2**53) == history.era and history.first <= since else -1
-        levels, to = self._changes(history, known)
+        levels, to = self._lines.changes(history, known)
         return {
             "era": history.era,
             "from": known,
@@ -181,36 +145,6 @@ class TimeLine:
             "levels": levels,
             "marks": [asdict(mark) for mark in self._marks()][-MOST_MARKED:],
         }
-
-    def _changes(self, history: History, since: int) -> tuple[dict[str, list[list[Any]]], int]:
-        """By level each tick with what it ran from then on, and up to which tick that is known."""
-        levels: dict[str, list[list[Any]]] = {}
-        to = history.last
-        for log in history.logs:
-            for logged in log.levels:
-                changes = levels.setdefault(logged.name, [])
-                self._add(logged, since, to, changes)
-                if len(changes) > MOST_CHANGES:
-                    to = min(to, changes[MOST_CHANGES][0])
-        return {
-            name: [change for change in changes if change[0] <= to] for name, changes in levels.items()
-        }, to
-
-    def _add(self, logged: LoggedLevel, since: int, to: int, changes: list[list[Any]]) -> None:
-        """Append what a level began to run after a tick; the first record is what it began with, and no cycle."""
-        track = logged.track
-        place = track.place(since)
-        last = changes[-1][1:] if changes else None
-        if place >= 1:
-            last = [*self._lines.of(logged, track.packed[place])]
-        elif last is None and place < 0:
-            last = ["", "", ""]
-            changes.append([track.ticks[0], *last])
-        for at in range(max(1, place + 1), track.place(to) + 1):
-            stand = [*self._lines.of(logged, track.packed[at])]
-            if stand != last:
-                changes.append([track.ticks[at], *stand])
-                last = stand
 
     def _marks(self) -> Iterator[Any]:
         if self._log is None:
@@ -238,26 +172,6 @@ class TimeLine:
             {**_leaf(sign, at), "text": leaf.shown(now[at]), "changed": alike and now[at] != before[at]}
             for at, leaf in enumerate(sign.leaves)
         ]
-
-    def _series(self, ask: Ask) -> Json:
-        """The values of one variable over all ticks, each where it changed: `level`, `name`."""
-        name, changes = ask.body.text("name"), list[list[Any]]()
-        level = ask.body.text("level")
-        for log in self._history().logs:
-            logged = next((one for one in log.levels if one.name == level), None)
-            if logged is None or name not in logged.sign.index:
-                raise Refused(Code.STUDIO, f"the run has no variable `{level}.{name}`")
-            at, last = logged.sign.index[name], None
-            for tick, values in logged.track:
-                if last is None or values[at] != last:
-                    changes.append([tick, values[at]])
-                    last = values[at]
-        logged = self._history().logs[-1].level(level)
-        return {
-            **_leaf(logged.sign, logged.sign.index[name]),
-            "changes": changes,
-            "last": self._history().last,
-        }
 
     # --- questions about a cycle ---
 
