@@ -4,8 +4,7 @@ import random
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
-from math import cos, hypot, inf, nan, radians, sin
+from math import hypot, inf, nan, radians
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -19,7 +18,6 @@ from hypothesis import strategies as st
 from rcsc_cell.cell.arm import LIMITS_DEG, plate, skeleton
 from rcsc_cell.database.pose import nine
 from rcsc_cell.pages.report import CellPicture, Figure, Matched, Placement, ReportRow, Story, page, report
-from rcsc_cell.pictures.plot import plot, ticks
 from rcsc_cell.pictures.solid import OVERVIEW, View, solid
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import Outline
@@ -284,79 +282,6 @@ def test_stations_and_the_trail_are_drawn_and_names_are_text() -> None:
     assert "<a&b>" in [element.text for element in ET.fromstring(svg).iter(f"{SVG}text")]  # noqa: S314  # our own text
 
 
-# --- plots ---
-
-
-@given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6), st.integers(2, 10))
-def test_ticks_are_round_and_within(low: float, wide: float, most: int) -> None:
-    found = ticks(low, low + wide, most)
-    slack = 1e-6 * wide
-    assert 1 <= len(found) <= most + 1
-    if len(found) > 1:
-        steps = [b - a for a, b in pairwise(found)]
-        assert low - slack <= found[0]
-        assert found[-1] <= low + wide + slack
-        assert max(steps) - min(steps) < slack
-        assert re.match(r"[125](\.0*)?e", f"{steps[0]:.4e}") or f"{steps[0]:.4e}"[0] in "1249"
-
-
-def curve(svg: str) -> list[tuple[float, float]]:
-    """Every corner of the curve, in pixels."""
-    path = re.search(r'class="curve" d="([^"]*)"', svg)
-    assert path is not None
-    corners: list[tuple[float, float]] = []
-    for kind, said in re.findall(r"([MHVh])([-\d. ]+)", path[1]):
-        numbers = [float(number) for number in said.split()]
-        x, y = corners[-1] if corners else (0.0, 0.0)
-        match kind:
-            case "M":
-                x, y = numbers
-            case "H":
-                x = numbers[0]
-            case "V":
-                y = numbers[0]
-            case _:
-                x += numbers[0]
-        corners.append((x, y))
-    return corners
-
-
-def test_a_spike_of_one_sample_in_a_long_run_is_seen() -> None:
-    points = [(at * 0.04, 0.0) for at in range(50_000)]
-    points[31_007] = (31_007 * 0.04, 9.0)
-    points[11_003] = (11_003 * 0.04, -9.0)
-    svg = plot(points)
-    heights = [y for _, y in curve(svg)]
-    assert max(heights) - min(heights) > 90.0
-    assert len(svg) < 20_000
-
-
-def test_values_hold_until_the_next() -> None:
-    corners = curve(plot([(0.0, 1.0), (1.0, 1.0), (2.0, 5.0), (4.0, 5.0)]))
-    for (ax, ay), (bx, by) in pairwise(corners):
-        assert ax == bx or ay == by  # never aslant
-    start, end = corners[0][0], corners[-1][0]
-    jump = next(bx for (_, ay), (bx, by) in pairwise(corners) if ay != by)
-    assert (jump - start) / (end - start) == pytest.approx(0.5, abs=0.01)
-
-
-def test_what_is_not_finite_is_a_gap() -> None:
-    svg = plot([(0.0, 1.0), (1.0, 2.0), (2.0, nan), (3.0, 2.0), (4.0, inf), (5.0, 3.0)])
-    path = re.search(r'class="curve" d="([^"]*)"', svg)
-    assert path is not None
-    assert path[1].count("M") == 3
-    assert "nan" not in svg
-    assert "no values" in plot([(0.0, nan)])
-    assert "no values" in plot([])
-
-
-@pytest.mark.parametrize("value", [0.0, 5.0, -1e9, 1e-12])
-def test_what_does_not_move_is_a_level_line(value: float) -> None:
-    corners = curve(plot([(0.0, value), (1.0, value), (2.0, value)]))
-    assert len({y for _, y in corners}) == 1
-    assert corners[-1][0] > corners[0][0] + 500
-
-
 # --- the report ---
 
 
@@ -369,7 +294,6 @@ def story() -> Story:
             CellPicture(0, "as it <began>", solid(model, data)),
             CellPicture(22, "the end", stick(nine(plate(HOME)), 80.0, HOME)),
         ),
-        {"plate[2] (mm)": [(at * 0.04, 300 + 50 * sin(at * 0.1) * cos(at)) for at in range(300)]},
         (
             Matched("task", "acquire", "begin", 12),
             Matched("task", "acquire", "lost", 0),
@@ -425,7 +349,6 @@ def test_the_report_needs_nothing_else(browser: Browser, tmp_path: Path) -> None
     assert browser.said == []
     assert browser.value("document.scripts.length") == 0
     assert browser.value("document.querySelectorAll('figure > a > svg').length") == 2
-    assert browser.value("document.querySelector('.plot .curve').getBBox().width") > 500
     inside_page = "document.documentElement.scrollWidth <= document.documentElement.clientWidth"
     assert browser.value(inside_page)
 

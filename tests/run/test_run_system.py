@@ -20,6 +20,7 @@ from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.system import System, assemble, signatures
 from rcsc_cell.pages.report import page
 from rcsc_cell.pages.witness import RunWitness
+from tests.support.films import film_of
 from tests.support.programs.texts import edit_file, edited
 
 Said = Callable[[], str]
@@ -186,11 +187,11 @@ def test_a_report_is_written_and_nothing_is_left_to_resume(
     page = Path("dock.html").read_text(encoding="utf-8")
     for said in (
         "every row done",
-        "drive.travelled_mm (mm)",
         "supervisor · dock",
         "times as fast as the clock",
     ):
         assert said in page
+    assert film_of(page)["shown"] == ["drive.travelled_mm", "drive.lateral_mm", "drive.speed_mm_s"]
     assert run(["run", "dock", "--no-compile", "-q", "--resume"]) == 1
     assert "error[RCS726]: there is nothing to resume" in stopped(capsys)
 

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from rcsc.commands import run
+from rcsc.commands.shared.played import with_ticks
 from rcsc.host.files.names import BadName
 from rcsc.host.files.read import CheckedFields, Malformed, json_of
 from rcsc.run.adopt import Begun
@@ -28,6 +29,7 @@ from rcsc.run.system import System, assemble
 from rcsc_cell.pages.report import page
 from rcsc_cell.pages.witness import RunWitness, variables
 from tests.run.test_log import REPO, restarted, system
+from tests.support.films import film_of, unset_in
 from tests.support.programs.stages import emitted, program_of
 
 POSE = "primitive.from_robot.plate[0]"
@@ -229,7 +231,7 @@ def test_exports_and_plots_have_gaps_where_nothing_was_set(tmp_path: Path) -> No
     assert min(value for value in series.values if not math.isnan(value)) > -4000
 
 
-def test_the_report_and_the_live_page_have_the_same_gaps() -> None:
+def test_the_report_and_the_live_page_have_the_same_gaps(tmp_path: Path) -> None:
     running = system("python")
     running.description = replace(running.description, displays={"pose": (POSE,)})
     published: list[Mapping[str, float | str]] = []
@@ -249,15 +251,17 @@ def test_the_report_and_the_live_page_have_the_same_gaps() -> None:
 
     witness = RunWitness(ScriptedRun(running, None), live=Page(), film=True)
     running.watch.append(witness)
+    recorder = Recorder(running, tmp_path / "run.mcap")
+    running.watch.append(recorder)
     for _ in range(60):
         running.step()
-    [points] = witness.series.values()
-    assert [math.isnan(value) for _, value in points] == [POSE not in values for values in published]
-    assert math.isnan(points[0][1])
-    assert not math.isnan(points[-1][1])
-    said = page(witness.story("pose", 1.0))
-    assert "-4000" not in said
-    assert 'class="curve" d="M' in said
+    recorder.close()
+    film = film_of(page(with_ticks(witness.story("pose", 1.0), read(tmp_path / "run.mcap"), witness.drawn)))
+    assert film["shown"] == [POSE]
+    unset = [unset_in(film, POSE, tick) for tick in range(61)]
+    assert unset[1:] == [POSE not in values for values in published]
+    assert unset[:2] == [True, True]
+    assert not unset[-1]
     assert POSE in variables(running), "who asks for everything has it"
 
 

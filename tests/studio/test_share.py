@@ -1,9 +1,9 @@
 """What the studio hands on: files that show what was, need nothing else, and run nothing that comes to stand in them."""
 
 import asyncio
-import json
 import re
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from rcsc.shell.opening import Opening
 from rcsc.studio.share.document import of_film, player
 from tests.studio.driven import HIGH, WIDE, Seat, dock
 from tests.studio.served import Page, Refused, page, serving
+from tests.support.films import film_of, standing, values_at
 
 OVERLAP = ("< 2500 || tick             | 400 ", "       || tick             | 400 ")
 HOSTILE = "</script><script>document.title = 'run'</script><img src=x onerror=\"document.title = 'run'\">"
@@ -68,24 +69,15 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Values]:
     return found
 
 
-def film_of(text: str) -> dict[str, Any]:
-    [data] = re.findall(r'<script type="application/json" id="film">(.*?)</script>', text, re.DOTALL)
-    film: dict[str, Any] = json.loads(data)
-    return film
-
-
 def test_a_file_holds_every_value_of_every_tick_around_the_moment(ran: tuple[str, Values]) -> None:
     text, values = ran
     film = film_of(text)
     assert (film["at"], film["first"], film["last"]) == (40, 20, 60)
-    told: dict[str, dict[str, str]] = {}
-    for tick in film["ticks"]:
-        for level in tick["levels"]:
-            known = told.setdefault(level["level"], {})
-            assert all(known.get(name) != value for name, value in level["values"].items())  # changes alone
-            known.update(level["values"])
-            assert known == values[tick["tick"], level["level"]]
-    assert len(film["ticks"]) == 41
+    for (tick, level), known in values.items():
+        assert values_at(film, level, tick) == known
+    for changes in (one["changes"] for level in film["variables"].values() for one in level.values()):
+        assert all(before[1] != after[1] for before, after in pairwise(changes))  # changes alone
+    assert len(values) == 82
 
 
 @pytest.mark.needs("chromium")
@@ -96,16 +88,14 @@ def test_a_shared_moment_is_scrubbed_in_the_file_and_fetches_nothing(
     file.write_text(ran[0], encoding="utf-8")
     with Seat(WIDE, HIGH) as seat:
         seat.open(file.as_uri())
-        assert seat.value("document.querySelector('#moment').dataset.tick") == "40"
+        seat.wait("document.querySelector('#moment').dataset.tick === '40'")
         seat.click("#moment article:nth-child(2) summary")  # stays open from tick to tick
         seat.wait("document.querySelector('#moment article:nth-child(2) tbody')")
-        for tick in (20, 60, 41):
-            scrubbed = f"one.value = {tick}; one.dispatchEvent(new Event('input'));"
-            seat.value(f"((one) => {{ {scrubbed} }})(document.querySelector('#scrub input'))")
-            assert seat.reads("#scrub output").startswith(f"tick {tick} ")
-            level = next(
-                one for one in film_of(ran[0])["ticks"][tick - 20]["levels"] if one["level"] == "drive"
-            )
+        for tick, keys in ((20, ("l", "home")), (60, ("end",)), (41, ("home", *["]"] * 21))):
+            seat.press(*keys)
+            seat.wait(f"document.querySelector('#moment').dataset.tick === '{tick}'")
+            seat.until("#time output", f"tick {tick} of 60,")
+            level = standing(film_of(ran[0])["boxes"]["drive"], tick)
             assert f"table {level['table']}, line {level['lines'][0]}" in seat.reads(
                 "#moment article:nth-child(2)"
             )
@@ -120,7 +110,7 @@ def test_a_shared_moment_is_scrubbed_in_the_file_and_fetches_nothing(
 @pytest.mark.parametrize("place", ["title", "caption", "svg", "beside"])
 def test_nothing_that_stands_in_a_file_is_run(place: str, tmp_path: Path) -> None:
     svg = f'<svg xmlns="http://www.w3.org/2000/svg" onload="document.title = \'run\'">{HOSTILE if place == "svg" else ""}</svg>'
-    film = {"at": 1, "first": 1, "last": 1, "tick_ms": 40, "why": "", "ticks": [{"tick": 1, "levels": []}],
+    film = {"at": 1, "first": 1, "last": 1, "tick_ms": 40, "why": "", "levels": [], "tracks": {}, "boxes": {}, "variables": {}, "shown": [],
             "pictures": [{"tick": 1, "svg": svg, "caption": [HOSTILE] if place == "caption" else []}]}  # fmt: skip
     text = of_film(HOSTILE if place == "title" else "a run", film)
     if place == "beside":  # somebody wrote it into the file
@@ -135,10 +125,12 @@ def test_nothing_that_stands_in_a_file_is_run(place: str, tmp_path: Path) -> Non
 
 def test_the_one_script_is_named_by_its_hash(ran: tuple[str, Values]) -> None:
     scripts = re.findall(r"<script(?: [^>]*)?>", ran[0])
-    assert scripts == ['<script type="application/json" id="film">', "<script>"]
+    assert scripts == ['<script type="application/gzip" id="film">', "<script>"]
     assert f"script-src '{hashed(player())}'" in ran[0].replace("&#39;", "'")
     assert f"<script>{player()}</script>" in ran[0]
-    assert not re.search(r"^(?:import|export) ", player(), re.MULTILINE)
+    assert not re.search(
+        r"^(?:import|export) ", re.sub(r"/\*.*?\*/", "", player(), flags=re.DOTALL), re.MULTILINE
+    )
 
 
 def test_a_shared_finding_has_its_witness_its_region_and_its_repair(tmp_path: Path) -> None:

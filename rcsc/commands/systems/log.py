@@ -9,6 +9,7 @@ import click
 
 from rcsc.commands.shared.cells import cell_of
 from rcsc.commands.shared.logs import FILE, SHOWN, refuse, told
+from rcsc.commands.shared.played import with_ticks
 from rcsc.commands.shared.show import writing
 from rcsc.commands.shared.stopped import stopped
 from rcsc.commands.shared.systems import NoSystem, system_path
@@ -23,7 +24,7 @@ from rcsc.run.log.records import Seal
 from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
 from rcsc_cell.database.build import BadData
 from rcsc_cell.pages.finding_page import trace
-from rcsc_cell.pages.log_page import story_of
+from rcsc_cell.pages.log_page import drawn_first, story_of
 from rcsc_cell.pages.report import report as run_page
 from rcsc_cell.pictures.scene import DrawnCell, same_system
 
@@ -133,7 +134,8 @@ def _report(path: Path, log: Log, system: Path | None) -> None:
         _written(path, lambda: trace(path, log, finding, cell, why_not))
         return
     displays = _displays(log, system) if cell is None else cell.system.displays
-    _written(path, lambda: run_page(path, story_of(log, cell, displays, why_not)))
+    story = with_ticks(story_of(log, cell, why_not), log, drawn_first(log, displays))
+    _written(path, lambda: run_page(path, story))
 
 
 def _displays(log: Log, system: Path | None) -> Mapping[str, Sequence[str]]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from rcsc.commands.shared.extras import need
+from rcsc.commands.shared.played import with_ticks
 from rcsc.commands.shared.stopped import Stopped
 from rcsc.commands.shared.systems import DATABASE, EXECUTOR, PLANT, SYSTEM, compiled, meant
 from rcsc.diagnostics.codes import Code
@@ -97,7 +98,7 @@ Examples:
 @click.option("--log", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
               help="Where the complete state of every cycle is kept (MCAP); else in .rcsc-cache beside the system.")  # fmt: skip
 @click.option("--report", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
-              help="Write a page about the run: pictures, plots, lines, timing; one file that needs nothing else.")  # fmt: skip
+              help="Write a page about the run: its ticks, pictures, curves, lines, timing; one file that needs nothing else.")  # fmt: skip
 @click.option("--live", is_flag=True,
               help="Show the run in a browser's page, at --rate; to this machine only.")  # fmt: skip
 @click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
@@ -189,7 +190,7 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
         running.watch.append(witness)
         seconds = _watch(run, asked)
     if asked.report is not None:
-        _write_report(asked.report, witness, asked, seconds)
+        _write_report(asked.report, witness, log, asked, seconds)
     return _closing(witness, stage.resume, asked, seconds, log)
 
 
@@ -368,9 +369,11 @@ def _rows_apart(asked: RunOptions, system: Description, first: int, results: Pat
 # --- when it is over ---
 
 
-def _write_report(path: Path, witness: RunWitness, asked: RunOptions, seconds: float) -> None:
+def _write_report(path: Path, witness: RunWitness, log: Path, asked: RunOptions, seconds: float) -> None:
+    from rcsc.run.log.read import read  # of an extra, which the recorder had
+
     try:
-        report(path, witness.story(asked.title, seconds))
+        report(path, with_ticks(witness.story(asked.title, seconds), read(log), witness.drawn))
     except OSError as error:
         raise BadDescription(f"the report {path} cannot be written: {error.strerror}") from error
 

@@ -1,4 +1,4 @@
-// What views share: questions to the server, its events, what is selected, and the keys.
+// What views share: questions, events, what is selected, and the keys.
 //
 //   await bus.ask("run.type", { line: "step 5" }, { progress: (how) => ..., signal })
 //   bus.on("run.state", (state) => ...)          at once with the latest, where there is one
@@ -15,54 +15,16 @@ export class Refusal extends Error {
   }
 }
 
+/** Events, selection and keys of a page; who answers its questions is a matter of who extends it, with `ask`. */
 export class Bus {
-  #socket = null;
-  #number = 0;
-  #open = new Map(); // by number: { resolve, reject, progress }
   #handlers = new Map(); // by kind: a set
   #latest = new Map(); // by kind of event
   #selection = Object.freeze({ system: "", level: "", table: "", line: "", tick: null, follow: true });
-  #retry = 500;
   keys = []; // { keys, what, run, where }
 
-  connect() {
-    const socket = new WebSocket(`ws://${location.host}${location.pathname}socket`);
-    this.#socket = socket;
-    socket.addEventListener("open", () => {
-      this.#retry = 500;
-      this.tell("connection", true);
-    });
-    socket.addEventListener("message", (event) => this.#take(JSON.parse(event.data)));
-    socket.addEventListener("close", () => {
-      for (const [, asked] of this.#open) asked.reject(new Refusal({ text: "no connection to the studio", lost: true }));
-      this.#open.clear();
-      this.tell("connection", false);
-      setTimeout(() => this.connect(), this.#retry);
-      this.#retry = Math.min(5000, this.#retry * 2);
-    });
-  }
-
-  #take(said) {
-    if (said.event !== undefined) return this.tell(said.event, said.body);
-    const asked = this.#open.get(said.id);
-    if (!asked) return undefined;
-    if (said.progress) return asked.progress?.(said.progress);
-    this.#open.delete(said.id);
-    if (said.refused) return asked.reject(new Refusal(said.refused));
-    if (said.cancelled) return asked.reject(new Refusal({ text: "cancelled" }));
-    return asked.resolve(said.answer);
-  }
-
-  /** Ask the server; the promise is refused with a `Refusal`. `signal` cancels. */
-  ask(kind, body = {}, { progress, signal } = {}) {
-    if (this.#socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Refusal({ text: "no connection to the studio", lost: true }));
-    const id = ++this.#number;
-    const answer = new Promise((resolve, reject) => this.#open.set(id, { resolve, reject, progress }));
-    this.#socket.send(JSON.stringify({ id, kind, body }));
-    signal?.addEventListener("abort", () => {
-      if (this.#open.has(id)) this.#socket.send(JSON.stringify({ id, cancel: true }));
-    });
-    return answer;
+  /** Whether somebody answers questions of a kind; in a file that was shared not all are. */
+  answers() {
+    return true;
   }
 
   /** Hear events of a kind, the server's and the page's; returns what ends it. */

@@ -1,10 +1,12 @@
 // The page's frame: the views in one pane or two, what is said, the keys, and the theme.
 
-import { Bus, make, Refusal } from "./bus.js";
+import { make, Refusal } from "./bus.js";
+import { followKeys } from "./keys.js";
 import { sharing } from "./share.js";
+import { Connected } from "./socket.js";
 import { BELOW, VIEWS } from "./views.js";
 
-const bus = new Bus();
+const bus = new Connected();
 const page = (id) => document.getElementById(id);
 const store = { get: (key, other) => { try { return localStorage.getItem(`studio.${key}`) ?? other; } catch { return other; } },
   set: (key, value) => { try { localStorage.setItem(`studio.${key}`, value); } catch { /* a private window keeps nothing */ } } };
@@ -143,25 +145,7 @@ theme(themes.includes(store.get("theme", "system")) ? store.get("theme", "system
 
 // --- keys ---
 
-const spoken = (event) => [event.ctrlKey && "ctrl", event.altKey && "alt", event.metaKey && "meta",
-  event.shiftKey && event.key.length > 1 && "shift", event.key === " " ? "space" : event.key.length === 1 && !event.ctrlKey ? event.key : event.key.toLowerCase()]
-  .filter(Boolean).join("+");
-const typed = (target) => target.closest?.("input:not([type=checkbox]):not([type=range]), textarea, select, [contenteditable], dialog[open], [data-keys=own]");
-let before = "";
-document.addEventListener("keydown", (event) => {
-  if (event.defaultPrevented) return;
-  if (event.key === "Escape" && typed(event.target) && !event.target.closest("dialog")) event.target.blur(); // the keys are free again
-  if ( ["Control", "Shift", "Alt", "Meta"].includes(event.key)) return;
-  const now = spoken(event);
-  const free = !typed(event.target);
-  const wanted = [before && `${before} ${now}`, now].filter(Boolean);
-  const pressable = event.target.closest?.("button, a, summary, [role=button]") && (now === "space" || now === "enter");
-  const found = bus.keys.findLast(({ keys }) => keys.split(", ").some((one) => wanted.includes(one)) && (free || /^(ctrl|alt|f\d)/.test(keys)) && !pressable);
-  before = !found && free && bus.keys.some(({ keys }) => keys.startsWith(`${now} `)) ? now : "";
-  if (!found) return;
-  event.preventDefault();
-  found.run(event);
-});
+followKeys(bus);
 function listKeys() {
   const by = Map.groupBy(bus.keys, ({ where }) => where);
   page("keys").querySelector("table").replaceChildren(...[...by].flatMap(([where, several]) => [

@@ -8,6 +8,11 @@ export function make(kind, attributes = {}, ...inside) {
     else if (typeof value === "boolean") made.toggleAttribute(name, value);
     else if (value !== undefined && value !== null) made.setAttribute(name, value);
   }
-  made.append(...inside.flat().filter((one) => one !== undefined && one !== null));
+  made.append(...inside.flat().filter((one) => one !== undefined && one !== null && one !== false));
   return made;
+}
+
+/** A text in which names stand in backticks, with the names set apart. */
+export function spoken(text) {
+  return text.split(/`([^`]*)`/).map((piece, at) => (at % 2 ? make("code", {}, piece) : piece));
 }

@@ -1,60 +1,88 @@
-// What a shared file does: draws the tick that is scrubbed to, of the data that stands in it. Part of such files alone.
+// What a file does that shows a run, or a moment of one: the studio's time line, levels and curves, of the data that stands in the file.
 
 import { changes, exchanges } from "./exchanges.js";
-import { make } from "./make.js";
-
-function play(film, scrub, place, figure) {
-  const slider = make("input", { type: "range", min: film.first, max: film.last, "aria-label": "Tick" });
-  const readout = make("output", {});
-  const step = (by) => () => go(tick + by);
-  const open = new Set();
-  let tick = film.at;
-  scrub.append(make("button", { type: "button", onclick: step(-1), "aria-label": "The tick before" }, "◀"), slider,
-    make("button", { type: "button", onclick: step(1), "aria-label": "The tick after" }, "▶"), readout, make("button", { type: "button", onclick: () => go(film.at) }, `Back to tick ${film.at}`));
-  slider.addEventListener("input", () => go(Number(slider.value)));
-
-  // Values are told where they change: those of a tick are all that were told up to it.
-  function valuesAt(level) {
-    const values = new Map();
-    for (let at = film.first; at <= tick; at += 1) {
-      const told = film.ticks[at - film.first].levels.find((one) => one.level === level)?.values ?? {};
-      for (const [name, text] of Object.entries(told)) values.set(name, { text, changed: at === tick && at > film.first });
-    }
-    return values;
-  }
-
-  function card(box) {
-    const lines = [...box.before, ...(box.lines.length ? box.lines : ["-"]).map((line) => [box.table, line])];
-    const values = make("details", { open: open.has(box.level) }, make("summary", {}, "Variables"));
-    const fill = () => {
-      if (!values.open || values.childElementCount > 1) return;
-      values.append(make("table", {}, make("tbody", {}, [...valuesAt(box.level)].map(([name, { text, changed }]) => make("tr", { class: changed ? "changed" : "" }, make("td", { class: "code" }, name), make("td", { class: "code" }, text, changed ? " (changed)" : ""))))));
-    };
-    values.addEventListener("toggle", () => { if (values.open) open.add(box.level); else open.delete(box.level); fill(); });
-    fill();
-    return make("article", {}, make("h2", {}, box.level), ...lines.map(([table, line]) => make("p", {}, make("span", { class: "soft" }, "table "), table, make("span", { class: "soft" }, ", line "), make("strong", {}, line))),
-      box.ran ? null : make("p", { class: "soft" }, "no cycle in this tick"), ...[box.fault, box.wrong].filter(Boolean).map((text) => make("p", { class: "bad" }, `✗ ${text}`)), ...exchanges(box), ...changes(box), values);
-  }
-
-  let drawn = null;
-  function picture() {
-    const before = film.pictures.filter((one) => one.tick <= tick).sort((a, b) => b.tick - a.tick)[0] ?? film.pictures[0];
-    if (!before || before === drawn) return;
-    drawn = before;
-    const svg = new DOMParser().parseFromString(before.svg, "image/svg+xml").documentElement;
-    figure.replaceChildren(document.adoptNode(svg), make("figcaption", {}, `drawn of tick ${before.tick}. ${before.caption.join(" ")}`));
-  }
-
-  function go(to) {
-    tick = Math.max(film.first, Math.min(film.last, to));
-    slider.value = tick;
-    readout.textContent = `tick ${tick} of ${film.first} to ${film.last}, ${(tick * film.tick_ms / 1000).toFixed(2)} s`;
-    place.replaceChildren(...film.ticks[tick - film.first].levels.map(card));
-    place.dataset.tick = tick;
-    picture();
-  }
-  go(film.at);
-}
+import { FilmBus, standing, unpacked } from "./film.js";
+import { followKeys } from "./keys.js";
+import { faults, linesOf } from "./level.js";
+import { make, spoken } from "./make.js";
+import { lookAt } from "./moments.js";
+import { mount as mountCurves } from "./plots.js";
+import { mount as mountTime } from "./timeline.js";
 
 const part = (id) => document.getElementById(id);
-play(JSON.parse(part("film").textContent), part("scrub"), part("moment"), part("cell"));
+
+function play(film) {
+  const bus = new FilmBus(film);
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const theme = () => bus.tell("theme", dark.matches ? "dark" : "light");
+  dark.addEventListener("change", theme);
+  theme();
+  bus.on("said", ({ text, helps }) => { part("said").textContent = [text, ...helps].join(" "); });
+  mountTime(part("time"), bus);
+  const back = film.at === null ? null : make("button", { type: "button", onclick: () => lookAt(bus, film.at) }, `Back to tick ${film.at}`);
+  if (back) part("time").querySelector(".bar").append(back);
+  levels(film, bus);
+  pictures(film, bus);
+  bus.tell("run.state", { open: false, title: document.title });
+  bus.tell("time.hello", { source: "log", name: document.title, first: film.first, last: film.last, tick_ms: film.tick_ms, levels: film.levels, finding: null });
+  mountCurves(part("curves"), bus);
+  lookAt(bus, film.at ?? film.last);
+  followKeys(bus);
+  for (const one of document.querySelectorAll("[data-tick-of]")) one.addEventListener("click", () => lookAt(bus, Number(one.dataset.tickOf)));
+}
+
+// --- levels ---
+
+function levels(film, bus) {
+  const open = new Set();
+  const place = part("moment");
+  function variables(level, tick) {
+    const rows = Object.entries(film.variables[level] ?? {}).flatMap(([name, { changes: told, unset }]) => {
+      const at = standing(told, tick);
+      if (at < 0) return [];
+      const changed = told[at][0] === tick && tick > film.first, never = unset.some(([from, to]) => from <= tick && tick <= to);
+      return [make("tr", { class: changed ? "changed" : "" }, make("td", { class: "code" }, name), make("td", { class: "code" }, told[at][1], changed ? " (changed)" : "", never ? make("span", { class: "soft" }, " (nobody has set it)") : ""))];
+    });
+    return make("table", {}, make("tbody", {}, rows));
+  }
+  function card(box, tick) {
+    const level = film.levels.find(({ name }) => name === box.level);
+    const lines = [...box.before, ...(box.lines.length ? box.lines : [""]).map((line) => [box.table, line])];
+    const values = make("details", { open: open.has(box.level) }, make("summary", {}, "Variables"));
+    const fill = () => { if (values.open && values.childElementCount < 2) values.append(variables(box.level, tick)); };
+    values.addEventListener("toggle", () => { if (values.open) open.add(box.level); else open.delete(box.level); fill(); });
+    fill();
+    return make("article", { class: `card${bus.selection.level === box.level ? " chosen" : ""}`, "aria-label": `Level ${box.level}` },
+      make("header", {}, make("h3", {}, box.level), make("span", { class: "soft" }, `every ${level.period_ms} ms${box.ran ? "" : "; no cycle in this tick"}`)),
+      make("div", {}, ...linesOf(bus, level, lines, box.ran), ...faults(box.fault, box.wrong), ...exchanges(box), ...changes(box)), values);
+  }
+  function draw() {
+    const moment = bus.latest("moment");
+    if (!moment) return;
+    const focused = place.contains(document.activeElement) ? [...place.querySelectorAll("button, summary")].indexOf(document.activeElement) : -1;
+    place.replaceChildren(...moment.levels.map((box) => card(box, moment.tick)));
+    place.dataset.tick = moment.tick;
+    if (focused >= 0) place.querySelectorAll("button, summary")[focused]?.focus({ preventScroll: true });
+  }
+  bus.on("moment", draw);
+  bus.on("selection", (_, changed) => { if (changed && !changed.has("tick")) draw(); });
+}
+
+// --- pictures ---
+
+function pictures(film, bus) {
+  const sorted = [...film.pictures].sort((a, b) => a.tick - b.tick), figure = part("cell");
+  let drawn = null;
+  function of(picture) {
+    if (picture.of) return part(picture.of).querySelector("svg").cloneNode(true);
+    return document.adoptNode(new DOMParser().parseFromString(picture.svg, "image/svg+xml").documentElement);
+  }
+  bus.on("selection", ({ tick }, changed) => {
+    const now = sorted.findLast((one) => one.tick <= tick) ?? sorted[0];
+    if (!changed?.has("tick") || !now || now === drawn) return;
+    drawn = now;
+    figure.replaceChildren(of(now), make("figcaption", {}, `drawn of tick ${now.tick}. `, ...spoken(now.caption.join(" "))));
+  });
+}
+
+play(await unpacked(part("film")));

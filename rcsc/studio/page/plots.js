@@ -16,26 +16,27 @@ export function mount(root, bus) {
   const empty = make("p", { class: "closed soft" }, "No graph yet: name a variable above.");
   root.append(make("form", { class: "bar", onsubmit: (event) => { event.preventDefault(); add(what.value.trim()); } },
     what, make("button", { type: "submit" }, "New graph"), shows), words, empty, list);
-  const sheet = make("link", { rel: "stylesheet", href: "vendor/uplot/uPlot.css" });
-  document.head.append(sheet);
 
   let graphs = []; // { names, over, element, plot, curves }
-  let known = [], displays = {}, named = "", shown = true, asking = false, again = false, last = 0;
+  let known = [], displays = {}, named = "", asked = null, shown = true, asking = false, again = false, last = 0;
 
   // --- which there are ---
 
+  const keeps = bus.answers("run.type"); // a file shows what it was made with
   const store = () => `studio.plots.${bus.latest("run.state")?.title ?? ""}`;
   function keep() {
+    if (!keeps) return;
     try { localStorage.setItem(store(), JSON.stringify(graphs.map(({ names, over }) => ({ names, over })))); } catch { /* a private window keeps nothing */ }
   }
 
-  function add(text, quietly = false) {
+  async function add(text, quietly = false) {
     const [drawn, over = ""] = text.split(/\s+over\s+/);
-    const names = drawn.split(/[\s,]+/).filter(Boolean);
-    const wrong = [...names, over].filter(Boolean).find((name) => !known.includes(name));
-    if (!names.length) return undefined;
+    const several = drawn.split(/[\s,]+/).filter(Boolean);
+    if (!quietly) await names(); // who is quick types before it is known which there are
+    const wrong = [...several, over].filter(Boolean).find((name) => !known.includes(name));
+    if (!several.length) return undefined;
     if (wrong) return bus.say(`there is no variable \`${wrong}\``, { wrong: true, helps: near(wrong) });
-    const graph = { names, over, curves: [] };
+    const graph = { names: several, over, curves: [] };
     graph.element = frame(graph);
     graphs.push(graph);
     list.append(graph.element);
@@ -79,12 +80,16 @@ export function mount(root, bus) {
     return element;
   }
 
-  async function names() {
+  function names() {
     const run = bus.latest("run");
-    if (!run?.open) return;
+    if (!run?.open) return undefined;
     const key = `${run.source} ${run.name ?? ""} ${run.levels.map((one) => one.name ?? one).join()}`;
-    if (key === named) return;
+    if (key === named) return asked;
     named = key;
+    return asked = learn();
+  }
+
+  async function learn() {
     try {
       const answer = await bus.ask("plot.names");
       known = answer.names.map(({ name }) => name);
@@ -104,7 +109,7 @@ export function mount(root, bus) {
 
   function remembered(sets) {
     let kept = null;
-    try { kept = JSON.parse(localStorage.getItem(store())); } catch { /* none */ }
+    try { kept = keeps ? JSON.parse(localStorage.getItem(store())) : null; } catch { /* none */ }
     for (const { names: several, over } of kept ?? []) if (several.every((name) => known.includes(name))) add(over ? `${several.join(" ")} over ${over}` : several.join(" "), true);
     if (!kept && sets.length) for (const text of displays[sets[0]]) add(text, true);
   }

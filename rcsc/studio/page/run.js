@@ -1,9 +1,10 @@
 // The run: every level beside the others, what is done to it, and why a line did not match.
 
-import { doLine, make, typeLine } from "./bus.js";
+import { doLine, typeLine } from "./bus.js";
 import { changes, exchanges, short } from "./exchanges.js";
+import { faults, linesOf } from "./level.js";
+import { make, spoken } from "./make.js";
 import { lookAt } from "./moments.js";
-import { spoken } from "./tables/desk.js";
 
 const RATES = [["4 times the clock", "4"], ["real time", "1"], ["20 times", "20"], ["as fast as it goes", ""], ["a quarter", "0.25"], ["a tenth", "0.1"]];
 
@@ -163,42 +164,11 @@ function Card(bus, level) {
     ran.textContent = `every ${level.period_ms} ms${box.ran ? "" : "; no cycle in this tick"}`;
     const alone = now?.now.every(([, line]) => line); // what was set by hand may choose another table, of which no line ran
     const lines = alone ? now.now : [...box.before, ...(box.lines.length ? box.lines : [""]).map((line) => [box.table, line])];
-    tables.replaceChildren(...chips(bus, level, lines, box.ran), ...fault(now ? now.fault : box.fault, box.wrong));
+    tables.replaceChildren(...linesOf(bus, level, lines, box.ran), ...faults(now ? now.fault : box.fault, box.wrong));
     body.replaceChildren(...exchanges(box), ...changes(box));
     why();
   }
   return { root, show, last: () => last };
-}
-
-function fault(text, wrong) {
-  return [text, wrong].filter(Boolean).map((one) => make("p", { class: "wrong" }, make("strong", {}, "✗ "), one));
-}
-
-// Every line of each table that ran: the one that ran is lit, and says so.
-function chips(bus, level, lines, cycled) {
-  const by = new Map();
-  for (const [table, line] of lines) by.set(table, [...(by.get(table) ?? []), line].filter(Boolean));
-  return [...by].map(([table, ran]) => make("div", { class: "tried" },
-    make("div", { class: "name" }, make("span", { class: "soft" }, "table "), table, make("span", { class: "soft" }, ran.length ? ", line " : cycled ? ": no line ran" : ": no cycle yet"), make("strong", {}, ran.join(" and "))),
-    make("div", { class: "chips", role: "group", "aria-label": `Lines of ${table}` }, (level.tables[table] ?? []).map((line) => {
-      const lit = ran.includes(line);
-      const chosen = bus.selection.level === level.name && bus.selection.table === table && bus.selection.line === line;
-      return make("button", { type: "button", class: `chip${lit ? " lit" : ""}`, "aria-current": lit ? "true" : undefined, "aria-pressed": String(chosen),
-        title: lit ? `line ${line} ran` : `line ${line} did not match: press to see why`,
-        onclick: () => bus.select(chosen ? { line: "" } : { level: level.name, table, line }) }, lit ? `▶ ${line}` : line);
-    })),
-    bus.selection.level === level.name && bus.selection.table === table && bus.selection.line ? lineButtons(bus, level.name, table, bus.selection.line) : null));
-}
-
-function lineButtons(bus, level, table, line) {
-  const place = `${level}.${table}.${line}`;
-  const live = bus.latest("run").source === "live";
-  const type = (text) => doLine(bus, text).then((answer) => answer && bus.say(answer.shown.join("\n")));
-  return make("div", { class: "bar small" }, make("span", { class: "soft" }, `line ${line}: `),
-    make("button", { type: "button", disabled: !live, onclick: () => type(`break ${place}`) }, "Break here"),
-    make("button", { type: "button", disabled: !live, onclick: () => type(`run to ${place}`) }, "Run to here"),
-    make("button", { type: "button", onclick: () => bus.tell("to-line", { level, table, line, back: true }) }, "Ran before"),
-    make("button", { type: "button", onclick: () => bus.tell("to-line", { level, table, line, back: false }) }, "Ran next"));
 }
 
 function reasonTable(table, only) {

@@ -1,7 +1,7 @@
 // Sharing: the moment that everybody looks at, or a finding of the open file, as one file that needs nothing else.
 
-import { make } from "./bus.js";
-import { deskOf, spoken } from "./tables/desk.js";
+import { make, spoken } from "./make.js";
+import { deskOf } from "./tables/desk.js";
 
 const AROUND = 200; // ticks before the moment and after it
 

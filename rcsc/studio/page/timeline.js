@@ -12,6 +12,7 @@ export function mount(root, bus) {
   const slider = make("div", { class: "line", role: "slider", tabindex: "0", "aria-label": "Tick" }, canvas);
   const readout = make("output", { class: "grow readout" });
   const find = make("input", { "aria-label": "Find a tick by a condition", placeholder: "find: task.cur_state = state_3", spellcheck: "false", list: "run-words" });
+  const finds = bus.answers("time.find");
   const bar = make("div", { class: "bar" });
   root.append(bar, make("div", { class: "tracks scroll" }, names, slider));
 
@@ -180,7 +181,7 @@ export function mount(root, bus) {
     if (!run?.open || tick === null) { readout.textContent = ""; return; }
     const lines = run.levels.map(({ name }) => { const stands = standing(name, tick).change; return stands ? `${name} ${stands[1]} ${stands[2] || "-"}` : name; });
     const here = tracks.marks.filter((mark) => mark.tick === tick).map(({ text }) => text);
-    const text = `tick ${tick} of ${run.last}, ${(tick * run.tick_ms / 1000).toFixed(2)} s${here.length ? `; here: ${here.join("; ")}` : ""}`;
+    const text = `tick ${tick} of ${run.last}, ${(tick * run.tick_ms / 1000).toFixed(2)} s${here.length ? `; here: ${here.join("; ")}` : ""}${tracks.to < tracks.last ? `; reading which lines ran: tick ${Math.max(0, tracks.to)} of ${tracks.last}` : ""}`;
     if (readout.textContent !== text) { readout.textContent = text; readout.title = text; }
     slider.setAttribute("aria-valuemin", run.first);
     slider.setAttribute("aria-valuemax", run.last);
@@ -248,8 +249,11 @@ export function mount(root, bus) {
   async function search(back) {
     const text = find.value.trim();
     if (!text) return find.focus();
-    const found = await bus.try("time.find", { text, tick: here(), back });
-    if (found) { if (found.tick === null) bus.say(`no ${back ? "earlier" : "later"} tick in which ${text}`); else go(found.tick); }
+    const stop = new AbortController(), cancel = () => stop.abort();
+    const told = ({ done, of }) => bus.say(`looking for ${text}: ${Math.round(100 * done / Math.max(1, of))} %`, { cancel });
+    const found = await bus.try("time.find", { text, tick: here(), back }, { signal: stop.signal, progress: told });
+    if (found) { if (bus.latest("said")?.cancel === cancel) bus.say("");
+      if (found.tick === null) bus.say(`no ${back ? "earlier" : "later"} tick in which ${text}`); else go(found.tick); }
     return undefined;
   }
   function toLine({ level, table, line, back }) {
@@ -272,10 +276,10 @@ export function mount(root, bus) {
   for (const [keys, what, run] of [
     ["[", "The tick before", () => go(here() - 1)], ["]", "The tick after", () => go(here() + 1)],
     ["{", "The change of line before, of the level chosen", () => change(-1)], ["}", "The change of line after", () => change(1)],
-    ["m", "The next mark: a finding, a stop, what was done by hand", () => mark(1)], ["M", "The mark before", () => mark(-1)],
     ["+, =", "Closer", () => zoom(0.6)], ["-", "Farther", () => zoom(1.7)], ["0", "The whole run", () => { view.whole = true; soon(); }],
-    ["f", "Find a tick by a condition; Enter the next, Shift+Enter the one before", () => find.focus()],
-    ["n", "The next tick found", () => search(false)], ["N", "The one before", () => search(true)],
+    ...(finds ? [["m", "The next mark: a finding, a stop, what was done by hand", () => mark(1)], ["M", "The mark before", () => mark(-1)],
+      ["f", "Find a tick by a condition; Enter the next, Shift+Enter the one before", () => find.focus()],
+      ["n", "The next tick found", () => search(false)], ["N", "The one before", () => search(true)]] : []),
     ["e", "To the end, and follow the run", () => go(tracks.last)],
     ["l", "To the time line itself: arrows, Page, Home, End", () => slider.focus()],
   ]) bus.key(keys, what, run, "Time line");
@@ -283,8 +287,8 @@ export function mount(root, bus) {
   find.addEventListener("keydown", (event) => { if (event.key === "Enter") { event.preventDefault(); search(event.shiftKey); } if (event.key === "Escape") slider.focus(); });
   const button = (text, title, run) => make("button", { type: "button", title, onclick: run }, text);
   bar.append(readout, button("⇤ change", "The change of line before, of the level chosen: {", () => change(-1)), button("change ⇥", "The change of line after: }", () => change(1)),
-    button("⇤ mark", "The mark before: M", () => mark(-1)), button("mark ⇥", "The next mark: m", () => mark(1)),
-    find, button("Before", "The tick before in which it holds: N", () => search(true)), button("Next", "The next tick in which it holds: n", () => search(false)),
+    ...(finds ? [button("⇤ mark", "The mark before: M", () => mark(-1)), button("mark ⇥", "The next mark: m", () => mark(1))] : []),
+    ...(finds ? [find, button("Before", "The tick before in which it holds: N", () => search(true)), button("Next", "The next tick in which it holds: n", () => search(false))] : []),
     button("−", "Farther", () => zoom(1.7)), button("+", "Closer", () => zoom(0.6)), button("Whole run", "The whole run: 0", () => { view.whole = true; soon(); }));
 
   bus.on("selection", soon);

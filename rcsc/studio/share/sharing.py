@@ -4,6 +4,7 @@ In: questions about a tick in the lane of the run, about a finding in that of pr
 asked writes it where its user says.
 """
 
+import itertools
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -65,11 +66,11 @@ class Moments:
             if so_far is None:
                 return {"name": f"{_plain(title)}_tick_{tick}.html", "text": of_film(title, whole)}
             whole.update(so_far)
-            ask.progress("gathering ticks and pictures", len(whole["ticks"]) + len(whole["pictures"]))
+            ask.progress("gathering ticks and pictures", next(count))
             self._hub.do(LANE, lambda: ask.done(piece))
             return LATER
 
-        whole: dict[str, Any] = {}
+        whole, count = dict[str, Any](), itertools.count(1)
         return piece()
 
 

@@ -23,13 +23,13 @@ from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import outline
 from rcsc_cell.workstation.station import RowResult, Workstation
 
-SERIES = {
-    "hand height (mm)": "primitive.from_robot.plate[2]",
-    "hand speed (mm/s)": "primitive.speed_mm_s",
-    "finger opening (mm)": "gripper.hand.opening_mm",
-    "finger force (N)": "gripper.hand.force_n",
-}
-"""What the report draws, by the name above the drawing."""
+DRAWN = (
+    "primitive.from_robot.plate[2]",
+    "primitive.speed_mm_s",
+    "gripper.hand.opening_mm",
+    "gripper.hand.force_n",
+)
+"""Curves of the report: height and speed of the hand, opening and force of its fingers."""
 PUTS = ("release", "transfer", "clear")
 """Commands after which a part lies somewhere."""
 
@@ -106,9 +106,9 @@ class Witness(RunWitness):
         return self.timed.inner
 
     @property
-    def series_names(self) -> Mapping[str, str]:
+    def drawn(self) -> Sequence[str]:
         """What the report draws."""
-        return SERIES
+        return DRAWN
 
     def look(self) -> None:
         """Keeps the least distances of the joints from their limits."""

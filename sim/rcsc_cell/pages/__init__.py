@@ -1,8 +1,8 @@
 """Pages about a run: HTML files that need nothing else, and who watches a run for them.
 
-A page has no script and fetches nothing, and says so to the browser; what is shown is escaped. The *report* of a run has
-rows, values over time, lines that ran, and pictures of what stands outside where there are any. The page of a *finding*
-draws what `rcsc prove --log` kept, cycle by cycle.
+A page fetches nothing, and says so to the browser; what is shown is escaped. The *report* of a run has rows, lines that ran,
+pictures of what stands outside where there are any, and the run tick by tick by the studio's parts. The page of a *finding* has no
+script; it draws what `rcsc prove --log` kept, cycle by cycle.
 
 >>> from rcsc_cell.pages.report import ReportRow, Story, page
 >>> "every row done" in page(Story("dock", [ReportRow(1, "dock", "done", 70)]))

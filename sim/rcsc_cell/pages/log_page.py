@@ -1,14 +1,13 @@
-"""A recorded run as a report: orders from outside and what became of them, values over time, lines that ran, the cell from time to time.
+"""A recorded run as a report: orders from outside and what became of them, lines that ran, the cell from time to time.
 
 In: a log, and the cell where there is one to be drawn. Out: a `Story`, which `report` makes a page of; the same for the same log and cell.
 What only who watched the run knew (script, parts, timing) is not in a log, and not in the page.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import nan
 
-from rcsc.run.log.export import coverage, valued
+from rcsc.run.log.export import coverage
 from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import Log
 from rcsc.run.log.states import LogColumn
@@ -45,7 +44,6 @@ class _Ordered:
 def story_of(
     log: Log,
     cell: DrawnCell | None = None,
-    displays: Mapping[str, Sequence[str]] | None = None,
     why_not: str = "",
 ) -> Story:
     """Return what a page shows of the log.
@@ -53,7 +51,6 @@ def story_of(
     Args:
         log: The run.
         cell: To be drawn; None for none.
-        displays: Of the system's description, where it is there: what is drawn over time.
         why_not: Why there is no cell, a sentence.
     """
     ordered = _ordered(log)
@@ -61,7 +58,6 @@ def story_of(
         str(log.facts["name"]),
         [order.row(number, log.last) for number, order in enumerate(ordered, 1)],
         _pictures(log, cell, ordered),
-        _series(log, displays or {}),
         [
             Matched(table.level, table.table, line, count)
             for table in coverage(log)
@@ -125,29 +121,18 @@ def _values(fields: tuple[TickValue, ...]) -> str:
 # --- values and pictures ---
 
 
-def _series(log: Log, displays: Mapping[str, Sequence[str]]) -> dict[str, list[tuple[float, float]]]:
-    """Numbers over time: those of the displays, else the first that buffers from outside or to there carry; a gap where none was set."""
-    known = {name: column for name, column in named_columns(log).items() if _is_number(column[1])}
+def drawn_first(log: Log, displays: Mapping[str, Sequence[str]]) -> list[str]:
+    """Which variables have a curve at first: the numbers of the displays, else the first that buffers from outside or to there carry."""
+    known = {name for name, (_, column) in named_columns(log).items() if _is_number(column)}
     shown = [name for names in displays.values() for name in names if name in known]
-    chosen = list(dict.fromkeys(shown or _outside(log, known)))
-    drawn = {name: known[name] for name in (chosen if shown else chosen[:MOST_SERIES])}
-    curves: dict[str, list[tuple[float, float]]] = {name: [] for name in drawn}
-    for tick, values in valued(log, drawn):
-        for name, value in zip(drawn, values, strict=True):
-            number = float(value) if isinstance(value, int | float) else nan
-            curves[name].append((tick * log.tick_ms / 1000, number))
-    return {_titled(name, known[name][1]): points for name, points in curves.items()}
+    return list(dict.fromkeys(shown or list(_outside(log, known))[:MOST_SERIES]))
 
 
 def _is_number(column: LogColumn) -> bool:
     return column.at >= 0 and not column.members and column.c_type != "bool"
 
 
-def _titled(name: str, column: LogColumn) -> str:
-    return f"{name} ({column.unit})" if column.unit else name
-
-
-def _outside(log: Log, known: Mapping[str, object]) -> Iterator[str]:
+def _outside(log: Log, known: Collection[str]) -> Iterator[str]:
     """Names of numbers in buffers with one end outside the levels."""
     levels = {level.name for level in log.levels}
     for wire in log.system().wires:

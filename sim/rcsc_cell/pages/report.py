@@ -1,18 +1,20 @@
 """The report of a run in the cell: one HTML page that needs nothing else.
 
-In: a `Story`, filled from a finished run. Out: a file with the filmstrip, what became of each row of the script, plots, where
-the parts ended, which lines of the tables ran, how near the joints came to their limits, and timing. The page has no
-scripts and fetches nothing; it says so to the browser.
+In: a `Story`, filled from a finished run. Out: a file with the run tick by tick, the filmstrip, what became of each row of the script,
+where the parts ended, which lines of the tables ran, how near the joints came to their limits, and timing. Time line, levels and curves are
+the studio's, of what `Played` holds; without it the page has no script. It fetches nothing, and says so to the browser.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
+
+from markupsafe import Markup
 
 from rcsc.host.files import write_atomically
 from rcsc_cell.pages.page import PAGES
-from rcsc_cell.pictures.plot import plot
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,30 @@ class Placement:
     error_mm: float
 
 
+class Played(Protocol):
+    """What draws a run tick by tick: `rcsc.studio.share.document.Played`."""
+
+    @property
+    def data(self) -> Markup:
+        """The run."""
+        ...
+
+    @property
+    def script(self) -> Markup:
+        """What draws it."""
+        ...
+
+    @property
+    def hash(self) -> str:
+        """As a policy names the script."""
+        ...
+
+    @property
+    def style(self) -> Markup:
+        """How it looks."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Story:
     """A finished run.
@@ -72,7 +98,6 @@ class Story:
         title: Of the page.
         rows: Of the script.
         frames: The filmstrip.
-        series: What moved: (seconds, value) by name, a unit in the name.
         matched: Lines of tables, also those that never ran, in the order of the tables.
         timing: How long things took.
         placements: Of the parts.
@@ -81,12 +106,13 @@ class Story:
         ticks: How many there were: those of all rows, and those in which nothing was ordered any more.
         recorded: What is said of the log that the story is of; empty for a run that was watched. Its rows are orders, which may overlap.
         about_cell: What the pictures rest on, where that is not the plant.
+        played: The run tick by tick, as the studio shows it.
+        left_out: Cycles of the run that are not in `played`, the first of it.
     """
 
     title: str
     rows: Sequence[ReportRow] = ()
     frames: Sequence[CellPicture] = ()
-    series: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
     matched: Sequence[Matched] = ()
     timing: Sequence[Figure] = ()
     placements: Sequence[Placement] = ()
@@ -95,6 +121,8 @@ class Story:
     ticks: int = 0
     recorded: str = ""
     about_cell: str = ""
+    played: Played | None = None
+    left_out: int = 0
 
     @property
     def counted(self) -> str:
@@ -145,7 +173,6 @@ def page(story: Story) -> str:
     return PAGES.get_template("report.html.jinja").render(
         story=story,
         seconds=lambda tick: tick * story.tick_ms / 1000,
-        plots=[(name, plot(points)) for name, points in story.series.items()],
         tables=_tables(story.matched),
     )
 

@@ -6,11 +6,10 @@ it. The paper's cell adds what is true of the cell alone.
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from math import nan
 from typing import Protocol
 
 from rcsc.run.adopt import Begun
@@ -23,7 +22,7 @@ from rcsc_cell.pages.report import CellPicture, Figure, Matched, ReportRow, Stor
 FRAMES_APART, LONG_APART = 25, 80
 """Cycles between pictures of the filmstrip: at the least, and in the middle of a long row."""
 MOST_SERIES = 8
-"""Values that the report draws where the description has no displays."""
+"""Curves of the report where the description has no displays."""
 
 
 class LivePage(Protocol):
@@ -54,7 +53,7 @@ class RunWitness:
         run: System and operator.
         pictures: How what stands outside looks: an SVG document by kind, drawn when it is called.
         live: The page that follows; None where nobody looks.
-        film: Whether pictures and series for a report are kept.
+        film: Whether pictures for a report are kept.
         seconds: Spent on watching.
         matched: How often each line ran, by level, table and line.
     """
@@ -65,7 +64,6 @@ class RunWitness:
     film: bool = False
     seconds: float = 0.0
     frames: list[CellPicture] = field(default_factory=list)
-    series: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     matched: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     unset: Unsets = field(init=False)
     _row: int = -1
@@ -96,14 +94,9 @@ class RunWitness:
         """Looks at what stands outside, after each cycle; here nothing is known of it."""
 
     @property
-    def series_names(self) -> Mapping[str, str]:
-        """What the report draws: `level.variable` by the name above the drawing."""
-        return series_names(self.run.system)
-
-    def _number(self, level: RunningLevel, leaf: str) -> float:
-        """The value of a leaf; not a number where nobody has set it."""
-        unset = level.sign.index[leaf] in self.unset.now.get(level.name, ())
-        return nan if unset else float(level.value(leaf))
+    def drawn(self) -> Sequence[str]:
+        """Which variables, `level.variable`, the report draws at first."""
+        return drawn_first(self.run.system)
 
     def _note(self, system: System, due: tuple[RunningLevel, ...]) -> None:
         """What was set in the tick."""
@@ -119,10 +112,6 @@ class RunWitness:
     # --- the report ---
 
     def _film(self, system: System) -> None:
-        seconds = system.tick * 0.001 * system.description.tick_ms
-        for shown, name in self.series_names.items():
-            level, _, leaf = name.partition(".")
-            self.series.setdefault(shown, []).append((seconds, self._number(system.level(level), leaf)))
         at = 0 if self.run.operator is None else self.run.operator.at
         since = system.tick - self._drawn
         drawing = next(reversed(list(self.pictures.values())), None)
@@ -152,7 +141,6 @@ class RunWitness:
             title,
             [ReportRow(end.row.number, end.row.text, end.state, end.ticks, end.reason) for end in results],
             self.frames,
-            self.series,
             [Matched(*line, self.matched[line]) for line in _lines(system, self.matched)],
             [
                 Figure("computing", seconds, "s"),
@@ -226,17 +214,17 @@ def names(system: System) -> tuple[str, ...]:
     return tuple(f"{level.name}.{leaf.name}" for level in system.levels for leaf in level.sign.leaves)
 
 
-def series_names(system: System) -> dict[str, str]:
-    """What can be drawn over time: the numbers of the displays, else numbers that come from outside or go there."""
+def drawn_first(system: System) -> list[str]:
+    """What is worth a curve: the numbers of the displays, else numbers that come from outside or go there."""
     shown = [name for names_ in system.description.displays.values() for name in names_]
     numbers = {
-        f"{level.name}.{leaf.name}": f"{level.name}.{leaf.name}{f' ({leaf.unit})' if leaf.unit else ''}"
+        f"{level.name}.{leaf.name}": leaf
         for level in system.levels
         for leaf in level.sign.leaves
         if not leaf.members and leaf.c_type != "bool"
     }
     chosen = [name for name in shown if name in numbers] or list(_outside(system, numbers))[:MOST_SERIES]
-    return {numbers[name]: name for name in dict.fromkeys(chosen)}
+    return list(dict.fromkeys(chosen))
 
 
 def _outside(system: System, known: Iterable[str]) -> Iterator[str]:

@@ -3,8 +3,8 @@
 No graphics driver, no browser and no script: the same state gives the same text on one machine, so that pictures can
 be compared in tests and opened anywhere.
 
->>> from rcsc_cell.pictures.plot import plot
->>> plot([(0.0, 1.0), (1.0, 3.0)]).startswith("<svg")
+>>> from rcsc_cell.pictures.stick import stick
+>>> stick((560, 0, 725, 560, 0, 625, 460, 0, 725), 80.0, None).startswith("<svg")
 True
 
 A *solid* picture draws the faces of MuJoCo's shapes from far to near. A *stick* figure is the arm in three
@@ -14,5 +14,5 @@ drawn of a log. A *scene* is the cell as far as a log says it.
 Nothing here is trusted for a proof. What it costs: time by the faces that are drawn.
 
 Modules, in the order the data flows: `solid` draws a MuJoCo model (`shapes`, `order`), `stick` the stick figure
-(`views`, `things`), `plot` a value over time; `scene` finds in a log where everything is.
+(`views`, `things`); `scene` finds in a log where everything is.
 """

@@ -1,6 +1,7 @@
 // The open file that grid, text and graph show: one for the page, so that they always show the same.
 
 import { make, Refusal } from "../bus.js";
+import { spoken } from "../make.js";
 
 export const SIGNS = { proved: "✓", "rests on an assumption": "◑", stale: "…", failed: "✗" }; // beside the words
 
@@ -250,11 +251,6 @@ export class Desk {
     if (!(error instanceof Refusal)) throw error;
     this.#bus.say(error.message, { wrong: true, helps: error.helps });
   }
-}
-
-/** A sentence with names between back quotes, these as code. */
-export function spoken(text) {
-  return text.split(/`([^`]*)`/).map((piece, at) => (at % 2 ? make("code", {}, piece) : piece));
 }
 
 /** A heading that may be broken after `_` and `.`, as the text of the table breaks it. */

@@ -10,7 +10,7 @@ import { nextDiagnostic, openLintPanel, previousDiagnostic, setDiagnostics } fro
 import { highlightSelectionMatches, search, searchKeymap } from "../vendor/codemirror/search/index.js";
 import { Annotation, EditorSelection, EditorState, RangeSet, StateEffect, StateField } from "../vendor/codemirror/state/index.js";
 import { Decoration, drawSelection, EditorView, gutter, GutterMarker, highlightActiveLine, hoverTooltip, keymap, lineNumbers } from "../vendor/codemirror/view/index.js";
-import { spoken } from "./desk.js";
+import { spoken } from "../make.js";
 
 const THEIRS = Annotation.define(); // a change that nobody typed here
 const SHOWS = 8; // findings of a line that are told at its number

@@ -1,7 +1,8 @@
 // The graph of the table that is shown: states, composite states, and an arrow for each line; linked to the rows, and drawn in.
 
 import { make, Refusal } from "../bus.js";
-import { deskOf, SIGNS, spoken } from "./desk.js";
+import { spoken } from "../make.js";
+import { deskOf, SIGNS } from "./desk.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 function put(kind, attributes = {}, ...inside) {

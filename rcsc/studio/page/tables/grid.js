@@ -1,7 +1,8 @@
 // Tables: a grid and the text of one file, with what is proved of it.
 
 import { make } from "../bus.js";
-import { deskOf, SIGNS, spoken } from "./desk.js";
+import { spoken } from "../make.js";
+import { deskOf, SIGNS } from "./desk.js";
 import { SheetGrid } from "./sheet.js";
 import { TextView } from "./text.js";
 

@@ -1,8 +1,9 @@
 // A table as a grid that is edited in place. Cells are told by line and column from 0; column -1 is the line's name, line -1 the heading.
 
 import { make } from "../bus.js";
+import { spoken } from "../make.js";
 import { cellsOf, filling, textOf } from "./clip.js";
-import { breakable, kindOf, spoken } from "./desk.js";
+import { breakable, kindOf } from "./desk.js";
 
 export class SheetGrid {
   #desk; #bus; #root; #table; #cells = []; #shape = ""; #at = { line: 0, column: -1 }; #anchor = null; #editing = null; #shownWitness = null;

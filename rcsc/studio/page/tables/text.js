@@ -1,7 +1,7 @@
 // The same file as text: what is typed goes to the server as edits, one after the other; what others do comes in.
 
 import { make, Refusal } from "../bus.js";
-import { spoken } from "./desk.js";
+import { spoken } from "../make.js";
 import { Editor } from "./editor.js";
 
 export class TextView {
