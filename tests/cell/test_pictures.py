@@ -21,7 +21,8 @@ from rcsc_cell.pages.report import CellPicture, Figure, Matched, Placement, Repo
 from rcsc_cell.pictures.solid import OVERVIEW, View, solid
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import Outline
-from rcsc_cell.pictures.views import FRONT, HIGH_MM, LOW_MM, SIDE, TOP
+from rcsc_cell.pictures.views import FRONT, HIGH_MM, LOW_MM, SCALE, SIDE, TOP
+from rcsc_cell.pictures.views import View as FlatView
 from tests.support.browser import Browser
 
 ABOVE = View((0.35, -0.001, 2.9), (0.35, 0.0, 0.3))
@@ -280,6 +281,33 @@ def test_stations_and_the_trail_are_drawn_and_names_are_text() -> None:
     assert lines(svg, "station")[0] == [pytest.approx(TOP.flat(corner), abs=0.06) for corner in corners]
     assert lines(svg, "trail")[0] == [pytest.approx(TOP.flat(point), abs=0.06) for point in trail]
     assert "<a&b>" in [element.text for element in ET.fromstring(svg).iter(f"{SVG}text")]  # noqa: S314  # our own text
+
+
+@pytest.mark.parametrize(("view", "across", "upward"), [(TOP, 1, 0), (FRONT, 1, 2), (SIDE, 0, 2)])
+def test_projections_have_a_scale(view: FlatView, across: int, upward: int) -> None:
+    """Marks stand where the base's coordinates are that their numbers say, and a bar is as long as it says."""
+    [drawn] = [
+        one
+        for one in ET.fromstring(stick(nine(plate(HOME)), 80.0, HOME)).iter(f"{SVG}g")  # noqa: S314  # our own text
+        if (one.findtext(f"{SVG}title") or "") == view.name
+    ]
+    numbers = {
+        (float(one.get("x", "")), float(one.get("y", ""))): int(one.text.replace("\N{MINUS SIGN}", "-"))
+        for one in drawn.iter(f"{SVG}text")
+        if one.text and re.fullmatch(r"\N{MINUS SIGN}?\d+", one.text)
+    }
+    assert len(numbers) >= 5
+    marks = [one.get("d", "") for one in drawn.iter(f"{SVG}path") if one.get("class") == "scale"]
+    for (x, y), mm in numbers.items():
+        lies_below = x != min(at for at, _ in numbers)
+        point = [0.0, 0.0, 0.0]
+        point[across if lies_below else upward] = float(mm)
+        at = view.flat((point[0], point[1], point[2]))
+        assert (x if lies_below else y - 3) == pytest.approx(at[0] if lies_below else at[1], abs=0.06)
+        assert any(f"{at[0]:.1f} " in mark if lies_below else f" {at[1]:.1f}h" in mark for mark in marks)
+    [bar] = [one.get("d", "") for one in drawn.iter(f"{SVG}path") if one.get("class") == "bar"]
+    assert float(bar.split("h")[1].split("m")[0]) == pytest.approx(500 * SCALE)
+    assert "500 mm" in [one.text for one in drawn.iter(f"{SVG}text")]
 
 
 # --- the report ---

@@ -1,6 +1,7 @@
 // The cell: what stands outside the levels, in space and as a drawing, at the tick that everybody looks at.
 
-import { make, Refusal } from "./bus.js";
+import { Refusal } from "./bus.js";
+import { make, spoken } from "./make.js";
 import { OrbitControls } from "./vendor/three/OrbitControls.js";
 import * as THREE from "./vendor/three/three.module.js";
 
@@ -175,7 +176,7 @@ export function mount(root, bus) {
   async function drawn(tick) {
     const { svg, caption } = await bus.ask("cell.drawing", { tick, projected: how.value === "projections" });
     const picture = new DOMParser().parseFromString(svg, "image/svg+xml").documentElement;
-    drawing.replaceChildren(document.adoptNode(picture), ...caption.map((text) => make("p", {}, text)));
+    drawing.replaceChildren(document.adoptNode(picture), ...caption.map((text) => make("p", {}, ...spoken(text))));
     drawing.setAttribute("aria-label", caption.join(" "));
   }
 
@@ -202,7 +203,7 @@ export function mount(root, bus) {
       return said("This browser cannot draw in space (WebGL).");
     }
     note.title = now === "space" ? "Drag to turn, wheel to go nearer" : "";
-    note.textContent = now === "space" ? `squares of ${GRID_M * 1000} mm` : how.value === "space" && state.space ? "a log holds no poses: drawn of what buffers say" : "";
+    note.textContent = now === "space" ? `squares of ${GRID_M * 1000} mm` : how.value === "projections" ? "lengths in mm" : how.value === "space" && state.space ? "a log holds no poses: drawn of what buffers say" : "";
     note.title = note.textContent;
     said("");
     size();

@@ -16,7 +16,7 @@ from math import isfinite
 from rcsc_cell.cell.arm import Joints, skeleton
 from rcsc_cell.database.pose import Pose, Vector, pose_of
 from rcsc_cell.pictures.things import Block, Mark, Outline, ground, lying, name, pointed_at, standing
-from rcsc_cell.pictures.views import GAP_PX, PICTURES, TOP, Perspective, View, line, page_px, text
+from rcsc_cell.pictures.views import GAP_PX, PICTURES, TOP, Perspective, View, line, page_px, scale, text
 
 TOOL_MM = 165.0
 PALM_MM = 70.0
@@ -139,6 +139,8 @@ def _picture(picture: View | Perspective, figure: _Figure, scene: Scene) -> Iter
             'stroke-opacity=".35"/>'
         )
         yield text((left, top + height + 13), escape(picture.name))
+    if isinstance(picture, View):
+        yield from scale(picture)
     if picture.axes != ("", ""):
         yield text((left + width, top + height + 13), f"{picture.axes[0]} →", "end")
         yield text((left + 4, top + 12), f"↑ {picture.axes[1]}")

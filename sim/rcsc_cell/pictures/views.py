@@ -4,7 +4,7 @@ In: points of the base's axes, in mm. Out: pixels, and lines and words of SVG th
 light or dark.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from rcsc_cell.database.pose import Vector, apply, cross, dot, minus, unit
@@ -50,6 +50,10 @@ class View:
             self.top_px + (top - dot(self.up, at)) * SCALE,
         )
 
+
+BAR_MM = 500
+"""The length that is drawn beside its name, in each projection."""
+_STEP_MM, _NUMBERED_MM = 200, 400
 
 _X, _Y, _Z = (high - low for low, high in zip(LOW_MM, HIGH_MM, strict=True))
 _WIDE, _DEEP, _HIGH = _Y * SCALE, _X * SCALE, _Z * SCALE
@@ -114,6 +118,33 @@ def line(
     """Return points joined by lines, by one more where closed; `look` are attributes."""
     corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(picture.flat, points))
     return f'<{"polygon" if close else "polyline"} class="{kind}" points="{corners}" {look}/>'
+
+
+def scale(picture: View) -> Iterator[str]:
+    """Draw what lengths are: marks along two sides, with the coordinates of the base, and a bar with its length."""
+    (width, height), left, top = picture.size_px, picture.left_px, picture.top_px
+    for along, upward in ((picture.right, False), (picture.up, True)):
+        axis = next(at for at in range(3) if along[at])
+        first = -int(-LOW_MM[axis] // _STEP_MM) * _STEP_MM
+        for mm in range(first, int(HIGH_MM[axis]), _STEP_MM):
+            point = tuple(float(mm) if at == axis else LOW_MM[at] for at in range(3))
+            x, y = picture.flat((point[0], point[1], point[2]))
+            numbered = mm % _NUMBERED_MM == 0
+            long = 6 if numbered else 3
+            mark = f"M{left:.1f} {y:.1f}h{long}" if upward else f"M{x:.1f} {top + height:.1f}v{-long}"
+            yield f'<path class="scale" d="{mark}" stroke="currentColor" stroke-opacity=".5"/>'
+            if numbered and upward and top + 20 < y < top + height - 12:
+                yield text((left + 8, y + 3), _signed(mm), size="10")
+            if numbered and not upward and left + 24 < x < left + width - 12:
+                yield text((x, top + height - 8), _signed(mm), "middle", size="10")
+    end = left + width - 10
+    bar = f"M{end - BAR_MM * SCALE:.1f} {top + 18:.1f}v-5m0 2.5h{BAR_MM * SCALE:.1f}m0 -2.5v5"
+    yield f'<path class="bar" d="{bar}" stroke="currentColor" stroke-opacity=".75"/>'
+    yield text((end - BAR_MM * SCALE / 2, top + 12), f"{BAR_MM} mm", "middle", size="10")
+
+
+def _signed(number: int) -> str:
+    return str(number).replace("-", "\N{MINUS SIGN}")
 
 
 def text(at: Point, words: str, anchor: str = "start", size: str = "11", colour: str = "") -> str:
