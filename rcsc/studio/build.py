@@ -72,6 +72,7 @@ class Build:
 
     def begin(self) -> None:
         """Compile, and open the system; where there are tables alone, say so."""
+        self._hub.watch(self._live.lane, self._live.held)
         if not self._path.is_file():
             self._hub.do(RUN, lambda: self._live.close_because(NO_SYSTEM))
             return

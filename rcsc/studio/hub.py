@@ -34,6 +34,8 @@ Json: TypeAlias = Any
 """What JSON can hold."""
 PROVER = threading.RLock()
 """Whoever proves in this process holds it: the solvers know one thread at a time."""
+LONG_S = 1.0
+"""What a lane does at one go takes long after so many seconds."""
 TOLD_S = 0.5
 """A page is told so often how long a proof takes."""
 MOST_OPEN = 32
@@ -191,6 +193,7 @@ class Lane:
         self._work: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
         self._ended = False
+        self._since_s: float | None = None
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
@@ -216,6 +219,12 @@ class Lane:
         self._thread.join(within_s)
         return not self._thread.is_alive()
 
+    @property
+    def busy_s(self) -> float:
+        """How many seconds what is being done takes so far."""
+        since_s = self._since_s
+        return 0.0 if since_s is None else time.monotonic() - since_s
+
     def _next(self) -> Callable[[], None] | None:
         with self._changed:
             while True:
@@ -228,10 +237,12 @@ class Lane:
 
     def _run(self) -> None:
         while (work := self._next()) is not None:
+            self._since_s = time.monotonic()
             try:
                 work()
             except BaseException as error:  # noqa: BLE001  # of somebody's plant, too: the next in the lane must be done
                 self._failed(error)
+            self._since_s = None
 
 
 @dataclass(slots=True)
@@ -309,6 +320,25 @@ class Hub:
     def do(self, lane: str, work: Callable[[], None], after_s: float = 0.0) -> None:
         """Have something done in a lane, so many seconds from now at the earliest; from any thread."""
         self._lanes[lane].do(work, after_s)
+
+    def watch(self, lane: str, told: Callable[[float], None]) -> None:
+        """Have somebody told, in a thread of its own, how long a lane does one thing that takes long, and 0 once it is over.
+
+        Args:
+            lane: Which.
+            told: Takes seconds.
+        """
+        watched = self._lanes[lane]
+
+        def look() -> None:
+            held = False
+            while not watched.ended(LONG_S / 2):
+                busy_s = watched.busy_s
+                if busy_s >= LONG_S or held:
+                    held = busy_s >= LONG_S
+                    told(busy_s if held else 0.0)
+
+        threading.Thread(target=look, name=f"studio watches {lane}", daemon=True).start()
 
     def tell(self, kind: str, body: Json) -> None:
         """Tell every page; from any thread. Of a kind the latest is sent to a page that was not ready for those before."""

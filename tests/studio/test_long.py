@@ -16,7 +16,7 @@ from rcsc.shell.opening import Opening
 from rcsc.studio import plots
 from rcsc.studio.runs.lines import MOST_RECORDS
 from tests.studio.driven import dock
-from tests.studio.served import Page, page, serving
+from tests.studio.served import Page, page, serving, until
 
 CYCLES = 3 * plots.A_PIECE
 
@@ -110,3 +110,34 @@ def test_curves_are_what_the_log_has_with_a_gap_where_nobody_has_set_a_number(
         assert gaps
 
     looked_at(long, work)
+
+
+def test_a_plant_that_does_not_come_back_is_told_of_by_its_cycle(long: tuple[Path, Path]) -> None:
+    """Every page hears of it, also one that comes meanwhile, and hears when it is over."""
+    base, stuck = long[0].parent / "base.py", long[0].parent / "stuck"
+    text = base.read_text(encoding="utf-8")
+    first = "    def step(self, seconds: float) -> None:\n"
+    assert text.count(first) == 1
+    waits = f"        while __import__('pathlib').Path({str(stuck)!r}).exists():\n            pass\n"
+    base.write_text(text.replace(first, first + waits), encoding="utf-8")
+
+    async def inside() -> None:
+        async with page(server) as one:
+            await one.heard("run.state", open=True)
+            await one.ask("run.type", line="step 3")
+            stuck.touch()
+            asked = await one.send("run.type", line="step 2")
+            async with page(server) as other:
+                for each in (one, other):
+                    await until(lambda each=each: "run.held" in each.events)  # type: ignore[misc]
+                    assert each.events["run.held"]["text"].startswith(
+                        "cycle 4 does not come to its end, for "
+                    )
+                    assert "Ctrl-C" in each.events["run.held"]["help"]
+                stuck.unlink()
+                await one.answer(asked)
+                for each in (one, other):
+                    await each.heard("run.held", text="", help="")
+
+    with serving(Opening(long[0])) as server:
+        asyncio.run(inside())

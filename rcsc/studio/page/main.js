@@ -118,11 +118,15 @@ bus.on("said", ({ text, wrong, helps, cancel }) => {
 function stated() {
   const state = bus.latest("run.state") ?? bus.latest("run.hello");
   let said = "no connection";
-  if (bus.latest("connection")) said = !state ? "connected" : state.text;
-  page("state").textContent = said;
+  const held = bus.latest("run.held");
+  if (bus.latest("connection")) said = held?.text || (!state ? "connected" : state.text);
+  page("state").textContent = page("state").title = said;
+  page("state").classList.toggle("wrong", Boolean(bus.latest("connection") && held?.help));
+  if (held?.help) page("state").title += `; ${held.help}`;
 }
 bus.on("connection", stated);
 bus.on("run.state", stated);
+bus.on("run.held", stated);
 bus.on("run.hello", (state) => {
   if (state.title) document.title = `${(page("title").textContent = state.title)} · rcsc studio`;
   bus.tell("run.state", state);

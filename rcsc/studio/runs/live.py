@@ -88,6 +88,7 @@ class Live:
         history: What the run did.
         why: Why nothing is open; empty where something is.
         opened: Called with each system that was opened, before its first cycle.
+        cycle: Which cycle is under way; 0 for none.
         prove_first: Has the levels proved together beside them, and then something done in this lane.
     """
 
@@ -115,6 +116,7 @@ class Live:
         self.opened: list[Callable[[Session], None]] = []
         self.prove_first: Callable[[Ask, Callable[[], Json]], Json] = lambda _, then: then()
         self.marks: list[Mark] = []
+        self.cycle = 0
         self._going: Going | None = None
         self._ended = ""
         self._rate = rate
@@ -176,6 +178,17 @@ class Live:
         going, self._going, self._ended = self._going, None, ""
         if going is not None:
             going.done(lambda: _shown([], Refused(Code.STUDIO, why)))
+
+    def held(self, seconds: float) -> None:
+        """Tell every page that one thing takes long, and how long; 0 once it is over. Not called in the lane, which is held."""
+        what = (
+            f"cycle {self.cycle} does not come to its end"
+            if self.cycle
+            else "what was asked is not answered yet"
+        )
+        helps = "what stands outside the levels, or an extern procedure, holds it; Ctrl-C where `rcsc studio` runs ends it"
+        text = f"{what}, for {seconds:.0f} s" if seconds else ""
+        self._tell("run.held", {"text": text, "help": helps if self.cycle and seconds else ""})
 
     # --- what pages see ---
 
@@ -369,6 +382,7 @@ class Live:
 
     def _cycle(self, system: System, going: Going) -> None:
         assert self.commands is not None
+        self.cycle = system.tick + 1
         try:
             why = next(going.cycles)
             going.left, going.done_ticks = going.left - 1, going.done_ticks + 1
@@ -390,6 +404,8 @@ class Live:
             why = f"cycle {system.tick}: a bug in rcsc: {type(error).__name__}"
             self._end(why, refused=Refused(Code.INTERNAL, why))
             raise
+        finally:
+            self.cycle = 0
 
     def _end(self, why: str, *, hand: bool = False, refused: Refused | None = None) -> None:
         """End the run under way, and say why."""
