@@ -141,3 +141,18 @@ def test_a_plant_that_does_not_come_back_is_told_of_by_its_cycle(long: tuple[Pat
 
     with serving(Opening(long[0])) as server:
         asyncio.run(inside())
+
+
+def test_a_log_of_another_system_is_said_to_be_one(long: tuple[Path, Path], tmp_path: Path) -> None:
+    other = dock(tmp_path / "other")
+    text = other.read_text(encoding="utf-8")
+    other.write_text(text.replace('name = "dock"', 'name = "another"'), encoding="utf-8")
+
+    async def told(system: Path) -> str:
+        with serving(Opening(system), logs=long[1:]) as server:
+            async with page(server) as one:
+                said: str = (await one.heard("time.state", source="log"))["other"]
+                return said
+
+    assert asyncio.run(told(other)) == "dock"
+    assert asyncio.run(told(long[0])) == ""

@@ -240,6 +240,7 @@ export function mount(root, bus) {
     if (tick === null) return;
     const { ctx } = plot;
     ctx.save();
+    ctx.setLineDash([]); // the last curve's is still set
     ctx.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--ink").trim();
     ctx.lineWidth = devicePixelRatio;
     ctx.beginPath();

@@ -70,7 +70,7 @@ function toolbar(bus, drawer) {
     undo.disabled = !of.open || log || !of.undo;
     if (document.activeElement !== rate) rate.value = of.rate ? String(of.rate) : "";
     live.hidden = !log;
-    said.replaceChildren(...(log ? [...spoken(run.finding ? `finding: ${run.finding.text}; ` : ""), `log ${run.name}, ${run.text}`] : [of.ended ?? ""]));
+    said.replaceChildren(...(log ? [...spoken(run.finding ? `finding: ${run.finding.text}; ` : ""), `log ${run.name}${run.other ? `, of system ${run.other}, which is not the one that is open here` : ""}, ${run.text}`] : [of.ended ?? ""]));
     said.title = said.textContent;
     past();
   });

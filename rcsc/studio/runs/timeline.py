@@ -4,12 +4,14 @@ In: questions of kind `time.*`. Out: what was at a tick. Which run it is about i
 page opened.
 """
 
+import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.model import Program
+from rcsc.run.description import BadDescription, description
 from rcsc.run.log.queries import BadExpression, predicate
 from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.signature import Signature, number_word
@@ -95,8 +97,16 @@ class TimeLine:
             "tick_ms": log.tick_ms,
             "levels": [_named(level) for level in log.levels],
             "text": log.checked.text,
+            "other": self._other(log),
             "finding": None if finding is None else finding.shown(),
         }
+
+    def _other(self, log: Log) -> str:
+        """Of which system a log is; empty where it is the studio's, or nobody knows what that is called."""
+        with contextlib.suppress(BadDescription, OSError):
+            name = log.facts["name"]
+            return "" if name == description(self.live.opening.path).name else name
+        return ""
 
     def show(self, name: str, log: Log, finding: KeptFinding | None = None) -> None:
         """Have everybody look at a log, and at what it breaks."""
