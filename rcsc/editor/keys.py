@@ -14,11 +14,10 @@ table t {
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, count
 from typing import TypeAlias
 
 from rcsc.editor.repairs import spliced
-from rcsc.editor.written import RowText, WrittenPart, WrittenTable, dashes, joined_cells, tables_of
+from rcsc.editor.written import RowText, WrittenTable, dashes, fresh_name, joined_cells, tables_of
 from rcsc.lang.syntax.rows import stub_of
 
 Splice: TypeAlias = tuple[int, int, str]
@@ -79,17 +78,9 @@ def regions(row: RowText) -> tuple[Region, ...]:
     return tuple(found)
 
 
-def rows_of(table: WrittenTable, part: WrittenPart) -> tuple[RowText, ...]:
-    """All rows of a part, those of dashes too."""
-    starts = [each.heading[0].start for each in table.parts]
-    begin = part.heading[0].start
-    past = min((start for start in starts if start > begin), default=table.end + 1)
-    return tuple(row for row in table.rows if begin <= row.start < past)
-
-
 def aligned(table: WrittenTable) -> list[Splice]:
     """The splices that align the columns of a table; none touches the text of a cell."""
-    return [splice for part in table.parts for splice in _aligned(rows_of(table, part))]
+    return [splice for part in table.parts for splice in _aligned(table.rows_of(part))]
 
 
 def _aligned(rows: Sequence[RowText]) -> Iterator[Splice]:
@@ -178,18 +169,18 @@ def add_row(text: str, offset: int) -> Moved | None:
     at = next((at for part in parts for at, line in enumerate(part.lines) if around in line), -1)
     names = [stub_of(joined_cells(line).conditions[0]).name.text for line in parts[0].lines]
     end = "\r\n" if "\r\n" in text else "\n"
-    wanted, name = 0, _name(names, at)
+    wanted, name = 0, fresh_name(names, names[at] if at >= 0 else "")
     for part in parts:
         if at >= 0 and at < len(part.lines):
             after = part.lines[at][-1]
         else:
-            after = rows_of(here.table, part)[-1] if not part.lines else _before(here.table, part.lines[0][0])
+            after = here.table.rows_of(part)[-1] if not part.lines else _before(here.table, part.lines[0][0])
         cells = regions(part.heading[0])
         indent = text[text.rfind("\n", 0, after.start) + 1 : after.start]
         left = " | ".join([name, *("" for each in cells[1:] if not each.action)])
         row = f"| {left} ||{''.join('  |' for each in cells if each.action)}"
         splices.append((after.past, after.past, f"{end}{indent}{row}"))
-        if any(around in line for line in part.lines) or around in rows_of(here.table, part):
+        if any(around in line for line in part.lines) or around in here.table.rows_of(part):
             wanted = here.table.rows.index(after) + 1 + _further(here.table, splices[:-1], after.past)
     text = spliced(text, splices)
     table = here.again(text)
@@ -203,22 +194,20 @@ def insert_column(text: str, offset: int) -> Moved | None:
     if here is None:
         return None
     around = here.table.rows[here.row]
-    part = next(each for each in here.table.parts if around in rows_of(here.table, each))
+    part = next(each for each in here.table.parts if around in here.table.rows_of(each))
     shape = [each.action for each in regions(part.heading[0])]
     at = min(here.cell, len(shape) - 1)
     splices: list[Splice] = []
-    for row in rows_of(here.table, part):
+    for row in here.table.rows_of(part):
         cells = regions(row)
         if [each.action for each in cells] == shape:
             fill = "-" if dashes(row) else " "
             splices.append((cells[at].end, cells[at].end, f"|{fill}{fill}{fill}"))
     text = spliced(text, splices)
     text = spliced(text, aligned(here.again(text)))
-    rows = rows_of(
-        here.again(text),
-        next(each for each in here.again(text).parts if each.heading[0].start >= part.heading[0].start),
-    )
-    return Moved(text, _cursor(rows[0], at + 1))
+    after = here.again(text)
+    own = next(each for each in after.parts if each.heading[0].start >= part.heading[0].start)
+    return Moved(text, _cursor(after.rows_of(own)[0], at + 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,14 +258,3 @@ def _cursor(row: RowText, cell: int) -> int:
         return row.past
     region = cells[min(cell, len(cells) - 1)]
     return region.first if region.length else min(region.start + 1, region.end)
-
-
-def _name(names: Sequence[str], at: int) -> str:
-    """A name for a line after another: the next number or letter where names are such, else `new`."""
-    before = names[at] if 0 <= at < len(names) else ""
-    numbers = (str(number) for number in count(int(before) + 1)) if before.isdecimal() else iter(())
-    letters = (
-        map(chr, range(ord(before) + 1, ord("z") + 1)) if len(before) == 1 and before.isalpha() else iter(())
-    )
-    others = (f"new_{number}" for number in count(2))
-    return next(name for name in chain(numbers, letters, ("new",), others) if name not in names)

@@ -4,19 +4,25 @@ In: a text and a proposal. Out: the text with it. Nothing is trusted of what com
 """
 
 import re
-from collections.abc import Collection, Sequence
-from itertools import chain, count
+from collections.abc import Sequence
 
 from rcsc.diagnostics.diagnostic import Change, Diagnostic, Place, Proposal
 from rcsc.diagnostics.source import Source
 from rcsc.editor.grid import pieces
-from rcsc.editor.written import RowText, WrittenTable, cells_of, joined_cells, table_of
+from rcsc.editor.written import (
+    RowText,
+    WrittenTable,
+    cells_of,
+    fresh_name,
+    joined_cells,
+    table_of,
+    whole_line,
+)
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import Cell, stub_of
 
-NEW_LINE = "new"
 _MEANT = re.compile(r"did you mean `([^`]+)`\?$")
 _Splice = tuple[int, int, str]
 
@@ -85,7 +91,7 @@ def _splices(text: str, table: WrittenTable, change: Change) -> list[_Splice] | 
             return _over(text, joined_cells(rows).conditions[1], "DEFAULT unreachable", rows)
         case _:
             every = [row for part in table.parts for row in part.lines[at]]
-            return [(*_whole_line(text, row), "") for row in every]
+            return [(*whole_line(text, row), "") for row in every]
 
 
 def _line(table: WrittenTable, name: str) -> tuple[int, tuple[RowText, ...]]:
@@ -116,21 +122,14 @@ def _over(text: str, cell: Cell, new: str, rows: Sequence[RowText]) -> list[_Spl
     for start, end in more:
         row = next(row for row in rows if row.start <= start < row.past)
         alone = not any(each.text for each in cells_of(row).all if each.start != start)
-        splices.append((*_whole_line(text, row), "") if alone else (start, end, ""))
+        splices.append((*whole_line(text, row), "") if alone else (start, end, ""))
     return splices
-
-
-def _whole_line(text: str, row: RowText) -> tuple[int, int]:
-    """From the beginning of a row's line of text to that of the next."""
-    start = text.rfind("\n", 0, row.start) + 1
-    end = text.find("\n", row.past)
-    return start, len(text) if end < 0 else end + 1
 
 
 def _new_line(text: str, table: WrittenTable, change: Change) -> list[_Splice] | None:
     """Write a line after the last, in each part of the table."""
     names = {stub_of(joined_cells(rows).conditions[0]).name.text for rows in table.parts[0].lines}
-    name = _fresh(names)
+    name = fresh_name(names)
     waiting, splices = list(change.texts), []
     end = "\r\n" if "\r\n" in text else "\n"
     for part in table.parts:
@@ -140,15 +139,9 @@ def _new_line(text: str, table: WrittenTable, change: Change) -> list[_Splice] |
         many = len(heading.conditions) - 1
         mine, waiting = waiting[:many], waiting[many:]
         last = part.lines[-1][-1]
-        indent = text[_whole_line(text, last)[0] : last.start]
+        indent = text[whole_line(text, last)[0] : last.start]
         actions = "".join("  |" for _ in heading.actions)
         row = f"{indent}| {' | '.join((name, *mine))} ||{actions}"
         past = last.past
         splices.append((past, past, f"{end}{row}"))
     return splices
-
-
-def _fresh(names: Collection[str]) -> str:
-    """A name for a line that no other has."""
-    others = (f"{NEW_LINE}_{number}" for number in count(2))
-    return next(name for name in chain((NEW_LINE,), others) if name not in names)

@@ -5,8 +5,9 @@ In: a text. Out: `WrittenTable`s. Which rows go together and where cells begin i
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, count
 
 from rcsc.lang.syntax.rows import Cell, Cells, cut, is_separator, parts
 
@@ -15,6 +16,8 @@ _HEAD = re.compile(
     re.MULTILINE | re.ASCII,
 )
 """A level names its tables otherwise: without a brace, or `by` what."""
+NEW_LINE = "new"
+"""What a line is called that nobody has named."""
 _ROW = re.compile(r"^[ \t]*(?P<row>\|[^\r\n]*)", re.MULTILINE)
 _END = re.compile(r"^[ \t]*(?P<brace>\})|^[ \t]*(?:[A-Za-z_])", re.MULTILINE)
 
@@ -71,6 +74,14 @@ class WrittenTable:
             WrittenPart(tuple(groups[0]), tuple(map(tuple, groups[1:]))) for groups in found if groups
         )
 
+    def rows_of(self, part: WrittenPart) -> tuple[RowText, ...]:
+        """All rows of one of its parts, those of dashes, too."""
+        begin = part.heading[0].start
+        past = min(
+            (each.heading[0].start for each in self.parts if each.heading[0].start > begin), default=self.end
+        )
+        return tuple(row for row in self.rows if begin <= row.start < past)
+
 
 def tables_of(text: str) -> Iterator[WrittenTable]:
     """Yield the tables of a text, in order."""
@@ -123,3 +134,25 @@ def joined_cells(rows: Sequence[RowText], file: str = "") -> Cells:
 def dashes(row: RowText) -> bool:
     """Whether a row is only `|---|---|`."""
     return is_separator(row)
+
+
+def whole_line(text: str, row: RowText) -> tuple[int, int]:
+    """From the beginning of a row's line of text to that of the next."""
+    start = text.rfind("\n", 0, row.start) + 1
+    end = text.find("\n", row.past)
+    return start, len(text) if end < 0 else end + 1
+
+
+def fresh_name(names: Collection[str], above: str = "") -> str:
+    """A name for a line that no other has: the next number or letter after that of the line above, else `new`.
+
+    >>> fresh_name(["1", "2", "3"], "1"), fresh_name(["a"], "a"), fresh_name(["go", "new"], "go")
+    ('4', 'b', 'new_2')
+    """
+    numbers = (str(number) for number in count(int(above) + 1)) if above.isdecimal() else iter(())
+    single = len(above) == 1 and above.isascii() and above.isalpha()
+    letters = (
+        map(chr, range(ord(above) + 1, ord("Z" if above.isupper() else "z") + 1)) if single else iter(())
+    )
+    others = (f"{NEW_LINE}_{number}" for number in count(2))
+    return next(name for name in chain(numbers, letters, (NEW_LINE,), others) if name not in names)

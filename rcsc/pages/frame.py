@@ -4,13 +4,14 @@ In: a package's folder of templates, which may extend `page.html.jinja`. Out: an
 """
 
 import base64
-import gzip
 import hashlib
 import json
 from typing import Any
 
 import jinja2
 from markupsafe import Markup, escape
+
+from rcsc.host.files.write import compressed
 
 
 def environment(package: str, folder: str) -> jinja2.Environment:
@@ -47,4 +48,4 @@ def hashed(script: str) -> str:
 def packed(data: Any) -> Markup:
     """Write data into a `script` element that is none: gzip, in letters that mean nothing to HTML; the same for the same."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    return Markup(base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode())  # noqa: S704  # nothing is left that means something to HTML
+    return Markup(base64.b64encode(compressed(text.encode())).decode())  # noqa: S704  # nothing is left that means something to HTML

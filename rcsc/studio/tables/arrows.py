@@ -113,7 +113,7 @@ def _with_line(text: str, name: str, state: str, source: str, way: tuple[str, st
     row[sheet.headings.index(heading, sheet.conditions)] = action
     many = len(sheet.stubs)
     at = many - 1 if sheet.cells and sheet.cells[-1][0].startswith("DEFAULT") else many
-    line = cells.fresh(sheet)
+    line = cells.fresh(sheet, at)
     return Drawn(cells.with_line(text, name, at, row, line), line, at)
 
 

@@ -5,7 +5,6 @@ cell; where it does not say what was asked for, nothing is changed. Comments sta
 a text that parses is laid out as `rcsc fmt` does it.
 """
 
-import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -13,7 +12,17 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Source
 from rcsc.editor.grid import pieces
 from rcsc.editor.repairs import formatted, spliced
-from rcsc.editor.written import RowText, WrittenPart, WrittenTable, cells_of, dashes, joined_cells, table_of
+from rcsc.editor.written import (
+    RowText,
+    WrittenPart,
+    WrittenTable,
+    cells_of,
+    dashes,
+    fresh_name,
+    joined_cells,
+    table_of,
+    whole_line,
+)
 from rcsc.lang.syntax.rows import Cell, Cells, stub_of
 from rcsc.shell.reload.refusal import Refused
 
@@ -23,7 +32,6 @@ LONGEST_CELL = 4_000
 STUB = -1
 """The column of the line's name and marks."""
 _Splice = tuple[int, int, str]
-_NUMBER = re.compile(r"\d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +150,7 @@ def with_line(text: str, name: str, at: int, cells: Sequence[str] = (), stub: st
     if not 0 <= at <= len(before.stubs):
         raise Refused(Code.STUDIO, f"table `{name}` has no place {at} for a line")
     row = tuple(_checked(cell) for cell in cells) or ("",) * len(before.headings)
-    stub = _checked(stub) or fresh(before)
+    stub = _checked(stub) or fresh(before, at)
     splices, column, action = list[_Splice](), 0, before.conditions
     for part in table.parts:
         heading = joined_cells(part.heading)
@@ -174,7 +182,7 @@ def without_lines(text: str, name: str, lines: Sequence[int]) -> str:
     if not gone <= set(range(len(before.stubs))):
         raise Refused(Code.STUDIO, f"table `{name}` has {len(before.stubs)} lines")
     splices = [
-        (*_whole_line(text, row), "")
+        (*whole_line(text, row), "")
         for part in table.parts
         for at in gone
         if at < len(part.lines)
@@ -246,8 +254,7 @@ def without_column(text: str, name: str, at: int) -> str:
     part, side = _part_of(table, at, action=action, inside=True)
     heading = joined_cells(part.heading)
     if len(heading.conditions) - 1 + len(heading.actions) == 1:
-        rows = [row for row in table.rows if part.heading[0].start <= row.start < _past(table, part)]
-        splices = [(*_whole_line(text, row), "") for row in rows]
+        splices = [(*whole_line(text, row), "") for row in table.rows_of(part)]
     else:
 
         def change(cells: Cells, *, top: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:  # noqa: ARG001  # as for one that is new
@@ -266,13 +273,10 @@ def without_column(text: str, name: str, at: int) -> str:
     return _sure(text, name, spliced(text, splices), after)
 
 
-def fresh(sheet: Sheet) -> str:
-    """A name for a line that no other has: the next number where all names are numbers."""
+def fresh(sheet: Sheet, at: int) -> str:
+    """A name for a line before position `at` that no other has."""
     names = [name_of(stub) for stub in sheet.stubs]
-    numbers = [name for name in names if _NUMBER.fullmatch(name)]
-    if names and len(numbers) >= len(names) - 1:
-        return str(max(map(int, numbers), default=0) + 1)
-    return next(name for at in range(len(names) + 1) if (name := f"new_{at + 1}") not in names)
+    return fresh_name(names, names[at - 1] if 0 < at <= len(names) else "")
 
 
 def name_of(stub: str) -> str:
@@ -335,7 +339,7 @@ def _cell_splices(text: str, table: WrittenTable, place: Place, new: str) -> Ite
     for start, end in more:
         row = next(row for row in rows if row.start <= start < row.past)
         alone = not any(each.text for each in cells_of(row).all if each.start != start)
-        yield (*_whole_line(text, row), "") if alone and "#" not in row else (start, end, "")
+        yield (*whole_line(text, row), "") if alone and "#" not in row else (start, end, "")
 
 
 def _found(table: WrittenTable, place: Place) -> tuple[tuple[RowText, ...], Cell]:
@@ -411,9 +415,7 @@ def _reshaped(
     table: WrittenTable, part: WrittenPart, change: Callable[..., tuple[tuple[str, ...], tuple[str, ...]]]
 ) -> Iterator[_Splice]:
     """Yield what gives every row of a part other cells; `change` is told whether it is the first of the heading."""
-    for row in table.rows:
-        if not part.heading[0].start <= row.start < _past(table, part):
-            continue
+    for row in table.rows_of(part):
         body, mark, comment = row.partition("#")
         tail = f" {mark}{comment}" if mark else ""
         if dashes(row):
@@ -426,12 +428,6 @@ def _reshaped(
             yield row.start, row.past, _row_text(*change(cells_of(row), top=top)) + tail
 
 
-def _past(table: WrittenTable, part: WrittenPart) -> int:
-    """The offset at which the next part begins, or the table ends."""
-    after = [each.heading[0].start for each in table.parts if each.heading[0].start > part.heading[0].start]
-    return min(after, default=table.end)
-
-
 def _row_text(conditions: Sequence[str], actions: Sequence[str], blank: str = " ") -> str:
     left = "|".join(f"{blank}{cell}{blank}" for cell in conditions)
     right = "".join(f"{blank}{cell}{blank}|" for cell in actions)
@@ -441,12 +437,11 @@ def _row_text(conditions: Sequence[str], actions: Sequence[str], blank: str = " 
 def _inserted(text: str, table: WrittenTable, part: WrittenPart, at: int, row: str) -> _Splice:
     """What writes a row before the line at a position of a part."""
     if at < len(part.lines):
-        start, _ = _whole_line(text, part.lines[at][0])
+        start, _ = whole_line(text, part.lines[at][0])
         indent = text[start : part.lines[at][0].start]
         return start, start, f"{indent}{row}\n"
-    past = _past(table, part)
-    last = [each for each in table.rows if part.heading[0].start <= each.start < past][-1]
-    start, _ = _whole_line(text, last)
+    last = table.rows_of(part)[-1]
+    start, _ = whole_line(text, last)
     more = "" if part.lines or dashes(last) else f"\n{text[start : last.start]}{_dashes_of(part)}"
     return last.past, last.past, f"{more}\n{text[start : last.start]}{row}"
 
@@ -454,9 +449,3 @@ def _inserted(text: str, table: WrittenTable, part: WrittenPart, at: int, row: s
 def _dashes_of(part: WrittenPart) -> str:
     heading = joined_cells(part.heading)
     return _row_text(["---"] * len(heading.conditions), ["---"] * len(heading.actions), "")
-
-
-def _whole_line(text: str, row: RowText) -> tuple[int, int]:
-    """From the beginning of a row's line of text to that of the next."""
-    end = text.find("\n", row.past)
-    return text.rfind("\n", 0, row.start) + 1, len(text) if end < 0 else end + 1
