@@ -109,6 +109,7 @@ class Workspace:
     """
 
     def __init__(self, options: Options | None = None) -> None:
+        smt.for_threads()  # who edits waits in one thread for what another proves
         self.options = options or Options()
         self.memo = Memo()
         self._overlay: Mapping[str, str] = {}

@@ -36,7 +36,29 @@ class Answer(Enum):
 def _z3() -> Any:
     import z3
 
+    if _threads.is_set():
+        _count_with_care()
     return z3
+
+
+_threads = threading.Event()
+
+
+def for_threads() -> None:
+    """Let every thread of this process let go of terms, whichever of them asks at the time.
+
+    Python throws away what is in a cycle in whatever thread happens to run, and Z3, unless told, counts there without care: the question
+    that another thread asks meanwhile is answered wrongly, or the process ends. Threads still ask one after the other.
+    """
+    if not _threads.is_set():
+        _threads.set()
+        if "z3" in sys.modules:
+            _count_with_care()
+
+
+def _count_with_care() -> None:
+    z3 = sys.modules["z3"]
+    z3.Z3_enable_concurrent_dec_ref(z3.main_ctx().ref())
 
 
 _cut: list[int] = []

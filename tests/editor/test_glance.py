@@ -1,6 +1,8 @@
 """A glance says nothing that a check takes back, and what nobody waits for ends."""
 
 import itertools
+import subprocess
+import sys
 import threading
 import time
 from functools import partial
@@ -256,3 +258,45 @@ def test_a_question_that_ended_as_it_was_broken_off_leaves_the_solver_as_it_was(
         solver.push()
         assert solver.check() is Solved.SATISFIABLE
         solver.pop()
+
+
+THROWN_AWAY = """
+import gc, sys, threading
+from rcsc.editor.workspace import Workspace
+from rcsc.lang.model import Int
+from rcsc.solvers import smt
+from rcsc.solvers.options import Limits
+
+Workspace()
+gc.disable()
+over = threading.Event()
+
+def collect():
+    while not over.wait(0.001):
+        gc.collect()
+
+collector = threading.Thread(target=collect)
+collector.start()
+kind = Int(0, 99)
+names = [smt.variable(f"x{at}", kind) for at in range(12)]
+answers = set()
+for _ in range(60):
+    solver = smt.Solver(Limits())
+    for at in range(400):
+        cycle = [smt.equal(names[at % 12], smt.literal(kind, at), kind)]
+        cycle.append(cycle)  # nobody but the collector finds it
+    for at in range(11):
+        solver.add(smt.negation(smt.equal(names[at], names[at + 1], kind)))
+    answers.add(solver.check().name)
+    solver.add(smt.equal(names[0], names[1], kind))
+    answers.add(solver.check().name)
+over.set()
+collector.join()
+print(sorted(answers))
+"""
+
+
+def test_what_another_thread_throws_away_disturbs_no_question() -> None:
+    """In a process of its own: it would end, or answer wrongly."""
+    ran = subprocess.run([sys.executable, "-c", THROWN_AWAY], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "['SATISFIABLE', 'UNSATISFIABLE']\n", "")
