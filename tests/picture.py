@@ -76,6 +76,7 @@ def robot() -> str:
     parts = []
     for place, number in enumerate(FRAMES):
         svg, caption = film[number]
+        caption = re.sub(r"<button[^>]*>(.*?)</button>", r"\1 ·", caption)  # of the page alone
         left = place * (width + 10)
         parts += [
             re.sub(

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rcsc.run.log.read import Log
-
 if TYPE_CHECKING:
+    from rcsc.run.log.read import Log  # of an extra
     from rcsc_cell.pages.report import Story
 
 
-def with_ticks(story: "Story", log: Log, drawn: Sequence[str]) -> "Story":
+def with_ticks(story: "Story", log: "Log", drawn: Sequence[str]) -> "Story":
     """Return a story with its run tick by tick.
 
     Args:
