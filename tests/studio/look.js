@@ -1,5 +1,5 @@
 // What is wrong with how a page looks: text that is cut, what sticks out, and text that is too faint (WCAG 2.2, 1.4.3); words of empty
-// fields, too.
+// fields, too; and names that stand between the back quotes of a terminal.
 
 (() => {
   const wrong = [];
@@ -47,6 +47,7 @@
       if (faint < 4.5 - 0.005) wrong.push(`too faint: ${called(element)} ${element.placeholder}, ${faint.toFixed(2)}`);
     }
     if (!texts(element)) continue;
+    if (!element.closest("pre, [role=log], .text-view") && [...element.childNodes].some((node) => node.nodeType === 3 && node.data.includes("`"))) wrong.push(`back quotes: ${called(element)}`);
     if (style.display !== "inline" && element.scrollWidth > element.clientWidth + 1 && !inside(element, "overflowX") && !(style.textOverflow === "ellipsis" && told(element)))
       wrong.push(`text is cut: ${called(element)}, ${element.scrollWidth} > ${element.clientWidth}`);
     if (element.closest(":disabled")) continue;

@@ -23,6 +23,7 @@ WRONG = {
     "text is cut: input. «» so many words": "<input style='width:50px' placeholder='so many words'>",
     "too faint: input. «» faint": "<style>::placeholder { color: #bbb }</style><input placeholder='faint'>",
     "too faint: p. «dark": "<div style='background:#000'><p style='background:rgba(255,255,255,.2);color:#333'>dark on dark</p></div>",
+    "back quotes": "<p>a name like `this`</p>",
     "sticks out sideways": "<div style='position:absolute;left:1200px;width:200px'>out of it</div>",
     "sticks out downwards": "<div style='position:absolute;top:900px'>below</div>",
 }
@@ -30,6 +31,7 @@ RIGHT = (
     "<p>fine</p>", "<div style='width:50px;overflow:auto;white-space:nowrap'>a long text that is scrolled</div>",
     "<input style='width:200px' placeholder='few words'>", "<input value='1' style='width:50px' placeholder='so many words'>",
     "<p style='color:#767676'>just dark enough</p>",
+    "<pre>what a command printed: `this`</pre>",
     "<p title='a long text' style='width:50px;overflow:hidden;white-space:nowrap;text-overflow:ellipsis'>a long text</p>",
 )  # fmt: skip
 
@@ -72,6 +74,21 @@ def test_every_view_can_be_read_in_both_themes(seat: Seat, theme: str) -> None:
         assert seat.settled(LOOK) == [], f"{dialog}, {theme}"
         seat.press("escape")
         seat.wait(f"!document.querySelector('#{dialog}').open")
+
+
+def test_a_system_that_is_not_proved_can_be_read(tmp_path: Path) -> None:
+    """What is found stands in place of the levels, in the head, and at the table."""
+    system = dock(
+        tmp_path / "dock", ("< 2500 || tick             | 400 ", "       || tick             | 400 ")
+    )
+    with seated(Opening(system)) as one:
+        one.until(
+            "#state", "lines go and late of table goto both match some input"
+        )
+        for view in VIEWS:
+            one.click(f"#views button[data-view={view}]")
+            one.wait(f"document.querySelector('.view-{view}')?.childElementCount")
+            assert one.settled(LOOK) == [], view
 
 
 def test_the_page_has_every_key_that_its_guide_names(seat: Seat) -> None:

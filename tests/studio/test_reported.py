@@ -110,7 +110,7 @@ def test_a_curve_that_is_asked_for_is_drawn_and_nothing_is_kept(
     seat.type("drive.travelled_mm over drive.lateral_mm")
     seat.wait("document.querySelectorAll('#curves canvas').length === 4")
     seat.type("drive.nothing")
-    seat.until("#said", "there is no variable `drive.nothing`")
+    seat.until("#said", "there is no variable drive.nothing")
     opened(seat, made[0])  # as it was made
 
 

@@ -186,7 +186,7 @@ export function mount(root, bus) {
 
   function said(text) {
     why.hidden = !text;
-    why.textContent = text;
+    why.replaceChildren(...spoken(text));
   }
 
   function arrange() {

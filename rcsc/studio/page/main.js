@@ -1,6 +1,7 @@
 // The page's frame: the views in one pane or two, what is said, the keys, and the theme.
 
 import { make, Refusal } from "./bus.js";
+import { spoken } from "./make.js";
 import { followKeys } from "./keys.js";
 import { sharing } from "./share.js";
 import { Connected } from "./socket.js";
@@ -106,10 +107,10 @@ addEventListener("unhandledrejection", ({ reason }) => broken(reason));
 let clearing = 0, under = null; // what a click would cancel
 bus.on("said", ({ text, wrong, helps, cancel }) => {
   const line = page("said");
-  if (cancel && cancel === under) return line.firstChild.replaceWith(text); // the button stays where it is
+  if (cancel && cancel === under) return line.firstChild.replaceChildren(...spoken(text)); // the button stays where it is
   under = cancel;
   line.className = wrong ? "wrong" : "";
-  line.replaceChildren(...(wrong ? [make("strong", {}, "Not done: ")] : []), text, ...helps.map((help) => make("span", { class: "help" }, ` Help: ${help}`)), cancel ? make("button", { type: "button", title: "Give up what is under way: .", onclick: cancel }, "Cancel") : "",
+  line.replaceChildren(...(wrong ? [make("strong", {}, "Not done: ")] : []), make("span", {}, ...spoken(text)), ...helps.map((help) => make("span", { class: "help" }, " Help: ", ...spoken(help))), cancel ? make("button", { type: "button", title: "Give up what is under way: .", onclick: cancel }, "Cancel") : "",
     make("button", { type: "button", class: "close", "aria-label": "Dismiss", onclick: () => line.replaceChildren() }, "×"));
   clearTimeout(clearing);
   if (!wrong && !cancel) clearing = setTimeout(() => line.replaceChildren(), 6000);
@@ -120,7 +121,8 @@ function stated() {
   let said = "no connection";
   const held = bus.latest("run.held");
   if (bus.latest("connection")) said = held?.text || (!state ? "connected" : state.text);
-  page("state").textContent = page("state").title = said;
+  page("state").replaceChildren(...spoken(said));
+  page("state").title = said.replaceAll("`", "");
   page("state").classList.toggle("wrong", Boolean(bus.latest("connection") && held?.help));
   if (held?.help) page("state").title += `; ${held.help}`;
 }

@@ -17,7 +17,7 @@ function play(film) {
   const theme = () => bus.tell("theme", dark.matches ? "dark" : "light");
   dark.addEventListener("change", theme);
   theme();
-  bus.on("said", ({ text, helps }) => { part("said").textContent = [text, ...helps].join(" "); });
+  bus.on("said", ({ text, helps }) => { part("said").replaceChildren(...spoken([text, ...helps].join(" "))); });
   mountTime(part("time"), bus);
   const back = film.at === null ? null : make("button", { type: "button", onclick: () => lookAt(bus, film.at) }, `Back to tick ${film.at}`);
   if (back) part("time").querySelector(".bar").append(back);

@@ -94,7 +94,7 @@ function closed(bus) {
   const findings = (build.findings ?? []).filter(({ severity }) => severity === "error");
   return make("div", { class: "closed" },
     make("h2", {}, build.doing ? `${build.doing[0].toUpperCase()}${build.doing.slice(1)}` : "No system runs"),
-    build.doing ? null : make("p", { class: "pre" }, state.why ?? "not connected"),
+    build.doing ? null : make("p", { class: "pre" }, ...spoken(state.why ?? "not connected")),
     ...findings.slice(0, 20).map(finding),
     findings.length > 20 ? make("p", { class: "soft" }, `and ${findings.length - 20} more`) : null,
     build.doing ? null : make("button", { type: "button", onclick: () => bus.try("build.open") }, "Prove, compile and open again"));
@@ -104,11 +104,11 @@ function closed(bus) {
 function finding({ code, message, primary, witnesses, help }) {
   const { file, start } = primary.place;
   return make("section", { class: "finding" },
-    make("p", {}, make("strong", { class: "wrong" }, `${code}: `), message, make("span", { class: "soft" }, ` at ${file}:${start.line}:${start.column}`)),
+    make("p", {}, make("strong", { class: "wrong" }, `${code}: `), ...spoken(message), make("span", { class: "soft", title: file }, ` at ${file.split("/").slice(-2).join("/")}:${start.line}:${start.column}`)),
     ...witnesses.slice(0, 3).map((witness) => make("p", {}, make("span", { class: "soft" }, "for instance "), make("code", {}, witness.input.map(({ variable, value }) => `${variable} = ${value}`).join(", ")),
       witness.lines.length ? `: lines ${witness.lines.map(({ name }) => name).join(" and ")} match` : "",
       witness.region.length ? make("span", { class: "soft" }, "; all of ", make("code", {}, witness.region.join(", "))) : "")),
-    ...help.map((text) => make("p", {}, make("span", { class: "soft" }, "help: "), text)));
+    ...help.map((text) => make("p", {}, make("span", { class: "soft" }, "help: "), ...spoken(text))));
 }
 
 // --- one level ---
