@@ -126,6 +126,12 @@ class Client:
             assert arrived, self.told.get(method)
             return self.told[method][-1]
 
+    def heard_ever(self, method: str, is_so: Callable[[Any], bool]) -> None:
+        """Wait for a notification of a kind that is so, whatever comes after it."""
+        with self._arrived:
+            arrived = self._arrived.wait_for(lambda: any(map(is_so, self.told.get(method, ()))), PATIENCE_S)
+            assert arrived, self.told.get(method)
+
     # --- documents ---
 
     def uri(self, name: str) -> str:

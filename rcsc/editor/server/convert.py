@@ -4,11 +4,14 @@ In: areas, findings and edits. Out: the same for a client, columns in its units.
 """
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 from lsprotocol import types
 from pygls import uris
+from pygls.protocol import default_converter
 
 from rcsc.editor.places import Area, Edit, Lines, Place, Units
 from rcsc.editor.values import Finding, Witness
@@ -21,6 +24,22 @@ _SEVERITIES = {
 }
 _UNUSED = {"RCS403"}
 """Codes of what never runs: editors show it faded."""
+
+
+NO_VERSION = -1
+"""Stands for the version of a document that a client does not count, as the protocol once allowed."""
+
+
+def reads_messages() -> Any:
+    """What makes values of messages: as pygls does, but that a document may come without a version."""
+    made: Any = default_converter()  # type: ignore[no-untyped-call]  # of pygls
+    for kind in (types.TextDocumentItem, types.VersionedTextDocumentIdentifier):
+        made.register_structure_hook(kind, partial(_versioned, made.get_structure_hook(kind)))
+    return made
+
+
+def _versioned(make: Callable[[Any, Any], Any], value: Mapping[str, object], kind: type[object]) -> object:
+    return make(value if value.get("version") is not None else {**value, "version": NO_VERSION}, kind)
 
 
 def path_of(uri: str, folder: str = "/") -> str:

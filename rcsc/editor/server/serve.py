@@ -15,6 +15,7 @@ from pygls.lsp.server import LanguageServer
 from rcsc import __version__
 from rcsc.editor.places import Units
 from rcsc.editor.server import features, findings
+from rcsc.editor.server.convert import reads_messages
 from rcsc.editor.server.findings import by_file, converter_of, status_of
 from rcsc.editor.server.session import Session
 from rcsc.editor.values import Answer
@@ -41,7 +42,9 @@ class Server(LanguageServer):
     """
 
     def __init__(self, options: Options) -> None:
-        super().__init__("rcsc", __version__, types.TextDocumentSyncKind.Full)
+        super().__init__(
+            "rcsc", __version__, types.TextDocumentSyncKind.Full, converter_factory=reads_messages
+        )
         self.session = Session(self.told, options, rests=at_rest)
         self._shown: dict[str, set[str]] = {}
         _lifecycle(self)
@@ -72,7 +75,7 @@ class Server(LanguageServer):
             for file, each in by_file(answer).items()
             if file == answer.file or file not in self.session.uris
         }
-        for file in self._shown.pop(answer.file, set()) - found.keys() - self.session.uris.keys():
+        for file in self._shown.pop(answer.file, set()) - found.keys() - self._held():
             found[file] = []
         self._shown[answer.file] = {file for file, each in found.items() if each}
         for file, each in found.items():
@@ -86,10 +89,14 @@ class Server(LanguageServer):
 
     def clear(self, path: str) -> None:
         """Take back the findings of a file that is closed."""
-        for file in {path, *self._shown.pop(path, set())} - self.session.uris.keys():
+        for file in {path, *self._shown.pop(path, set())} - self._held():
             uri = uris.from_fs_path(file)
             if uri is not None and not self._pulls:
                 self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, []))
+
+    def _held(self) -> set[str]:
+        """Files whose findings stay: those that are open, and those of which another open file has told some."""
+        return self.session.uris.keys() | set[str]().union(*self._shown.values())
 
     def _refresh(self) -> None:
         """Have the client ask again for what may differ, if it can."""

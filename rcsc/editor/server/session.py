@@ -18,7 +18,7 @@ from pygls.exceptions import JsonRpcContentModified
 from rcsc.editor.memo import OutdatedError
 from rcsc.editor.names.find import Names
 from rcsc.editor.places import Lines, Units
-from rcsc.editor.server.convert import Converter, path_of
+from rcsc.editor.server.convert import NO_VERSION, Converter, path_of
 from rcsc.editor.values import Answer
 from rcsc.editor.workspace import Workspace
 from rcsc.solvers.options import Options
@@ -51,7 +51,7 @@ class Session:
         units: What the client's columns count.
         folders: Its folders.
         uris: What it calls each open file.
-        versions: The version of each open file, as it counts them.
+        versions: The version of each open file, as it counts them; none of a file that it does not count.
         shows: Whether it wants texts of lenses shown; one that shows them itself does not.
         turn: Rises with every change; an answer of an earlier turn is outdated.
         rests: Called when all is answered, where proofs are made: for what would keep a key waiting.
@@ -88,7 +88,10 @@ class Session:
     def open(self, uri: str, text: str, version: int) -> None:
         """Take a text as it is now, and have it checked."""
         path = self.path(uri)
-        self.uris[path], self.versions[path] = uri, version
+        self.uris[path] = uri
+        self.versions.pop(path, None)
+        if version != NO_VERSION:
+            self.versions[path] = version
         self.workspace.open(path, text)
         self.changed(path)
 
