@@ -189,12 +189,17 @@ def add_row(text: str, offset: int) -> Moved | None:
 
 
 def insert_column(text: str, offset: int) -> Moved | None:
-    """Insert a column after that of the cell around an offset, on its side of `||`; None outside tables."""
+    """Insert a column after that of the cell around an offset, on its side of `||`; None outside tables and their parts."""
     here = _Here.of(text, offset)
     if here is None:
         return None
     around = here.table.rows[here.row]
-    part = next(each for each in here.table.parts if around in here.table.rows_of(each))
+    number = next(
+        (at for at, part in enumerate(here.table.parts) if around in here.table.rows_of(part)), None
+    )
+    if number is None:  # a row above the first heading
+        return None
+    part = here.table.parts[number]
     shape = [each.action for each in regions(part.heading[0])]
     at = min(here.cell, len(shape) - 1)
     splices: list[Splice] = []
@@ -205,9 +210,8 @@ def insert_column(text: str, offset: int) -> Moved | None:
             splices.append((cells[at].end, cells[at].end, f"|{fill}{fill}{fill}"))
     text = spliced(text, splices)
     text = spliced(text, aligned(here.again(text)))
-    after = here.again(text)
-    own = next(each for each in after.parts if each.heading[0].start >= part.heading[0].start)
-    return Moved(text, _cursor(after.rows_of(own)[0], at + 1))
+    table = here.again(text)
+    return Moved(text, _cursor(table.rows_of(table.parts[number])[0], at + 1))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """Keys in tables: aligning touches no cell, tab visits every cell, a new line and a new column leave the table a table."""
 
 from pathlib import Path
+from random import Random
 
 import pytest
 from hypothesis import given
@@ -13,6 +14,7 @@ from rcsc.editor.repairs import spliced
 from rcsc.editor.written import cells_of, dashes, tables_of
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.tree import File, TableDecl
+from tests.editor.random_edits import edited
 
 REPO = Path(__file__).parents[2]
 FILES = [
@@ -129,6 +131,38 @@ def test_keys_survive_any_text(text: str, offset: int) -> None:
         moved = act(text, offset)
         assert moved is None or 0 <= moved.offset <= len(moved.text)
     spliced(text, keys.align(text, offset))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_keys_survive_shipped_tables_that_somebody_edits(seed: int) -> None:
+    """Rows above the first heading, parts that align to less than they were: most keys are pressed in such texts."""
+    random = Random(seed)  # noqa: S311  # edits, no secrets
+    for file in FILES:
+        text = (REPO / "tables" / file).read_text()
+        for _ in range(30):
+            text = edited(text, random)
+            bars = [at for at, letter in enumerate(text) if letter == "|"] or [0]
+            for act in (keys.next_cell, keys.previous_cell, keys.add_row, keys.insert_column):
+                moved = act(text, min(len(text), random.choice(bars) + random.randrange(3)))
+                assert moved is None or 0 <= moved.offset <= len(moved.text)
+
+
+def test_a_column_is_inserted_in_a_part_that_moves_up_as_those_above_it_are_aligned() -> None:
+    text = """table t {
+  | line             | a              ||
+  |---|---||
+  | x | 1 ||
+
+  | line | b || c |
+  |---|---||---|
+  | x | 2 || 3 |
+}
+"""
+    moved = keys.insert_column(text, text.index("2"))
+    assert moved is not None
+    line = moved.text[moved.text.rfind("\n", 0, moved.offset) + 1 :].splitlines()[0]
+    assert line == "  | line | b |  || c |"
+    assert keys.insert_column(text.replace("t {\n", "t {\n - | line | q ||\n"), text.index("line")) is None
 
 
 @given(

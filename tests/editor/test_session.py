@@ -118,6 +118,24 @@ def test_keys_in_a_text_that_was_typed_on_do_nothing(command: str, late: bool, t
         assert asyncio.run(ask())
 
 
+@pytest.mark.parametrize("method", ["reading", "editing", "proving"])
+def test_whatever_a_worker_raises_is_the_answer(method: str) -> None:
+    """A future would hear nothing of `StopIteration`, and who asks would wait for ever."""
+
+    async def listens(_: Answer) -> None:
+        pass
+
+    def fails() -> None:
+        next(iter(()))
+
+    async def ask() -> None:
+        session = Session(listens)
+        await asyncio.wait_for(getattr(session, method)(fails), 60)
+
+    with pytest.raises(RuntimeError):
+        asyncio.run(ask())
+
+
 @pytest.mark.parametrize("method", ["answer", "final"])
 def test_an_answer_that_a_key_overtakes_is_outdated(method: str, tmp_path: Path) -> None:
     async def ask() -> None:

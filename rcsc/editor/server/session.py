@@ -42,6 +42,18 @@ def current(ask: Callable[P, Awaitable[T]]) -> Callable[P, Awaitable[T]]:
     return asked
 
 
+async def _in(worker: ThreadPoolExecutor, ask: Callable[[], T]) -> T:
+    """Have a worker answer; whatever it raises is raised: of `StopIteration` a future hears nothing, and who waits would for ever."""
+
+    def asked() -> T:
+        try:
+            return ask()
+        except StopIteration as bug:
+            raise RuntimeError("something that should be there is not") from bug
+
+    return await asyncio.get_running_loop().run_in_executor(worker, asked)
+
+
 @dataclass(slots=True)
 class Session:
     """Open documents of one client.
@@ -171,7 +183,7 @@ class Session:
 
     async def reading(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Ask for something that needs no proof, and that no harm comes of where a text has changed meanwhile."""
-        return await asyncio.get_running_loop().run_in_executor(self._reads, lambda: ask(*args, **kwargs))
+        return await _in(self._reads, lambda: ask(*args, **kwargs))
 
     async def editing(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Ask for edits that need no proof.
@@ -183,7 +195,7 @@ class Session:
 
     async def _of_one_text(self, worker: ThreadPoolExecutor, ask: Callable[[], T]) -> T:
         turn = self.turn
-        answer = await asyncio.get_running_loop().run_in_executor(worker, ask)
+        answer = await _in(worker, ask)
         if self.turn != turn:  # after the worker has looked a last time, too
             raise OutdatedError
         return answer
