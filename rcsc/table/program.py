@@ -212,7 +212,9 @@ def _decided(verdict: TableVerdict) -> tuple[TableFinding, ...]:
 
 
 def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVerdict:
-    """Decide one table and whether its assumptions are consistent; open where memory ends."""
+    """Decide one table and whether its assumptions are consistent; open where memory ends, or nobody waits."""
+    if smt.gives_up("the table"):
+        return _left_open(table, Undecided("nobody waits for the answer"))
     try:
         verdict = prove_table(program, table, options)
         if not table.assumptions or any(

@@ -133,6 +133,7 @@ def test_what_it_takes_to_read_a_text_is_time_of_the_glance(monkeypatch: pytest.
 
     with monkeypatch.context() as patch:
         patch.setattr(Workspace, "reading", lambda _, path: slowly(path))
+        patch.setattr("rcsc.table.program.prove_table", None)  # nor is a table begun
         glance = workspace.glance(file)
     assert not glance.final
     assert {table.standing.state for table in glance.tables} == {State.STALE}
