@@ -82,9 +82,7 @@ def test_a_system_that_is_not_proved_can_be_read(tmp_path: Path) -> None:
         tmp_path / "dock", ("< 2500 || tick             | 400 ", "       || tick             | 400 ")
     )
     with seated(Opening(system)) as one:
-        one.until(
-            "#state", "lines go and late of table goto both match some input"
-        )
+        one.until("#state", "lines go and late of table goto both match some input")
         for view in VIEWS:
             one.click(f"#views button[data-view={view}]")
             one.wait(f"document.querySelector('.view-{view}')?.childElementCount")
