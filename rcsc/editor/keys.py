@@ -169,7 +169,7 @@ def add_row(text: str, offset: int) -> Moved | None:
     at = next((at for part in parts for at, line in enumerate(part.lines) if around in line), -1)
     names = [stub_of(joined_cells(line).conditions[0]).name.text for line in parts[0].lines]
     end = "\r\n" if "\r\n" in text else "\n"
-    wanted, name = 0, fresh_name(names, names[at] if at >= 0 else "")
+    wanted, name = 0, fresh_name(names, names[at] if 0 <= at < len(names) else "")
     for part in parts:
         if at >= 0 and at < len(part.lines):
             after = part.lines[at][-1]
