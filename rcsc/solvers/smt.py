@@ -122,12 +122,10 @@ class _Thread(threading.local):
 _own = _Thread()
 WATCH_S = 0.02
 """A question that nobody waits for any more is broken off within so long, and what Z3 takes to hear of it."""
-_asking: set[int] = set()
-"""Threads whose question Z3 is at."""
-_broken: set[int] = set()
-"""Those of them whose question was broken off."""
+_asking: dict[int, bool] = {}
+"""Threads whose question Z3 is at, and whether it was broken off."""
 _breaking = threading.Lock()
-"""Held while a question is broken off: it ends for who asked it no sooner."""
+"""Held by who looks whether a question is under way, until he has broken it off; so nothing is broken off that has begun since."""
 
 
 @contextmanager
@@ -158,32 +156,20 @@ def until(over: Callable[[], bool], *, breaks_off: bool = False) -> Iterator[Non
 
 def _watch(over: Callable[[], bool], left: threading.Event, asker: int) -> None:
     while not left.wait(WATCH_S):
-        if asker not in _asking or not over():
-            continue
-        with _breaking:
-            if asker in _asking:
-                _broken.add(asker)
-                _z3().main_ctx().interrupt()
+        if over():
+            with _breaking:
+                if asker in _asking:
+                    _asking[asker] = True
+                    _z3().main_ctx().interrupt()
 
 
-@contextmanager
-def _under_way() -> Iterator[None]:
-    """Inside, the question of this thread may be broken off; after it Z3 is as it was.
-
-    Z3 keeps that it is to break off until a question begins, where none is under way: one that had just ended. Who next pushes, or asks
-    for a model, would have an exception for it.
-    """
-    asker = threading.get_ident()
-    _asking.add(asker)
-    try:
-        yield
-    finally:
-        with _breaking:
-            _asking.discard(asker)
-            broken = asker in _broken
-            _broken.discard(asker)
-        if broken:
-            _z3().Solver().check()
+def _absorb() -> None:
+    """Ask something that anybody can answer until Z3 does: what is stated before it has heard that it is broken off may be lost."""
+    z3, answer = _z3(), None
+    while answer != z3.sat:
+        solver = z3.Solver()
+        solver.add(z3.Bool("absorbed"))
+        answer = solver.check()
 
 
 @contextmanager
@@ -462,9 +448,10 @@ class Solver:
         while True:
             counted = self._count()
             used_s, passed_s = time.thread_time(), time.monotonic()
-            with _under_way():
-                answer = self._solver.check(*assuming)
+            answer, broken_off = self._asked(assuming)
             signal.siginterrupt(signal.SIGINT, True)  # Z3 leaves it so that Ctrl-C ends no wait for a worker
+            if broken_off:
+                return z3.unknown, "interrupted"  # whatever Z3 says by then
             if answer != z3.unknown:
                 self._charge(counted)
                 return answer, ""
@@ -478,6 +465,20 @@ class Solver:
                 return answer, why
             self._patience_s *= 4
             self._wait()
+
+    def _asked(self, assuming: tuple[Term, ...]) -> tuple[Any, bool]:
+        """What Z3 says, and whether it was broken off."""
+        asker, broken_off = threading.get_ident(), False
+        with _breaking:
+            _asking[asker] = False
+        try:
+            answer = self._solver.check(*assuming)
+        finally:
+            with _breaking:
+                broken_off = _asking.pop(asker)
+            if broken_off:
+                _absorb()
+        return answer, broken_off
 
     def _give(self, steps: int) -> None:
         """Has Z3 end the next question after so many steps."""

@@ -14,7 +14,7 @@ from rcsc.editor import Workspace
 from rcsc.editor.memo import OutdatedError
 from rcsc.editor.values import Answer, State
 from rcsc.editor.workspace import GLANCE_S, Reading
-from rcsc.lang.model import Int
+from rcsc.lang.model import Bool, Int
 from rcsc.solvers import smt
 from rcsc.solvers.options import Limits, Options
 from rcsc.solvers.smt import Answer as Solved
@@ -161,6 +161,39 @@ def test_a_question_under_way_is_broken_off_when_nobody_waits_for_it() -> None:
     assert easy.check() is Solved.SATISFIABLE
     with smt.until(lambda: False, breaks_off=True):
         assert easy.check() is Solved.SATISFIABLE
+
+
+def test_what_is_broken_off_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever it comes, also just as a question ends: what is stated next is not lost, and the next answer is right."""
+    monkeypatch.setattr(smt, "WATCH_S", 0.0003)
+    kind = Int(0, 50)
+    a, b = (smt.variable(name, kind) for name in "ab")
+    answers: set[Solved] = set()
+    for number in range(300):
+        end_s = time.monotonic() + 0.00003 * (number % 300)
+        with smt.until(lambda end_s=end_s: time.monotonic() >= end_s, breaks_off=True):  # type: ignore[misc]  # bound early
+            _no_two(a, b, kind)
+        answers.add(_no_two(a, b, kind))
+    assert answers == {Solved.UNSATISFIABLE}
+
+
+def _no_two(a: smt.Term, b: smt.Term, kind: Int) -> Solved:
+    """Whether two of some lines that say different things match together: none do."""
+    solver = Solver(Limits())
+    for each in (a, b):
+        solver.add(
+            smt.at_most(smt.literal(kind, 0), each, kind), smt.at_most(each, smt.literal(kind, 50), kind)
+        )
+    seen, twice = smt.truth(False), []
+    for at in range(30):
+        here, so_far = smt.variable(f"line{at}", Bool()), smt.variable(f"seen{at}", Bool())
+        is_so = smt.all_of(
+            [smt.equal(a, smt.literal(kind, at), kind), smt.at_most(smt.literal(kind, at % 3), b, kind)]
+        )
+        solver.add(smt.equal(here, is_so, Bool()), smt.equal(so_far, smt.any_of([seen, here]), Bool()))
+        twice.append(smt.all_of([seen, here]))
+        seen = so_far
+    return solver.check(smt.any_of(twice))
 
 
 def test_what_one_thread_gives_up_another_asks() -> None:
