@@ -2,7 +2,7 @@
 
     python .ci/vendor.py
 
-Needs npm. `tests/studio/test_vendored.py` holds what is there against the digests, without a network. What is changed in a file on the
+Needs npm. `tests/page/test_vendored.py` holds what is there against the digests, without a network. What is changed in a file on the
 way is written in `PARTS`: a bare import becomes a relative one, for a page has no package manager.
 """
 

@@ -11,8 +11,8 @@ from rcsc.pages.frame import hashed
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.states import line_of
 from rcsc.studio.share.document import bundled, player
+from tests.page.test_looks import LOOK
 from tests.studio.driven import HIGH, WIDE, Seat, dock
-from tests.studio.test_looks import LOOK
 
 pytestmark = pytest.mark.needs("chromium")
 
