@@ -25,8 +25,6 @@ MOST_POINTS = 60_000
 """Of one answer's curve; of a longer one the end is shown, and the answer says from where."""
 A_PIECE = 5_000
 """Records that are looked at before the lane is free for others: some hundredths of a second."""
-A_GAP = 400
-"""Ticks in which is looked for what nobody has set, likewise."""
 
 
 @dataclass(slots=True)
@@ -131,7 +129,7 @@ class Plots:
             raise Refused(Code.STUDIO, f"more than {MOST_NAMES} curves")
         history = self._history()
         if (history, history.era) != self._of:
-            self._known, self._finding, self._of = {}, history.find_gaps(A_GAP), (history, history.era)
+            self._known, self._finding, self._of = {}, history.find_gaps(), (history, history.era)
         wanted = [self._traced(history, name) for name in names]
 
         def piece() -> Json:

@@ -19,6 +19,8 @@ from rcsc.run.unset.since import LevelSeen, Unsets
 
 Names = Mapping[str, frozenset[str]]
 """By level."""
+A_PIECE = 400
+"""Ticks of a log that are looked at before others have their turn."""
 
 
 @dataclass(slots=True)
@@ -90,12 +92,11 @@ class Gaps:
         )
 
 
-def gaps_of(log: Log, piece: int) -> Iterator[Gaps | None]:
+def gaps_of(log: Log) -> Iterator[Gaps | None]:
     """Yield nothing after each piece of a log, and at last what nobody has set in it.
 
     Args:
         log: Whole, or a part.
-        piece: How many ticks are looked at in between.
     """
     gaps, last = Gaps(), dict[str, frozenset[int]]()
     signs = {level.name: level.sign for level in log.levels}
@@ -103,7 +104,7 @@ def gaps_of(log: Log, piece: int) -> Iterator[Gaps | None]:
         if now != last:
             gaps.note(tick, now, signs)
             last = dict(now)
-        if count % piece == 0:
+        if count % A_PIECE == 0:
             yield None
     yield gaps
 

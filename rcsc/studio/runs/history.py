@@ -75,9 +75,9 @@ class History:
         self.era += taken_back
         self.logs[-1] = replace(log, levels=tuple(levels))
 
-    def find_gaps(self, piece: int) -> Iterator[None]:
-        """Find what nobody had set in a log that was opened, and yield after each piece of so many ticks; a live run has it."""
-        for found in () if self.gaps is not None else gaps_of(self.logs[0], piece):
+    def find_gaps(self) -> Iterator[None]:
+        """Find what nobody had set in a log that was opened, and yield after each piece of it; a live run has it."""
+        for found in () if self.gaps is not None else gaps_of(self.logs[0]):
             if found is None:
                 yield
             self.gaps = found

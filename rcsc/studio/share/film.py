@@ -21,9 +21,6 @@ MOST_PICTURE_BYTES = 12 * 1024 * 1024
 MOST_TICKS = 10_000
 """Ticks of a whole run that a file holds, the last of them: nearly seven minutes at 40 ms."""
 
-A_GAP = 400
-"""Ticks in which is looked for what nobody has set, before others have their turn."""
-
 Film = dict[str, Any]
 Draw = Callable[[int], dict[str, Any]]
 """Draws a tick: `svg` and `caption`."""
@@ -126,7 +123,7 @@ def _told(variables: dict[str, Film], logged: LoggedLevel, tick: int, now: tuple
 
 def _gaps(whole: Film, history: History) -> Iterator[None]:
     """Tell when nobody had set a number."""
-    yield from history.find_gaps(A_GAP)
+    yield from history.find_gaps()
     assert history.gaps is not None
     for level, variables in whole["variables"].items():
         for name, told in variables.items():

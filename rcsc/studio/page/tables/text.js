@@ -5,7 +5,7 @@ import { spoken } from "../make.js";
 import { Editor } from "./editor.js";
 
 export class TextView {
-  #desk; #bus; #root; #editor; #sent = null; #sending = null; #lost = null; #version = 0; #base = ""; #told = ""; #coloured = "";
+  #desk; #bus; #root; #editor; #sent = null; #sending = null; #lost = null; #version = 0; #base = ""; #told = ""; #coloured = ""; #wanted = null;
 
   constructor(root, bus, desk) {
     this.#desk = desk;
@@ -35,6 +35,7 @@ export class TextView {
       this.#base = doc.text;
       this.#editor.begin(doc.text);
       this.#version = doc.version;
+      this.#arrive();
     } else if (this.#sent === null && doc.version !== this.#version) {
       if (doc.text === this.#lost) this.#base = this.#lost; // it was taken before the connection went
       this.#lost = null;
@@ -120,16 +121,19 @@ export class TextView {
   async #declared() {
     const found = await this.#asked("text.declared", this.#editor.place);
     if (!found) return this.#bus.say("nothing here is a name that is declared");
-    if (found.file !== this.file) await this.#desk.open(found.file);
     this.#desk.follow("");
-    const there = () => {
-      if (this.file !== found.file || this.#desk.file !== found.file) return false;
-      this.#editor.go(found.start, found.end);
-      this.#editor.focus();
-      return true;
-    };
-    if (!there()) setTimeout(there, 300); // the file is told just after it is opened
+    this.#wanted = found;
+    if (found.file === this.file) this.#arrive();
+    else await this.#desk.open(found.file);
     return undefined;
+  }
+
+  /** Go to the declaration that is wanted, once its file is here. */
+  #arrive() {
+    if (this.#wanted?.file !== this.file) return;
+    this.#editor.go(this.#wanted.start, this.#wanted.end);
+    this.#editor.focus();
+    this.#wanted = null;
   }
 
   // --- what is known of the text ---
