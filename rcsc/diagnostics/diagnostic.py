@@ -1,5 +1,7 @@
 """`Diagnostic` and `Label`: what is wrong, as data; `render` turns it into text."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -96,8 +98,34 @@ class Effects:
         return (
             "both do the same where both match"
             if self.same
-            else f"they differ in: {', '.join(self.differ_in)}"
+            else f"they differ in: {', '.join(_with_ranges(self.differ_in))}"
         )
+
+
+def _with_ranges(names: Sequence[str]) -> list[str]:
+    """Names of variables; elements of an array that follow each other are one name.
+
+    >>> _with_ranges(["n", "at[0].x", "at[1].x", "at[2].x", "at[2].y", "at[4].y"])
+    ['n', 'at[0 .. 2].x', 'at[2].y', 'at[4].y']
+    """
+    told: list[str] = []
+    last: tuple[str, int, int, str] | None = None
+    for name in names:
+        parts = _ELEMENT.fullmatch(name)
+        if parts is None:
+            last = None
+            told.append(name)
+            continue
+        before, at, after = parts[1], int(parts[2]), parts[3]
+        follows = last is not None and (before, at - 1, after) == (last[0], last[2], last[3])
+        first = last[1] if last is not None and follows else at
+        last = (before, first, at, after)
+        told[-1 if follows else len(told) :] = [name if first == at else f"{before}[{first} .. {at}]{after}"]
+    return told
+
+
+_ELEMENT = re.compile(r"(.*)\[(\d+)\]([^\[\]]*)")
+"""A name that ends in an element of an array, or in a field of one: its last index is the one that counts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,10 +3,10 @@
 In: a table and two of its lines. Out: `Effects`: that they do, or what they leave different for some such input. Both do the
 same where their actions come to their end alike, call the same extern procedures in the same states with the same values, and
 leave every variable the same: text plays no part. Z3 is asked under what the table may rely on, and of each variable by itself;
-what folds is not asked. Of two lines that are said to do the same, `disagreement` tells an input for which they do not, and
-`meets` whether there is one at all for which it is said.
+what folds, or differs for an input that is tried, is not asked. Of two lines that are said to do the same, `disagreement` tells an
+input for which they do not, and `meets` whether there is one at all for which it is said.
 
-It costs a question a variable that the lines may leave different.
+It costs some inputs that are tried, and a question a variable that none of them shows to be left different.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,7 +17,7 @@ from rcsc.lang.model import Expr, Line, Program, Table, Value, VariableName
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
-from rcsc.symbolic import values
+from rcsc.symbolic import trial, values
 from rcsc.symbolic.effect import Meaning, Shared, differences, value_after
 from rcsc.symbolic.encode import Frame, least_witness
 from rcsc.symbolic.evaluation import TooLongError
@@ -40,11 +40,24 @@ class Disagreement:
 
 
 def alike(
-    program: Program, table: Table, pair: tuple[int, int], options: Options, where: Expr | None = None
+    program: Program,
+    table: Table,
+    pair: tuple[int, int],
+    options: Options,
+    where: Expr | None = None,
+    near: Mapping[str, Value] | None = None,
 ) -> Effects:
     """Compare two lines, by position, for every input that both match, or in `where`: there is one.
 
     The table's assumptions hold there, and invariants where they are among these (`meaning.relying`).
+
+    Args:
+        program: Of the table.
+        table: The table.
+        pair: The two lines, by position.
+        options: What a question may cost.
+        where: Where they are compared.
+        near: Such an input, where one is known: it is tried first.
     """
     first, second = (table.lines[at] for at in pair)
     if _spelled(first) == _spelled(second):
@@ -52,7 +65,7 @@ def alike(
     if smt.gives_up("whether two lines do the same"):
         return Effects(same=None)
     try:
-        return _Comparison(program, table, (first, second), where).effects(options)
+        return _Comparison(program, table, (first, second), where).effects(options, near or {})
     except (TooLongError, RecursionError):
         return Effects(same=None)
     except smt.troubles():
@@ -117,10 +130,12 @@ class _Comparison:
         tests = [test.condition for line in lines for test in line.tests if test is not None]
         self.here = list(_here(program, table, tests if where is None else [where], self.shared))
 
-    def effects(self, options: Options) -> Effects:
+    def effects(self, options: Options, near: Mapping[str, Value]) -> Effects:
         """Say what can be left different, each name for itself."""
+        changes = list({change for _, change in self.changes} - {values.TRUE})
+        seen = {values.TRUE} | (trial.met(self.here, changes, near) if changes else set())
         answers = {
-            name: Answer.SATISFIABLE if change is values.TRUE else _possible([*self.here, change], options)
+            name: Answer.SATISFIABLE if change in seen else _possible([*self.here, change], options)
             for name, change in self.changes
         }
         differ = tuple(name for name, answer in answers.items() if answer is Answer.SATISFIABLE)

@@ -29,6 +29,8 @@ from rcsc.symbolic.values import variable as variable_of
 SAMPLES = 400
 MOST_NODES = 1_500
 """Larger questions go to Z3 at once."""
+EVALUATIONS = 100_000
+"""Nodes of all points together at which `met` looks: about a tenth of a second."""
 
 Point = dict[str, Value]
 
@@ -60,6 +62,32 @@ def points(variables: Sequence[Variable]) -> Iterator[Point]:
 def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:
     """Whether a condition holds at a point that has a value for each of its variables; not where it is undefined."""
     return _all_hold(list(parts_first(condition)), [condition], point)
+
+
+def met(conditions: Sequence[Node], goals: Sequence[Node], near: Mapping[str, Value]) -> set[Node]:
+    """Find goals that hold at some point at which all conditions hold; what is not found may hold at another.
+
+    Args:
+        conditions: As of `witness`.
+        goals: Each is looked for by itself.
+        near: Values of some variables; the others are tried first with these, then all are.
+    """
+    order = list(parts_first(*conditions, *goals))
+    variables = [node for node in order if node.op == Shape.VARIABLE]
+    random, found = Random(0), set[Node]()  # noqa: S311  # a sample, not a secret
+    tries = min(SAMPLES, EVALUATIONS // max(1, len(order)))
+    for number in range(tries):
+        if len(found) == len(goals) or smt.gives_up("what trial finds"):
+            break
+        kept = near if number < tries // 2 else {}
+        point = {
+            each.name: kept[each.name] if each.name in kept else _pick(each, number, random)
+            for each in variables
+        }
+        known = _known(order, point)
+        if all(known[condition] for condition in conditions):
+            found |= {goal for goal in goals if known[goal]}
+    return found
 
 
 def _pick(variable: Node, number: int, random: Random) -> Value:
@@ -103,10 +131,16 @@ def _lowered(
 
 
 def _all_hold(order: Sequence[Node], conditions: Sequence[Node], point: Mapping[str, Value]) -> bool:
+    known = _known(order, point)
+    return all(known[condition] for condition in conditions)
+
+
+def _known(order: Sequence[Node], point: Mapping[str, Value]) -> dict[Node, Value | None]:
+    """The value of each node."""
     known: dict[Node, Value | None] = {}
     for node in order:
         known[node] = _value(node, [known[part] for part in node.args], point)
-    return all(known[condition] for condition in conditions)
+    return known
 
 
 def _value(node: Node, parts: list[Value | None], point: Mapping[str, Value]) -> Value | None:

@@ -54,6 +54,8 @@ MOST_PAIRS = 20
 """Overlapping pairs shown of one table; then how many more."""
 MOST_COMPARED = 200
 """Overlapping pairs of one table of which it is told whether the two lines do the same."""
+COMPARED_STEPS = 500_000
+"""Steps of Z3 a question whether two such lines leave a variable different: a tenth of a second or some; published tables need 20,000."""
 FAR = 80
 """Characters between a line's name and a cell of it from which on an excerpt points at both."""
 MOST_NAMED = 5
@@ -255,7 +257,8 @@ def _effects(program: Program, table: Table, overlap: Overlap, options: Options)
     if options.brief:
         smt.leave_open("whether two lines do the same")
         return None
-    return alike(program, table, (overlap.first, overlap.second), options)
+    few = replace(options, steps=min(options.steps, COMPARED_STEPS))
+    return alike(program, table, (overlap.first, overlap.second), few, near=overlap.witness)
 
 
 def _as_same(first: Line, second: Line, effects: Effects | None) -> tuple[str, ...]:

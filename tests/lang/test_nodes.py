@@ -213,6 +213,18 @@ def test_a_point_that_is_found_is_as_low_as_each_variable_goes() -> None:
     assert trial.witness([values.both(LOW, HIGH)], [N]) is None
 
 
+def test_a_goal_is_met_only_where_all_conditions_hold() -> None:
+    low, seven = values.compare(Op.LT, N, whole(0)), values.compare(Op.EQ, N, whole(7))
+    goals = [low, seven, values.both(low, B), values.negation(low)]
+    assert trial.met([], goals, {"n": 7, "b": False}) == set(goals)  # first near, then anywhere
+    assert trial.met([values.negation(low)], goals, {"n": -1}) == {seven, goals[3]}
+    assert trial.met([low, seven], goals, {}) == set()
+    divided = values.arithmetic(Op.DIV, (M, N), Int(-100, 100))
+    assert trial.met([values.compare(Op.EQ, N, whole(0))], [values.equal(divided, divided), low], {}) <= {
+        values.TRUE
+    }
+
+
 def test_the_points_that_are_tried_are_always_the_same() -> None:
     kinds: dict[str, Scalar] = {"i": Int(-1, 9), "r": Real(-1.0, 8.0), "p": Bool()}
     variables = [Variable(VariableName(name), Kind.INPUT, kind, 0) for name, kind in kinds.items()]

@@ -185,7 +185,7 @@ table t {
     assert errors(text) == []
     assert [str(name) for name, _ in verdict_of(text).tables[0].backing.assumptions] == ["few"]
     assert [error.code.value for error in errors(edited(text, ("invariant few : n < 5\n", "")))] == ["RCS422"]
-    hard = edited(text, ("n mod 5", "(n * n * n + a * a * a * n) mod 7 mod 5"))
+    hard = edited(text, ("n mod 5", "(n * a * a + n) / (a * a + 1) mod 5"))
     undecided = prove_program(program_of(hard), Options(steps=1)).findings
     assert {finding.code.value for finding in undecided} >= {"RCS409"}
 
