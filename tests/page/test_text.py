@@ -210,9 +210,7 @@ def test_tables_are_typed_as_tables(tmp_path: Path) -> None:
         seat.press("shift+tab")
         row = line(seat, "| bad ")
         seat.wait(f"{EDITOR}.place[1] === {row.index('moving')}")
-        seat.press("ctrl+alt+enter")
-        seat.wait(f"{EDITOR}.text.includes('| new ')")
-        goes(seat, "| new ", into=2, length=3)
+        seat.press("ctrl+alt+enter", "delete", "delete", "delete")
         seat.write("waits_long")
         seat.press("tab")
         seat.wait(f"{EDITOR}.text.includes('| start      | true')")
@@ -226,6 +224,26 @@ def test_tables_are_typed_as_tables(tmp_path: Path) -> None:
         seat.press("f12")
         seat.wait(f"{EDITOR}.text.startsWith('unit') || {EDITOR}.text.includes('record drive_order')")
         seat.until(".cm-activeLine", "drive_order")
+
+
+@pytest.mark.needs("chromium")
+def test_what_is_typed_before_the_server_has_done_a_tab_goes_where_that_leads(tmp_path: Path) -> None:
+    with seated(Opening(dock(tmp_path / "dock"), alone=True)) as seat:
+        sits(seat, "goto")
+        for at in range(4):
+            goes(seat, "| bad    |" if at == 0 else f"| n{at - 1}", into=2, length=2)
+            seat.press("ctrl+alt+enter", "delete", "delete", "delete")
+            seat.write(f"n{at}")
+            seat.press("tab")
+            seat.write("false")
+            seat.press("tab", "delete", "tab")
+            seat.write("true")
+            seat.press("tab", "shift+tab", "shift+tab", "left", "right")
+            seat.write("idle")
+            row = f"({EDITOR}.text.split('\\n').find((one) => one.trim().startsWith('| n{at} ')) ?? '')"
+            seat.wait(
+                f"{row}.split('|').slice(1, 5).map((one) => one.trim()).join() === 'n{at},false,idle,true'"
+            )
 
 
 @pytest.mark.needs("chromium")

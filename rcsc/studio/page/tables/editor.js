@@ -8,8 +8,8 @@ import { autocompletion, closeCompletion, completionKeymap } from "../vendor/cod
 import { defaultKeymap } from "../vendor/codemirror/commands/index.js";
 import { nextDiagnostic, openLintPanel, previousDiagnostic, setDiagnostics } from "../vendor/codemirror/lint/index.js";
 import { highlightSelectionMatches, search, searchKeymap } from "../vendor/codemirror/search/index.js";
-import { Annotation, EditorSelection, EditorState, RangeSet, StateEffect, StateField } from "../vendor/codemirror/state/index.js";
-import { Decoration, drawSelection, EditorView, gutter, GutterMarker, highlightActiveLine, hoverTooltip, keymap, lineNumbers } from "../vendor/codemirror/view/index.js";
+import { Annotation, EditorSelection, EditorState, Prec, RangeSet, StateEffect, StateField } from "../vendor/codemirror/state/index.js";
+import { Decoration, drawSelection, EditorView, gutter, GutterMarker, highlightActiveLine, hoverTooltip, keymap, lineNumbers, runScopeHandlers } from "../vendor/codemirror/view/index.js";
 import { spoken } from "../make.js";
 
 const THEIRS = Annotation.define(); // a change that nobody typed here
@@ -18,6 +18,7 @@ const SHOWS = 8; // findings of a line that are told at its number
 /** Make an editor in an element; `on` has `typed`, `moved`, `undo`, `redo`, and what is asked of places: `offers`, `about`, `declared`, `key`. */
 export class Editor {
   #view; #colours = StateEffect.define(); #marks = StateEffect.define();
+  #doing = false; #later = []; // whether a key is being done that the server does, and what was pressed and typed meanwhile
 
   constructor(parent, on) {
     const kept = (effect) => StateField.define({
@@ -26,7 +27,7 @@ export class Editor {
     });
     const colours = kept(this.#colours), marks = kept(this.#marks);
     const run = (act) => () => { act(); return true; };
-    const inTable = (act) => (view) => inRow(view.state) && (act(), true);
+    const inTable = (act) => (view) => inRow(view.state) && (this.#do(act), true);
     this.#view = new EditorView({ parent, state: EditorState.create({ doc: "", extensions: [
       EditorState.lineSeparator.of("\n"), EditorState.tabSize.of(2), EditorState.allowMultipleSelections.of(true),
       EditorView.clipboardInputFilter.of((text) => text.replace(/\r\n?/g, "\n")),
@@ -44,8 +45,16 @@ export class Editor {
         ...searchKeymap, ...defaultKeymap.filter(({ key }) => key !== "Mod-Alt-\\"),
       ]),
       EditorView.contentAttributes.of({ class: "text-area", "aria-label": "Text of the file", spellcheck: "false", autocapitalize: "off" }),
+      Prec.highest(EditorView.domEventHandlers({ keydown: (event, view) => {
+        if (!this.#doing || event.ctrlKey || event.metaKey || event.altKey || event.key.length === 1 || /^(Shift|Escape|Dead|Process|Unidentified)$/.test(event.key)) return false;
+        this.#later.push(() => runScopeHandlers(view, event, "editor"));
+        event.preventDefault();
+        return true;
+      } })),
       EditorView.domEventHandlers({ beforeinput: (event, view) => {
-        if (event.inputType === "historyUndo") on.undo();
+        if (this.#doing && event.inputType === "insertText" && event.data !== null && !view.composing) {
+          this.#later.push(() => view.dispatch(view.state.replaceSelection(event.data), { userEvent: "input.type", scrollIntoView: true }));
+        } else if (event.inputType === "historyUndo") on.undo();
         else if (event.inputType === "historyRedo") on.redo();
         else if (event.inputType === "insertText" && event.data !== null && !view.composing && !view.state.selection.main.empty) {
           view.dispatch(view.state.replaceSelection(event.data), { userEvent: "input.type", scrollIntoView: true }); // a browser joins lines with styles of its own, which the policy refuses
@@ -60,6 +69,13 @@ export class Editor {
       }),
     ] }) });
     parent.editor = this; // for who looks at the page from outside
+  }
+
+  /** Do what the server does for a key; what is pressed and typed meanwhile is done after it, where the cursor is then. */
+  async #do(act) {
+    this.#doing = true;
+    try { await act(); } finally { this.#doing = false; }
+    while (!this.#doing && this.#later.length) this.#later.shift()();
   }
 
   get text() {
