@@ -358,7 +358,7 @@ class Hub:
     # --- pages ---
 
     def enter(self, client: Client) -> None:
-        """Let a page in, and greet it: an event `NAME.hello` of each concern."""
+        """Let a page in, and tell it how each concern stands: an event `NAME.state`, as when that changes."""
         self._clients.append(client)
         if self._wrong is not None:
             client.event("said", message(event="said", body=self._wrong))
@@ -366,7 +366,7 @@ class Hub:
             self._lanes[concern.lane].do(partial(self._greet, client, concern))
 
     def _greet(self, client: Client, concern: Concern) -> None:
-        kind = f"{concern.name}.hello"
+        kind = f"{concern.name}.state"
         text = message(event=kind, body=concern.greeting())
         self._onto_server(lambda: client.event(kind, text))
 

@@ -13,8 +13,9 @@ from aiohttp import web
 from rcsc.commands import run as rcsc
 from rcsc.shell.opening import Opening
 from rcsc.studio.hub import PROVER
+from rcsc.studio.server import Server
 from tests.studio.driven import HIGH, WIDE, Seat, dock, seated
-from tests.studio.served import serving
+from tests.studio.served import page, serving
 
 pytestmark = pytest.mark.needs("chromium")
 REPO = Path(__file__).parents[2]
@@ -291,6 +292,29 @@ def _somewhere(seat: Seat, places: random.Random) -> int:
     seat.mouse("mouseReleased", x, top + 8, 0)
     seat.wait(f"Number(document.querySelector('#time [role=slider]').ariaValueNow) !== {before}")
     return seat.tick()
+
+
+@pytest.mark.parametrize("late", ["timeline.js", "run.js"])
+def test_what_is_told_before_a_view_is_there_is_not_taken_back(tmp_path: Path, late: str) -> None:
+    """A log that was opened as the page was loaded was not shown: what the page was greeted with came again after it."""
+    system, log = dock(tmp_path / "dock"), tmp_path / "dock" / "kept.mcap"
+    assert (
+        rcsc(["run", str(system), "--cycles", "20", "--log", str(log), "--quiet"]) == 1
+    )  # it does not come to its end
+    with serving(Opening(system, alone=True)) as server, Seat(WIDE, HIGH) as seat:
+        seat.hold_back(f"*/{late}")
+        seat.open(server.address)
+        seat.until("#state", "paused at cycle 0")
+        asyncio.run(_opens(server, log))
+        seat.let_go()
+        seat.wait("document.documentElement.dataset.ready === 'yes'")
+        seat.until(".view-run .ended", log.name)
+        seat.wait("document.querySelector('#time [role=slider]').ariaValueMax === '20'")
+
+
+async def _opens(server: Server, log: Path) -> None:
+    async with page(server) as other:
+        await other.ask("log.open", name=log.name)
 
 
 def test_a_text_that_is_written_as_it_is_typed_is_written_whole(drive: Path) -> None:

@@ -74,7 +74,7 @@ class Page:
         async for said in self.socket:
             one = said.json()
             if "event" in one:
-                self.events[one["event"].replace(".hello", ".state")] = one["body"]
+                self.events[one["event"]] = one["body"]
                 self._news.set()
             elif "progress" in one:
                 self.progress.append(one["progress"])

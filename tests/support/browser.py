@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import Any, Self
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
-PATIENCE_S = 300.0
+PATIENCE_S = 120.0
 """After that something is broken; a machine under load needs some seconds."""
 OPTIONS = (
     "--headless", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--hide-scrollbars",
@@ -52,6 +52,7 @@ class Browser:
         os.close(orders)
         os.close(answers)
         self._held, self._number, self._loads = b"", 0, 0
+        self._held_back: list[str] = []
         self.said: list[str] = []
         targets = self._tell("Target.getTargets")["targetInfos"]
         page = next(target["targetId"] for target in targets if target["type"] == "page")
@@ -88,6 +89,16 @@ class Browser:
         self.said.clear()
         assert not self._tell("Page.navigate", url=address).get("errorText")
         self.wait("document.readyState === 'complete'")
+
+    def hold_back(self, pattern: str) -> None:
+        """Has what is asked of addresses like this wait for `let_go`, as on a slow machine."""
+        self._tell("Fetch.enable", patterns=[{"urlPattern": pattern}])
+
+    def let_go(self) -> None:
+        """Lets through what was held back, and all that comes."""
+        assert self._held_back, "nothing was held back"
+        self._tell("Fetch.disable")
+        self._held_back.clear()
 
     def reload(self) -> None:
         """Loads the page anew, as who presses F5; a question whether to leave it is answered with yes."""
@@ -144,6 +155,8 @@ class Browser:
     def _note(self, event: dict[str, Any]) -> None:
         if event.get("method") == "Page.javascriptDialogOpening":
             self._order("Page.handleJavaScriptDialog", accept=True)
+        if event.get("method") == "Fetch.requestPaused":
+            self._held_back.append(event["params"]["requestId"])
         if event.get("method") == "Page.loadEventFired":
             self._loads += 1
         if event.get("method") == "Runtime.exceptionThrown":

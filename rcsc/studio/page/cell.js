@@ -222,7 +222,6 @@ export function mount(root, bus) {
   }
 
   const told = (now) => { state = now; space = null; arrange(); };
-  bus.on("cell.hello", told);
   bus.on("cell.state", told);
   let source = "";
   bus.on("run", (run) => { if (run.source !== source) { source = run.source; arrange(); } else fetch(); });

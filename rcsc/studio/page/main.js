@@ -117,7 +117,7 @@ bus.on("said", ({ text, wrong, helps, cancel }) => {
 });
 
 function stated() {
-  const state = bus.latest("run.state") ?? bus.latest("run.hello");
+  const state = bus.latest("run.state");
   let said = "no connection";
   const held = bus.latest("run.held");
   if (bus.latest("connection")) said = held?.text || (!state ? "connected" : state.text);
@@ -127,12 +127,11 @@ function stated() {
   if (held?.help) page("state").title += `; ${held.help}`;
 }
 bus.on("connection", stated);
-bus.on("run.state", stated);
-bus.on("run.held", stated);
-bus.on("run.hello", (state) => {
+bus.on("run.state", (state) => {
   if (state.title) document.title = `${(page("title").textContent = state.title)} · rcsc studio`;
-  bus.tell("run.state", state);
+  stated();
 });
+bus.on("run.held", stated);
 
 // --- theme ---
 

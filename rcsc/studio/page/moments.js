@@ -40,7 +40,6 @@ export function followMoments(bus) {
   }
 
   let source = "";
-  bus.on("time.hello", (state) => bus.tell("time.state", state));
   bus.on("time.state", (state) => {
     const now = `${state.source} ${state.name ?? ""}`;
     if (now !== source) {

@@ -24,7 +24,7 @@ function play(film) {
   levels(film, bus);
   pictures(film, bus);
   bus.tell("run.state", { open: false, title: document.title });
-  bus.tell("time.hello", { source: "log", name: document.title, first: film.first, last: film.last, tick_ms: film.tick_ms, levels: film.levels, finding: null });
+  bus.tell("time.state", { source: "log", name: document.title, first: film.first, last: film.last, tick_ms: film.tick_ms, levels: film.levels, finding: null });
   mountCurves(part("curves"), bus);
   lookAt(bus, film.at ?? film.last);
   followKeys(bus);

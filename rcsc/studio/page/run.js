@@ -333,7 +333,7 @@ function breaksTab(bus) {
 }
 
 function scriptTab(bus) {
-  const rows = make("tbody"), none = make("p", { class: "soft" }, "No script orders this system; `rcsc studio SCRIPT` starts it with one. Orders given here have the next number.");
+  const rows = make("tbody"), none = make("p", { class: "soft" }, ...spoken("No script orders this system; `rcsc studio SCRIPT` starts it with one. Orders given here have the next number."));
   const level = make("select", { "aria-label": "Level that is ordered", onchange: () => draw() });
   const fields = make("span", { class: "bar small" });
   let orders = [];
@@ -390,7 +390,7 @@ function foundTab(bus) {
       finding ? make("div", { class: "breaks" }, ...spoken(finding)) : null);
     const part = (title, some) => (some.length ? [make("h3", {}, title), make("ul", {}, some.map(named))] : []);
     logs.replaceChildren(...part("Findings: runs that break something", found.filter(({ finding }) => finding)), ...part("Runs that were kept", found.filter(({ finding }) => !finding)));
-    if (!found.length) logs.replaceChildren(make("p", { class: "soft" }, "no logs here: `rcsc run --log`, `rcsc prove --log` and campaigns write them"));
+    if (!found.length) logs.replaceChildren(make("p", { class: "soft" }, ...spoken("no logs here: `rcsc run --log`, `rcsc prove --log` and campaigns write them")));
   }
   const prove = make("button", { type: "button", onclick: () => job("build.prove", {}, (answer) => {
     text.hidden = false;
@@ -399,7 +399,6 @@ function foundTab(bus) {
     list();
   }) }, "Prove the levels together");
   const again = make("button", { type: "button", onclick: () => job("build.open", {}, (answer) => bus.say(answer.ok ? "proved, compiled and opened anew" : "the tables are not proved", { wrong: !answer.ok })) }, "Prove, compile and open anew");
-  bus.on("build.hello", (state) => bus.tell("build.state", state));
   bus.on("build.state", (state) => { if (!cancel) doing.textContent = state.doing; });
   return { root: make("div", { class: "column" }, make("div", { class: "bar" }, again, prove, make("button", { type: "button", onclick: list }, "List logs again"), stop, doing),
     make("div", { class: "scroll" }, text, logs)), shown: list, focus: () => prove.focus() };

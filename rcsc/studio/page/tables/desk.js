@@ -30,7 +30,7 @@ export class Desk {
 
   constructor(bus) {
     this.#bus = bus;
-    bus.on("tables.hello", ({ files }) => this.#greeted(files));
+    bus.on("tables.state", ({ files }) => this.#greeted(files));
     bus.on("selection", (now, changed) => {
       if (changed?.has("table") && now.table !== this.table) this.#go(now);
       else if (changed?.has("level") && this.follows) this.follow(now.level);
