@@ -41,7 +41,7 @@ export function mount(root, bus) {
   bus.on("run", soon);
   bus.on("moment", soon);
   bus.on("build.state", soon);
-  bus.on("selection", soon);
+  bus.on("selection", (_, changed) => { if (!changed || [...changed].some((one) => one !== "tick")) soon(); }); // of another tick the moment comes
 }
 
 // --- what is done to all levels ---

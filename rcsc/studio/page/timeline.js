@@ -18,6 +18,8 @@ export function mount(root, bus) {
 
   let tracks = { era: -1, to: -1, first: 0, last: 0, levels: new Map(), marks: [] };
   let key = "", asking = false, again = false, due = false;
+  const still = make("canvas"); // what does not move with the tick, drawn once
+  let stands = "", told = 0, across = 0;
   let view = { from: 0, to: 200, whole: true };
 
   // --- what the server knows ---
@@ -38,6 +40,7 @@ export function mount(root, bus) {
         held.push(...changes);
         tracks.levels.set(level, held);
       }
+      told += 1;
       Object.assign(tracks, { era: answer.era, to: answer.to, first: answer.first, last: answer.last, marks: answer.marks });
       if (answer.to < answer.last) again = true;
     }
@@ -67,7 +70,7 @@ export function mount(root, bus) {
     for (const letter of text) hash = (hash * 31 + letter.codePointAt(0)) % 360;
     return dark() ? `hsl(${hash} 28% ${at % 2 ? 27 : 22}%)` : `hsl(${hash} 55% ${at % 2 ? 88 : 82}%)`;
   };
-  const x = (tick) => (tick - view.from) / (view.to - view.from) * canvas.clientWidth;
+  const x = (tick) => (tick - view.from) / (view.to - view.from) * across;
   const tickAt = (pixel) => view.from + pixel / canvas.clientWidth * (view.to - view.from);
 
   function draw() {
@@ -79,6 +82,7 @@ export function mount(root, bus) {
     }
     for (const button of names.querySelectorAll("button")) button.toggleAttribute("data-chosen", button.textContent === bus.selection.level);
     const [wide, high] = [canvas.clientWidth || slider.clientWidth, AXIS + ROW * levels.length + 2];
+    across = wide;
     const ratio = devicePixelRatio || 1;
     if (canvas.width !== Math.round(wide * ratio) || canvas.height !== Math.round(high * ratio)) {
       canvas.width = Math.round(wide * ratio);
@@ -91,16 +95,29 @@ export function mount(root, bus) {
       const width = view.to - view.from;
       Object.assign(view, { to: bus.selection.tick + width * 0.05, from: bus.selection.tick - width * 0.95 });
     }
-    const on = canvas.getContext("2d"), say = colours();
-    on.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const say = colours();
+    const now = JSON.stringify([key, told, view, wide, high, ratio, levels, run?.tick_ms, bus.selection.level, Object.values(say)]);
+    if (now !== stands) {
+      stands = now;
+      Object.assign(still, { width: canvas.width, height: canvas.height });
+      const on = begun(still, ratio);
+      axis(on, wide, high, say, run?.tick_ms ?? 40);
+      levels.forEach((level, row) => track(on, level, AXIS + ROW * row, wide, say));
+      marks(on, high, say);
+    }
+    const on = begun(canvas, ratio);
     on.clearRect(0, 0, wide, high);
-    on.font = "11px system-ui, sans-serif";
-    on.textBaseline = "middle";
-    axis(on, wide, high, say, run?.tick_ms ?? 40);
-    levels.forEach((level, row) => track(on, level, AXIS + ROW * row, wide, say));
-    marks(on, high, say);
+    if (still.width && still.height) on.drawImage(still, 0, 0, wide, high);
     head(on, high, say);
     spoken();
+  }
+
+  function begun(one, ratio) {
+    const on = one.getContext("2d");
+    on.setTransform(ratio, 0, 0, ratio, 0, 0);
+    on.font = "11px system-ui, sans-serif";
+    on.textBaseline = "middle";
+    return on;
   }
 
   function axis(on, wide, high, say, tickMs) {
@@ -148,7 +165,7 @@ export function mount(root, bus) {
   function marks(on, high, say) {
     for (const { tick, kind } of tracks.marks) {
       const at = x(tick);
-      if (at < -5 || at > canvas.clientWidth + 5) continue;
+      if (at < -5 || at > across + 5) continue;
       on.fillStyle = kind === "finding" ? say.bad : kind === "stop" ? say.accent : say.warn;
       on.beginPath();
       if (kind === "hand") on.arc(at, AXIS - 4, 3, 0, 7);
@@ -169,9 +186,9 @@ export function mount(root, bus) {
     on.globalAlpha = 1;
     on.fillRect(Math.round(at) - 1, 0, 2, high);
     const text = `${tick}`;
-    const width = on.measureText(text).width + 8;
-    const place = Math.min(canvas.clientWidth - width, Math.max(0, at - width / 2));
-    on.fillRect(place, 0, width, AXIS - 3);
+    const room = on.measureText(text).width + 8;
+    const place = Math.min(across - room, Math.max(0, at - room / 2));
+    on.fillRect(place, 0, room, AXIS - 3);
     on.fillStyle = dark() ? "#0d1318" : "#ffffff";
     on.fillText(text, place + 4, (AXIS - 3) / 2);
   }
