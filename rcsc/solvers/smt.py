@@ -385,6 +385,11 @@ class Solver:
         self._model: Any = None
         self.names = 0
 
+    def begins_anew(self, steps: int, seed: int) -> None:
+        """Have each question from now on take so many steps at most, by another way through the same search."""
+        self._steps = steps
+        self._solver.set("random_seed", seed)
+
     def named(self, term: Term) -> Term:
         """Return a constant that stands for the term: quicker to read from a model, and to ask of. Call outside `push`."""
         defined: Any = term

@@ -560,7 +560,7 @@ def test_a_plant_answers_what_a_feed_asks(here: Path, capsys: pytest.CaptureFixt
     answer = "\n    def aside(self, travelled_mm: int) -> tuple[int]:\n        return (max(0, 120 - travelled_mm // 5),)\n"
     (here / "base.py").write_text(base + answer, encoding="utf-8")
     (here / "go.csv").write_text("command,base.contact\ndock,true\n", encoding="utf-8")
-    for more in ([], ["--processes", "--rate", "20"]):
+    for more in ([], ["--processes", "--rate", "5"]):
         assert (
             run(["run", "dock", "--no-compile", "-q", "--executor", "python", "--script", "go.csv", *more])
             == 0

@@ -31,6 +31,8 @@ from rcsc.symbolic.keyed import Keyed
 
 TOGETHER = 50
 """All questions about a level together may take the steps of so many; later ones are not decided."""
+TRIES = (64, 64, 16, 16, 4, 1)
+"""What part of its steps a question of the confirmation gets, try after try: what one search gives up another often refutes at once."""
 
 
 class NotConfirmedError(Exception):
@@ -193,21 +195,25 @@ def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
     Raises:
         NotConfirmedError: They are not, or the solver gave up.
     """
-    left = _not_refuted(_questions(asked, clauses))
-    if left:  # what Z3 gives up may be refuted at once in a solver of its own, whose terms were made in another order
-        again = (question for at, question in enumerate(_questions(asked, clauses)) if at in left)
-        if _not_refuted(again):
-            raise NotConfirmedError
+    left: set[int] | None = None
+    for seed, part in enumerate(TRIES):
+        left = _not_refuted(_questions(asked, clauses), left, asked.limits.steps // part, seed)
+        if not left:
+            return
+    raise NotConfirmedError
 
 
-def _not_refuted(questions: Iterable[Solver]) -> set[int]:
-    """Return the positions of the questions that Z3 gave up.
+def _not_refuted(questions: Iterable[Solver], only: set[int] | None, steps: int, seed: int) -> set[int]:
+    """Return the positions of the questions that Z3 gave up, of all or of `only` some.
 
     Raises:
         NotConfirmedError: It answers one.
     """
     left = set[int]()
     for at, question in enumerate(questions):
+        if only is not None and at not in only:
+            continue
+        question.begins_anew(steps, seed)
         answer = question.check()
         if answer is Answer.SATISFIABLE:
             raise NotConfirmedError
