@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 BOM = "\ufeff"
 GLANCE_STEPS = 200_000
 """Steps of Z3 a question while somebody types: some hundredths of a second."""
-GLANCE_S = 0.07
+GLANCE_S = 0.06
 """Processor time of a glance, in seconds, from the text on: what is not found by then is left open, and the answer is put together."""
 _LEFT_OPEN = {Code.UNDECIDED}
 """Findings that a larger budget may take away."""

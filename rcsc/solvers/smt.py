@@ -120,7 +120,7 @@ class _Thread(threading.local):
 
 
 _own = _Thread()
-WATCH_S = 0.02
+WATCH_S = 0.008
 """A question that nobody waits for any more is broken off within so long, and what Z3 takes to hear of it."""
 _asking: dict[int, bool] = {}
 """Threads whose question Z3 is at, and whether it was broken off."""

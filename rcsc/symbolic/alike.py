@@ -74,6 +74,8 @@ def alike(
 
 def meets(program: Program, table: Table, where: Expr, options: Options) -> bool | None:
     """Whether some input that the table's assumptions admit is in `where`; None where nobody could tell."""
+    if smt.gives_up("whether two lines meet"):
+        return None
     try:
         answer = _possible(list(_here(program, table, [where], _starting(program))), options)
     except smt.troubles():
@@ -86,6 +88,8 @@ def disagreement(
 ) -> Disagreement | None:
     """Find the least input in `where` for which two lines, by position, do not do the same; None where none is found."""
     lines = table.lines[pair[0]], table.lines[pair[1]]
+    if smt.gives_up("for which input two lines do not do the same"):
+        return None
     try:
         return _Comparison(program, table, lines, where).disagreement(options)
     except smt.troubles():
