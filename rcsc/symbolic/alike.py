@@ -136,15 +136,17 @@ class _Comparison:
 
     def effects(self, options: Options, near: Mapping[str, Value]) -> Effects:
         """Say what can be left different, each name for itself."""
-        changes = list({change for _, change in self.changes} - {values.TRUE})
-        seen = {values.TRUE} | (trial.met(self.here, changes, near) if changes else set())
+        open_ = [
+            change for change in dict.fromkeys(each for _, each in self.changes) if change is not values.TRUE
+        ]
+        seen = {values.TRUE} | (trial.met(self.here, open_, near) if open_ else set())
         answers = {
             name: Answer.SATISFIABLE if change in seen else _possible([*self.here, change], options)
             for name, change in self.changes
         }
         differ = tuple(name for name, answer in answers.items() if answer is Answer.SATISFIABLE)
-        open_ = Answer.UNKNOWN in answers.values()
-        return Effects(False if differ else None if open_ else True, differ)
+        unknown = Answer.UNKNOWN in answers.values()
+        return Effects(False if differ else None if unknown else True, differ)
 
     def disagreement(self, options: Options) -> Disagreement | None:
         """Find the least input for which something is left different, and what."""

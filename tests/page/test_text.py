@@ -244,6 +244,13 @@ def test_what_is_typed_before_the_server_has_done_a_tab_goes_where_that_leads(tm
             seat.wait(
                 f"{row}.split('|').slice(1, 5).map((one) => one.trim()).join() === 'n{at},false,idle,true'"
             )
+        seat.press("tab")
+        seat.write("false")
+        seat.press("ctrl+s")  # all that was typed before is written
+        seat.until("#said", "is written")
+        saved = (tmp_path / "dock" / DRIVE).read_text()
+        cells = saved[saved.index("| n3 ") :].split("|")[1:5]
+        assert [cell.strip() for cell in cells] == ["n3", "false", "idle", "falsetrue"]
 
 
 @pytest.mark.needs("chromium")

@@ -18,7 +18,7 @@ const SHOWS = 8; // findings of a line that are told at its number
 /** Make an editor in an element; `on` has `typed`, `moved`, `undo`, `redo`, and what is asked of places: `offers`, `about`, `declared`, `key`. */
 export class Editor {
   #view; #colours = StateEffect.define(); #marks = StateEffect.define();
-  #doing = false; #later = []; // whether a key is being done that the server does, and what was pressed and typed meanwhile
+  #doing = false; #done = null; #later = []; // whether a key is being done that the server does, its end, and what was pressed and typed meanwhile
 
   constructor(parent, on) {
     const kept = (effect) => StateField.define({
@@ -27,7 +27,7 @@ export class Editor {
     });
     const colours = kept(this.#colours), marks = kept(this.#marks);
     const run = (act) => () => { act(); return true; };
-    const inTable = (act) => (view) => inRow(view.state) && (this.#do(act), true);
+    const inTable = (act) => (view) => inRow(view.state) && (this.#done = this.#do(act), true);
     this.#view = new EditorView({ parent, state: EditorState.create({ doc: "", extensions: [
       EditorState.lineSeparator.of("\n"), EditorState.tabSize.of(2), EditorState.allowMultipleSelections.of(true),
       EditorView.clipboardInputFilter.of((text) => text.replace(/\r\n?/g, "\n")),
@@ -74,8 +74,15 @@ export class Editor {
   /** Do what the server does for a key; what is pressed and typed meanwhile is done after it, where the cursor is then. */
   async #do(act) {
     this.#doing = true;
-    try { await act(); } finally { this.#doing = false; }
-    while (!this.#doing && this.#later.length) this.#later.shift()();
+    try { await act(); } finally {
+      this.#doing = false;
+      while (!this.#doing && this.#later.length) this.#later.shift()();
+    }
+  }
+
+  /** Wait until all that was pressed and typed is in the text. */
+  async done() {
+    while (this.#doing) await this.#done.catch(() => {});
   }
 
   get text() {
@@ -105,6 +112,7 @@ export class Editor {
   /** Another file's text: the cursor and the window begin anew. */
   begin(text) {
     closeCompletion(this.#view);
+    this.#later = []; // was meant for the other
     this.#view.dispatch({ changes: { from: 0, to: this.#view.state.doc.length, insert: text }, selection: { anchor: 0 }, annotations: THEIRS.of(true), effects: [this.#colours.of(RangeSet.empty), EditorView.scrollIntoView(0)] });
   }
 

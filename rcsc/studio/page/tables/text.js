@@ -19,7 +19,7 @@ export class TextView {
       offers: (place) => this.#asked("text.offers", place), about: (place) => this.#asked("text.about", place),
       declared: () => this.#declared(), key: (key) => this.#key(key),
     });
-    desk.settled = () => this.#settled();
+    desk.settled = () => this.#editor.done().then(() => this.#settled());
     addEventListener("beforeunload", (event) => { if (this.file && this.#editor.text !== this.#base) event.preventDefault(); }); // typed, and not sent
     desk.on(() => this.take());
     bus.on("selection", (now, changed) => { if (changed?.has("line") || changed?.has("table")) this.#show(now); });
