@@ -151,6 +151,6 @@ def test_the_paper_s_part_reaches_the_pallet_and_is_looked_at_in_a_file(tmp_path
     file.write_text(text, encoding="utf-8")
     with Seat(WIDE, HIGH) as seat:
         seat.open(file.as_uri())
-        assert seat.value("document.querySelector('#cell svg').getBoundingClientRect().height") > 100
-        assert seat.reads("#cell figcaption").startswith("drawn of tick ")
+        seat.wait("document.querySelector('#cell svg')?.getBoundingClientRect().height > 100")
+        seat.until("#cell figcaption", "drawn of tick ")
         assert not seat.said
