@@ -327,11 +327,8 @@ def c_counts(
     (folder / "scan.c").write_text(f'#include "{names.program}.h"\n{scan}')
     (folder / "driver.c").write_text(driver_c(program, names.program, function, samples))
     compiler = shutil.which("cc") or "cc"
-    for flag, source in (
-        ("-O2", f"{names.program}.c"),
-        ("-O1", "scan.c"),
-        ("-O0", "driver.c"),
-    ):  # the driver is not counted
+    sources = {f"{names.program}.c": "-O2", "scan.c": "-O1", "driver.c": "-O0"}  # the driver is not counted
+    for source, flag in sources.items():
         subprocess.run([compiler, "-std=c99", flag, "-c", source], cwd=folder, check=True)
     objects = [f"{names.program}.o", "driver.o", "scan.o"]
     subprocess.run([compiler, "-o", "run", *objects], cwd=folder, check=True)

@@ -220,9 +220,9 @@ def test_a_goal_is_met_only_where_all_conditions_hold() -> None:
     assert trial.met([values.negation(low)], goals, {"n": -1}) == {seven, goals[3]}
     assert trial.met([low, seven], goals, {}) == set()
     divided = values.arithmetic(Op.DIV, (M, N), Int(-100, 100))
-    assert trial.met([values.compare(Op.EQ, N, whole(0))], [values.equal(divided, divided), low], {}) <= {
-        values.TRUE
-    }
+    none = values.compare(Op.EQ, divided, whole(0))  # is not defined there, nor is its negation
+    assert trial.met([values.compare(Op.EQ, N, whole(0))], [none, values.negation(none)], {}) == set()
+    assert trial.met([values.compare(Op.EQ, N, whole(1))], [none, values.negation(none)], {}) != set()
 
 
 def test_the_points_that_are_tried_are_always_the_same() -> None:

@@ -52,7 +52,7 @@ class Browser:
         os.close(orders)
         os.close(answers)
         self._held, self._number, self._loads = b"", 0, 0
-        self._held_back: list[str] = []
+        self._held_back = False
         self.said: list[str] = []
         targets = self._tell("Target.getTargets")["targetInfos"]
         page = next(target["targetId"] for target in targets if target["type"] == "page")
@@ -98,7 +98,7 @@ class Browser:
         """Lets through what was held back, and all that comes."""
         assert self._held_back, "nothing was held back"
         self._tell("Fetch.disable")
-        self._held_back.clear()
+        self._held_back = False
 
     def reload(self) -> None:
         """Loads the page anew, as who presses F5; a question whether to leave it is answered with yes."""
@@ -156,7 +156,7 @@ class Browser:
         if event.get("method") == "Page.javascriptDialogOpening":
             self._order("Page.handleJavaScriptDialog", accept=True)
         if event.get("method") == "Fetch.requestPaused":
-            self._held_back.append(event["params"]["requestId"])
+            self._held_back = True
         if event.get("method") == "Page.loadEventFired":
             self._loads += 1
         if event.get("method") == "Runtime.exceptionThrown":

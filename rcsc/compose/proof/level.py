@@ -8,6 +8,7 @@ the environment does within its contract, and every cycle that begins in it fulf
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from rcsc.compose.contract.claims import ACCEPTED
 from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of an obligation, too
@@ -195,38 +196,27 @@ def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
     Raises:
         NotConfirmedError: They are not, or the solver gave up.
     """
-    left: set[int] | None = None
+    left = [
+        *(partial(asked.first_question, clauses, first) for first in asked.firsts),
+        *(partial(asked.step_question, clauses, case) for case in asked.cases),
+    ]
     for seed, part in enumerate(TRIES):
-        left = _not_refuted(_questions(asked, clauses), left, asked.limits.steps // part, seed)
-        if not left:
-            return
-    raise NotConfirmedError
+        left = [make for make in left if not _confirmed(make(), asked.limits.steps // part, seed)]
+    if left:
+        raise NotConfirmedError
 
 
-def _not_refuted(questions: Iterable[Solver], only: set[int] | None, steps: int, seed: int) -> set[int]:
-    """Return the positions of the questions that Z3 gave up, of all or of `only` some.
+def _confirmed(question: Solver, steps: int, seed: int) -> bool:
+    """Return whether Z3 refutes a question, in one search; false where it gives up.
 
     Raises:
-        NotConfirmedError: It answers one.
+        NotConfirmedError: It answers it.
     """
-    left = set[int]()
-    for at, question in enumerate(questions):
-        if only is not None and at not in only:
-            continue
-        question.begins_anew(steps, seed)
-        answer = question.check()
-        if answer is Answer.SATISFIABLE:
-            raise NotConfirmedError
-        if answer is Answer.UNKNOWN:
-            left.add(at)
-    return left
-
-
-def _questions(asked: Confirmation, clauses: Sequence[Clause]) -> Iterable[Solver]:
-    for first in asked.firsts:
-        yield asked.first_question(clauses, first)
-    for case in asked.cases:
-        yield asked.step_question(clauses, case)
+    question.begins_anew(steps, seed)
+    answer = question.check()
+    if answer is Answer.SATISFIABLE:
+        raise NotConfirmedError
+    return answer is Answer.UNSATISFIABLE
 
 
 def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:

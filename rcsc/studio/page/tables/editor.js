@@ -18,7 +18,7 @@ const SHOWS = 8; // findings of a line that are told at its number
 /** Make an editor in an element; `on` has `typed`, `moved`, `undo`, `redo`, and what is asked of places: `offers`, `about`, `declared`, `key`. */
 export class Editor {
   #view; #colours = StateEffect.define(); #marks = StateEffect.define();
-  #doing = false; #done = null; #later = []; // whether a key is being done that the server does, its end, and what was pressed and typed meanwhile
+  #doing = null; #later = []; // a key that the server is doing, and what was pressed and typed meanwhile
 
   constructor(parent, on) {
     const kept = (effect) => StateField.define({
@@ -27,7 +27,7 @@ export class Editor {
     });
     const colours = kept(this.#colours), marks = kept(this.#marks);
     const run = (act) => () => { act(); return true; };
-    const inTable = (act) => (view) => inRow(view.state) && (this.#done = this.#do(act), true);
+    const inTable = (act) => (view) => inRow(view.state) && (this.#do(act), true);
     this.#view = new EditorView({ parent, state: EditorState.create({ doc: "", extensions: [
       EditorState.lineSeparator.of("\n"), EditorState.tabSize.of(2), EditorState.allowMultipleSelections.of(true),
       EditorView.clipboardInputFilter.of((text) => text.replace(/\r\n?/g, "\n")),
@@ -72,17 +72,16 @@ export class Editor {
   }
 
   /** Do what the server does for a key; what is pressed and typed meanwhile is done after it, where the cursor is then. */
-  async #do(act) {
-    this.#doing = true;
-    try { await act(); } finally {
-      this.#doing = false;
+  #do(act) {
+    this.#doing = act().finally(() => {
+      this.#doing = null;
       while (!this.#doing && this.#later.length) this.#later.shift()();
-    }
+    });
   }
 
   /** Wait until all that was pressed and typed is in the text. */
   async done() {
-    while (this.#doing) await this.#done.catch(() => {});
+    while (this.#doing) await this.#doing.catch(() => {});
   }
 
   get text() {
