@@ -78,7 +78,7 @@ typedef struct {
     double limit_n; /* 4: input; 10.0 .. 400.0 N; Force at which the move is given up. */
     double smooth_n; /* 5: state; 0.0 .. 500.0 N; Smoothed force. */
     uint8_t settled; /* 6: state; 0 .. 25; Cycles spent near the goal. */
-    uint16_t speed_mm_s; /* 7: output; 0 .. 1000 mm*s^-1; Commanded speed. */
+    uint16_t speed_mm_s; /* 7: output; 0 .. 1000 mm/s; Commanded speed. */
     exmpls_words_1984_level_status_t status_report; /* 8: output */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */

@@ -24,7 +24,7 @@ typedef struct {
     bool drive;
     double opening_mm; /* 0.0 .. 200.0 mm */
     double force_n; /* 0.0 .. 1000.0 N */
-    double speed_mm_s; /* 0.0 .. 500.0 mm*s^-1 */
+    double speed_mm_s; /* 0.0 .. 500.0 mm/s */
 } gripper_hand_order_t;
 
 #endif

@@ -284,7 +284,7 @@ typedef struct {
     double to[9]; /* 99 to 107: state; -4000.0 .. 4000.0 mm */
     double length_mm; /* 108: state; 1.0 .. 30000.0 mm */
     double travelled_mm; /* 109: state; 0.0 .. 30000.0 mm */
-    double speed_mm_s; /* 110: state; 0.0 .. 2000.0 mm*s^-1 */
+    double speed_mm_s; /* 110: state; 0.0 .. 2000.0 mm/s */
     /* 111: state; The end of the line is within the breakpoint distance; the line is at its end. */
     bool near_;
     bool there; /* 112: state */

@@ -27,9 +27,9 @@ enum {
 typedef struct {
     bool known;
     double plate[9]; /* -4000.0 .. 4000.0 mm */
-    double speed_mm_s; /* 1.0 .. 2000.0 mm*s^-1 */
-    double accel_mm_s2; /* 10.0 .. 10000.0 mm*s^-2 */
-    double decel_mm_s2; /* 10.0 .. 10000.0 mm*s^-2 */
+    double speed_mm_s; /* 1.0 .. 2000.0 mm/s */
+    double accel_mm_s2; /* 10.0 .. 10000.0 mm/s^2 */
+    double decel_mm_s2; /* 10.0 .. 10000.0 mm/s^2 */
     double breakpoint_mm; /* 0.0 .. 500.0 mm */
 } primitive_common_goal_point_t;
 
@@ -41,7 +41,7 @@ typedef struct {
     double grip_mm; /* 0.0 .. 200.0 mm */
     double tolerance_mm; /* 0.0 .. 50.0 mm */
     double force_n; /* 0.0 .. 1000.0 N */
-    double speed_mm_s; /* 0.0 .. 500.0 mm*s^-1 */
+    double speed_mm_s; /* 0.0 .. 500.0 mm/s */
 } primitive_common_end_effector_t;
 
 /* record robot_held, 4 bytes */
@@ -70,7 +70,7 @@ typedef struct {
     vocabulary_gripper_command_t input_command;
     double opening_mm; /* 0.0 .. 200.0 mm */
     double force_n; /* 0.0 .. 1000.0 N */
-    double speed_mm_s; /* 0.0 .. 500.0 mm*s^-1 */
+    double speed_mm_s; /* 0.0 .. 500.0 mm/s */
 } primitive_common_gripper_last_t;
 
 #endif

@@ -210,7 +210,7 @@ typedef struct {
     vocabulary_gripper_command_t input_command;
     double opening_mm; /* 0.0 .. 200.0 mm */
     double force_n; /* 0.0 .. 1000.0 N */
-    double speed_mm_s; /* 0.0 .. 500.0 mm*s^-1 */
+    double speed_mm_s; /* 0.0 .. 500.0 mm/s */
 } vocabulary_gripper_order_t;
 
 /* record gripper_report, 16 bytes */

@@ -12,7 +12,7 @@ from itertools import pairwise, zip_longest
 from rcsc.editor.places import Area, Lines
 from rcsc.editor.values import Grid, GridCell, GridColumn, GridRow, Standing
 from rcsc.editor.written import RowText, WrittenTable, joined_cells, tables_of
-from rcsc.lang.model import Array, Bool, Enum, Int, Program, Record, Single, Table, Type, Unit, spell
+from rcsc.lang.model import Array, Bool, Enum, Int, Program, Record, Single, Table, Type, spell, unit_text
 from rcsc.lang.syntax.rows import REQUIREMENTS, Cell, Cells, stub_of
 from rcsc.table.boxes import TableBoxes
 from rcsc.table.regions.word_bits import words_of
@@ -122,21 +122,6 @@ def type_text(kind: Type) -> str:
         case _:
             word = "single" if isinstance(kind, Single) else "real"
             return f"{word} {spell(kind, kind.low)} .. {spell(kind, kind.high)}"
-
-
-def unit_text(unit: Unit) -> str:
-    """A unit without its brackets: `mm/s`; empty for none.
-
-    >>> unit_text((("mm", 1), ("s", -2)))
-    'mm/s^2'
-    """
-    above = [_power(name, power) for name, power in unit if power > 0]
-    below = [_power(name, -power) for name, power in unit if power < 0]
-    return "/".join(["*".join(above) or "1", *below]) if unit else ""
-
-
-def _power(name: str, power: int) -> str:
-    return name if power == 1 else f"{name}^{power}"
 
 
 def _row(

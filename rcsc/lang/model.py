@@ -206,6 +206,21 @@ def spell(kind: Scalar, value: Value) -> str:
             return repr(float(value))
 
 
+def unit_text(unit: Unit) -> str:
+    """A unit without its brackets, as it would be declared; empty for none.
+
+    >>> unit_text((("mm", 1), ("s", -2))), unit_text((("s", -1),))
+    ('mm/s^2', '1/s')
+    """
+    above = [_power(name, power) for name, power in unit if power > 0]
+    below = [_power(name, -power) for name, power in unit if power < 0]
+    return "/".join(["*".join(above) or "1", *below]) if unit else ""
+
+
+def _power(name: str, power: int) -> str:
+    return name if power == 1 else f"{name}^{power}"
+
+
 def value_of_text(kind: Scalar, text: str) -> Value | None:
     """The value that is spelled so; None where the type has none such."""
     try:

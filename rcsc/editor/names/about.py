@@ -6,7 +6,7 @@ In: an occurrence, the program, and the standing of tables. Out: a text.
 from collections.abc import Iterator, Mapping
 
 from rcsc.diagnostics.source import Source
-from rcsc.editor.grid import type_text, unit_text
+from rcsc.editor.grid import type_text
 from rcsc.editor.names.find import Names
 from rcsc.editor.names.index import Occurrence, Space
 from rcsc.editor.values import Grid, Standing
@@ -23,6 +23,7 @@ from rcsc.lang.model import (
     Type,
     key_bounds,
     spell,
+    unit_text,
     value_of_key,
 )
 from rcsc.lang.syntax import tree

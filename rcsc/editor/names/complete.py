@@ -8,14 +8,14 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from rcsc.editor.grid import type_text, unit_text
+from rcsc.editor.grid import type_text
 from rcsc.editor.names.find import Names
 from rcsc.editor.names.index import Space
 from rcsc.editor.names.tokens import KEYWORDS
 from rcsc.editor.places import Lines
 from rcsc.editor.values import Grid, GridColumn
 from rcsc.editor.written import RowText, cells_of, tables_of
-from rcsc.lang.model import Bool, Enum, Int, Program, Real, Record, Type, spell
+from rcsc.lang.model import Bool, Enum, Int, Program, Real, Record, Type, spell, unit_text
 from rcsc.lang.syntax import tree
 
 MOST = 400

@@ -6,13 +6,12 @@ from typing import TypeAlias
 from rcsc.emit.c.cprogram import CProgram
 from rcsc.emit.c.ctext import c_type, declared, wide_type
 from rcsc.emit.c.layout import record_size, sizes
-from rcsc.emit.c.symbols import unit_text
 from rcsc.emit.identifiers import DIGEST, comment, parameter_word, types_guard, types_header
 from rcsc.emit.plan import table_position
 from rcsc.emit.rendering import render
 from rcsc.emit.scope import c_scope
 from rcsc.lang import model
-from rcsc.lang.model import Enum, Int, Procedure, Real, Variable, pending, spell
+from rcsc.lang.model import Enum, Int, Procedure, Real, Variable, pending, spell, unit_text
 
 Fields: TypeAlias = tuple[tuple[str, str], ...]
 """Members of a struct, or constants of an enumeration: the declaration of each, and its doc."""

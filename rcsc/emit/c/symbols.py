@@ -25,10 +25,10 @@ from rcsc.lang.model import (
     Roles,
     Table,
     TableChoice,
-    Unit,
     Variable,
     VariableName,
     pending,
+    unit_text,
 )
 from rcsc.lang.restart import Adopted, After, Fixed, SameAs
 
@@ -116,11 +116,6 @@ def _adopted(restart: tuple[tuple[VariableName, Adopted], ...]) -> Iterator[dict
                 yield {"leaf": leaf, "same_as": other}
             case After(other):
                 yield {"leaf": leaf, "after": other}
-
-
-def unit_text(unit: Unit) -> str:
-    """A unit as it is shown: `mm*s^-1`."""
-    return "*".join(name if power == 1 else f"{name}^{power}" for name, power in unit)
 
 
 MOST_DOC = 1000

@@ -21,6 +21,7 @@ from rcsc.lang.model import (
     Value,
     Variable,
     VariableName,
+    unit_text,
 )
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import BITS, CALL_UNDER, ONE_GROUP, Cell
@@ -241,9 +242,7 @@ def normal(powers: dict[str, int]) -> Unit:
 
 def spell_unit(unit: Unit) -> str:
     """`mm/s`; `1` for none."""
-    above = [name if power == 1 else f"{name}^{power}" for name, power in unit if power > 0]
-    below = [name if power == -1 else f"{name}^{-power}" for name, power in unit if power < 0]
-    return "*".join(above) + "".join(f"/{name}" for name in below) if above else "/".join(["1", *below])
+    return unit_text(unit) or "1"
 
 
 @dataclass(slots=True)
