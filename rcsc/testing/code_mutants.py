@@ -144,16 +144,34 @@ def _tokens(text: str) -> list[_Token]:
     return tokens
 
 
+@dataclass(frozen=True, slots=True)
+class _Variant:
+    """A C file as some compilers see it; lines keep their numbers.
+
+    Attributes:
+        own: Start and end of each part that only they see.
+    """
+
+    text: str
+    own: tuple[tuple[int, int], ...]
+
+
+def _variant(text: str, kept: str) -> _Variant:
+    """The C file with one part, `built_in` or `portable`, of each place where they differ."""
+    pieces, own, at, length = [], [], 0, 0
+    for match in BRANCHES.finditer(text):
+        begins, part = match.start(kept), match[kept]
+        before = text[at : match.start()] + "\n" * text.count("\n", match.start(), begins)
+        after = "\n" * text.count("\n", begins + len(part), match.end())
+        pieces += [before, part, after]
+        own.append((length + len(before), length + len(before) + len(part)))
+        length, at = own[-1][1] + len(after), match.end()
+    return _Variant("".join(pieces) + text[at:], tuple(own))
+
+
 def variants(text: str) -> tuple[str, str]:
-    """The C as a compiler with bit-scan built-ins sees it, and as any other does; lines keep their numbers."""
-    match = BRANCHES.search(text)
-    if match is None:
-        return text, text
-    blank = {part: "\n" * match[part].count("\n") for part in ("built_in", "portable")}
-    built_in = f"\n{match['built_in']}\n{blank['portable']}\n"
-    portable = f"\n{blank['built_in']}\n{match['portable']}\n"
-    begin, end = text[: match.start()], text[match.end() :]
-    return f"{begin}{built_in}{end}", f"{begin}{portable}{end}"
+    """The C as a compiler with GNU C's extensions and built-ins sees it, and as any other does; lines keep their numbers."""
+    return _variant(text, "built_in").text, _variant(text, "portable").text
 
 
 def _binary(tokens: Sequence[_Token], at: int) -> bool:
@@ -205,14 +223,14 @@ def code_mutants(text: str, lines: int) -> Iterator[CodeMutant]:
     Args:
         text: The C file.
         lines: How many lines its largest table has: so many bits of each mask word are flipped; one of each
-            entry of the portable bit scan.
+            entry of the portable bit scan that gives the position of a line, for nothing asks it for others.
     """
-    built_in, portable = variants(text)
-    yield from _mutants(built_in, lines, 0, len(built_in))
-    match = BRANCHES.search(text)
-    if match is not None:
-        shift = match.start() + 1 + match["built_in"].count("\n") + 1
-        yield from _mutants(portable, 1, shift, shift + len(match["portable"]))
+    built_in, portable = _variant(text, "built_in"), _variant(text, "portable")
+    yield from _mutants(built_in.text, lines, 0, len(built_in.text))
+    for first, last in portable.own:
+        for mutant in _mutants(portable.text, 1, first, last):
+            if mutant.change != "mask" or int(mutant.old.rstrip("uUlL")) < lines:
+                yield mutant
 
 
 def _mutants(text: str, lines: int, first: int, last: int) -> Iterator[CodeMutant]:
@@ -336,7 +354,7 @@ class Judge:
         files = {**self.files, self.source(): mutant.text}
         with_reference = {target.function: target for target in targets(self.program, self.symbols)}
         asked = first_callers(mutant.text, mutant.function, with_reference)
-        noticed = Noticed.EQUIVALENT
+        noticed = Noticed.EQUIVALENT if asked else Noticed.UNDECIDED  # what no such function calls only others may tell
         for target in (with_reference[name] for name in asked):
             answer = self.shown(files, target)
             if answer in (Noticed.MATCHER, Noticed.ESBMC):

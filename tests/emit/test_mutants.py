@@ -16,7 +16,7 @@ from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Program, Table, key_bounds, value_of_key
 from rcsc.solvers.options import Options
 from rcsc.testing import suite
-from rcsc.testing.code_mutants import Decider, Noticed, code_mutants, decider, source_of
+from rcsc.testing.code_mutants import Decider, Judge, Noticed, code_mutants, decider, source_of, variants
 from rcsc.testing.esbmc import EsbmcAnswer, EsbmcVerdict
 from rcsc.testing.executors.symbols import symbols_of
 from rcsc.testing.figures import SuiteResult
@@ -243,6 +243,60 @@ def test_a_check_of_the_masks_that_calls_all_equal_is_found_out(monkeypatch: pyt
     monkeypatch.setattr(Compared, "with_word", lambda *_: True)
     found = deep(program, emitted(program)).diagnostics
     assert ["calls equal what the tests tell apart" in finding.message for finding in found] == [True]
+
+
+@pytest.mark.parametrize("path", ["tables/examples/approach.rcs", "tables/vision/vision.rcs"])
+def test_each_part_of_the_c_is_seen_by_some_compilers_and_what_they_do_not_see_is_no_mutant(
+    path: str, repo: Path
+) -> None:
+    """Wherever GNU C and others differ: a mutant of what is not compiled nobody could notice."""
+    program = shipped(path, repo)
+    files = emitted(program)
+    source = source_of(symbols_of(program, files), files)
+    assert source.count("#if defined(__GNUC__)\n") > 1
+    seen = variants(source)
+    for text, ours, theirs in (
+        (seen[0], ("__builtin_ctz", "always_inline"), ("at[64]",)),
+        (seen[1], ("at[64]",), ("__builtin_ctz", "always_inline")),
+    ):
+        assert all(word in text for word in ours)
+        assert not any(word in text for word in theirs)
+        assert text.count("\n") == source.count("\n")
+    lines = max(len(table.lines) for table in program.tables)
+    scans = [
+        each
+        for each in code_mutants(source, lines)
+        if each.function.endswith("_bit64") and "at[64]" in each.base
+    ]
+    assert len([each for each in scans if each.change == "mask"]) == lines
+    assert {each.base for each in scans} == {seen[1]}
+    told = source.splitlines()
+    for each in scans:
+        line = int(each.where.split()[1].rstrip(":"))
+        assert each.old in told[line - 1]
+
+
+def test_a_bit_scan_of_other_compilers_that_is_wrong_is_found(repo: Path) -> None:
+    program = shipped("tables/examples/approach.rcs", repo)
+    files = emitted(program)
+    wrong = {name: text.replace(" 0u, 1u, 48u,", " 1u, 1u, 48u,") for name, text in files.items()}
+    assert wrong != files
+    found = deep(program, wrong, 1).diagnostics
+    assert ["without compiler built-ins" in finding.message for finding in found] == [True]
+    assert deep(program, files, 1).diagnostics == ()
+
+
+def test_a_mutant_of_what_nothing_proved_calls_is_not_called_equivalent(repo: Path, tmp_path: Path) -> None:
+    """`check` of a state is run by its caller alone."""
+    program = shipped("tables/examples/approach.rcs", repo)
+    files = emitted(program)
+    symbols = symbols_of(program, files)
+    judge = Judge(program, symbols, files, tmp_path, "", b"", 0.0, Decider())
+    mutants = [
+        each for each in code_mutants(source_of(symbols, files), 4) if each.function == "approach_check"
+    ]
+    assert len(mutants) > 5
+    assert {judge.by_proof(each) for each in mutants} == {Noticed.UNDECIDED}
 
 
 def test_without_being_asked_no_model_checker_runs_and_no_c_is_mutated(
