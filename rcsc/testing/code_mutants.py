@@ -354,7 +354,9 @@ class Judge:
         files = {**self.files, self.source(): mutant.text}
         with_reference = {target.function: target for target in targets(self.program, self.symbols)}
         asked = first_callers(mutant.text, mutant.function, with_reference)
-        noticed = Noticed.EQUIVALENT if asked else Noticed.UNDECIDED  # what no such function calls only others may tell
+        noticed = (
+            Noticed.EQUIVALENT if asked else Noticed.UNDECIDED
+        )  # what no such function calls only others may tell
         for target in (with_reference[name] for name in asked):
             answer = self.shown(files, target)
             if answer in (Noticed.MATCHER, Noticed.ESBMC):

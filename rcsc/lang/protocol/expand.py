@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any, TypeVar
 
 from rcsc.diagnostics.source import Source, Span
@@ -80,23 +80,32 @@ def _members(parties: Parties, called: set[str]) -> Iterator[str]:
             yield written.order_is(ordered[0], name)
 
 
-def _calls(nodes: Sequence[object]) -> Iterator[str]:
+def _calls(declarations: Iterable[tree.Declaration]) -> Iterator[str]:
     """The names of procedures that are called without arguments, in any order."""
-    waiting = [*nodes]
-    while waiting:
-        node = waiting.pop()
-        if isinstance(node, tuple):
-            waiting += node
-        elif isinstance(node, tree.Call) and not node.args:
-            yield node.name.text
-        elif is_dataclass(node) and not isinstance(node, type):
-            waiting += [getattr(node, part) for part in _parts(type(node))]
+    for declaration in declarations:
+        if isinstance(declaration, tree.ProcedureDecl):
+            yield from _called(declaration.body)
+        elif isinstance(declaration, tree.TableDecl):
+            cells = {
+                id(cell): cell for row in declaration.rows for cell in row.actions
+            }  # cells of one text are one
+            for cell in cells.values():
+                if isinstance(cell, tuple):
+                    yield from _called(cell)
 
 
-@cache
-def _parts(kind: type[Any]) -> tuple[str, ...]:
-    """The fields of nodes of a kind in which others may stand: those that equality looks at, which are not places."""
-    return tuple(part.name for part in fields(kind) if part.compare)
+def _called(statements: Iterable[tree.Statement]) -> Iterator[str]:
+    for statement in statements:
+        match statement:
+            case tree.Call(name, ()):
+                yield name.text
+            case tree.If(_, then, orelse):
+                yield from _called((*then, *orelse))
+            case tree.Case(_, arms, orelse):
+                yield from _called(inner for arm in arms for inner in arm.body)
+                yield from _called(orelse or ())
+            case tree.For(body=body):
+                yield from _called(body)
 
 
 def _heading(parties: Parties, heading: tree.Heading) -> tree.Heading:

@@ -13,11 +13,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
+from operator import contains
 from typing import TypeAlias
 
 from rcsc.lang.interval_sets import holds
 from rcsc.lang.model import (
     Assign,
+    Box,
     Call,
     Case,
     Default,
@@ -96,24 +98,28 @@ def in_step(
         procedures, {flags.settling} | {name for one in watched for name in (one.leaf, one.written)}
     )
     try:
-        ways = [(line, paths.through(line)) for line in _lines(table)]
+        ways = [(_Line.of(line), paths.through(line)) for line in _lines(table)]
     except TooManyPaths:
         return None
     seen = set(product(*(sorted(one.begins) for one in watched)))
     for line, ends in ways:
-        for way in ends if flags.new and _may(line, flags.new, 1) and _may(line, flags.answered, 0) else ():
-            if not way.get(flags.settling):
-                seen |= set(_answers(line, way, watched))
-    before: set[Seen] = set()
-    while before != seen:
-        before = set(seen)
-        for line, ends in ways:
-            sees = [one for one in before if _matches(line, watched, one)] if _may(line, flags.new, 0) else []
-            if flags.new and not _may(
-                line, flags.answered, 0
-            ):  # what the answer left is pending still, whatever the line sees
-                sees = list(before)
-            seen |= {after for way in ends for one in sees for after in _follows(way, watched, one)}
+        if flags.new and line.may(flags.new, 1) and line.may(flags.answered, 0):
+            for way in ends:
+                seen.update(() if way.get(flags.settling) else _answers(line, way, watched))
+    follows = [
+        (_seen_by(line, watched, flags), [[_set(one, way) for one in watched] for way in ends])
+        for line, ends in ways
+    ]
+    new = seen
+    while new:  # what a tuple leads to is looked for once
+        after: set[Seen] = set()
+        for members, leaves in follows:
+            matching = [one for one in new if all(map(contains, members, one))] if all(members) else ()
+            for parts in leaves:
+                for one in matching:
+                    after.update(product(*(part or (at,) for part, at in zip(parts, one, strict=True))))
+        new = after - seen
+        seen = seen | new
     read = [at for at, one in enumerate(watched) if one.leaf in map(str, table.variables)]
     told = {tuple(one[at] for at in read) for one in seen}
     if len(told) == prod(len(watched[at].type.members) for at in read):
@@ -130,27 +136,47 @@ def _lines(table: Table) -> Iterator[Line | Default]:
 # --- what a line sees ---
 
 
-def _may(line: Line | Default, leaf: str, key: int) -> bool:
-    """Return whether a line can match where a leaf has a value."""
-    if isinstance(line, Default) or not leaf:
-        return True
-    return all(
-        test is None or test.box is None or [*map(str, test.variables)] != [leaf] or holds(test.box, key)
-        for test in line.tests
-    )
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """The tests of a line that are of one leaf alone: what that may have where the line matches, box by box."""
+
+    alone: Mapping[str, Sequence[Box]]
+
+    @classmethod
+    def of(cls, line: Line | Default) -> "_Line":
+        alone: dict[str, list[Box]] = {}
+        for test in () if isinstance(line, Default) else line.tests:
+            if test is not None and test.box is not None and len(test.variables) == 1:
+                alone.setdefault(str(test.variables[0]), []).append(test.box)
+        return cls(alone)
+
+    def may(self, leaf: str, key: int) -> bool:
+        """Whether the line can match where a leaf has a value."""
+        return all(holds(box, key) for box in self.alone.get(leaf, ()))
 
 
-def _matches(line: Line | Default, watched: Sequence[Watched], seen: Seen) -> bool:
-    return all(
-        _may(line, one.leaf, at) and (at == 0 or not one.resting or _may(line, one.resting, 0))
-        for one, at in zip(watched, seen, strict=True)
-    )
+def _seen_by(line: _Line, watched: Sequence[Watched], flags: Flags) -> list[frozenset[int]]:
+    """The members of each leaf that a line can match with where no command is new: none where it cannot then."""
+    if flags.new and not line.may(flags.answered, 0):
+        return [
+            frozenset(range(len(one.type.members))) for one in watched
+        ]  # what the answer left is pending still
+    if not line.may(flags.new, 0):
+        return [frozenset() for _ in watched]
+    return [
+        frozenset(
+            at
+            for at in range(len(one.type.members))
+            if line.may(one.leaf, at) and (at == 0 or not one.resting or line.may(one.resting, 0))
+        )
+        for one in watched
+    ]
 
 
 # --- what a line leaves ---
 
 
-def _answers(line: Line | Default, way: Way, watched: Sequence[Watched]) -> Iterator[Seen]:
+def _answers(line: _Line, way: Way, watched: Sequence[Watched]) -> Iterator[Seen]:
     """List what may follow a line that answers a new command: what it does not set may be pending still, and so is anything."""
     parts = (
         _set(one, way) or ((0,) if _rests(line, one) else range(len(one.type.members))) for one in watched
@@ -158,12 +184,8 @@ def _answers(line: Line | Default, way: Way, watched: Sequence[Watched]) -> Iter
     yield from product(*parts)
 
 
-def _rests(line: Line | Default, one: Watched) -> bool:
-    return bool(one.resting) and not _may(line, one.resting, 0)
-
-
-def _follows(way: Way, watched: Sequence[Watched], before: Seen) -> Iterator[Seen]:
-    yield from product(*(_set(one, way) or (at,) for one, at in zip(watched, before, strict=True)))
+def _rests(line: _Line, one: Watched) -> bool:
+    return bool(one.resting) and not line.may(one.resting, 0)
 
 
 def _set(one: Watched, way: Way) -> Sequence[int]:

@@ -244,6 +244,17 @@ _NO_COMMENTS = Comments(Source("", ""))
 """Of a cell, which has none."""
 
 
+@lru_cache(maxsize=8192)  # an editor reads a text at every key, and of its cells the key has changed one
+def _meant(text: str, start: str) -> Any:
+    """What the text of a cell means by one of the start rules; None where it nests too deep.
+
+    Raises:
+        lark.UnexpectedInput: It means nothing.
+    """
+    node = _parsed(text, start)
+    return None if _deep_in(node) else Build("", _NO_COMMENTS, None).cell(node)
+
+
 @dataclass(slots=True)
 class _Rows:
     """Parses the rows of a table; each distinct cell text once.
@@ -533,17 +544,16 @@ class _Rows:
         if (start, cell.text) in self.memory:
             return self.memory[start, cell.text]
         try:
-            node = _parsed(cell.text, start)
-            if _deep_in(node):
-                self.diagnostics.append(screen.too_deep(self.source, cell.span.start, cell.span.end))
-                return None
-            parsed = Build("", _NO_COMMENTS, None).cell(node)
+            parsed = _meant(cell.text, start)
         except lark.UnexpectedInput as error:
             wrong = _syntax_error(error, "", 0, len(cell.text), cell.text)
             wrong = replace(wrong, primary=Label(tree.absolute(wrong.primary.span, cell)))
             if cell.further:
                 wrong = replace(wrong, help=(*wrong.help, PIECES))
             self.diagnostics.append(replace(wrong, help=(helps,)) if helps else wrong)
+            return None
+        if parsed is None:
+            self.diagnostics.append(screen.too_deep(self.source, cell.span.start, cell.span.end))
             return None
         self.memory[start, cell.text] = parsed
         return parsed
