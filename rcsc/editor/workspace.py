@@ -44,6 +44,10 @@ GLANCE_STEPS = 200_000
 """Steps of Z3 a question while somebody types: some hundredths of a second."""
 GLANCE_S = 0.06
 """Processor time of a glance, in seconds, from the text on: what is not found by then is left open, and the answer is put together."""
+WAITS_S = 0.07
+"""How long who has typed waits for that, in seconds by the clock, where other work on the machine holds the glance up."""
+LEAST_S = 0.02
+"""Processor time that a glance is given however long it is held up, so that a busy machine tells something, too."""
 _LEFT_OPEN = {Code.UNDECIDED}
 """Findings that a larger budget may take away."""
 
@@ -182,18 +186,21 @@ class Workspace:
         with self._asking(go_on):
             return self._answer(path, self.checked(path))
 
-    def glance(self, file: str, go_on: Callable[[], bool] = lambda: True) -> Answer:
+    def glance(
+        self, file: str, go_on: Callable[[], bool] = lambda: True, since_s: float | None = None
+    ) -> Answer:
         """What can be known of a file in a moment: the answer, or one that is not final, where a question needs more steps.
 
         Args:
             file: As for `check`.
             go_on: As for `check`.
+            since_s: Since when somebody waits, by `time.monotonic`; from now on where it is None.
 
         Raises:
             OutdatedError: Nobody waits for the answer.
         """
         path = os.path.normpath(os.path.abspath(file))
-        over = _spent(GLANCE_S)
+        over = _spent(time.monotonic() if since_s is None else since_s)
         with self._asking(go_on):
             reading = self.reading(path)
             known = self._checked.get(path)
@@ -415,11 +422,16 @@ def _read(path: str, loaded: Loaded, overlay: Mapping[str, str]) -> Reading:
     return Reading(path, loaded, None, rest_of(path, loaded, wrong, overlay), wrong)
 
 
-def _spent(seconds: float) -> Callable[[], bool]:
-    """Ask, in any thread, whether this one has used so much processor time from now on."""
+def _spent(since_s: float) -> Callable[[], bool]:
+    """Ask, in any thread, whether this one has used up, from now on, what a glance may take for somebody who waits since then."""
     clock = time.pthread_getcpuclockid(threading.get_ident())
-    end_s = time.clock_gettime(clock) + seconds
-    return lambda: time.clock_gettime(clock) >= end_s
+    begun_s = time.clock_gettime(clock)
+
+    def over() -> bool:
+        used_s = time.clock_gettime(clock) - begun_s
+        return used_s >= GLANCE_S or (used_s >= LEAST_S and time.monotonic() - since_s >= WAITS_S)
+
+    return over
 
 
 def _alike(before: Loaded, now: Loaded) -> bool:

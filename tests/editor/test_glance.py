@@ -145,6 +145,18 @@ def test_what_it_takes_to_read_a_text_is_time_of_the_glance(monkeypatch: pytest.
     assert workspace.check(file) == Workspace().check(file)
 
 
+def test_a_glance_that_other_work_holds_up_ends_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who has waited long is answered with what a moment's work has found; so much is done however long he has waited."""
+    file = str(REPO / "tables/task/acquire.rcs")
+    monkeypatch.setattr("rcsc.editor.workspace.GLANCE_S", 3600.0)
+    for waited_s, least_s, ends in ((3600.0, 0.0, True), (3600.0, 3600.0, False), (0.0, 0.0, False)):
+        monkeypatch.setattr("rcsc.editor.workspace.LEAST_S", least_s)
+        monkeypatch.setattr("rcsc.editor.workspace.WAITS_S", 1800.0)
+        glance = Workspace().glance(file, since_s=time.monotonic() - waited_s)
+        assert glance.final is not ends, (waited_s, least_s)
+        assert ({table.standing.state for table in glance.tables} == {State.STALE}) is ends
+
+
 def test_a_question_under_way_is_broken_off_when_nobody_waits_for_it() -> None:
     """However long it may take; the next is answered, and only what watches its end breaks anything off."""
     over = threading.Event()

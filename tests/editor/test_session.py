@@ -209,11 +209,11 @@ def test_a_key_is_looked_at_at_once_and_keys_that_come_faster_when_they_rest(
         session = Session(heard.put)
         glance = session.workspace.glance
 
-        def counted(file: str, go_on: Callable[[], bool]) -> Answer:
+        def counted(file: str, go_on: Callable[[], bool], since_s: float) -> Answer:
             glanced.append(session.workspace.overlay[os.path.realpath(file)])
-            return glance(file, go_on)
+            return glance(file, go_on, since_s)
 
-        monkeypatch.setattr(type(session.workspace), "glance", lambda _, file, go_on: counted(file, go_on))
+        monkeypatch.setattr(type(session.workspace), "glance", lambda _, *asked: counted(*asked))
         for version in (1, 2, 3):
             session.open(path.as_uri(), f"{TABLE}# {version}\n", version)
             answer = await asyncio.wait_for(heard.get(), 60)

@@ -7,6 +7,7 @@ the messages.
 import asyncio
 import contextlib
 import os
+import time
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -151,7 +152,8 @@ class Session:
         Raises:
             OutdatedError: A text has changed meanwhile.
         """
-        return await self._asked(self.workspace.glance, path)
+        since_s = time.monotonic()
+        return await self._asked(lambda file, go_on: self.workspace.glance(file, go_on, since_s), path)
 
     async def final(self, path: str) -> Answer:
         """The answer to a file as it is now, with all that it leaves open for a moment.
