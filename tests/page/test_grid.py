@@ -261,6 +261,10 @@ def test_grid_and_graph_follow_a_level_through_its_tables(tmp_path: Path) -> Non
         seat.press("2", "o", "3")
         seat.wait("document.querySelector('.table-choice')?.options.length")
         seat.wait("document.querySelector('.graph-place svg')")
+        seat.until(".standing", "acquire_resting is monitored")  # and beside the graph it is read to its end
+        assert seat.value(
+            "((one) => one.scrollWidth <= one.clientWidth)(document.querySelector('.view-tables .standing'))"
+        )
         for level in ("task", "primitive"):
             seat.choose(".table-choice", f"▶ {level} ")
             for _ in range(8):
