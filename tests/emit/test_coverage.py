@@ -144,9 +144,10 @@ def test_what_an_extern_function_is_given_is_compared(right: str, wrong: str, tm
 STATEMENT = re.compile(r"^ +((?:s->\w|probe_)[^\n{}]*;)$", re.MULTILINE)
 EQUAL = (
     "(b < a)", "(a >= least)", "(a <= most)", "s->width > 100u", "several ? (-2)", " t0[", " t1[", "+ 0.0", "_settle(s);", "_atleast_",
-    "(m == 0x0u)", "/* proved", "assumptions_failed |",
+    "(m == 0x0u)", "/* proved", "assumptions_failed |", "int32_t at = -1;",
 )  # fmt: skip
-"""Lines where a slip gives the same: of two that are equal either is the lesser; a table that is too long; nothing to settle."""
+"""Lines where a slip gives the same: of two that are equal either is the lesser; a table that is too long; nothing to settle; a place
+that is none, whichever number below 0 it has."""
 
 
 def slips(text: str, count: int) -> list[tuple[str, str]]:
