@@ -43,9 +43,7 @@ BOM = "\ufeff"
 GLANCE_STEPS = 200_000
 """Steps of Z3 a question while somebody types: some hundredths of a second."""
 GLANCE_S = 0.06
-"""Processor time of a glance, in seconds, from the text on: what is not found by then is left open, and the answer is put together."""
-WAITS_S = 0.07
-"""How long who has typed waits for that, in seconds by the clock, where other work on the machine holds the glance up."""
+"""How long who has typed waits for a glance, in seconds: what is not found by then is left open, and the answer is put together."""
 LEAST_S = 0.02
 """Processor time that a glance is given however long it is held up, so that a busy machine tells something, too."""
 _LEFT_OPEN = {Code.UNDECIDED}
@@ -423,15 +421,10 @@ def _read(path: str, loaded: Loaded, overlay: Mapping[str, str]) -> Reading:
 
 
 def _spent(since_s: float) -> Callable[[], bool]:
-    """Ask, in any thread, whether this one has used up, from now on, what a glance may take for somebody who waits since then."""
+    """Ask, in any thread, whether this one has done what a glance may do for somebody who waits since then."""
     clock = time.pthread_getcpuclockid(threading.get_ident())
     begun_s = time.clock_gettime(clock)
-
-    def over() -> bool:
-        used_s = time.clock_gettime(clock) - begun_s
-        return used_s >= GLANCE_S or (used_s >= LEAST_S and time.monotonic() - since_s >= WAITS_S)
-
-    return over
+    return lambda: time.monotonic() - since_s >= GLANCE_S and time.clock_gettime(clock) - begun_s >= LEAST_S
 
 
 def _alike(before: Loaded, now: Loaded) -> bool:

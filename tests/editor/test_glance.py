@@ -47,6 +47,12 @@ def _one_less(questions: list[int]) -> bool:
     return False
 
 
+def no_time(patch: pytest.MonkeyPatch) -> None:
+    """Let a glance be over as it begins."""
+    patch.setattr("rcsc.editor.workspace.GLANCE_S", 0.0)
+    patch.setattr("rcsc.editor.workspace.LEAST_S", 0.0)
+
+
 def said(answer: Answer) -> set[tuple[str, str]]:
     return {(each.code, each.message) for each in answer.findings}
 
@@ -66,7 +72,7 @@ def test_what_a_glance_leaves_open_is_neither_told_nor_kept(monkeypatch: pytest.
     file = str(REPO / "tables/emove/locate.rcs")
     workspace = Workspace()
     with monkeypatch.context() as patch:
-        patch.setattr("rcsc.editor.workspace.GLANCE_S", 0.0)
+        no_time(patch)
         glance = workspace.glance(file)
     assert not glance.final
     assert {table.standing.state for table in glance.tables} == {State.STALE}
@@ -117,7 +123,7 @@ def test_a_glance_whose_time_is_over_makes_no_question(name: str, monkeypatch: p
     monkeypatch.setattr(Solver, "__init__", counted)
     workspace, file = Workspace(), str(REPO / "tables" / name)
     with monkeypatch.context() as patch:
-        patch.setattr("rcsc.editor.workspace.GLANCE_S", 0.0)
+        no_time(patch)
         assert not workspace.glance(file).final
     assert not made
     workspace.check(file)
@@ -148,10 +154,9 @@ def test_what_it_takes_to_read_a_text_is_time_of_the_glance(monkeypatch: pytest.
 def test_a_glance_that_other_work_holds_up_ends_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """Who has waited long is answered with what a moment's work has found; so much is done however long he has waited."""
     file = str(REPO / "tables/task/acquire.rcs")
-    monkeypatch.setattr("rcsc.editor.workspace.GLANCE_S", 3600.0)
+    monkeypatch.setattr("rcsc.editor.workspace.GLANCE_S", 1800.0)
     for waited_s, least_s, ends in ((3600.0, 0.0, True), (3600.0, 3600.0, False), (0.0, 0.0, False)):
         monkeypatch.setattr("rcsc.editor.workspace.LEAST_S", least_s)
-        monkeypatch.setattr("rcsc.editor.workspace.WAITS_S", 1800.0)
         glance = Workspace().glance(file, since_s=time.monotonic() - waited_s)
         assert glance.final is not ends, (waited_s, least_s)
         assert ({table.standing.state for table in glance.tables} == {State.STALE}) is ends
