@@ -70,6 +70,7 @@ FUNCTION = re.compile(r"^(?:static inline |static )?(?:\w+ )+\**(\w+)\([^;{}]*\)
 BRANCHES = re.compile(
     r"^#if defined\(__GNUC__\)\n(?P<built_in>.*?)^#else\n(?P<portable>.*?)^#endif\n", re.DOTALL | re.MULTILINE
 )
+NOT_END = re.compile(r"[^\n]")
 INTEGER = re.compile(r"(0[xX][0-9a-fA-F]+|\d+)([uUlL]*)$")
 
 
@@ -144,34 +145,19 @@ def _tokens(text: str) -> list[_Token]:
     return tokens
 
 
-@dataclass(frozen=True, slots=True)
-class _Variant:
-    """A C file as some compilers see it; lines keep their numbers.
-
-    Attributes:
-        own: Start and end of each part that only they see.
-    """
-
-    text: str
-    own: tuple[tuple[int, int], ...]
-
-
-def _variant(text: str, kept: str) -> _Variant:
-    """The C file with one part, `built_in` or `portable`, of each place where they differ."""
-    pieces, own, at, length = [], [], 0, 0
-    for match in BRANCHES.finditer(text):
-        begins, part = match.start(kept), match[kept]
-        before = text[at : match.start()] + "\n" * text.count("\n", match.start(), begins)
-        after = "\n" * text.count("\n", begins + len(part), match.end())
-        pieces += [before, part, after]
-        own.append((length + len(before), length + len(before) + len(part)))
-        length, at = own[-1][1] + len(after), match.end()
-    return _Variant("".join(pieces) + text[at:], tuple(own))
-
-
 def variants(text: str) -> tuple[str, str]:
-    """The C as a compiler with GNU C's extensions and built-ins sees it, and as any other does; lines keep their numbers."""
-    return _variant(text, "built_in").text, _variant(text, "portable").text
+    """The C as a compiler with GNU C's extensions and built-ins sees it, and as any other does; all stands where it stood."""
+    return _only("built_in", text), _only("portable", text)
+
+
+def _only(kept: str, text: str) -> str:
+    """The C with one part of each place where compilers differ, and blanks in the place of the rest."""
+
+    def blanked(match: re.Match[str]) -> str:
+        first, last = (at - match.start() for at in match.span(kept))
+        return NOT_END.sub(" ", match[0][:first]) + match[kept] + NOT_END.sub(" ", match[0][last:])
+
+    return BRANCHES.sub(blanked, text)
 
 
 def _binary(tokens: Sequence[_Token], at: int) -> bool:
@@ -225,11 +211,12 @@ def code_mutants(text: str, lines: int) -> Iterator[CodeMutant]:
         lines: How many lines its largest table has: so many bits of each mask word are flipped; one of each
             entry of the portable bit scan that gives the position of a line, for nothing asks it for others.
     """
-    built_in, portable = _variant(text, "built_in"), _variant(text, "portable")
-    yield from _mutants(built_in.text, lines, 0, len(built_in.text))
-    for first, last in portable.own:
-        for mutant in _mutants(portable.text, 1, first, last):
-            if mutant.change != "mask" or int(mutant.old.rstrip("uUlL")) < lines:
+    built_in, portable = variants(text)
+    yield from _mutants(built_in, lines, 0, len(text))
+    for match in BRANCHES.finditer(text):
+        for mutant in _mutants(portable, 1, *match.span("portable")):
+            value = INTEGER.match(mutant.old)
+            if mutant.change != "mask" or (value and int(value[1], 0) < lines):
                 yield mutant
 
 
@@ -354,9 +341,8 @@ class Judge:
         files = {**self.files, self.source(): mutant.text}
         with_reference = {target.function: target for target in targets(self.program, self.symbols)}
         asked = first_callers(mutant.text, mutant.function, with_reference)
-        noticed = (
-            Noticed.EQUIVALENT if asked else Noticed.UNDECIDED
-        )  # what no such function calls only others may tell
+        # what no such function calls only others may tell
+        noticed = Noticed.EQUIVALENT if asked else Noticed.UNDECIDED
         for target in (with_reference[name] for name in asked):
             answer = self.shown(files, target)
             if answer in (Noticed.MATCHER, Noticed.ESBMC):

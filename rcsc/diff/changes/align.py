@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
-from rcsc.lang.expressions.scope import spell_unit
 from rcsc.lang.model import (
     Among,
     Arm,
@@ -26,6 +25,7 @@ from rcsc.lang.model import (
     Value,
     Variable,
     spell,
+    unit_text,
 )
 
 
@@ -237,7 +237,7 @@ def _is_pending(variable: Variable) -> bool:
 def _declared(variable: Variable) -> str:
     """The declaration in the language's words, without what it says of its deferred value."""
     unit = variable.type.unit if isinstance(variable.type, Int | Real) else ()
-    stated = f" [{spell_unit(unit)}]" if unit else ""
+    stated = f" [{unit_text(unit)}]" if unit else ""
     first = spell(variable.type, variable.initial)
     admit = f" {variable.admit.value}" if variable.kind is Kind.INPUT else ""
     deferred = " deferred" if variable.deferred_until is not None else ""

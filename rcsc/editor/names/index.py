@@ -364,17 +364,6 @@ def _operands(expr: tree.Expr) -> tuple[tree.Expr | None, ...]:
 
 def _locals(body: Iterable[tree.Statement]) -> Iterator[str]:
     """Yield the names that statements declare."""
-    for statement in body:
-        match statement:
-            case tree.Local(name):
-                yield name.text
-            case tree.For(name, _, _, inner):
-                yield name.text
-                yield from _locals(inner)
-            case tree.If(_, then, orelse):
-                yield from _locals((*then, *orelse))
-            case tree.Case(_, arms, orelse):
-                yield from _locals([each for arm in arms for each in arm.body])
-                yield from _locals(orelse or ())
-            case _:
-                pass
+    for statement in tree.inside(body):
+        if isinstance(statement, tree.Local | tree.For):
+            yield statement.name.text

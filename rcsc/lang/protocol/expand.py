@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from typing import Any, TypeVar
 
 from rcsc.diagnostics.source import Source, Span
@@ -82,30 +83,9 @@ def _members(parties: Parties, called: set[str]) -> Iterator[str]:
 
 def _calls(declarations: Iterable[tree.Declaration]) -> Iterator[str]:
     """The names of procedures that are called without arguments, in any order."""
-    for declaration in declarations:
-        if isinstance(declaration, tree.ProcedureDecl):
-            yield from _called(declaration.body)
-        elif isinstance(declaration, tree.TableDecl):
-            cells = {
-                id(cell): cell for row in declaration.rows for cell in row.actions
-            }  # cells of one text are one
-            for cell in cells.values():
-                if isinstance(cell, tuple):
-                    yield from _called(cell)
-
-
-def _called(statements: Iterable[tree.Statement]) -> Iterator[str]:
-    for statement in statements:
-        match statement:
-            case tree.Call(name, ()):
-                yield name.text
-            case tree.If(_, then, orelse):
-                yield from _called((*then, *orelse))
-            case tree.Case(_, arms, orelse):
-                yield from _called(inner for arm in arms for inner in arm.body)
-                yield from _called(orelse or ())
-            case tree.For(body=body):
-                yield from _called(body)
+    for statement in chain.from_iterable(map(tree.statements, declarations)):
+        if isinstance(statement, tree.Call) and not statement.args:
+            yield statement.name.text
 
 
 def _heading(parties: Parties, heading: tree.Heading) -> tree.Heading:

@@ -105,7 +105,8 @@ def in_step(
     for line, ends in ways:
         if flags.new and line.may(flags.new, 1) and line.may(flags.answered, 0):
             for way in ends:
-                seen.update(() if way.get(flags.settling) else _answers(line, way, watched))
+                if not way.get(flags.settling):
+                    seen.update(_answers(line, way, watched))
     follows = [
         (_seen_by(line, watched, flags), [[_set(one, way) for one in watched] for way in ends])
         for line, ends in ways
@@ -114,7 +115,7 @@ def in_step(
     while new:  # what a tuple leads to is looked for once
         after: set[Seen] = set()
         for members, leaves in follows:
-            matching = [one for one in new if all(map(contains, members, one))] if all(members) else ()
+            matching = [one for one in new if all(map(contains, members, one))]
             for parts in leaves:
                 for one in matching:
                     after.update(product(*(part or (at,) for part, at in zip(parts, one, strict=True))))
@@ -158,16 +159,15 @@ class _Line:
 def _seen_by(line: _Line, watched: Sequence[Watched], flags: Flags) -> list[frozenset[int]]:
     """The members of each leaf that a line can match with where no command is new: none where it cannot then."""
     if flags.new and not line.may(flags.answered, 0):
-        return [
-            frozenset(range(len(one.type.members))) for one in watched
-        ]  # what the answer left is pending still
+        # what the answer left is pending still, whatever the line sees
+        return [frozenset(range(len(one.type.members))) for one in watched]
     if not line.may(flags.new, 0):
         return [frozenset() for _ in watched]
     return [
         frozenset(
             at
             for at in range(len(one.type.members))
-            if line.may(one.leaf, at) and (at == 0 or not one.resting or line.may(one.resting, 0))
+            if line.may(one.leaf, at) and (at == 0 or not _rests(line, one))
         )
         for one in watched
     ]

@@ -129,32 +129,21 @@ def declared(scope: Scope, declarations: Sequence[tree.Declaration]) -> Parties:
     return Parties(superior, tuple(party for party in below if party is not None), types.members)
 
 
-def _ordered_again(node: Any) -> Iterator[str]:
-    """Yield the subordinates to which a declaration, or a statement, gives the same order once more."""
-    match node:
-        case tree.Assign(tree.Reference(name), tree.Order(again=True)):
-            yield name.text
-        case tree.TableDecl():
-            for at, heading in enumerate(node.actions):
-                if isinstance(heading.subject, tree.Reference) and any(
-                    isinstance(cell := row.actions[at], tree.Comparison)
-                    and isinstance(cell.value, tree.Order)
-                    and cell.value.again
-                    for row in node.rows
-                ):
-                    yield heading.subject.name.text
-            yield from _ordered_again(tuple(row.actions for row in node.rows))
-        case tuple():
-            for part in node:
-                yield from _ordered_again(part)
-        case tree.ProcedureDecl(body=parts) | tree.Arm(body=parts):
-            yield from _ordered_again(parts)
-        case tree.If(_, then, orelse):
-            yield from _ordered_again((then, orelse))
-        case tree.Case(_, arms, orelse):
-            yield from _ordered_again((arms, orelse))
-        case tree.For(body=parts):
-            yield from _ordered_again(parts)
+def _ordered_again(declaration: tree.Declaration) -> Iterator[str]:
+    """Yield the subordinates to which a declaration gives the same order once more."""
+    if isinstance(declaration, tree.TableDecl):
+        for at, heading in enumerate(declaration.actions):
+            if isinstance(heading.subject, tree.Reference) and any(
+                isinstance(cell := row.actions[at], tree.Comparison)
+                and isinstance(cell.value, tree.Order)
+                and cell.value.again
+                for row in declaration.rows
+            ):
+                yield heading.subject.name.text
+    for statement in tree.statements(declaration):
+        match statement:
+            case tree.Assign(tree.Reference(name), tree.Order(again=True)):
+                yield name.text
 
 
 class _Types:

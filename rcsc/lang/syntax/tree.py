@@ -3,8 +3,9 @@
 Equality means "says the same": spans and layout do not count, comments do.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import TypeAlias
 
 from rcsc.diagnostics.source import Span
@@ -797,6 +798,29 @@ Declaration: TypeAlias = (
     | AdoptDecl
     | LevelDecl
 )
+
+
+def statements(declaration: Declaration) -> Iterator[Statement]:
+    """Yield every statement of a procedure, or of the action cells of a table; those inside others, too."""
+    if isinstance(declaration, ProcedureDecl):
+        yield from inside(declaration.body)
+    elif isinstance(declaration, TableDecl):
+        for row in declaration.rows:
+            yield from inside(chain.from_iterable(cell for cell in row.actions if isinstance(cell, tuple)))
+
+
+def inside(body: Iterable[Statement]) -> Iterator[Statement]:
+    """Yield statements, each before those inside it."""
+    for statement in body:
+        yield statement
+        match statement:
+            case If(_, then, orelse):
+                yield from inside((*then, *orelse))
+            case Case(_, arms, orelse):
+                yield from inside(chain.from_iterable(arm.body for arm in arms))
+                yield from inside(orelse or ())
+            case For(body=inner):
+                yield from inside(inner)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Units of measure, and the exact factor from one to another.
 
-In: units as a table writes them, `mm/s`, or with powers below nothing, `mm*s^-1`. Out: what one of the first is in the second:
+In: units as a table writes them, `mm/s`, or with negative powers, `mm*s^-1`. Out: what one of the first is in the second:
 a fraction, and a power of pi (a degree is pi / 180 radians). The language multiplies and divides units and never
 converts; here, where readings come in, they are converted.
 
