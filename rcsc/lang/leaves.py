@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from math import isfinite
 from typing import assert_never
 
 from rcsc.lang.model import (
@@ -19,6 +20,7 @@ from rcsc.lang.model import (
     Procedure,
     Read,
     ReadLocal,
+    Real,
     Select,
     Statement,
     ToElement,
@@ -52,6 +54,11 @@ def operands(expr: Expr) -> tuple[Expr, ...]:
             return ()
         case _:
             assert_never(expr)
+
+
+def is_finite(expr: Expr) -> bool:
+    """Whether no NaN or infinity can arise in the expression: then its values are ordered, and a comparison has an opposite."""
+    return not isinstance(expr.type, Real) or (isfinite(expr.type.low) and isfinite(expr.type.high))
 
 
 def conjuncts(condition: Expr) -> Iterator[Expr]:

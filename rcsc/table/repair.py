@@ -13,7 +13,9 @@ from rcsc.diagnostics.diagnostic import Change, Place
 from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interval_sets import complement, holds, joined, meet, size
+from rcsc.lang.leaves import is_finite
 from rcsc.lang.model import (
+    Among,
     Apply,
     Bool,
     Box,
@@ -33,6 +35,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.operator_table import OPPOSITE, Op, is_comparison
+from rcsc.lang.questions import conjunction, disjunction
 from rcsc.table import boxes, cells
 from rcsc.table.regions.atoms import (
     Atom,
@@ -204,22 +207,20 @@ def left_by(program: Program, table: Table, changed: Sequence[PartingCell]) -> s
 
 
 def _says(number: Expr, box: Box) -> Expr:
-    """Return the condition that a leaf, or bits of one, have one of the keys."""
+    """Return the condition that a leaf, or bits of one, have one of the keys: a term an interval, however many keys it has."""
     kind = number.type
 
     def compared(op: Op, key: int) -> Expr:
         return Apply(op, (number, Literal(value_of_key(kind, key), kind)), Bool())
 
-    listed = isinstance(kind, Bool | Enum)
-    parts = [
-        *(compared(Op.EQ, key) for low, high in box for key in range(low, high + 1) if listed or low == high),
-        *(
-            Apply(Op.AND, (compared(Op.GE, low), compared(Op.LE, high)), Bool())
-            for low, high in box
-            if not listed and low < high
-        ),
-    ]
-    return reduce(lambda either, part: Apply(Op.OR, (either, part), Bool()), parts)
+    if isinstance(kind, Enum):
+        return Among(number, tuple(key for low, high in box for key in range(low, high + 1)))
+    if isinstance(kind, Bool):
+        return disjunction(compared(Op.EQ, key) for key in (0, 1) if holds(box, key))
+    return disjunction(
+        compared(Op.EQ, low) if low == high else conjunction((compared(Op.GE, low), compared(Op.LE, high)))
+        for low, high in box
+    )
 
 
 def _within(inner: Box, outer: Box) -> bool:
@@ -513,8 +514,10 @@ def _line_across(program: Program, table: Table, witness: Witness, region: Regio
 
 
 def _opposite(text: str, condition: Expr) -> str:
-    """The cell that says the opposite of a comparison's; empty for any other."""
-    if not (isinstance(condition, Apply) and is_comparison(condition.op)):
+    """The cell that says the opposite of a comparison's; empty for any other, and where a side may be a NaN."""
+    if not (
+        isinstance(condition, Apply) and is_comparison(condition.op) and all(map(is_finite, condition.args))
+    ):
         return ""
     value = re.sub(r"^(/=|<=|>=|=|<|>)\s*", "", text)
     other = OPPOSITE[condition.op]

@@ -26,8 +26,9 @@ from rcsc.table.regions import holes, partition
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench.made import families
-from tests.support.programs.stages import BOXES, drawn_program, program_of
+from tests.support.programs.stages import BOXES, drawn_program, program_of, verdict_of
 from tests.support.programs.texts import table as table_text
+from tests.support.steps import counted
 
 HEAD = """enum colour { red, green, blue }
 input a : bool
@@ -544,3 +545,26 @@ def test_z3_is_told_only_of_what_a_table_and_its_assumptions_read(monkeypatch: p
     )
     assert confirm(program, program.tables[0], (), Options(solver="both")) is Agreement.AGREES
     assert sorted(name for name in told if "!" not in name) == ["v1", "v2", "v3"]
+
+
+TOUCHING = {
+    "real 0.0 .. 100.0": ("12.5", "50.0"),
+    "real -1.7976931348623157e308 .. 1.7976931348623157e308": ("-1.0", "1.0"),
+    "single -3.4028234663852886e38 .. 3.4028234663852886e38": ("0.5", "1.5"),
+    "int -9223372036854775808 .. 9223372036854775807": ("-9000000000000000000", "9000000000000000000"),
+    "int 0 .. 18446744073709551615": ("1", "18446744073709551614"),
+}
+
+
+@pytest.mark.parametrize("kind", TOUCHING)
+def test_ranges_that_touch_over_the_widest_types_are_told_in_few_steps(kind: str) -> None:
+    """Two overlaps have helps of one cell, and what these do together walks no range of keys."""
+    low, high = TOUCHING[kind]
+    with counted(400_000):
+        found = verdict_of(
+            f"input x : {kind}\ninput y : {kind}\noutput o : bool\ntable t {{\n  | line | x | y || o |\n"
+            f"  | a | <= {low} | || true |\n  | b | {low} .. {high} | || false |\n  | c | >= {high} | /= {low} || true |\n}}\n"
+        ).findings
+    overlaps = [each for each in found if each.code is Code.OVERLAP]
+    assert len(overlaps) == 2
+    assert any("together: proved that no two lines match any more" in note for note in overlaps[-1].notes)

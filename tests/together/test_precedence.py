@@ -422,3 +422,37 @@ table t {
         "d": ("w[15] = true", ("e",)),
         "e": ("not (w[7..0] = 0bx0xx_xxxx and done = true)", ("b",)),
     }
+
+
+NAN = {
+    "single(a) * 2e38 - single(a) * 2e38": (">= 0.0", "<= 1.0", "< 1.0", "> -1.0"),
+    "x * 1e308 - y * 1e308": (">= 0.5", "< 2.0", "= 0.0", "/= 0.0", "in {0.0, 1.0}", "0.0 .. 1.0"),
+    "x - y": ("<= 0.5", "> 1.0"),
+    "a - b": ("<= 0", "> 1"),
+}
+
+
+@pytest.mark.parametrize("heading", NAN)
+def test_what_a_line_gives_way_to_is_said_so_that_a_nan_changes_nothing(heading: str) -> None:
+    """A comparison is turned only where neither side can be a NaN: for one, `a < b` and `a >= b` are both false."""
+    for cell in NAN[heading]:
+        text = f"""input a : int 0 .. 3
+input b : int 0 .. 3
+input x : real 0.0 .. 4.0
+input y : real 0.0 .. 4.0
+output o : int 0 .. 3
+table t {{
+  | line | {heading} || o |
+  | up above low | {cell} || 1 |
+  | low | || 2 |
+}}
+"""
+        program = program_of(text)
+        parsed = parse(Source("", text))
+        assert isinstance(parsed, tree.File)
+        other = program_of(format_file(tree.File(tuple(
+            expanded(d, program.tables[0]) if isinstance(d, tree.TableDecl) else d for d in parsed.declarations
+        ))))  # fmt: skip
+        for a, b, x, y in product(range(4), range(4), (0.0, 1.0, 4.0), (0.0, 1.0, 4.0)):
+            now: dict[str, Value] = {"a": a, "b": b, "x": x, "y": y, "o": 0}
+            assert matching_lines(other.tables[0], now) == matching_lines(program.tables[0], now), (cell, now)

@@ -22,20 +22,20 @@ from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.expressions.words import Mask, mask_of
 from rcsc.lang.interval_sets import meet
-from rcsc.lang.leaves import read_by
+from rcsc.lang.leaves import is_finite, read_by
 from rcsc.lang.model import (
+    Apply,
     Box,
     Column,
     Expr,
     Line,
     LineName,
     Meeting,
-    Real,
     Table,
     Test,
     key_bounds,
 )
-from rcsc.lang.operator_table import NEGATION, OPPOSITE
+from rcsc.lang.operator_table import NEGATION, OPPOSITE, is_comparison
 from rcsc.lang.questions import conjunction, negation
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
@@ -496,8 +496,7 @@ class _Lines:
         ]
         if len(terms) == 1:
             [test] = self._tests(before)
-            kinds = [self.scope.leaves[name].type for name in test.variables]
-            return _other(terms[0], ordered=not any(isinstance(kind, Real) for kind in kinds))
+            return _other(terms[0], ordered=_has_opposite(test.condition))
         return tree.Unary("not", reduce(lambda left, right: tree.Binary("and", left, right), terms))
 
 
@@ -535,6 +534,14 @@ def _excluding(word: tree.Expr) -> tuple[tree.Expr, tuple[tree.Member, ...]] | N
         case tree.InSet(subject, members, negated=True):
             return subject, members
     return None
+
+
+def _has_opposite(condition: Expr) -> bool:
+    """Whether a condition is a comparison of what can be no NaN: with one, `a < b` and `a >= b` are both false."""
+    match condition:
+        case Apply(op=op, args=(left, right)):
+            return is_comparison(op) and is_finite(left) and is_finite(right)
+    return False
 
 
 def _other(expr: tree.Expr, *, ordered: bool) -> tree.Expr:

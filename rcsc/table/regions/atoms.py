@@ -14,7 +14,7 @@ from functools import partial
 from typing import TypeAlias
 
 from rcsc.lang.interval_sets import joined, meet, scaled
-from rcsc.lang.leaves import conjuncts, parts
+from rcsc.lang.leaves import conjuncts, is_finite, parts
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     Among,
@@ -26,7 +26,6 @@ from rcsc.lang.model import (
     Literal,
     Program,
     Read,
-    Real,
     Table,
     Test,
     key_bounds,
@@ -209,14 +208,14 @@ class Universe:
             if _written_out(whole) > MOST_WRITTEN_OUT:
                 return self._truth(whole, wanted)
             return self._truths(op, left, right)(True)
-        if not (_is_finite(left) and _is_finite(right)):
+        if not (is_finite(left) and is_finite(right)):
             return self._truth(whole, wanted)
         total: dict[int, int] = {}
         constant = self._add(total, left, 1) + self._add(total, right, -1)
         return self._against(total, op, -constant)
 
     def _among(self, whole: Expr, subject: Expr, keys: list[int], wanted: bool) -> Formula:
-        if not _is_finite(subject):
+        if not is_finite(subject):
             return self._truth(whole, wanted)
         coefficients, constant = self.linear(subject)
         parts = [
@@ -361,13 +360,6 @@ def _written_out(condition: Expr) -> int:
 
 def _is_plain(expr: Expr) -> bool:
     return not isinstance(expr, Apply | Among)
-
-
-def _is_finite(expr: Expr) -> bool:
-    """Whether no NaN or infinity can arise in `expr`: then its key orders it."""
-    if not isinstance(expr.type, Real):
-        return True
-    return math.isfinite(expr.type.low) and math.isfinite(expr.type.high)
 
 
 def _reads(condition: Expr, name: str) -> Read:
