@@ -52,6 +52,7 @@ class OrderSpec:
         fields: Those that are not as the variable is at first.
         wait: Ticks after the end of the order before it to the same level; 0 is at its very end.
         interrupts: It comes `wait` ticks after the one before was given, whether that has ended or not.
+        faults: The plant's faults that are on while it is under way.
     """
 
     level: str
@@ -59,6 +60,7 @@ class OrderSpec:
     fields: tuple[FieldValue, ...] = ()
     wait: int = 0
     interrupts: bool = False
+    faults: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,15 +201,25 @@ class Episode:
         """Return its orders as a script that `rcsc run --script` reads, one after the other."""
         columns = list(dict.fromkeys(field.name for order in self.orders for field in order.fields))
         several = len({order.level for order in self.orders}) > 1
-        rows: list[list[Setting]] = [["command", *(["level"] if several else []), *columns, "cycles"]]
+        faulty = any(order.faults for order in self.orders)
+        head = [
+            "command",
+            *(["level"] if several else []),
+            *columns,
+            "cycles",
+            *(["fault"] if faulty else []),
+        ]
+        rows: list[list[Setting]] = [[*head]]
         for at, order in enumerate(self.orders):
             after = self.orders[at + 1] if at + 1 < len(self.orders) else None
             given = {field.name: _in_file(field.value) for field in order.fields}
             if order.wait and not order.interrupts:
-                rows.append(["", *([""] if several else []), *("" for _ in columns), str(order.wait)])
+                waits = ["", *([""] if several else []), *("" for _ in columns), str(order.wait)]
+                rows.append([*waits, *([""] if faulty else [])])
             cycles = str(max(after.wait, 1)) if after is not None and after.interrupts else ""
             level = [order.level] if several else []
-            rows.append([order.command, *level, *(given.get(name, "") for name in columns), cycles])
+            ends = [cycles, *([" ".join(order.faults)] if faulty else [])]
+            rows.append([order.command, *level, *(given.get(name, "") for name in columns), *ends])
         return csv_text(rows)
 
 
@@ -249,7 +261,8 @@ def _order_told(order: OrderSpec, *, first: bool) -> str:
         if order.interrupts
         else "the end of the one before"
     )
-    return f"`{order.level}` is ordered `{order.command}`{fields}, {order.wait} ticks after {after}"
+    faults = "".join(f", with the plant's fault `{fault}`" for fault in order.faults)
+    return f"`{order.level}` is ordered `{order.command}`{fields}, {order.wait} ticks after {after}{faults}"
 
 
 def _in_file(value: Setting) -> Setting:

@@ -4,7 +4,7 @@ In: an episode and the description of a system, compiled. Out: an `EpisodeOutcom
 """
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,13 +18,14 @@ from rcsc.episodes.properties import ENDS, NO_ERROR, properties, was_refused
 from rcsc.episodes.stand import Field, Stand, stand
 from rcsc.run.faults import faults_of, switch
 from rcsc.run.levels import BadState, RunningLevel, StateTableError, running_level
+from rcsc.run.orders.numbered import Latest
 from rcsc.run.orders.roles import FAILED
 from rcsc.run.orders.together import Together
 from rcsc.run.plant.bind import PlantFailed
 from rcsc.run.plant.load import Staged
 from rcsc.run.plant.staging import StageOrder, staged
-from rcsc.run.signature import STOPPED, Value
-from rcsc.run.system import System, check_answered, executors
+from rcsc.run.signature import STOPPED, Value, Values
+from rcsc.run.system import Outside, System, check_answered, executors
 from rcsc.run.unproved import refuse_unproved
 
 COOL_TICKS = 30
@@ -96,7 +97,8 @@ def _checked(episode: Episode, its: Stand) -> tuple[Staged, EpisodeOperator, lis
         if name not in its.signs:
             raise ValueError(f"there is no level `{name}`")
     known = faults_of(stage.outside)
-    for name in (switched.fault for switched in episode.switches):
+    switched = (one.fault for one in episode.switches)
+    for name in (*switched, *(fault for order in episode.orders for fault in order.faults)):
         if name not in known:
             raise ValueError(f"the plant has no fault `{name}`")
     return stage, operator(its.served, episode.orders), list(held(its, episode.readings))
@@ -120,6 +122,18 @@ class _Seen:
     excused: dict[str, Excused] = field(default_factory=dict)
     lines: set[tuple[str, int, int]] = field(default_factory=set)
     staged: set[tuple[str, str, str]] = field(default_factory=set)
+
+
+@dataclass(frozen=True, slots=True)
+class _Ordered:
+    """Switches the plant's faults once the orders of a tick are given, and before the plant takes its step."""
+
+    switch: Callable[[int], None]
+
+    def step(self, tick: int, _: Latest) -> Mapping[str, Values]:
+        """One tick."""
+        self.switch(tick)
+        return {}
 
 
 class Loop:
@@ -148,7 +162,8 @@ class Loop:
             running_level(spec, its.system, its.signs[spec.name], by_level[spec.name], self._stage.queries)
             for spec in its.system.levels
         )
-        outside = Together(None, (self.operator, *self._stage.outside), first, frozenset(its.buffers))
+        parts: tuple[Outside, ...] = (self.operator, _Ordered(self._switch), *self._stage.outside)
+        outside = Together(None, parts, first, frozenset(its.buffers))
         self.system = System(its.system, levels, (outside,), self._memory, watch=[self._after])
         self.cycle = Cycle(
             {level.name: level for level in levels}, self._stage.plants, self.operator, self._memory.said,
@@ -156,6 +171,7 @@ class Loop:
         )  # fmt: skip
         self._properties = properties(its, its.system.within)
         self._explained, self._seen = Explanations(its), _Seen()
+        self._on = frozenset[str]()
         self._digest, self._end, self._cool = hashlib.blake2b(digest_size=16), "", COOL_TICKS
         self._windows = tuple(_windows(episode))
         self._packed = {level.name: level.sign.packed for level in levels}
@@ -186,7 +202,7 @@ class Loop:
         self.cycle.restarted = frozenset(one.level for one in self.episode.restarts if one.tick == tick)
         for name in sorted(self.cycle.restarted):
             self._restart(name)
-        self.cycle.faulty = any(first <= tick <= last for first, last in self._windows)
+        self.cycle.faulty = bool(self._on) or any(first <= tick <= last for first, last in self._windows)
         self.cycle.refused = self._to_refuse(tick)
         self._cool = self._cool - 1 if self.operator.over else COOL_TICKS
         try:
@@ -234,12 +250,14 @@ class Loop:
     # --- what goes wrong ---
 
     def _switch(self, tick: int) -> None:
+        """Have on, of the plant's faults, those of this tick and of the orders under way."""
         switches = self.episode.switches
-        if not any(tick in (one.first_tick, one.last_tick + 1) for one in switches):
-            return
-        wanted = {one.fault for one in switches if one.first_tick <= tick <= one.last_tick}
-        for name in faults_of(self._stage.outside):
+        wanted = self.operator.faults.union(
+            one.fault for one in switches if one.first_tick <= tick <= one.last_tick
+        )
+        for name in sorted(self._on ^ wanted):
             switch(self._stage.outside, name, on=name in wanted)
+        self._on = wanted
 
     def _restart(self, name: str) -> None:
         try:

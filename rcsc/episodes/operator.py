@@ -150,6 +150,12 @@ class EpisodeOperator:
         """Whether every order was given, and has ended."""
         return all(line.over for line in self.lines)
 
+    @property
+    def faults(self) -> frozenset[str]:
+        """The plant's faults that are on because of orders under way."""
+        under_way = (line.given for line in self.lines if line.given is not None and line.ended is None)
+        return frozenset(fault for given in under_way for fault in given.spec.faults)
+
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
         """One tick: what stands in the order buffers."""
         for line in self.lines:

@@ -66,7 +66,7 @@ def draw_on(its: Stand, seed: int, plant: str = "", script: str = "") -> Episode
         CodedError: As `draw`.
     """
     random = Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
-    orders = tuple(_orders(random, its, script))
+    orders = tuple(_orders(random, its, script, plant))
     ticks = 0 if orders else random.choice(UNORDERED)
     episode = Episode(plant, seed=seed, orders=orders, ticks=ticks)
     adds = _kinds(its, switches(its, plant))
@@ -80,9 +80,9 @@ def draw_on(its: Stand, seed: int, plant: str = "", script: str = "") -> Episode
 # --- orders ---
 
 
-def _orders(random: Random, its: Stand, script: str) -> Iterator[OrderSpec]:
+def _orders(random: Random, its: Stand, script: str, plant: str) -> Iterator[OrderSpec]:
     """Yield the orders to every level: of a script as they are, or each after, at or before the end of the one before."""
-    rows = scripted(its, script) if script or random.random() < SCRIPTED else ()
+    rows = scripted(its, script, plant) if script or random.random() < SCRIPTED else ()
     if rows:
         for row in rows:
             wait, interrupts = _when(random, 0.15)
@@ -122,8 +122,8 @@ def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
     )
 
 
-def scripted(its: Stand, script: str) -> tuple[OrderSpec, ...]:
-    """The orders of a script; of the description's own, if nobody says which, as far as it is one of orders.
+def scripted(its: Stand, script: str, plant: str = "") -> tuple[OrderSpec, ...]:
+    """The orders of a script with their faults; of the description's own, if nobody says which, as far as it is one of orders.
 
     Raises:
         BadScript: It is not in order.
@@ -133,13 +133,18 @@ def scripted(its: Stand, script: str) -> tuple[OrderSpec, ...]:
     if file is None:
         return ()
     try:
-        rows = read_script(file, its.system, its.signs)
+        rows = read_script(file, its.system, its.signs, switches(its, plant))
     except CodedError:
         if script:
             raise
         return ()  # a plant's own kind of script
     return tuple(
-        OrderSpec(row.served.level, _command(row.served, row.order), tuple(_fields(row.served, row.order)))
+        OrderSpec(
+            row.served.level,
+            _command(row.served, row.order),
+            tuple(_fields(row.served, row.order)),
+            faults=row.faults,
+        )
         for row in rows
         if row.served is not None
     )
@@ -240,4 +245,6 @@ def fault_classes(episode: Episode, system: Path | None = None) -> tuple[str, ..
         *(["restarted"] if episode.restarts else []),
         *(["changed order"] if any(order.interrupts for order in episode.orders) else []),
     }
-    return (*(name for name in FAULTS if name in has), *dict.fromkeys(one.fault for one in episode.switches))
+    ordered = (fault for order in episode.orders for fault in order.faults)
+    switched = dict.fromkeys([*(one.fault for one in episode.switches), *ordered])
+    return (*(name for name in FAULTS if name in has), *switched)

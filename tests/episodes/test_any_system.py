@@ -259,6 +259,39 @@ class TestEveryFault:
             check(Episode(readings=(replace(beyond, value=20_000),)), path)
 
 
+class TestAScriptsFault:
+    """A row's fault of the plant is on while the order of the row is under way, as `rcsc run` has it."""
+
+    def test_it_is_drawn_with_its_order(self, robot: Path, tmp_path: Path) -> None:
+        script = tmp_path / "slip.csv"
+        script.write_text("command,fault,expect\ndock,wheel_slips,failed\nstop,,\n", encoding="utf-8")
+        episode = draw(1, robot, script=str(script))
+        assert [(order.command, order.faults) for order in episode.orders] == [
+            ("dock", ("wheel_slips",)),
+            ("stop", ()),
+        ]
+        assert "wheel_slips" in fault_classes(episode)
+        assert episode == Episode.from_json(episode.to_json())
+        assert episode.script().splitlines()[0].endswith(",fault")
+        assert "with the plant's fault `wheel_slips`" in "".join(episode.told())
+
+    def test_it_is_on_while_the_order_is_under_way(self, robot: Path) -> None:
+        slips = replace(DOCK, faults=("wheel_slips",))
+        assert run(Episode(orders=(DOCK,)), robot).end == "done"
+        loop = Loop(Episode(orders=(slips, OrderSpec("supervisor", "stop"))), stand(robot))
+        (base,) = loop.cycle.plants
+        on = []
+        while not loop.over:
+            loop.step()
+            on.append((loop.operator.ends == [], base.plant.wheel_slips))
+        assert set(on) == {(True, True), (False, False)}
+        assert loop.operator.ends[0].state == "failed"
+
+    def test_one_that_the_plant_has_not_is_refused(self, robot: Path) -> None:
+        with pytest.raises(ValueError, match="no fault `sulks`"):
+            check(Episode(orders=(replace(DOCK, faults=("sulks",)),)), robot)
+
+
 class TestWhatAFaultExplains:
     def test_an_older_order_again_is_no_finding_and_says_so(self, robot: Path) -> None:
         stale = BufferFault("supervisor.to_drive", "stale", 24, 30, ticks=8)
