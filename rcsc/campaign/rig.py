@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar
 
 from rcsc.episodes.outcome import EpisodeOutcome
+from rcsc.host.files.read import MOST_OF_OURS, content
 from rcsc.run.description import BadDescription, description
 from rcsc.run.executors import NotBuilt
 from rcsc.run.log.schema import fingerprints
@@ -158,8 +159,8 @@ def digest(rig: Rig[Any]) -> str:
     for name, fingerprint in fingerprints(description(rig.system)).items():
         hashed.update(f"{name} {fingerprint}\n".encode())
     for name, path in (("system", rig.system), *rig.kind.files(rig.system, rig.plant, rig.script)):
-        content = path.read_bytes() if path.is_file() else b""
-        hashed.update(f"{name} {len(content)}\n".encode() + content)
+        held = content(path, MOST_OF_OURS) if path.is_file() else b""
+        hashed.update(f"{name} {len(held)}\n".encode() + held)
     return hashed.hexdigest()
 
 

@@ -24,6 +24,7 @@ from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome
 from rcsc.host.children import scratch
+from rcsc.host.files.read import MOST_OF_OURS, content
 
 CRASH, HANG, ERROR = "crash", "hang", "error"
 SURVIVES, ENDS, RAISES = "the process survives", "the run ends in time", "nothing is raised"
@@ -172,7 +173,7 @@ def counterexample(episode: E, outcome: EpisodeOutcome, name: str, log: Path) ->
         (finding for finding in outcome.findings if finding.property == name),
         EpisodeFinding(name, 0, outcome.end),
     )
-    return Shrunk(episode, dated(finding, log), log.read_bytes() if log.is_file() else b"")
+    return Shrunk(episode, dated(finding, log), content(log, MOST_OF_OURS) if log.is_file() else b"")
 
 
 def dated(finding: EpisodeFinding, log: Path) -> EpisodeFinding:

@@ -19,6 +19,7 @@ from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, 
 from rcsc.diagnostics.source import Source, Span
 from rcsc.driver.outline import known
 from rcsc.host.cache import Cache, cache_of
+from rcsc.host.files import read
 from rcsc.lang.project import systems_above
 from rcsc.run.description import BadDescription, description, places
 
@@ -212,7 +213,7 @@ class _Seen:
     def _label(self, system: str, level: LevelOutline) -> Label:
         """The level's name where it is declared."""
         file = _shown(level.file, system)
-        self.sources.setdefault(file, Source(file, Path(level.file).read_text(encoding="utf-8-sig")))
+        self.sources.setdefault(file, Source(file, read.text(Path(level.file))))
         return Label(Span(file, level.start, level.end))
 
 

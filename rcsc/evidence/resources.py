@@ -18,7 +18,7 @@ from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.evidence.processors.assembly import Assembly, Bounds, UnboundedError, of_compiler, of_disassembly
 from rcsc.evidence.processors.boards import BOARDS, OPTIMIZED, Board, compiled, harness, link, run_image
 from rcsc.host.children import scratch
-from rcsc.host.files import csv_text
+from rcsc.host.files import csv_text, read
 from rcsc.host.tools import BuildFailed, ending, run_command
 from rcsc.lang.model import Kind as VariableKind
 from rcsc.lang.model import Program
@@ -197,10 +197,10 @@ def _needs(
 ) -> Iterator[Need]:
     stem = Path(symbols.source).stem
     compiled(board, place, (*OPTIMIZED, "-I.", "-g", "-fstack-usage", "-S", f"{stem}.c", "-o", f"{stem}.s"))
-    text = (place / f"{stem}.c").read_text("utf-8")
-    program = of_compiler((place / f"{stem}.s").read_text("utf-8"))
+    text = read.text(place / f"{stem}.c")
+    program = of_compiler(read.text(place / f"{stem}.s"))
     bounds = Bounds(program, image, _loops(text))
-    frames = _frames((place / f"{stem}.su").read_text("utf-8"))
+    frames = _frames(read.text(place / f"{stem}.su"))
     codes = _codes(board, place, f"{stem}.o")
     for function in sorted(program.routines, key=lambda name: (name in entries, name)):
         frame = frames.get(_original(function), (0, True))

@@ -30,7 +30,7 @@ from pathlib import Path
 from rcsc.evidence.harness import bounds, calls, stand_ins
 from rcsc.evidence.kind import Evidence, Kind, Shortfall, Subject
 from rcsc.host.children import scratch
-from rcsc.host.files import csv_text
+from rcsc.host.files import csv_text, read
 from rcsc.host.tools import ending, run_command, write_c
 from rcsc.lang.model import I64_MAX, Program, Real, Scalar
 from rcsc.lang.model import Kind as Role
@@ -165,7 +165,7 @@ def _analysis(subject: Subject, name: str, *, defensive: bool, finite: bool) -> 
         table = place / "properties.csv"
         if ran.status != 0 or not table.is_file():
             return Analysis(name, shown, sources, (), ending(ran, TIMEOUT_S))
-        found = tuple(_properties(table.read_text("utf-8")))
+        found = tuple(_properties(read.text(table)))
         return Analysis(name, shown, sources, found, "" if found else "its report names no place")
 
 

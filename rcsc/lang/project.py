@@ -5,7 +5,6 @@ In: paths as the user gave them. Out: `Loaded`; what cannot be read or found is 
 
 import os
 import re
-import stat
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
 from rcsc.diagnostics.source import Source, Span
-from rcsc.host.files.read import Malformed, toml_of
+from rcsc.host.files.read import MOST_TOML_BYTES, Malformed, TooLarge, content, toml_of
 
 if TYPE_CHECKING:  # who only looks for the folder of a project, as a running level does, needs no syntax
     from rcsc.lang.syntax import tree
@@ -134,7 +133,7 @@ def prefix(root: str) -> str:
         root: The project's folder.
     """
     try:
-        said = toml_of(Path(root, PROJECT_FILE).read_text(encoding="utf-8")).get("prefix", "")
+        said = toml_of(content(Path(root, PROJECT_FILE), MOST_TOML_BYTES)).get("prefix", "")
     except (OSError, ValueError, Malformed):
         return ""
     return said if isinstance(said, str) and PREFIX.fullmatch(said) else ""
@@ -363,15 +362,13 @@ class _Loader:
 def _bytes(file: str) -> bytes | _Unread:
     """The content of a regular file of bounded size; a pipe or a device might never end."""
     try:
-        about = os.stat(file)
-        if not stat.S_ISREG(about.st_mode):
-            return _Unread(Code.UNREADABLE, f"`{file}` is not a regular file", ("pipe the text to `-`",))
-        if about.st_size > MOST_BYTES:
-            return _too_large(file)
-        with open(file, "rb") as opened:
-            return opened.read(MOST_BYTES + 1)
+        return content(Path(file), MOST_BYTES)
     except OSError as error:
         return _Unread(Code.UNREADABLE, f"`{file}` cannot be read: {error.strerror}")
+    except TooLarge:
+        return _too_large(file)
+    except Malformed as error:
+        return _Unread(Code.UNREADABLE, f"`{file}` {error}", ("pipe the text to `-`",))
 
 
 def _too_large(file: str) -> _Unread:

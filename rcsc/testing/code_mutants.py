@@ -19,6 +19,7 @@ from pathlib import Path
 from random import Random
 
 from rcsc.host.children import scratch
+from rcsc.host.files.read import MOST_OF_OURS, content
 from rcsc.host.tools import Absent, c_compiler, run_command, write_c
 from rcsc.lang.model import Program, Snapshot
 from rcsc.testing.esbmc import EsbmcAnswer, prove_function, too_large
@@ -308,7 +309,7 @@ class Judge:
         noticed = self.by_tests(source)
         if noticed is not Noticed.TESTS:
             raise RuntimeError("the emitted C does not run")  # `build` ran it before
-        self.expected = (self.place / "out.bin").read_bytes()
+        self.expected = content(self.place / "out.bin", MOST_OF_OURS)
 
     def judge(self, mutant: CodeMutant) -> Noticed:
         """Who notices the mutant."""
@@ -329,7 +330,7 @@ class Judge:
         out = self.place / "out.bin"
         out.unlink(missing_ok=True)
         ran = run_command([str(self.place / "mutant"), "in.bin", "out.bin"], self.place, RUN_S)
-        same = ran.status == 0 and out.read_bytes() == self.expected
+        same = ran.status == 0 and content(out, MOST_OF_OURS) == self.expected
         return Noticed.UNDECIDED if same else Noticed.TESTS
 
     def by_proof(self, mutant: CodeMutant) -> Noticed:

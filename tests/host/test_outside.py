@@ -15,7 +15,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import pytest
 import zstandard
@@ -29,7 +29,7 @@ from rcsc.graph.drawing import svg
 from rcsc.graph.formats.state_graph import Edge, StateGraph
 from rcsc.host.files import csv_text
 from rcsc.host.files.names import BadName, identifier, inside, within
-from rcsc.host.files.read import CheckedFields, Malformed, content, json_of, toml_of, xml_of
+from rcsc.host.files.read import CheckedFields, Malformed, content, json_of, lines_of, toml_of, xml_of
 from rcsc.run.description import BadDescription, description
 from rcsc.run.log.read import UnreadableLog, read
 from rcsc.run.log.recorder import Recorder
@@ -63,17 +63,75 @@ FORMATS_OF_OURS = {
 """Who may name `struct`: their formats are written in them, or taken from `FORMATS` for a type that was checked."""
 
 
+Outward = ast.Call | ast.Import | ast.ImportFrom | ast.Attribute
+
+
 @cache
-def sources() -> tuple[tuple[str, tuple[ast.Call | ast.Import | ast.ImportFrom, ...]], ...]:
-    """What is called and imported in each file; to walk through a tree takes longer than to parse it, so it is done once."""
+def sources() -> tuple[tuple[str, tuple[Outward, ...]], ...]:
+    """Return what each file calls and imports, and the streams that it names; the walk takes longer than parsing, so it is done once."""
     paths = sorted(path for folder in ("rcsc", "sim") for path in (REPO / folder).rglob("*.py"))
     return tuple((path.relative_to(REPO).as_posix(), tuple(_outside(path))) for path in paths)
 
 
-def _outside(path: Path) -> Iterator[ast.Call | ast.Import | ast.ImportFrom]:
+def _outside(path: Path) -> Iterator[Outward]:
     for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, ast.Call | ast.Import | ast.ImportFrom):
+        if isinstance(node, ast.Call | ast.Import | ast.ImportFrom) or _is_stream(node):
             yield node
+
+
+def _is_stream(node: ast.AST) -> TypeGuard[ast.Attribute]:
+    return (
+        isinstance(node, ast.Attribute) and node.attr in {"stdin", "__stdin__"} and _word(node.value) == "sys"
+    )
+
+
+READS = {"open", "fdopen", "read_text", "read_bytes", "memmap", "fromfile"}
+READERS_OF_FILES: Mapping[str, str] = {
+    "rcsc/host/files/": "reads within bounds",
+    "rcsc/host/children.py": "a lock on what this process made",
+    "rcsc/host/cache.py": "rcsc's own files, for their digest",
+    "rcsc/host/keeper.py": "what its own parent says; imports nothing of rcsc",
+    "rcsc/host/tools.py": "the pinned ESBMC, for its digest",
+    "rcsc/run/processes/supervisor.py": "/proc",
+    "rcsc/run/processes/block.py": "shared memory of its own",
+    "rcsc/campaign/journal.py": "is added to and read in one opening, regular and bounded by itself",
+    "rcsc/shell/terminal.py": "is added to",
+    "rcsc/run/log/recorder.py": "is written",
+    "rcsc/lang/syntax/parse.py": "comes with the compiler",
+    "rcsc/studio/server.py": "comes with the compiler",
+    "rcsc/studio/share/document.py": "comes with the compiler",
+    "rcsc/commands/new.py": "comes with the compiler",
+    "sim/rcsc_cell/live/server.py": "comes with the cell",
+    "sim/rcsc_cell/cell/reach.py": "comes with the cell",
+}
+"""Who may open something, and what."""
+
+
+def _reads(node: ast.AST) -> bool:
+    """Whether it is a call that opens something for reading, or names the standard input."""
+    if isinstance(node, ast.Attribute):
+        return True
+    if not isinstance(node, ast.Call):
+        return False
+    what = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    if what == "open" and isinstance(node.func, ast.Attribute) and _word(node.func.value) in _NOT_FILES:
+        return False
+    return (what in READS and not _writes(node) and "os.devnull" not in ast.unparse(node)) or what == "input"
+
+
+_NOT_FILES = {"session", "workspace", "_workspace", "trial"}
+"""Whose `open` is about an editor's text."""
+
+
+def test_files_are_read_by_the_one_reader() -> None:
+    wrong = [
+        f"{name}:{node.lineno}: {ast.unparse(node)}"
+        for name, nodes in sources()
+        if not name.startswith(tuple(READERS_OF_FILES))
+        for node in nodes
+        if _reads(node)
+    ]
+    assert wrong == []
 
 
 def calls() -> Iterator[tuple[str, str]]:
@@ -192,6 +250,17 @@ def test_what_is_no_regular_file_is_not_read(tmp_path: Path) -> None:
             content(path, 10)
     with pytest.raises(OSError, match="directory"):
         content(tmp_path)
+
+
+def test_lines_are_bounded_and_come_when_they_are_there() -> None:
+    endless = lines_of(io.BytesIO(b"\xef\xbb\xbfstep 1\r\n" * 3 + b"\xff\n"))
+    assert [next(endless), next(endless)] == ["step 1", "\ufeffstep 1"]
+    for said, why in (
+        (b"a\n\xff\n", "is not UTF-8 in line 2"),
+        (b"x" * 11, "has a line 1 of more than 10 bytes"),
+    ):
+        with pytest.raises(Malformed, match=why):
+            list(lines_of(io.BytesIO(said), 10))
 
 
 GRAPHS = {

@@ -111,6 +111,38 @@ def test_wrong_usage_is_2_and_a_wrong_system_is_1(tmp_path: Path) -> None:
     assert "error[RCS721]" in done.stderr
 
 
+def test_a_script_is_a_text_of_bounded_size(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    (tmp_path / "bytes").write_bytes(b"step\n\xff\n")
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(1 << 32)
+    whys = {
+        "fifo": "is not a regular file",
+        "zero": "is not a regular file",
+        "bytes": "UTF-8 at byte 5",
+        "large": "64 MiB",
+    }
+    for name, why in whys.items():
+        done = run("--alone", "--executor", "python", "--script", str(tmp_path / name))
+        assert (done.returncode, done.stdout) == (1, "")
+        assert "error[RCS723]" in done.stderr
+        assert why in done.stderr
+
+
+def test_bytes_that_are_no_text_end_the_shell_in_order() -> None:
+    command = [*RCSC, "--alone", "--executor", "python"]
+    for said, why in (
+        (b"step\n\xff\n", "UTF-8 in line 2"),
+        (b"step\n" + b"x" * 100_000, "line 2 of more than"),
+    ):
+        done = subprocess.run(command, cwd=REPO, input=said, capture_output=True, check=False)
+        assert done.returncode == 1
+        assert done.stdout.startswith(b"cycle 1")
+        assert why in done.stderr.decode()
+        assert b"error[RCS723]" in done.stderr
+
+
 def test_a_script_is_interrupted_between_cycles(tmp_path: Path) -> None:
     path = tmp_path / "script.txt"
     path.write_text("step\nrun until task.cur_state = state_8\nstep 7\n", encoding="utf-8")

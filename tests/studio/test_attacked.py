@@ -116,6 +116,14 @@ def test_a_check_that_outlives_a_text_it_used_is_not_shown_as_known(bench: Bench
     assert state(bench.doc("t.rcs")) != "proved"
 
 
+def test_what_is_no_file_holds_nobody_up(folder: Path, bench: Bench) -> None:
+    os.mkfifo(folder / "f.rcs")
+    (folder / "g.rcs").symlink_to("g.rcs")
+    (folder / "h.rcs").mkdir()
+    (folder / "i.rcs").symlink_to("/dev/zero")
+    assert "t.rcs" in str(bench.ask("tables.list"))
+
+
 @pytest.mark.parametrize("where", ["check", "reading"])
 def test_a_bug_in_the_way_of_a_text_is_told_and_the_next_text_is_looked_at(
     where: str, bench: Bench, monkeypatch: pytest.MonkeyPatch

@@ -1,7 +1,6 @@
 """Options that several commands share."""
 
 import os
-import sys
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -11,6 +10,8 @@ import click
 
 from rcsc.commands.shared.show import Color, Output, OutputForm, Progress
 from rcsc.driver.settings import Settings
+from rcsc.host.files.read import standard_input
+from rcsc.lang.project import MOST_BYTES
 from rcsc.solvers.options import Options
 
 Command = Callable[..., int]
@@ -150,5 +151,5 @@ def settings_of(options: Options, use_cache: bool, output: Output, paths: tuple[
 
 
 def piped(paths: tuple[str, ...]) -> bytes | None:
-    """What `-` stands for, if it is one of the paths."""
-    return sys.stdin.buffer.read() if "-" in paths else None
+    """Return what `-` stands for, if it is one of the paths; of a text that is too large no more than shows it."""
+    return standard_input().read(MOST_BYTES + 1) if "-" in paths else None

@@ -1,15 +1,16 @@
 """`rcsc shell`: a system under somebody's hands."""
 
 import importlib.util
-import sys
+import io
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
 import click
 
 from rcsc.commands.shared.systems import EXECUTOR, PLANT, system_path
+from rcsc.host.files.read import Malformed, lines_of, standard_input, text, typed
+from rcsc.run.orders.script import BadScript
 from rcsc.shell.opening import Opening, opened
 from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.terminal import converse, follow
@@ -46,12 +47,12 @@ def command(script: Path | None, executor: str, plant: str | None, alone: bool, 
     run, as they are, with the plant that the description declares.
     """
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
+    written = None if script is None else _text(script)
     commands = opened(Opening(system_path(system), kind, plant or "", alone=alone))
 
-    if script is None and sys.stdin.isatty() and sys.stdout.isatty() and _has_prompt():
+    if written is None and typed() and _has_prompt():
         return converse(commands, click.echo, _complain)
-    with _lines(script) as (lines, name):
-        return follow(commands, lines, name, click.echo, _complain)
+    return follow(commands, _lines(written), "-" if script is None else str(script), click.echo, _complain)
 
 
 def _has_prompt() -> bool:
@@ -59,17 +60,30 @@ def _has_prompt() -> bool:
     return importlib.util.find_spec("prompt_toolkit") is not None
 
 
-@contextmanager
-def _lines(script: Path | None) -> Iterator[tuple[Iterator[str], str]]:
-    """The lines of a script, or of standard input, and what to call it."""
-    if script is None:
-        yield iter(sys.stdin), "-"
-        return
+def _text(script: Path) -> str:
+    """Return the text of a script.
+
+    Raises:
+        BadScript: It cannot be read.
+    """
     try:
-        text = script.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise click.BadParameter(f"{script} cannot be read: {error}", param_hint="--script") from error
-    yield iter(text.splitlines()), str(script)
+        return text(script)
+    except OSError as error:
+        raise BadScript(f"`{script}` cannot be read: {error.strerror}") from error
+    except Malformed as error:
+        raise BadScript(f"`{script}` {error}") from error
+
+
+def _lines(written: str | None) -> Iterator[str]:
+    """Give the lines of a script, or those of standard input as they come.
+
+    Raises:
+        BadScript: One is none.
+    """
+    try:
+        yield from lines_of(standard_input() if written is None else io.BytesIO(written.encode()))
+    except Malformed as error:
+        raise BadScript(f"what is typed {error}" if written is None else f"the script {error}") from error
 
 
 def _complain(where: str, refused: Refused) -> None:
@@ -78,5 +92,5 @@ def _complain(where: str, refused: Refused) -> None:
     click.echo(f"{where}error[{refused.code.value}]: {first}", err=True)
     for line in rest:
         click.echo(f"  {line}", err=True)
-    for text in refused.helps:
-        click.echo(f"  = help: {text}", err=True)
+    for words in refused.helps:
+        click.echo(f"  = help: {words}", err=True)

@@ -6,6 +6,7 @@ import click
 
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.options import steps_option
+from rcsc.host.files.read import standard_input
 from rcsc.solvers.options import Options
 
 PATIENCE_S = 5.0
@@ -31,5 +32,5 @@ def command(stdio: bool, steps: int) -> int:  # noqa: ARG001 - editors give it
     need("lsp")
     from rcsc.editor.server.serve import serve  # keep lazy: its packages are an extra
 
-    serve(Options(steps=steps, cpu_s=PATIENCE_S), sys.stdin.buffer, sys.stdout.buffer)
+    serve(Options(steps=steps, cpu_s=PATIENCE_S), standard_input(), sys.stdout.buffer)
     return 0

@@ -1,6 +1,5 @@
 """`rcsc table`: the table of a state graph."""
 
-import sys
 from pathlib import Path
 
 import click
@@ -13,7 +12,7 @@ from rcsc.graph.formats.choice import FORMS, form_of
 from rcsc.graph.formats.reading import MOST_BYTES, UnreadableError, diagnosed
 from rcsc.graph.round_trip import against, in_place
 from rcsc.graph.to_table import Tabled, tabled
-from rcsc.host.files.read import Malformed, content, decoded, piped, plain
+from rcsc.host.files.read import Malformed, content, decoded, piped, plain, standard_input
 from rcsc.lang.project import load
 from rcsc.solvers.options import Options
 
@@ -58,7 +57,7 @@ def command(
 def _tabled(drawn: str, form: str | None) -> Tabled:
 
     try:
-        raw = piped(sys.stdin.buffer, MOST_BYTES) if drawn == "-" else content(Path(drawn), MOST_BYTES)
+        raw = piped(standard_input(), MOST_BYTES) if drawn == "-" else content(Path(drawn), MOST_BYTES)
         source = Source(drawn, plain(decoded(raw)))
     except (OSError, Malformed) as error:
         place = Label(Span(drawn, 0, 0))

@@ -17,7 +17,7 @@ from rcsc.evidence.misra.cppcheck import MISSING, OWN, UNGUARDED, Checked, Findi
 from rcsc.evidence.misra.deviations import Deviation, explained, own_findings
 from rcsc.evidence.misra.guidelines import Category, Guideline, guidelines
 from rcsc.evidence.misra.words import RULES
-from rcsc.host.files import csv_text
+from rcsc.host.files import csv_text, read
 
 ELSEWHERE: Mapping[str, str] = {
     "Dir 2.1": "`rcsc evidence --only analysers` compiles it with every warning", "1.1": "`rcsc evidence --only analysers`",
@@ -210,7 +210,7 @@ def _suppressions(made: Summary) -> str:
 def main(folder: str) -> int:
     """Check a folder of generated C; say what no reason explains."""
     paths = sorted(path for path in Path(folder).iterdir() if path.suffix in {".c", ".h"})
-    made = summary({path.name: path.read_text("utf-8") for path in paths})
+    made = summary({path.name: read.text(path) for path in paths})
     for place in made.unexplained:
         sys.stdout.write(f"{place.where}: {place.guideline}: {place.what} [{place.finding.check}]\n")
     sys.stdout.write(

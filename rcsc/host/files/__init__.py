@@ -2,8 +2,8 @@
 
 A log, a symbol file, a description, a journal, a graph or a cache entry may come from anybody. `read` bounds its size
 and its nesting before it is parsed, and hands out each value as the kind that it must have; `names` says what may
-become the name of a file or of a thing in C. No other module parses text from outside, and none writes a file by
-itself; `tests/host/test_outside.py` checks every module for that.
+become the name of a file or of a thing in C. No other module reads a file or the standard input, parses text from
+outside, or writes a file by itself; `tests/host/test_outside.py` checks every module for that.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

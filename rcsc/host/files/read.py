@@ -10,6 +10,7 @@ import json
 import os
 import re
 import stat
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,10 @@ MIB = 1024 * 1024
 MOST_BYTES = 64 * MIB
 """Of a file that is read whole, where nobody says otherwise."""
 MOST_TOML_BYTES = 4 * MIB
+MOST_OF_OURS = 4096 * MIB
+"""Of a file that rcsc, or a program that it started, made just now."""
+LONGEST_LINE = 64 * 1024
+"""Bytes of a line of what is read line by line."""
 DEEPEST = 200
 """Levels of nesting of JSON; Python's own parser gives up at about 900."""
 DEEPEST_TOML = 32
@@ -46,6 +51,10 @@ class Malformed(ValueError):  # noqa: N818  # what happened, not an error of our
     """A text from outside is not what it must be; says why."""
 
 
+class TooLarge(Malformed):
+    """It has more bytes than it may have."""
+
+
 # --- files ---------------------------------------------------------------------------------
 
 
@@ -58,7 +67,7 @@ def content(path: Path, most: int = MOST_BYTES) -> bytes:
     """
     with opened(path) as file:
         if os.fstat(file.fileno()).st_size > most:
-            raise Malformed(f"has more than {_size(most)}")
+            raise TooLarge(f"has more than {_size(most)}")
         return piped(file, most)
 
 
@@ -74,6 +83,17 @@ def opened(path: Path) -> BinaryIO:
         file.close()
         raise Malformed("is not a regular file")
     return file
+
+
+def beginning(path: Path, most: int) -> bytes:
+    """Return the first bytes of a regular file, `most` of them at most.
+
+    Raises:
+        OSError: It cannot be read.
+        Malformed: It is no regular file.
+    """
+    with opened(path) as file:
+        return file.read(most)
 
 
 def _size(count: int) -> str:
@@ -98,8 +118,35 @@ def piped(file: IO[bytes], most: int = MOST_BYTES) -> bytes:
     """
     received = file.read(most + 1)
     if len(received) > most:
-        raise Malformed(f"has more than {_size(most)}")
+        raise TooLarge(f"has more than {_size(most)}")
     return received
+
+
+def standard_input() -> BinaryIO:
+    """Return the standard input; one without anything in it where the process was started without."""
+    return io.BytesIO() if sys.stdin is None else sys.stdin.buffer
+
+
+def typed() -> bool:
+    """Whether a person types and reads: standard input and output are a terminal."""
+    return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout))
+
+
+def lines_of(file: IO[bytes], longest: int = LONGEST_LINE) -> Iterator[str]:
+    """Give each line of a text when it is there, without its end; a line is bounded, the text is not.
+
+    Raises:
+        Malformed: A line is longer, or not UTF-8; the message names it.
+    """
+    number = 0
+    while line := file.readline(longest + 1):
+        number += 1
+        if len(line) > longest:
+            raise TooLarge(f"has a line {number} of more than {_size(longest)}")
+        try:
+            yield line.decode("utf-8-sig" if number == 1 else "utf-8").rstrip("\r\n")
+        except UnicodeDecodeError as error:
+            raise Malformed(f"is not UTF-8 in line {number}, at byte {error.start}") from error
 
 
 def plain(text: str) -> str:

@@ -19,6 +19,7 @@ from rcsc.editor.values import Answer, Repair
 from rcsc.editor.workspace import Checked, Workspace
 from rcsc.editor.written import tables_of
 from rcsc.host.cache import FOLDER
+from rcsc.host.files.read import Malformed, beginning
 from rcsc.lang.project import listed, load, project_root
 from rcsc.run.description import BadDescription, description, places
 from rcsc.shell.reload.refusal import Refused
@@ -414,7 +415,6 @@ def _mark(file: str) -> Mark:
 def _glance(path: str) -> str:
     """The beginning of a file; empty where it cannot be read."""
     try:
-        with Path(path).open("rb") as file:
-            return file.read(MOST_LISTED_BYTES).decode(errors="replace")
-    except OSError:
+        return beginning(Path(path), MOST_LISTED_BYTES).decode(errors="replace")
+    except (OSError, Malformed):
         return ""

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Self
 
 from rcsc.host.children import scratch
+from rcsc.host.files.read import MOST_OF_OURS, content
 from rcsc.host.tools import Absent, BuildFailed, c_compiler, run_command, write_c
 from rcsc.lang.model import Bool, Program, Real, Scalar, Snapshot, Value
 from rcsc.testing.executors.reference_file import monitored
@@ -118,7 +119,7 @@ class Native:
         if ran.status != 0:
             return BuildFailed("\n".join(ran.err.strip().splitlines()[:6]) or f"exit status {ran.status}")
         output = array("q")
-        output.frombytes((place / "out.bin").read_bytes())
+        output.frombytes(content(place / "out.bin", MOST_OF_OURS))
         return self._parted(output, [len(snapshots) for _, _, snapshots in sessions])
 
     def _parted(self, output: "array[int]", lengths: Sequence[int]) -> list[list[NativeRun]]:
