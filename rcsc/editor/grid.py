@@ -7,13 +7,13 @@ one variable, or at bits of one; assumptions are left out of the count.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise, zip_longest
+from itertools import zip_longest
 
 from rcsc.editor.places import Area, Lines
 from rcsc.editor.values import Grid, GridCell, GridColumn, GridRow, Standing
-from rcsc.editor.written import RowText, WrittenTable, joined_cells, tables_of
 from rcsc.lang.model import Array, Bool, Enum, Int, Program, Record, Single, Table, Type, spell, unit_text
 from rcsc.lang.syntax.rows import REQUIREMENTS, Cell, Cells, stub_of
+from rcsc.lang.written.tables import RowText, WrittenTable, joined_cells, pieces, tables_of
 from rcsc.table.boxes import TableBoxes
 from rcsc.table.regions.word_bits import words_of
 
@@ -61,20 +61,6 @@ def _grid(
     name = lines.area(file, written.named, written.named + len(written.name))
     whole = lines.area(file, written.start, written.end)
     return Grid(written.name, name, whole, columns, rows, standing)
-
-
-def pieces(cell: Cell) -> list[tuple[int, int]]:
-    """Start and end of each piece of a cell; an empty one has one, of no length.
-
-    >>> pieces(Cell("in {left, right}", "a.rcs", 40, ((10, 90),)))
-    [(40, 49), (90, 96)]
-    """
-    bounds = [(0, cell.start), *cell.further, (len(cell.text) + 1, 0)]
-    found = []
-    for (begin, start), (past, _) in pairwise(bounds):
-        text = cell.text[begin:past].rstrip()
-        found.append((start, start + len(text)))
-    return found
 
 
 def _columns(

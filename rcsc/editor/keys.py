@@ -16,9 +16,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from rcsc.editor.repairs import spliced
-from rcsc.editor.written import RowText, WrittenTable, dashes, fresh_name, joined_cells, tables_of
 from rcsc.lang.syntax.rows import stub_of
+from rcsc.lang.written.changes import spliced
+from rcsc.lang.written.tables import RowText, WrittenTable, dashes, fresh_name, joined_cells, tables_of
 
 Splice: TypeAlias = tuple[int, int, str]
 

@@ -21,13 +21,13 @@ from dataclasses import dataclass
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source, Span
-from rcsc.editor.written import RowText, cells_of, tables_of
 from rcsc.lang.model import Program
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import resolve
 from rcsc.lang.resolve.program import closure
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
+from rcsc.lang.written.tables import RowText, cells_of, tables_of
 
 MOST_ROUNDS = 12
 """Times that something is left out; a text with more layers of errors is not looked at further."""

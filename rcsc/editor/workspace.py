@@ -23,14 +23,14 @@ from rcsc.editor.grid import grids
 from rcsc.editor.memo import Memo, OutdatedError
 from rcsc.editor.places import Area, Lines, difference
 from rcsc.editor.recovery import Rest, rest_of
-from rcsc.editor.repairs import with_proposal, with_spelling
 from rcsc.editor.standing import BEING_PROVED, GIVEN_UP, standing
 from rcsc.editor.values import Answer, Finding, Repair, Standing, Witness, WitnessLine
-from rcsc.editor.written import WrittenTable, tables_of
 from rcsc.host.memory import uncollected
 from rcsc.lang.model import Program
 from rcsc.lang.project import PROJECT_FILE, Loaded, load, project_root
 from rcsc.lang.resolve import resolve
+from rcsc.lang.written.changes import with_proposal, with_spelling
+from rcsc.lang.written.tables import WrittenTable, tables_of
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.symbolic.remembered import remembering

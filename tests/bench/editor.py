@@ -15,7 +15,7 @@ from statistics import median
 from rcsc.editor.server.serve import at_rest
 from rcsc.editor.server.session import Session
 from rcsc.editor.values import Answer
-from rcsc.editor.written import cells_of, dashes, tables_of
+from rcsc.lang.written.tables import cells_of, dashes, tables_of
 
 TABLES = Path(__file__).parents[2] / "tables"
 KEYS = 8

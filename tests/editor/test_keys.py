@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from rcsc.diagnostics.source import Source
 from rcsc.editor import keys
 from rcsc.editor.places import Lines, Place, Units, difference
-from rcsc.editor.repairs import spliced
-from rcsc.editor.written import cells_of, dashes, tables_of
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.tree import File, TableDecl
+from rcsc.lang.written.changes import spliced
+from rcsc.lang.written.tables import cells_of, dashes, tables_of
 from tests.editor.random_edits import edited
 
 REPO = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ from rcsc.editor import Workspace
 from rcsc.editor.memo import OutdatedError
 from rcsc.editor.standing import standing
 from rcsc.editor.values import Answer, State
-from rcsc.editor.written import cells_of, tables_of
+from rcsc.lang.written.tables import cells_of, tables_of
 from rcsc.solvers.options import Options
 from tests.editor.random_edits import compared
 

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from rcsc.diagnostics.source import Source
-from rcsc.editor.repairs import formatted
 from rcsc.host.files.read import Malformed
 from rcsc.lang.project import listed
+from rcsc.lang.written.changes import formatted
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import MOST_OPEN, MOST_UNREAD, Client, Hub
 from rcsc.studio.tables import desk

@@ -15,13 +15,13 @@ from rcsc.diagnostics.codes import Code
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.editor.places import Lines, difference
-from rcsc.editor.written import tables_of
 from rcsc.graph.derive import Derived, derive
 from rcsc.host.files.read import Malformed
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.model import Program, key_bounds, value_of_key
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
+from rcsc.lang.written.tables import tables_of
 from rcsc.shell.opening import Opening
 from rcsc.shell.reload.refusal import Refused
 from rcsc.solvers.options import Options

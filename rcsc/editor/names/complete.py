@@ -14,9 +14,9 @@ from rcsc.editor.names.index import Space
 from rcsc.editor.names.tokens import KEYWORDS
 from rcsc.editor.places import Lines
 from rcsc.editor.values import Grid, GridColumn
-from rcsc.editor.written import RowText, cells_of, tables_of
 from rcsc.lang.model import Bool, Enum, Int, Program, Real, Record, Type, spell, unit_text
 from rcsc.lang.syntax import tree
+from rcsc.lang.written.tables import RowText, cells_of, tables_of
 
 MOST = 400
 """Offers at once; who types on gets fewer."""

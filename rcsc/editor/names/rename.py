@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from rcsc.diagnostics.source import Source, Span
 from rcsc.editor.names.find import Names
 from rcsc.editor.names.index import Occurrence, Space
-from rcsc.editor.repairs import laid_out, spliced
+from rcsc.lang.written.changes import laid_out, spliced
 
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _LINE = re.compile(r"\w+", re.ASCII)

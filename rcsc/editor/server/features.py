@@ -23,17 +23,17 @@ from rcsc.editor.names.rename import RefusedError, renamable, renamed
 from rcsc.editor.names.tokens import MODIFIERS, TYPES, tokens
 from rcsc.editor.places import Edit, Lines, difference
 from rcsc.editor.recovery import declarations
-from rcsc.editor.repairs import formatted
 from rcsc.editor.server.convert import Converter
 from rcsc.editor.server.session import Session, current
 from rcsc.editor.standing import BEING_PROVED
 from rcsc.editor.values import Grid
-from rcsc.editor.written import joined_cells, table_of
 from rcsc.host.files.read import Malformed, content
 from rcsc.lang.model import Program
 from rcsc.lang.resolve import resolve
 from rcsc.lang.resolve.program import closure
 from rcsc.lang.syntax.rows import stub_of
+from rcsc.lang.written.changes import formatted
+from rcsc.lang.written.tables import joined_cells, table_of
 
 MOST_SEARCHED = 1 << 20
 """Bytes of a file that is no table in which a name is looked for."""

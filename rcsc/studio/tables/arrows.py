@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
 from rcsc.editor.workspace import Workspace
-from rcsc.editor.written import table_of
 from rcsc.graph.formats.state_graph import StateGraph
 from rcsc.lang.model import Program, Table, Value, spell
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
+from rcsc.lang.written.tables import table_of
 from rcsc.relation.steps import Steps, UnansweredError
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.tables import cells

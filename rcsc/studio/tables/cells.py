@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Source
-from rcsc.editor.grid import pieces
-from rcsc.editor.repairs import formatted, spliced
-from rcsc.editor.written import (
+from rcsc.lang.syntax.rows import Cell, Cells, stub_of
+from rcsc.lang.written.changes import formatted, spliced
+from rcsc.lang.written.tables import (
     RowText,
     WrittenPart,
     WrittenTable,
@@ -20,10 +20,10 @@ from rcsc.editor.written import (
     dashes,
     fresh_name,
     joined_cells,
+    pieces,
     table_of,
     whole_line,
 )
-from rcsc.lang.syntax.rows import Cell, Cells, stub_of
 from rcsc.shell.reload.refusal import Refused
 
 MOST_CELLS = 20_000

@@ -17,10 +17,10 @@ from rcsc.diagnostics.codes import Code
 from rcsc.editor.memo import OutdatedError
 from rcsc.editor.values import Answer, Repair
 from rcsc.editor.workspace import Checked, Workspace
-from rcsc.editor.written import tables_of
 from rcsc.host.cache import FOLDER
 from rcsc.host.files.read import Malformed, beginning
 from rcsc.lang.project import listed, load, project_root
+from rcsc.lang.written.tables import tables_of
 from rcsc.run.description import BadDescription, description, places
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import PROVER

@@ -14,9 +14,9 @@ from pathlib import Path
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Source
 from rcsc.editor.places import Edit, Lines
-from rcsc.editor.repairs import formatted
 from rcsc.host.files.read import MIB, Malformed, content
 from rcsc.host.files.write import write_atomically
+from rcsc.lang.written.changes import formatted
 from rcsc.shell.reload.refusal import Refused
 
 MOST_BYTES = 2 * MIB

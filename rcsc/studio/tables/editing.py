@@ -257,7 +257,7 @@ def _over_default(text: str, table: str, line: int, column: int, rows: Sequence[
 
 def _lines_of(text: str, table: str) -> tuple[int, int]:
     """How many lines a table has, and whether the last is DEFAULT."""
-    from rcsc.editor.written import table_of
+    from rcsc.lang.written.tables import table_of
 
     found = table_of(text, table)
     sheet = None if found is None else cells.sheet_of(found)

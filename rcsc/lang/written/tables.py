@@ -7,7 +7,7 @@ In: a text. Out: `WrittenTable`s. Which rows go together and where cells begin i
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, count
+from itertools import chain, count, pairwise
 
 from rcsc.lang.syntax.rows import Cell, Cells, cut, is_separator, parts
 
@@ -129,6 +129,20 @@ def joined_cells(rows: Sequence[RowText], file: str = "") -> Cells:
             for cell, piece in zip(every, more.all, strict=True)
         ]
     return Cells(tuple(every[:split]), tuple(every[split:]))
+
+
+def pieces(cell: Cell) -> list[tuple[int, int]]:
+    """Start and end of each piece of a cell; an empty one has one, of no length.
+
+    >>> pieces(Cell("in {left, right}", "a.rcs", 40, ((10, 90),)))
+    [(40, 49), (90, 96)]
+    """
+    bounds = [(0, cell.start), *cell.further, (len(cell.text) + 1, 0)]
+    found = []
+    for (begin, start), (past, _) in pairwise(bounds):
+        text = cell.text[begin:past].rstrip()
+        found.append((start, start + len(text)))
+    return found
 
 
 def dashes(row: RowText) -> bool:

@@ -8,20 +8,20 @@ from collections.abc import Sequence
 
 from rcsc.diagnostics.diagnostic import Change, Diagnostic, Place, Proposal
 from rcsc.diagnostics.source import Source
-from rcsc.editor.grid import pieces
-from rcsc.editor.written import (
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
+from rcsc.lang.syntax.rows import Cell, stub_of
+from rcsc.lang.written.tables import (
     RowText,
     WrittenTable,
     cells_of,
     fresh_name,
     joined_cells,
+    pieces,
     table_of,
     whole_line,
 )
-from rcsc.lang.syntax import tree
-from rcsc.lang.syntax.format import format_file
-from rcsc.lang.syntax.parse import parse
-from rcsc.lang.syntax.rows import Cell, stub_of
 
 _MEANT = re.compile(r"did you mean `([^`]+)`\?$")
 _Splice = tuple[int, int, str]
