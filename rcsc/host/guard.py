@@ -6,12 +6,19 @@ that the user has open; these rules keep them out:
 - `Host`, `Origin` and `Sec-Fetch-Site` are there once at most, so that nobody reads another one than is judged here;
 - `Host` names this server by its loopback address: a foreign name that was made to resolve to 127.0.0.1 does not (DNS rebinding);
 - `Origin`, which a browser sends with what other pages start, is the page's own, and a WebSocket must have one;
-- `Sec-Fetch-Site` says that the page itself or the user asked;
-- the path begins with a token that cannot be guessed; it stands in the address that the user is given, and no referrer tells it.
+- `Sec-Fetch-Site` says that the page itself or the user asked; or else the page is gone to in a window of its own, by who knows the token:
+  the user's own file (`door`);
+- the path begins with a token that cannot be guessed; it stands in the address that the user is given, in no command line, which every
+  user of the machine reads, and no referrer tells it.
 """
 
 import hmac
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from rcsc.host.children import scratch
+from rcsc.host.files import write_atomically
 
 HEADERS = {
     "Cache-Control": "no-store",
@@ -21,7 +28,27 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
 }
 """Of every answer, beside the content security policy."""
-_ONCE = ("host", "origin", "sec-fetch-site")
+_ONCE = ("host", "origin", "sec-fetch-site", "sec-fetch-mode", "sec-fetch-dest")
+_DOOR = """<!doctype html>
+<meta charset="utf-8"><meta name="referrer" content="no-referrer">
+<meta http-equiv="refresh" content="0; url={address}">
+<title>rcsc</title><a href="{address}">to the page</a>
+"""
+
+
+@contextmanager
+def door(address: str) -> Iterator[Path]:
+    """Give a file that sends a browser to an address, in a folder of the user's own, for as long as the block takes.
+
+    Whoever opens it in a browser names the file, and not the address with its token.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    with scratch("page") as folder:
+        path = folder / "open.html"
+        write_atomically(path, _DOOR.format(address=address).encode(), 0o600, durable=False)
+        yield path
 
 
 def policy(port: int) -> str:
@@ -53,8 +80,13 @@ def refusal(headers: Mapping[str, str], path: str, port: int, token: str) -> str
         return "a socket is for the page alone"
     if origin is not None and origin != f"http://{host}":
         return "another page asked"
-    if headers.get("Sec-Fetch-Site", "none") not in {"none", "same-origin"}:
+    if headers.get("Sec-Fetch-Site", "none") not in {"none", "same-origin"} and not _is_gone_to(headers):
         return "another page asked"
     if not hmac.compare_digest(path.split("/")[1].encode(), token.encode()):
         return "the address lacks its token"
     return ""
+
+
+def _is_gone_to(headers: Mapping[str, str]) -> bool:
+    """Whether a window goes to the page: whoever had it do so sees nothing of it, and is no page that frames or fetches it."""
+    return headers.get("Sec-Fetch-Mode") == "navigate" and headers.get("Sec-Fetch-Dest") == "document"

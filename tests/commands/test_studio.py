@@ -1,12 +1,14 @@
 """`rcsc studio` as a user starts it: one address, a page behind it, and an end at Ctrl-C."""
 
 import asyncio
+import os
 import re
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
@@ -34,6 +36,33 @@ NO_REQUESTS = (
     b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\nContent-Length: 3\r\n\r\nzz",
 )
 """Anybody on this machine may send such, as often as he likes: it is not printed where the studio runs."""
+
+
+def test_the_token_is_in_no_command_line(tmp_path: Path) -> None:
+    shutil.copytree(DOCK, tmp_path / "dock", ignore=shutil.ignore_patterns("generated", ".rcsc-cache"))
+    opener, seen = tmp_path / "xdg-open", tmp_path / "seen"
+    opener.write_text(f'#!/bin/sh\nprintf %s "$*" > {seen}.part && mv {seen}.part {seen}\n', encoding="utf-8")
+    opener.chmod(0o755)
+    environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    with subprocess.Popen(
+        [*COMMAND, str(tmp_path / "dock"), "--open"],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        env=environment,
+    ) as studio:
+        assert studio.stdout is not None
+        address = studio.stdout.readline().split()[-1]
+        token = address.split("/")[3]
+        while not seen.exists():
+            time.sleep(0.05)
+        path = Path(seen.read_text(encoding="utf-8").removeprefix("file://"))
+        assert token not in str(path)
+        assert f'content="0; url={address}"' in path.read_text(encoding="utf-8")
+        assert [one.stat().st_mode & 0o777 for one in (path, path.parent)] == [0o600, 0o700]
+        studio.send_signal(signal.SIGINT)
+        studio.wait(60)
+        assert not path.parent.exists()
 
 
 def test_it_says_one_address_and_ends_at_an_interrupt(tmp_path: Path) -> None:

@@ -17,10 +17,11 @@ import pytest
 
 from rcsc.commands import run as rcsc
 from rcsc.diagnostics.codes import Code
+from rcsc.host.guard import door
 from rcsc.shell.reload.refusal import Refused as Refusal
 from rcsc.studio.hub import MOST_OPEN, Ask, Client, Hub, message
 from rcsc.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
-from tests.studio.driven import DOCK
+from tests.studio.driven import DOCK, Seat
 from tests.studio.served import PATIENCE_S, Page, Refused, page, page_at, serving, until
 
 
@@ -107,8 +108,13 @@ def test_only_its_own_page_is_let_in_and_nothing_leads_out_of_its_folder() -> No
         ):  # fmt: skip
             assert status(server, "", **wrong)[0] == 403, wrong
             assert status(server, "socket", **wrong)[0] == 403, wrong
+        gone_to = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"}
+        assert status(server, "", **gone_to)[0] == 200
+        for wrong in ({"Sec-Fetch-Dest": "iframe"}, {"Sec-Fetch-Mode": "cors"}, {"Origin": "null"}):
+            assert status(server, "", **(gone_to | wrong))[0] == 403, wrong
         for path in ("/", "/socket", "/x" * 20, f"/{'x' * 32}/"):
             assert status(server, path)[0] == 403, path
+            assert status(server, path, **gone_to)[0] == 403, path
         for path in OUTSIDE:
             assert status(server, path)[0] in {400, 403, 404}, path
         assert status(server, "", "POST")[0] == 405
@@ -404,3 +410,10 @@ def test_the_latest_event_of_a_kind_takes_the_place_of_those_before() -> None:
 def test_what_is_not_finite_is_sent_as_text() -> None:
     said = json.loads(message(answer={"x": float("nan"), "y": [float("inf"), 1.5, {"z": -float("inf")}]}))
     assert said == {"answer": {"x": "nan", "y": ["inf", 1.5, {"z": "-inf"}]}}
+
+
+def test_a_browser_that_opens_the_file_comes_to_the_page() -> None:
+    with serving(others=[Echo()]) as server, door(server.address) as path, Seat() as seat:
+        seat.open(path.as_uri())
+        seat.wait("document.title === 'rcsc studio'")
+        assert seat.value("location.href") == server.address

@@ -8,6 +8,7 @@ import click
 
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.systems import EXECUTOR, PLANT, SYSTEM, meant, tables_meant
+from rcsc.host.guard import door
 from rcsc.run.description import description
 from rcsc.shell.opening import Opening
 
@@ -69,9 +70,9 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     def told(address: str) -> None:
         click.echo(f"the studio is at {address}")
         if opens:
-            click.launch(address)
+            click.launch(held.enter_context(door(address)).as_uri())
 
-    with contextlib.suppress(KeyboardInterrupt):
+    with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as held:
         first = Path(target) if target is not None and tables is not None else None
         server.serve(concerns(opening, server.hub, logs, drawer=_drawer(path), first=first), told)
     click.echo("\n".join(("the studio is closed", *server.hub.partings)))
