@@ -11,7 +11,7 @@ Slower than `keyed`, for the solver has to reason in fractions; asked only where
 
 import math
 
-from rcsc.lang.model import Real, Scalar, Single
+from rcsc.lang.model import Bool, Enum, Real, Scalar, Single, next_value
 from rcsc.lang.operator_table import Arithmetic, Conversion, Op
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Term
@@ -74,6 +74,13 @@ class Measured(Keyed):
         return smt.all_of([term for arg in parts for term in self._inside(arg)])
 
     def _inside(self, node: Node) -> list[Term]:
+        """Return the terms that each value of the type within the bounds meets: it lies between the nearest values beyond them.
+
+        Not the bounds themselves: `x > 0.1` of a number that is real holds below the next double, too.
+        """
+        if isinstance(node.kind, Bool | Enum):
+            return []
         term = self.term(node)
-        low, high = (self.literal(node.kind, end) for end in (node.low, node.high))
-        return [smt.at_most(low, term, KEY), smt.at_most(term, high, KEY)]
+        low, high = (next_value(node.kind, end, by) for end, by in ((node.low, -1), (node.high, 1)))
+        above = [smt.below(self.literal(node.kind, low), term, KEY)] if math.isfinite(low) else []
+        return above + ([smt.below(term, self.literal(node.kind, high), KEY)] if math.isfinite(high) else [])

@@ -83,6 +83,59 @@ def test_a_counter_that_rises_only_now_and_then_is_none(tmp_path: Path) -> None:
     assert ending(tmp_path, now_and_then).endless == ("2",)
 
 
+@pytest.mark.parametrize(
+    ("work", "counters"),
+    [
+        ("c := max(c - 1, 0)", {("c", True)}),
+        ("if c > 4 { c := c - 3 } else { c := 0 }", {("c", True)}),
+        ("if d > 0 { d := d - 1 } else { c := max(c - 1, 0); d := 3 }", {("c", True), ("d", True)}),
+        ("if there { d := max(d - 1, 0); c := max(c - 1, 0) } else { d := min(d + 1, 99); c := max(c - 2, 0) }", {("c", True)}),
+        ("if there and c >= 2 { d := min(d + 1, 99); c := c - 2 } else { if d >= 2 and c < 99 { d := d - 2; c := c + 1 } else { c := 0 } }",
+         {("c + d", True)}),
+    ],
+    ids=["by one", "in steps", "either of two", "one of two", "a sum"],
+)  # fmt: skip
+def test_what_falls_ends(work: str, counters: set[tuple[str, bool]], tmp_path: Path) -> None:
+    """A counter that goes down, one that does while another stays, and a sum of which each part goes both ways."""
+    found = ending(tmp_path, falling(work))
+    assert found.proved
+    assert {(one.counter, one.falls) for one in found.counted if one.line == "2"} == counters
+
+
+def falling(work: str) -> str:
+    """Return a lower level that works until `c` is 0."""
+    declared = "state c : int 0 .. 99\nstate d : int 0 .. 99"
+    return lower_level(*WAY, declared=declared, seen="on := c = 0", begin="c := 9; d := 9", work=work)
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        "if there { c := max(c - 1, 0) } else { c := min(c + 1, 99) }",
+        "if there { c := max(c - 1, 0) }",
+        "if d > 0 { d := d - 1 } else { if there { c := max(c - 1, 0) } d := 3 }",
+        "if there and c >= 2 and d < 9 { d := d + 1; c := c - 1 } else { if d >= 1 and c < 99 { d := d - 1; c := c + 1 } else { c := 0 } }",
+    ],
+    ids=["both ways", "now and then", "the outer one now and then", "sum that stays"],
+)
+def test_what_need_not_fall_is_not_shown_to_end(work: str, tmp_path: Path) -> None:
+    assert ending(tmp_path, falling(work)).endless == ("2",)
+
+
+def test_a_way_that_is_halved_ends(tmp_path: Path) -> None:
+    """By a share of what is left, down to more than 0; down to 0 it is not shown."""
+    halved = lower_level(
+        *WAY,
+        declared="state x : real 0.0 .. 100.0",
+        seen="on := x <= 0.1",
+        begin="x := 90.0",
+        work="x := x * 0.5",
+    )
+    found = ending(tmp_path / "end", halved)
+    assert (found.proved, [(one.counter, one.falls) for one in found.counted]) == (True, [("x", True)])
+    assert ending(tmp_path / "none", edited(halved, ("x <= 0.1", "x <= 0.0"))).endless == ("2",)
+
+
 def test_default_may_go_on_for_ever_like_any_line(tmp_path: Path) -> None:
     ends = going("3", there="true", does="state(d_state)", status="done")
     assert ending(tmp_path, lower_level(ends, "5 | DEFAULT | | | || | executing")).endless == ("5",)

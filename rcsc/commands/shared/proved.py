@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from itertools import groupby
+from operator import attrgetter
 from typing import Any
 
 from rcsc.compose.contract.claims import AGAIN, ENDING, RUNS, UNREACHED, Key, Need, declared, spelled
@@ -137,15 +139,21 @@ def _ends(ending: Ending) -> str:
             f"is not shown to end: {'line' if len(ending.endless) == 1 else 'lines'} {lines} may run for ever"
         )
     if ending.counted:
-        text += "; meanwhile " + ", ".join(map(_counted, ending.counted))
+        by_line = groupby(ending.counted, key=attrgetter("line"))
+        text += "; meanwhile " + ", ".join(_counted(line, tuple(counters)) for line, counters in by_line)
     if ending.still:
         text += "; if the values in {} stand still".format(", ".join(f"`{name}`" for name in ending.still))
     return text
 
 
-def _counted(rising: RisingLine) -> str:
+def _counted(line: str, counters: Sequence[RisingLine]) -> str:
+    """Say what a line is counted by: the first counter moves, or it stays and the next one does."""
+    return f"line `{line}` runs as long as {', or stays and '.join(map(_moves, counters))}"
+
+
+def _moves(rising: RisingLine) -> str:
     by = "" if rising.least is None else f" by at least {rising.least:.2g}"
-    return f"line `{rising.line}` runs as long as `{rising.counter}` rises{by}"
+    return f"`{rising.counter}` {'falls' if rising.falls else 'rises'}{by}"
 
 
 def assumptions(proof: SystemProof) -> str:

@@ -1,25 +1,29 @@
 """Ranking: shows that lines stop following one another while the phase of a level stays.
 
-In: three cycles in a row, as `Turn`s; the questions are about the middle one. Out: the lines that stop because a counter
-rises, and those that are not shown to stop. The argument is in `termination`.
-Counters are found one after another, each for what the earlier ones leave (Bradley, Manna and
-Sipma, "Linear ranking with reachability", 2005).
+In: three cycles in a row, as `Turn`s; the questions are about the middle one. Out: the lines that stop because of a counter, and
+those that are not shown to stop. The argument is in `termination`.
+Counters are found one after another, each for what the earlier ones leave (Bradley, Manna and Sipma, "Linear ranking with
+reachability", 2005): once one that never goes back is found, only cycles that leave it as it is remain to be looked at. The
+weights of a sum are guessed from cycles that the solver shows, and then asked about.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import product
+from operator import attrgetter
 from typing import TypeAlias
 
 from rcsc.compose.contract.transition import Leaves, TableAt
 from rcsc.compose.invariant.confirm import Confirmation, may
+from rcsc.compose.invariant.confirm import answer as answered
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.model import Bool, Int, Kind, Program, Real, Scalar, pending
 from rcsc.solvers import smt
 from rcsc.solvers.search import furthest
 from rcsc.solvers.smt import Answer, Term
 from rcsc.symbolic import values
-from rcsc.symbolic.keyed import KEY
+from rcsc.symbolic.keyed import KEY, sort
 from rcsc.symbolic.measured import Measured
 from rcsc.symbolic.values import Node
 
@@ -31,13 +35,26 @@ Part = frozenset[int]
 """Lines each of which leads to every other one."""
 
 
+MOST_GUESSES = 24
+"""Sums of numbers that are asked about, for one line."""
+WEIGHTS = (1, 4)
+"""The greatest weight of a number in a sum: small ones first, which read better."""
+
+
 @dataclass(frozen=True, slots=True)
 class RisingLine:
-    """A line that stops because a number of the level rises each time: a real by at least `least`."""
+    """A line that stops because a counter goes one way, and never back, on what earlier counters of the line leave.
+
+    Attributes:
+        counter: A number of the level, or a sum of several, as it is read.
+        least: By how much a real changes each time.
+        falls: Whether it goes down.
+    """
 
     line: str
     counter: str
     least: float | None = None
+    falls: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +100,7 @@ class StoppingLines:
     """Which lines of one table stop.
 
     Attributes:
-        counted: Lines that stop because a counter rises.
+        counted: Lines that stop because of a counter; where one has several, the first that counts comes first.
         still: Inputs whose values, echoes and statuses apart, are assumed constant meanwhile.
         endless: Lines that are not shown to stop, even if all inputs are constant.
     """
@@ -125,8 +142,15 @@ def lines_that_stop(
         rested_on.append(ranking.solver)
     asked.rested_on += rested_on
     endless = tuple(str(first.turn.at.lines[line][0].name) for line in sorted(ranking.endless))
-    one_each = {counted.line: counted for counted in reversed(ranking.counted)}
-    return StoppingLines(tuple(reversed(one_each.values())), () if endless else still, endless)
+    return StoppingLines(_first_of_each(ranking.counted), () if endless else still, endless)
+
+
+def _first_of_each(counted: Sequence[Sequence[RisingLine]]) -> tuple[RisingLine, ...]:
+    """Return the counters with which each line was first shown to stop."""
+    first: dict[str, Sequence[RisingLine]] = {}
+    for counters in counted:
+        first.setdefault(counters[0].line, counters)
+    return tuple(rising for counters in first.values() for rising in counters)
 
 
 def fewest(names: tuple[str, ...], enough: Callable[[tuple[str, ...]], bool]) -> tuple[str, ...]:
@@ -163,12 +187,16 @@ def inputs(program: Program) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class KeptNumber:
-    """A number that the level keeps, before and after a cycle."""
+    """A number that the level keeps, or a sum of several, before and after a cycle."""
 
     name: str
     kind: Scalar
     before: Term
     after: Term
+
+    def back(self, *, falls: bool) -> Term:
+        """Return the term that it goes the other way."""
+        return smt.below(self.before, self.after, KEY) if falls else smt.below(self.after, self.before, KEY)
 
 
 class _Ranking:
@@ -206,8 +234,12 @@ class _Ranking:
         self.solver = asked.known(clauses)
         self.solver.add(*asked.keyed.ranges, *stay)
         self.last, self.now, self.next = (list(map(self.solver.named, each)) for each in matches)
-        self.rises = [self.solver.named(smt.below(each.before, each.after, KEY)) for each in self.numbers]
-        self.counted: list[RisingLine] = []
+        self.moves = [
+            (each, falls, self.solver.named(each.back(falls=not falls)))
+            for each in self.numbers
+            for falls in (False, True)
+        ]
+        self.counted: list[tuple[RisingLine, ...]] = []
         always, self.always = smt.truth(True), set(_every_step(len(self.now)))
         self.open = set(range(len(self.now))) if weaker is None else weaker.endless
         if weaker is None:
@@ -264,69 +296,173 @@ class _Ranking:
         return smt.all_of([self.now[step[0]], self.next[step[1]]])
 
     def _uncounted(self, steps: set[LinePair], when: Term) -> set[LinePair]:
-        """Drop the steps of lines that stop because a counter rises."""
+        """Drop the steps of lines that stop because of a counter; sums are tried where nothing else is left."""
         again = True
         while again:
             again = False
-            for part in parts(steps):
-                stopped = {line for line in sorted(part & self.open) if self._stops(line, part, when, when)}
-                if stopped:
-                    again = True
-                    steps = {step for step in steps if not stopped & set(step)}
+            for sums in (False, True):
+                for part in parts(steps):
+                    open_lines = sorted(part & self.open)
+                    stopped = {line for line in open_lines if self._stops(line, part, when, when, sums=sums)}
+                    if stopped:
+                        again = True
+                        steps = {step for step in steps if not stopped & set(step)}
+                if again:
+                    break
         return steps
 
-    def _stops(self, line: int, part: Part, when: Term, then: Term) -> bool:
-        """Return whether the line runs only finitely often while the part's lines follow one another; note the counter."""
+    def _stops(self, line: int, part: Part, when: Term, then: Term, *, sums: bool = True) -> bool:
+        """Return whether the line runs only finitely often while the part's lines follow one another; note the counters.
+
+        A counter that goes one way in each cycle, or stays, comes to an end of its range: from some cycle on it stays. So the next
+        one is looked for among cycles that leave the counters before it as they are, until the line runs in none of those.
+        """
         asked = [*(self._one_of(turn, part) for turn in (self.last, self.next)), self.solver.switch(when)]
         runs = [*asked, self.now[line], self.solver.switch(then)]
-        rising = self._rising_once(runs)
-        if rising is None:
-            return True
-        counted = next(self._rising(line, part, asked, runs, rising), None)
-        if counted is not None and counted not in self.counted:
-            self.counted.append(counted)
-        return counted is not None
+        others = [*asked, self._one_of(self.now, part)]
+        counted: list[RisingLine] = []
+        while (moving := self._moving(runs)) is not None:
+            found = self._counter(line, runs, others, moving)
+            if found is None and sums:
+                found = self._sum(line, runs, others)
+            if found is None:
+                return False
+            rising, number = found
+            counted.append(rising)
+            if rising.least is not None:
+                break
+            stays = self.solver.switch(
+                smt.negation(smt.any_of([number.back(falls=True), number.back(falls=False)]))
+            )
+            runs, others = [*runs, stays], [*others, stays]
+        if counted and tuple(counted) not in self.counted:
+            self.counted.append(tuple(counted))
+        return True
 
     def _one_of(self, turn: list[Term], part: Part) -> Term:
         """Return a switch for one of the part's lines to run in this turn."""
         return self.solver.switch(smt.any_of([turn[other] for other in sorted(part)]))
 
-    def _rising_once(self, runs: list[Term]) -> list[KeptNumber] | None:
-        """Return the numbers that rise in one such cycle, to try only these; None if there is no such cycle."""
+    def _moving(self, runs: list[Term]) -> list[tuple[KeptNumber, bool]] | None:
+        """Return the numbers that rise, or fall, in one such cycle, to try only these; None if there is no such cycle."""
         answer = self.solver.check(*runs)
         if answer is Answer.UNSATISFIABLE:
             return None
         return [
-            number
-            for number, rises in zip(self.numbers, self.rises, strict=True)
-            if answer is not Answer.SATISFIABLE or self.solver.value(rises, Bool())
+            (number, falls)
+            for number, falls, moves in self.moves
+            if answer is not Answer.SATISFIABLE or self.solver.value(moves, Bool())
         ]
 
-    def _rising(
-        self, line: int, part: Part, asked: list[Term], runs: list[Term], among: list[KeptNumber]
-    ) -> Iterator[RisingLine]:
-        """Yield the numbers that always rise with the line and never fall within the part."""
-        others = [*asked, self._one_of(self.now, part)] if among else asked
-        name = str(self.turn.at.lines[line][0].name)
-        for number in among:
-            if may(self.solver, *others, smt.below(number.after, number.before, KEY)):
+    def _counter(
+        self, line: int, runs: list[Term], others: list[Term], among: list[tuple[KeptNumber, bool]]
+    ) -> tuple[RisingLine, KeptNumber] | None:
+        """Find a number that moves one way in a cycle of the line and in no cycle of its part goes back."""
+        for number, falls in among:
+            if may(self.solver, *others, number.back(falls=falls)):
                 continue
-            if isinstance(number.kind, Real):
-                least = self._least_rise(runs, number, number.kind.high - number.kind.low)
-                if least is not None:
-                    yield RisingLine(name, number.name, least)
-            elif not may(self.solver, *runs, smt.at_most(number.after, number.before, KEY)):
-                yield RisingLine(name, number.name)
+            if not isinstance(number.kind, Real):
+                return RisingLine(self._name(line), number.name, falls=falls), number
+            least = self._least_move(runs, number, falls=falls)
+            if least is not None:
+                return RisingLine(self._name(line), number.name, least, falls), number
+        return None
 
-    def _least_rise(self, runs: list[Term], number: KeptNumber, width: float) -> float | None:
-        """Return the least rise of the real; None if no rise is shown."""
+    def _sum(self, line: int, runs: list[Term], others: list[Term]) -> tuple[RisingLine, KeptNumber] | None:
+        """Find a sum of whole numbers with small weights that rises in a cycle of the line and falls in none of its part."""
+        whole = [number for number in self.numbers if not isinstance(number.kind, Real)]
+        if len(whole) < 2 or self.solver.check(*runs) is not Answer.SATISFIABLE:
+            return None
+        rise = self._differences(whole)
+        for most in WEIGHTS:
+            guesses = _Guesses(len(whole), most, rise)
+            for weights in guesses:
+                falls = next(filter(None, weights), 0) < 0  # as it is read: `a + b` falls
+                number = _weighed(whole, [-weight for weight in weights] if falls else weights)
+                answer = answered(self.solver, *others, number.back(falls=falls))
+                if answer is Answer.UNSATISFIABLE:
+                    return RisingLine(self._name(line), number.name, falls=falls), number
+                if answer is Answer.UNKNOWN:
+                    return None
+                guesses.never_falls(self._differences(whole))
+        return None
 
-        def rises(power: int) -> bool:
-            risen = smt.integer_operation("+", number.before, smt.fraction(width / 2**power))
-            return not may(self.solver, *runs, smt.below(number.after, risen, KEY))
+    def _name(self, line: int) -> str:
+        return str(self.turn.at.lines[line][0].name)
 
-        power = least_power(rises)
+    def _differences(self, whole: Sequence[KeptNumber]) -> list[int]:
+        """Return by how much each number rises in the cycle that the solver shows."""
+        return [
+            int(self.solver.value(each.after, sort(each.kind)))
+            - int(self.solver.value(each.before, sort(each.kind)))
+            for each in whole
+        ]
+
+    def _least_move(self, runs: list[Term], number: KeptNumber, *, falls: bool) -> float | None:
+        """Return by how much the real changes at least; None if that is not shown."""
+        assert isinstance(number.kind, Real)
+        width = number.kind.high - number.kind.low
+        low, high = (number.after, number.before) if falls else (number.before, number.after)
+
+        def moves(power: int) -> bool:
+            moved = smt.integer_operation("+", low, smt.fraction(width / 2**power))
+            return not may(self.solver, *runs, smt.below(high, moved, KEY))
+
+        power = least_power(moves)
         return None if power is None else width / 2**power
+
+
+class _Guesses:
+    """Weights of a sum that rises in one cycle and falls in none that was shown; each is a guess."""
+
+    def __init__(self, count: int, most: int, rise: Sequence[int]) -> None:
+        kind = Int(-most, most)
+        self._solver = smt.Solver()
+        self._weights = [smt.variable(f"weight {at}", kind) for at in range(count)]
+        for weight in self._weights:
+            self._solver.add(*(smt.at_most(*pair, kind) for pair in self._within(weight, kind)))
+        self._kind = kind
+        self._at_least(rise, 1)
+
+    @staticmethod
+    def _within(weight: Term, kind: Int) -> tuple[tuple[Term, Term], ...]:
+        return (smt.literal(kind, kind.low), weight), (weight, smt.literal(kind, kind.high))
+
+    def __iter__(self) -> Iterator[list[int]]:
+        for _ in range(MOST_GUESSES):
+            if self._solver.check() is not Answer.SATISFIABLE:
+                return
+            yield [int(self._solver.value(weight, self._kind)) for weight in self._weights]
+
+    def never_falls(self, change: Sequence[int]) -> None:
+        """Leave out weights whose sum falls where the numbers change so."""
+        self._at_least(change, 0)
+
+    def _at_least(self, change: Sequence[int], least: int) -> None:
+        changed = _sum_of(
+            [(smt.literal(self._kind, by), weight) for by, weight in zip(change, self._weights, strict=True)]
+        )
+        self._solver.add(smt.at_most(smt.literal(self._kind, least), changed, self._kind))
+
+
+def _sum_of(products: Sequence[tuple[Term, Term]]) -> Term:
+    """Return the sum of the products."""
+    terms = [smt.integer_operation("*", left, right) for left, right in products]
+    return reduce(lambda total, term: smt.integer_operation("+", total, term), terms)
+
+
+def _weighed(whole: Sequence[KeptNumber], weights: Sequence[int]) -> KeptNumber:
+    """Return the sum of the numbers with these weights, named as it is read."""
+    some = [(weight, number) for weight, number in zip(weights, whole, strict=True) if weight]
+    before, after = (
+        _sum_of([(smt.literal(number.kind, weight), end(number)) for weight, number in some])
+        for end in (attrgetter("before"), attrgetter("after"))
+    )
+    text = " ".join(
+        f"{'-' if weight < 0 else '+'} {'' if abs(weight) == 1 else f'{abs(weight)} * '}{number.name}"
+        for weight, number in some
+    )
+    return KeptNumber(text.removeprefix("+ "), some[0][1].kind, before, after)
 
 
 def least_power(holds: Callable[[int], bool]) -> int | None:

@@ -13,9 +13,11 @@ it is *unanswered* while it reports neither; no other status answers. The argume
   answered for good. So after the cycle that takes the command, which may be the first of all, the phase changes at most
   `changes` times.
 - While the phase stays, lines follow one another. A line that runs again and again is on a loop of lines. It
-  runs finitely often if there is a *counter*, a number of the level that rises whenever the line runs and never falls on that
-  loop: it ends at the end of its range. A real has to rise by a share of its range (`SMALLEST`), found in fractions
-  (`measured`). Lines that have one are taken out, and what is left is examined again.
+  runs finitely often if there is a *counter*, a number of the level, or a sum of several, that rises whenever the line runs and
+  never falls on that loop: it ends at the end of its range. Likewise one that falls and never rises; or one that moves in some of
+  the line's cycles and never goes back, for in the end it stays, and a next counter, looked for among cycles that leave it, then
+  stops the line. A real has to move by a share of its range (`SMALLEST`), found in fractions
+  (`measured`). Lines that stop are taken out, and what is left is examined again.
 - A line that gives orders must have one, at least for the cycles in which it does so. So orders end.
 - Then answers come, and stay. The lines that are left may form no loop in answered cycles that give no order, except loops that
   leave the command unanswered only finitely often.
@@ -53,7 +55,7 @@ class Ending:
 
     Attributes:
         changes: How often the phase can change after the cycle that takes the command; None if phases or tables may loop.
-        counted: Lines that stop because a counter rises.
+        counted: Lines that stop because of a counter; of several of one line each counts while those before it stay.
         still: Inputs whose values, echoes and statuses apart, are assumed constant meanwhile.
         endless: Lines that are not shown to stop.
     """
