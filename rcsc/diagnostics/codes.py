@@ -827,9 +827,9 @@ class Code(StrEnum):
     NO_CYCLE_BEFORE = """RCS315: there is no cycle before to speak of
 
     `was x` is the value that `x` had after the cycle before, and an event, `@T(c)`, is of that cycle and this one. An invariant is about
-    one state, and a constant about none: they cannot look back. `was` is about variables, not about locals or constants. Neither `was`
-    nor events nest, and neither what stands before `then` nor either side of `until` or `upon` can have them: these are each about one
-    cycle.
+    one state, and a constant about none: they cannot look back. `was` is about variables, not about locals or constants alone. What has
+    to hold for a time, `c for 2 [s]`, is counted where each cycle ends: no local or parameter is known there. Neither `was` nor events
+    nest, and neither what stands before `then` nor either side of `until` or `upon` can have them: these are each about one cycle.
 
         state n : int 0 .. 9
         invariant grows : n >= was n

@@ -90,7 +90,7 @@ def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic
         if v.kind is Kind.STATE
         and not v.name.endswith(".next")
         and v.previous_of is None
-        and not v.counts
+        and v.counts is None
         and _few(v)
     ]
     if wanted:

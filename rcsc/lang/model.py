@@ -273,7 +273,7 @@ class Variable:
         safe: What an output shows after a cycle that ended in a fault; None where it stays as it is.
         previous_of: Of a hidden state, the leaf whose value after the cycle before it holds.
         line_of: Of a hidden state, the table whose line of this cycle it holds: 0 for none, else one more than the line's position.
-        counts: Whether it is a hidden state that counts the cycles for which a condition has held.
+        counts: Of a hidden state that counts cycles, the condition that has held for so many.
         restart: What it has when the level starts anew; None where it is then as it is initially, or as `Program.restart` says.
         given: Whether its initial value is written; else it has the least of its type, which nobody meant.
     """
@@ -290,7 +290,7 @@ class Variable:
     restart: Value | None = None
     previous_of: VariableName | None = field(default=None, compare=False)
     line_of: TableName | None = field(default=None, compare=False)
-    counts: bool = field(default=False, compare=False)
+    counts: "Expr | None" = field(default=None, compare=False, repr=False)
     given: bool = field(default=True, compare=False, repr=False)
 
     @property

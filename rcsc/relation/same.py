@@ -3,13 +3,15 @@
 In: two programs that differ in one table. Out: `Same`, `Differs` with the least input, or `NotDecided`. Both do the same where both have
 an undefined condition, match no line or match several, or where each matches one line and the actions of these end alike, call the same
 extern procedures in the same states with the same values, and leave every variable the same. Z3 is asked about pairs of lines,
-under the assumptions of the first table and the program's invariants; lines are compared by what they do, not by name.
+under the assumptions of the first table and the program's invariants; lines are compared by what they do, not by name, and what they
+look back at by what feeds it (`rcsc.lang.hidden`): of a state that the compiler adds to one of the programs alone nothing is known.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from rcsc.lang.hidden import hidden, matched
 from rcsc.lang.meaning import relying
 from rcsc.lang.model import Action, Kind, Program, Scalar, Table, Value, Variable, VariableName, value_of_key
 from rcsc.relation.steps import assumed
@@ -89,13 +91,17 @@ class _Question:
         self.options = options
         self.shared = Shared()
         self.start = self.shared.start
-        program = relying(first[0])
+        other, one = matched(second[0], first[0])
+        program = relying(one)
         self.variables = program.variables
-        self.kinds = {str(v.name): v.type for v in program.variables}
+        self.kinds = {str(v.name): v.type for v in (*other.variables, *program.variables)}
+        own = hidden(one) ^ hidden(other)
+        self.compared = [name for name in self.kinds if name not in own]
         for name, kind in self.kinds.items():
             self.start[name] = self.shared.canonical(values.variable(name, kind))
-        self.outcomes, self.others = list(self._outcomes(*first)), list(self._outcomes(*second))
-        table = next(candidate for candidate in program.tables if candidate.name == first[1].name)
+        self.outcomes = list(self._outcomes(one, _named(one, first[1])))
+        self.others = list(self._outcomes(other, _named(other, second[1])))
+        table = _named(program, first[1])
         run = Run({}, self.kinds, self.start)
         self.known = [run.evaluate(condition) for condition in assumed(program, table)]
         self.questions = 0
@@ -137,7 +143,7 @@ class _Question:
 
     def _changes(self, first: Effect, second: Effect) -> Iterator[tuple[str, Node]]:
         """Yield what can differ afterwards, and where it does."""
-        return differences(first, second, self.kinds, self.shared)
+        return differences(first, second, self.compared, self.shared)
 
     def _check(self, wrong: Node) -> tuple[Answer, Solver | None, dict[str, Node]]:
         """Ask whether `wrong` is possible; return the answer, its solver and variables."""
@@ -178,6 +184,10 @@ class _Question:
                 if solver.check(values.term_of(node)) is Answer.SATISFIABLE
             )
         return Differs(tuple((v, least[v.name]) for v in shown), first.name, second.name, changed)
+
+
+def _named(program: Program, table: Table) -> Table:
+    return next(candidate for candidate in program.tables if candidate.name == table.name)
 
 
 def _done(meaning: Meaning, actions: tuple[Action, ...]) -> Effect:

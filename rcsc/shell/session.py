@@ -408,15 +408,12 @@ class Session:
     def _try_reload(self, name: str, *, prove: bool = False) -> tuple[RunningLevel, Reloaded, Judged | None]:
         """Return the running level, its reload, and the verdict on that; None where they are the same."""
         old = self.system.level(name)
-        reloaded = reload(self.plant, self.spec(name), old)
+        reloaded = reload(self.plant, self.spec(name), old, lambda: self._meaning(old))
         if self._builds[id(old)][1:] == (reloaded.digest, reloaded.sources):
             return old, reloaded, None
         self._answer_by_hand(reloaded.level)
-        try:
-            program = self.program(old)
-        except Refused:
-            program = None
-        judged = judge(Running(old, program), reloaded.level, reloaded.program, self.memory)
+        running = Running(old, self._meaning(old))
+        judged = judge(running, reloaded.level, reloaded.program, self.memory)
         runs = {
             level.name: reloaded.sources if level is old else self._builds[id(level)][2]
             for level in self.levels
@@ -425,6 +422,13 @@ class Session:
         if spent():
             raise Refused(Code.SHELL_RELOAD, f"level `{name}` keeps its tables: their proof was given up")
         return old, reloaded, replace(judged, notes=(*judged.notes, known))
+
+    def _meaning(self, level: RunningLevel) -> Program | None:
+        """What a level's tables mean; None where their sources are not known."""
+        try:
+            return self.program(level)
+        except Refused:
+            return None
 
     def _compiled(self, name: str) -> bool:
         """Whether a level's executors were made of the sources that were there when it began to run."""

@@ -837,6 +837,34 @@ def test_graph_and_table_are_each_other_s_way_back(form: str, assuming: str, tmp
     )  # only `task/common` is not beside it
 
 
+@pytest.mark.parametrize(
+    ("asked", "other"),
+    [
+        ("(a or b) for 200 [ms]", "a for 200 [ms]"),
+        ("(a or b) for 200 [ms]", "(a and b) for 200 [ms]"),
+        ("(a or b) for 200 [ms]", "a"),
+        ("was r.b", "was r_b"),
+        ("@T(r.b)", "@T(r_b)"),
+    ],
+)
+def test_a_graph_that_looks_back_at_something_else_does_not_the_same(
+    asked: str, other: str, tmp_path: Path
+) -> None:
+    text = (
+        "enum m { off, on }\nrecord part { b : bool }\ninput r : part\ninput r_b : bool\ninput a : bool\ninput b : bool\nstate s : m\n"
+        f"table t {{\n| line | s | a | when || s |\n| p | off | true | {asked} || on |\n| r | on | false | || off |\n"
+        "| q | DEFAULT | | || |\n}\nlevel l { period 100 [ms] table t }\n"
+    )
+    path = tmp_path / "t.rcs"
+    path.write_text(text, encoding="utf-8")
+    status, drawn, _ = run("graph", str(path), "--form", "dot")
+    assert (status, asked in drawn) == (0, True)
+    status, _, said = run("table", "-", "--against", str(path), stdin=drawn)
+    assert (status, "does the same as" in said) == (0, True)
+    status, refuted, _ = run("table", "-", "--against", str(path), stdin=drawn.replace(asked, other))
+    assert (status, "error[RCS773]" in refuted) == (1, True)
+
+
 def test_a_folder_of_tables_is_drawn_into_a_folder(tmp_path: Path) -> None:
     (tmp_path / "door.rcs").write_text(DOOR, encoding="utf-8")
     (tmp_path / "plain.rcs").write_text(

@@ -72,7 +72,7 @@ def test_runs_are_as_an_evaluator_that_keeps_every_cycle_says() -> None:
 
 
 def test_a_condition_has_one_counter_that_goes_as_far_as_the_longest_time() -> None:
-    counters = {str(v.name): v for v in PROGRAM.variables if v.counts}
+    counters = {str(v.name): v for v in PROGRAM.variables if v.counts is not None}
     assert {name: v.type.high for name, v in counters.items()} == {  # type: ignore[union-attr]
         "held_b": 10, "held_x": 3, "held_x_2": 2, "held_b_2": 1, "held_x_3": 2, "held_x_4": 2, "held_mode": 2,
     }  # fmt: skip
@@ -164,6 +164,38 @@ def test_what_is_wrong_with_a_time_is_said(text: str, code: str, message: str) -
     assert any(found.code.value == code and found.message.startswith(message) for found in refused(text)), [
         (found.code, found.message, found.help) for found in refused(text)
     ]
+
+
+WAYS = (
+    "procedure q(n : int 0 .. 9) { a := x > n FOR }",
+    "procedure q(n : bool) { a := n FOR }",
+    "procedure q(n : bool) { a := (n and b) FOR }",
+    "procedure q { local n : int 0 .. 9 := x  a := x > n FOR }",
+    "procedure q { for n in 0 .. 2 { a := arr[n] FOR } }",
+    "procedure q { for n in 0 .. 2 { if arr[n] FOR { a := true } } }",
+    "procedure q { for n in 0 .. 2 { a := x in {1, 2} and n = 1 xor (arr[0] or arr[n]) FOR } }",
+    "procedure q(n : int 0 .. 2) { if b { if x > 1 { a := (x mod 3 = n or b) FOR } } }",
+    "procedure q(n : int 0 .. 2) { case n { 0 { a := count(b, arr[n]) > 1 FOR } else { a := b } } }",
+    "procedure q(n : int 0 .. 2) { r(x in n .. 9 FOR) } procedure r(n : bool) { a := n }",
+    "module q reads x writes a { local n : int 0 .. 9 := x  a := min(x, n) > 1 FOR }",
+)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_what_is_counted_where_a_cycle_ends_speaks_of_no_local(way: str) -> None:
+    head = "input x : int 0 .. 9\ninput b : bool\ninput arr : array[3] of bool\nstate a : bool\n"
+    rest = "\nlevel l { period 100 [ms] table t }\ntable t {\n| line | when ||\n| only | true ||\n}"
+    assert set(codes(refused(head + way.replace("FOR", "for 200 [ms]") + rest))) == {"RCS315"}
+    assert not program_of(head + way.replace("FOR", "") + rest).levels[0].postprocess
+
+
+def test_a_constant_of_the_name_of_a_local_elsewhere_may_be_counted() -> None:
+    text = (
+        TEXT
+        + "const n = 4\nprocedure other(n : int 0 .. 9) { if x = n { early := b } }\nassume seen monitored : x > n for delay"
+    )
+    program = program_of(text)
+    assert any("x > n" in v.doc for v in program.variables if v.counts is not None)
 
 
 def test_the_nearest_times_are_offered() -> None:

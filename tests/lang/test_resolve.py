@@ -8,8 +8,21 @@ import pytest
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
-from rcsc.lang.interpret import evaluate, holds
-from rcsc.lang.model import Assign, Call, Int, Program, Real, Select, Test, ToElement, ToLeaf, VariableName
+from rcsc.lang.interpret import call, evaluate, holds
+from rcsc.lang.model import (
+    Assign,
+    Call,
+    Int,
+    Program,
+    Real,
+    Select,
+    Test,
+    ToElement,
+    ToLeaf,
+    Value,
+    VariableName,
+)
+from rcsc.lang.operator_table import single as to_single
 from rcsc.lang.resolve import compile_text
 from tests.support.programs.stages import program_of, refused
 from tests.support.programs.texts import edited
@@ -583,6 +596,14 @@ def test_sets_mean_what_they_name(cells: str, plain: str) -> None:
         ("set odd : int 0 .. 9 = {8 .. 3}", "done", "RCS303", ""),
         ("set odd : int 0 .. 9 = {x}", "done", "RCS305", "`x` is a variable"),
         ("set odd : status = {other}\nset other : status = {odd}", "done", "RCS305", "by means of itself"),
+        ("set odd : int 0 .. 9 = {10}", "done", "RCS306", "10 is not in 0 .. 9"),
+        ("set odd : int 0 .. 9 = {3 .. 10}", "done", "RCS306", "10 is not in 0 .. 9"),
+        ("set odd : int 0 .. 9 = {few, 19 .. 20, edges}", "done", "RCS306", "19 is not in 0 .. 9"),
+        ("set odd : int 0 .. 9 = {edges}", "done", "RCS306", "19 is not in 0 .. 9"),
+        ("set odd : int 0 .. 9 [mm] = {3 [N]}", "done", "RCS302", ""),
+        ("set odd : int 0 .. 9 [mm] = {3, 5 [mm]}", "done, odd", "RCS301", ""),
+        ("enum other { done, more }\nset odd : status = {other.done}", "done", "RCS301", ""),
+        ("enum other { done, more }\nset odd : other = {done}", "in odd", "RCS301", ""),
         ("set ended : status = {done}", "done", "RCS202", "declared twice"),
         ("record r { a : bool }\nset odd : r = {1}", "done", "RCS301", "a set has values of a scalar type"),
     ],
@@ -591,6 +612,76 @@ def test_what_is_wrong_with_a_set_is_said(declared: str, cell: str, code: str, m
     text = SETS.replace("table t", f"{declared}\ntable t").replace("CELLS", f"{cell} | - | -")
     diagnostics = refused(text)
     assert (code, True) in {(each.code.value, message in each.message) for each in diagnostics}
+
+
+HIDING = """\
+enum status { executing, done, failed }
+const lim = 5
+const step = 0.1
+set low : int 0 .. 9 = {0 .. lim, 9}
+set near : single 0.0 .. 1.0 = {step, 0.5 .. 1.0}
+set ended : status = {done, failed}
+set both : status = {ended}
+input x : int 0 .. 9
+input s : status
+input r : single 0.0 .. 1.0
+output o : bool
+BODY
+table t {
+  | line | when ||
+  | a    | true ||
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("body", "wanted"),
+    [
+        (
+            "procedure p(lim : int 0 .. 9) { o := x in low }",
+            "procedure p(q : int 0 .. 9) { o := x <= 5 or x = 9 }",
+        ),
+        ("procedure p(lim : int 0 .. 9) { o := x not in {low, lim} }", "RCS305"),
+        (
+            "procedure p { for lim in 2 .. 3 { o := x in {low, 7} } }",
+            "procedure p { for q in 2 .. 3 { o := x <= 5 or x = 9 or x = 7 } }",
+        ),
+        ("procedure p { local lim : bool := true  o := x in low }", "procedure p { o := x <= 5 or x = 9 }"),
+        ("procedure p(done : bool) { o := s in both }", "procedure p(q : bool) { o := s /= executing }"),
+        ("procedure p(low : int 0 .. 9) { o := x in {low} }", "RCS305"),
+        (
+            "procedure p(low : int 0 .. 9) { o := x in low }",
+            "procedure p(q : int 0 .. 9) { o := x <= 5 or x = 9 }",
+        ),
+        (
+            "procedure p(step : single 0.0 .. 1.0) { o := r in near }",
+            "procedure p(q : bool) { o := r = 0.1 or r in 0.5 .. 1.0 }",
+        ),
+        (
+            "procedure p { local s : int 0 .. 9 := 3  o := s in low }",
+            "procedure p { local q : int 0 .. 9 := 3  o := q <= 5 or q = 9 }",
+        ),
+        ("procedure p(lim : int 0 .. 9) { local k : int 0 .. lim := 0  o := k = 0 }", "RCS305"),
+        ("procedure p(lim : int 0 .. 9) { for k in 0 .. lim { o := k = 0 } }", "RCS305"),
+        ("procedure p(lim : int 0 .. 9) { case x { lim { o := true } else { o := false } } }", "RCS305"),
+        ("procedure p(lim : int 0 .. 9, k : int 0 .. lim) { o := k = 0 }", "RCS305"),
+        ("procedure p(done : status) { case s { done { o := true } else { o := false } } }", "RCS305"),
+    ],
+)
+def test_a_local_hides_constants_where_it_stands_and_in_no_set(body: str, wanted: str) -> None:
+    """A set means what it meant where it was declared; what has to be constant is none where a local has its name."""
+    text = HIDING.replace("BODY", body)
+    if wanted.startswith("RCS"):
+        assert wanted in {each.code.value for each in refused(text)}
+        return
+    programs = program_of(text), program_of(HIDING.replace("BODY", wanted))
+    for x, s, r in product(range(10), range(3), (0.0, to_single(0.1), 0.5, 1.0)):
+        found = []
+        for program in programs:
+            now: dict[str, Value] = {"x": x, "s": s, "r": r, "o": False}
+            call(program, "p", [0 for _ in program.procedures[0].params], now)
+            found.append(now["o"])
+        assert found[0] is found[1], (x, s, r)
 
 
 COUNTS = """\

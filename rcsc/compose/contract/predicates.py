@@ -245,7 +245,7 @@ def _cells(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
 def _durations(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
     """Make predicates of whether conditions have held for the times that tables and procedures ask for."""
     program, seen = ts.program, set()
-    counters = {v.name for v in program.variables if v.counts}
+    counters = {v.name for v in program.variables if v.counts is not None}
     tests = (
         test.condition for table in program.tables for line in table.lines for test in line.tests if test
     )

@@ -95,7 +95,7 @@ USUAL, LONGEST = 8, 100
 
 def usual_length(systems: Iterable[TransitionSystem]) -> int:
     """Return how many cycles a run is searched for: as many as the longest time that a table asks for needs, and some before and after."""
-    counters = (v.type for ts in systems for v in ts.program.variables if v.counts)
+    counters = (v.type for ts in systems for v in ts.program.variables if v.counts is not None)
     times = (kind.high for kind in counters if isinstance(kind, Int))
     return max((USUAL, *(min(time + USUAL // 2, LONGEST) for time in times)))
 

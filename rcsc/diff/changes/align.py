@@ -2,13 +2,14 @@
 
 In: two programs. Out: `Aligned`: the leaves that both have, each with the values that both versions can hold, and what
 changed of the declarations. Members of an enumeration are the same where their names are: where the two versions number them
-differently, both are numbered anew.
+differently, both are numbered anew. States that the compiler adds are the same where they are fed with the same (`rcsc.lang.hidden`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
+from rcsc.lang.hidden import hidden, matched
 from rcsc.lang.model import (
     Among,
     Arm,
@@ -68,6 +69,7 @@ def aligned(before: Program, after: Program) -> Aligned:
     old, new = (
         _Rewriter(numbering).program(program) if numbering else program for program in (before, after)
     )
+    old, new = matched(old, new)
     later = {str(variable.name): variable.type for variable in new.variables}
     leaves: dict[str, Scalar] = {}
     apart = set()
@@ -205,10 +207,10 @@ class _Rewriter:
 
 def _declarations(before: Program, after: Program) -> Iterable[Declaration]:
     """Enumerations and variables that are new, gone, or declared otherwise."""
-    hidden = {*before.line_leaves.values(), *after.line_leaves.values()}  # they follow from levels and tables
+    added = hidden(before), hidden(after)  # they follow from what asks for them, and from levels and tables
     enums = [
-        {enum.name: ", ".join(enum.members) for enum in program.enums if enum.name not in hidden}
-        for program in (before, after)
+        {enum.name: ", ".join(enum.members) for enum in program.enums if enum.name not in own}
+        for program, own in zip((before, after), added, strict=True)
     ]
     yield from _changed(
         "enumeration",
@@ -217,8 +219,8 @@ def _declarations(before: Program, after: Program) -> Iterable[Declaration]:
     yield from _changed(
         "variable",
         *(
-            {str(v.name): _declared(v) for v in p.variables if not _is_pending(v) and v.name not in hidden}
-            for p in (before, after)
+            {str(v.name): _declared(v) for v in p.variables if not _is_pending(v) and v.name not in own}
+            for p, own in zip((before, after), added, strict=True)
         ),
     )
 

@@ -14,6 +14,7 @@ from rcsc.diff.changes.contrast import changes, contrast
 from rcsc.diff.changes.difference import Basis, Change, ComparedPart, PartSort
 from rcsc.diff.changes.value_text import number
 from rcsc.diff.changes.versions import Doing, Runner, Versions
+from rcsc.lang.hidden import hidden, keeps
 from rcsc.lang.interpret import call, execute
 from rcsc.lang.leaves import read_by
 from rcsc.lang.meaning import digest
@@ -48,8 +49,9 @@ def procedures(versions: Versions) -> Iterator[ComparedPart]:
         UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
     """
     later = versions.digests[1].procedures
+    made = keeps(versions.before)  # it keeps what something looks back at, which is compared where it does
     for name, procedure in versions.digests[0].procedures.items():
-        if name in later:
+        if name in later and not made(name):
             yield _procedure(versions, procedure, later[name])
 
 
@@ -167,7 +169,11 @@ def _sequence(
     versions: Versions, what: str, level: str, names: tuple[tuple[str, ...], tuple[str, ...]]
 ) -> ComparedPart:
     """What runs before a level's table, or after it, as one run."""
-    bodies: list[list[Statement]] = [[Call(ProcedureName(name)) for name in part] for part in names]
+    made = keeps(versions.before), keeps(versions.after)
+    bodies: list[list[Statement]] = [
+        [Call(ProcedureName(name)) for name in part if not own(name)]
+        for part, own in zip(names, made, strict=True)
+    ]
     first, second = versions.digests
     if first.body(bodies[0]) == second.body(bodies[1]):
         return ComparedPart(what, level, basis=Basis.DIGEST)
@@ -218,16 +224,18 @@ def unreported(versions: Versions, reported: Iterable[str]) -> Iterator[Compared
     """
     known = set(reported)
     before, after = versions.before, versions.after
-    hidden = {
-        *before.line_leaves.values(),
-        *after.line_leaves.values(),
-    }  # what lines they have shows in the tables
+    added = hidden(before), hidden(after)  # what they hold shows where it is looked at
+    roots = [
+        {declared.name for declared in p.declared if set(declared.leaves) <= own}
+        for p, own in zip((before, after), added, strict=True)
+    ]
     for field in fields(Program):
         if field.name in _UNSEEN or field.name in _UNNAMED:
             continue
         what, compared = _COMPARED.get(field.name, (field.name, {}))
         old, new = (
-            {str(m.name): m for m in getattr(p, field.name) if m.name not in hidden} for p in (before, after)
+            {str(m.name): m for m in getattr(p, field.name) if m.name not in own and m.name not in root}
+            for p, own, root in zip((before, after), added, roots, strict=True)
         )
         for name in dict.fromkeys((*old, *new)):
             key = f"{what} `{name.removesuffix('.next')}"

@@ -15,7 +15,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.scope import MOST_LEAVES, Held, Scope
-from rcsc.lang.leaves import one_earlier, read_by, renamed
+from rcsc.lang.leaves import one_earlier, parts, read_by, renamed
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     Action,
@@ -35,6 +35,7 @@ from rcsc.lang.model import (
     Procedure,
     ProcedureName,
     Read,
+    ReadLocal,
     Record,
     Statement,
     Table,
@@ -118,6 +119,12 @@ def lasting(scope: Scope, condition: Expr, text: str, cycles: int, span: Span) -
         message = "`for` is about a variable; a constant, a local or a parameter has not held for a time"
         scope.report(Code.NO_CYCLE_BEFORE, message, span)
         return None
+    local = next((part for part in parts(condition) if isinstance(part, ReadLocal)), None)
+    if local is not None:
+        message = f"`{local.name}` is known in its procedure alone: what has to hold for a time is counted where each cycle ends"
+        helps = "say it of variables and constants: of a state, if need be, that keeps the value"
+        scope.report(Code.NO_CYCLE_BEFORE, message, local.span, helps)
+        return None
     key = spelled(_plain(condition))
     known = scope.held.get(key)
     if scope.in_property and (known is None or known.limit < cycles):
@@ -156,7 +163,8 @@ def _counted(scope: Scope, condition: Expr, text: str, limit: int, span: Span) -
     name = VariableName(fresh(scope, f"held_{of}"))
     doc = f"cycles for which {text} has held, up to {limit}"
     kind = Int(0, limit)
-    scope.leaves[name] = Variable(name, Kind.STATE, kind, 0, doc=doc, span=scope.at(span), counts=True)
+    plain = _plain(condition)
+    scope.leaves[name] = Variable(name, Kind.STATE, kind, 0, doc=doc, span=scope.at(span), counts=plain)
     scope.kept.append(Declared(str(name), Kind.STATE, kind, (name,), doc, scope.at(span)))
     return Held(condition if scope.cell is None else placed(condition, scope.cell), name, limit)
 

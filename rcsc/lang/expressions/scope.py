@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from typing import TypeAlias
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
@@ -36,6 +37,10 @@ class Constant:
 
     literal: Literal
     bare: bool
+
+
+SetMember: TypeAlias = Constant | tuple[Constant, Constant] | tree.Mask
+"""A value of a declared set, the two ends of a range of it, or a mask."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +86,7 @@ class Scope:
     places: dict[str, Span] = field(default_factory=dict)
     units: set[str] = field(default_factory=lambda: set(BASE_UNITS))
     constants: dict[str, Constant] = field(default_factory=dict)
-    sets: dict[str, tuple[tree.Expr | tree.Range, ...]] = field(default_factory=dict)
+    sets: dict[str, tuple[SetMember, ...]] = field(default_factory=dict)
     set_names: set[str] = field(default_factory=set)
     types: dict[str, Type] = field(default_factory=dict)
     members: dict[str, list[Enum]] = field(default_factory=dict)

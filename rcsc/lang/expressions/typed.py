@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
+from typing import TypeAlias
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -23,7 +24,7 @@ from rcsc.lang.expressions.operators import (
     scaled,
 )
 from rcsc.lang.expressions.previous import before, cycles_of, lasting
-from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.expressions.scope import Body, Constant, Scope
 from rcsc.lang.model import (
     Among,
     Apply,
@@ -528,61 +529,87 @@ def other_than(condition: Typed) -> Typed:
     return Typed(Apply(Op.NOT, (condition.expr,), Bool(), condition.expr.span))
 
 
+@dataclass(frozen=True, slots=True)
+class _Range:
+    """A range among the members of a set."""
+
+    low: Typed
+    high: Typed
+    span: Span
+
+
+_Part: TypeAlias = Typed | _Range | tree.Mask
+
+
 def among(
     scope: Scope, body: Body, subject: Typed, members: tuple[tree.Member, ...], span: Span
 ) -> Typed | None:
     """`subject in {members}`; members are constants, ranges and named sets."""
+    parts = _parts(scope, body, members, subject.expr.type)
+    return None if parts is None else _one_of(scope, subject, parts, span)
+
+
+def _one_of(scope: Scope, subject: Typed, parts: list[_Part], span: Span) -> Typed | None:
+    """The subject is one of these values, in one of these ranges, or fits one of these masks."""
     values: list[Value] = []
     ranges: list[Expr] = []
-    every = _members(scope, body, members)
-    if every is None:
-        return None
-    for member in every:
-        if isinstance(member, tree.Range):
-            inside = between(scope, body, subject, member.low, member.high, member.span)
-            if inside is None:
+    for part in parts:
+        if isinstance(part, Typed):
+            value = _value(scope, subject, part)
+            if value is None:
                 return None
-            ranges.append(inside.expr)
+            values.append(value)
             continue
-        if isinstance(member, tree.Mask):
-            fits = masked(scope, subject, "=", member)
-            if fits is None:
-                return None
-            ranges.append(fits.expr)
-            continue
-        element = typed(scope, body, member, subject.expr.type)
-        if element is None:
+        inside = (
+            masked(scope, subject, "=", part)
+            if isinstance(part, tree.Mask)
+            else within(scope, subject, part.low, part.high, part.span)
+        )
+        if inside is None:
             return None
-        value = fold(element.expr)
-        if value is None:
-            scope.report(Code.NOT_CONSTANT, "the members of a set are constants", member.span)
-            return None
-        if (
-            not one_kind(scope, subject, element, member.span)
-            or common_unit(scope, (subject, element), member.span) is None
-        ):
-            return None
-        values.append(value)
+        ranges.append(inside.expr)
     among_values = Among(subject.expr, tuple(sorted(set(values))), Bool(), span)
-    parts = [among_values, *ranges] if values else ranges
-    return Typed(reduce(lambda left, right: Apply(Op.OR, (left, right), Bool(), span), parts))
+    conditions = [among_values, *ranges] if values else ranges
+    return Typed(reduce(lambda left, right: Apply(Op.OR, (left, right), Bool(), span), conditions))
 
 
-def _members(
-    scope: Scope, body: Body, members: tuple[tree.Member, ...]
-) -> list[tree.Expr | tree.Range] | None:
-    """The members, with those of named sets in their place; None after an error."""
-    every: list[tree.Expr | tree.Range] = []
+def _value(scope: Scope, subject: Typed, element: Typed) -> Value | None:
+    """The value of a member that may be one of the subject's; None after an error."""
+    span, value = element.expr.span, fold(element.expr)
+    if value is None:
+        scope.report(Code.NOT_CONSTANT, "the members of a set are constants", span)
+        return None
+    if not one_kind(scope, subject, element, span) or common_unit(scope, (subject, element), span) is None:
+        return None
+    return value
+
+
+def _parts(scope: Scope, body: Body, members: tuple[tree.Member, ...], want: Scalar) -> list[_Part] | None:
+    """The members, with those of named sets, as they were declared, in their place; None after an error."""
+    every: list[_Part] = []
     for member in members:
         name = _set_name(scope, body, member)
-        if name is None:
-            assert not isinstance(member, tree.NamedSet)
-            every.append(member)
-        elif (its := named_set(scope, name)) is None:
-            return None
-        else:
+        if name is not None:
+            its = named_set(scope, name)
+            if its is None:
+                return None
             every += its
+            continue
+        assert not isinstance(member, tree.NamedSet)
+        part = _part(scope, body, member, want)
+        if part is None:
+            return None
+        every.append(part)
     return every
+
+
+def _part(scope: Scope, body: Body, member: tree.Expr | tree.Range, want: Scalar) -> _Part | None:
+    if isinstance(member, tree.Mask):
+        return member
+    if not isinstance(member, tree.Range):
+        return typed(scope, body, member, want)
+    ends = typed(scope, body, member.low, want), typed(scope, body, member.high, want)
+    return None if ends[0] is None or ends[1] is None else _Range(ends[0], ends[1], member.span)
 
 
 def _set_name(scope: Scope, body: Body, member: tree.Member) -> tree.Name | None:
@@ -595,23 +622,36 @@ def _set_name(scope: Scope, body: Body, member: tree.Member) -> tree.Name | None
     return None
 
 
-def named_set(scope: Scope, name: tree.Name) -> tuple[tree.Expr | tree.Range, ...] | None:
-    """The members of a declared set; None after an error."""
+def named_set(scope: Scope, name: tree.Name) -> list[_Part] | None:
+    """The members of a declared set, at the place of its name; None after an error."""
     if name.text not in scope.set_names:
         scope.unknown("set", name, sorted(scope.set_names))
         return None
-    if not scope.demand("value", name):
+    if not scope.demand("value", name) or name.text not in scope.sets:
         return None
-    return scope.sets.get(name.text)
+
+    def here(one: Constant) -> Typed:
+        return Typed(replace(one.literal, span=name.span), one.bare)
+
+    return [
+        replace(member, span=name.span)
+        if isinstance(member, tree.Mask)
+        else here(member)
+        if isinstance(member, Constant)
+        else _Range(here(member[0]), here(member[1]), name.span)
+        for member in scope.sets[name.text]
+    ]
 
 
-def declare_set(scope: Scope, written: tree.SetDecl, kind: Scalar) -> None:
-    """Adds a set, once its members are values of its type."""
-    body = Body()
-    every = _members(scope, body, written.members)
+def members_of(
+    scope: Scope, written: tree.SetDecl, kind: Scalar
+) -> list[tree.Mask | Typed | tuple[Typed, Typed]] | None:
+    """The members of a set that is declared, typed as values of its type; None after an error."""
+    parts = _parts(scope, Body(), written.members, kind)
     any_value = Typed(Literal(value_of_key(kind, key_bounds(kind)[0]), kind, written.name.span))
-    if every is not None and among(scope, body, any_value, written.members, written.name.span) is not None:
-        scope.sets[written.name.text] = tuple(every)
+    if parts is None or _one_of(scope, any_value, parts, written.name.span) is None:
+        return None
+    return [(part.low, part.high) if isinstance(part, _Range) else part for part in parts]
 
 
 def _in_range(scope: Scope, body: Body, written: tree.InRange) -> Typed | None:
@@ -628,8 +668,11 @@ def between(
     """`low <= subject and subject <= high`."""
     least = typed(scope, body, low, subject.expr.type)
     most = typed(scope, body, high, subject.expr.type)
-    if least is None or most is None:
-        return None
+    return None if least is None or most is None else within(scope, subject, least, most, span)
+
+
+def within(scope: Scope, subject: Typed, least: Typed, most: Typed, span: Span) -> Typed | None:
+    """The subject lies between these two."""
     ends = fold(least.expr), fold(most.expr)
     if ends[0] is not None and ends[1] is not None and ends[0] > ends[1]:
         scope.report(

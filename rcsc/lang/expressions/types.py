@@ -32,8 +32,8 @@ from rcsc.lang.syntax import tree
 MOST_ELEMENTS = 4096
 
 
-def type_of(scope: Scope, written: tree.TypeExpr) -> Type:
-    """The type written; after an error some type, so that resolving goes on."""
+def type_of(scope: Scope, written: tree.TypeExpr, body: Body | None = None) -> Type:
+    """The type written; after an error some type, so that resolving goes on. `body`: as of `constant`."""
     match written:
         case tree.BoolType():
             return Bool()
@@ -45,13 +45,13 @@ def type_of(scope: Scope, written: tree.TypeExpr) -> Type:
                 return Bool()
             return scope.types[name.text]
         case tree.ArrayType(length, element, span):
-            return _small(scope, Array(_length(scope, length), type_of(scope, element)), span)
+            return _small(scope, Array(_length(scope, length), type_of(scope, element, body)), span)
         case tree.IntType():
-            return _int(scope, written)
+            return _int(scope, written, body)
         case tree.RealType():
-            return _real(scope, written, Real(0.0, 0.0))
+            return _real(scope, written, Real(0.0, 0.0), body)
         case tree.SingleType():
-            return _real(scope, written, Single(0.0, 0.0))
+            return _real(scope, written, Single(0.0, 0.0), body)
 
 
 def size(kind: Type) -> int:
@@ -72,29 +72,39 @@ def _small(scope: Scope, kind: Array, span: Span) -> Type:
     return Bool()
 
 
-def scalar_of(scope: Scope, written: tree.TypeExpr) -> Scalar:
+def scalar_of(scope: Scope, written: tree.TypeExpr, body: Body) -> Scalar:
     """The type of a local or parameter, which is a scalar."""
-    kind = type_of(scope, written)
+    kind = type_of(scope, written, body)
     if isinstance(kind, Bool | Enum | Int | Real):
         return kind
     scope.report(Code.KIND, "a local or parameter is a bool, an enumeration or a number", written.span)
     return Bool()
 
 
-def constant(scope: Scope, written: tree.Expr, want: Scalar | None = None) -> Typed | None:
-    """The folded value of a constant expression; None (reported) where it is not one."""
+def constant(
+    scope: Scope, written: tree.Expr, want: Scalar | None = None, body: Body | None = None
+) -> Typed | None:
+    """The folded value of a constant expression; None (reported) where it is not one.
+
+    Args:
+        scope: Everything declared.
+        written: The expression.
+        want: The type that it should have, where one is known.
+        body: Parameters and locals where it stands, which hide constants of their names.
+    """
     with without_before(scope, "a constant has no cycle before: `was` is about a variable"):
-        value = typed(scope, Body(), written, want)
+        value = typed(scope, body or Body(), written, want)
     if value is None:
         return None
     folded = fold(value.expr)
     if folded is None:
         scope.report(Code.NOT_CONSTANT, "this must be a constant", written.span)
         return None
-    return Typed(Literal(folded, _point(value.expr.type, folded), written.span), value.bare)
+    return Typed(Literal(folded, point(value.expr.type, folded), written.span), value.bare)
 
 
-def _point(kind: Scalar, value: Value) -> Scalar:
+def point(kind: Scalar, value: Value) -> Scalar:
+    """The type that has this value alone; of a bool or a member as it is."""
     if isinstance(kind, Int):
         return Int(int(value), int(value), kind.unit)
     return replace(kind, low=float(value), high=float(value)) if isinstance(kind, Real) else kind
@@ -112,9 +122,9 @@ def _length(scope: Scope, written: tree.Expr) -> int:
 
 
 def _bounds(
-    scope: Scope, written: tree.IntType | tree.RealType | tree.SingleType
+    scope: Scope, written: tree.IntType | tree.RealType | tree.SingleType, body: Body | None
 ) -> tuple[Typed, Typed, Unit] | None:
-    low, high = constant(scope, written.low), constant(scope, written.high)
+    low, high = (constant(scope, end, body=body) for end in (written.low, written.high))
     if low is None or high is None:
         return None
     unit = scope.unit(written.unit)
@@ -126,8 +136,8 @@ def _bounds(
     return low, high, unit
 
 
-def _int(scope: Scope, written: tree.IntType) -> Int:
-    bounds = _bounds(scope, written)
+def _int(scope: Scope, written: tree.IntType, body: Body | None) -> Int:
+    bounds = _bounds(scope, written, body)
     if bounds is None:
         return Int(0, 0)
     low, high, unit = bounds
@@ -149,9 +159,9 @@ def _int(scope: Scope, written: tree.IntType) -> Int:
     return Int(least, most, unit)
 
 
-def _real(scope: Scope, written: tree.RealType | tree.SingleType, kind: Real) -> Real:
+def _real(scope: Scope, written: tree.RealType | tree.SingleType, kind: Real, body: Body | None) -> Real:
     """A type of numbers with a decimal point; `kind` is one of them."""
-    bounds = _bounds(scope, written)
+    bounds = _bounds(scope, written, body)
     if bounds is None:
         return kind
     low, high, unit = bounds

@@ -20,6 +20,7 @@ from rcsc.lang.model import (
     Procedure,
     ProcedureName,
     Read,
+    Scalar,
     Select,
     Statement,
     VariableName,
@@ -42,9 +43,7 @@ _Body: TypeAlias = tuple[tuple[Parameter, ...], tuple[Statement, ...]]
 def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedure, ...]:
     """All procedures, with what they read and write, calls included."""
     for procedure in written:
-        scope.signatures[procedure.name.text] = tuple(
-            scalar_of(scope, param.type) for param in procedure.params
-        )
+        scope.signatures[procedure.name.text] = tuple(_signature(scope, procedure.params))
     bodies = {procedure.name.text: _body(scope, procedure) for procedure in written}
     order = _call_order(scope, bodies)
     known: dict[str, Procedure] = {}
@@ -60,6 +59,15 @@ def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedu
                 by_name[name].name.span,
             )
     return tuple(known[procedure.name.text] for procedure in written if procedure.name.text in known)
+
+
+def _signature(scope: Scope, params: tuple[tree.Parameter, ...]) -> Iterator[Scalar]:
+    """The types of parameters; none names one that stands before it."""
+    before = Body()
+    for param in params:
+        kind = scalar_of(scope, param.type, before)
+        before.visible[param.name.text] = Parameter(param.name.text, kind, param.span)
+        yield kind
 
 
 def _body(scope: Scope, written: tree.ProcedureDecl) -> _Body:

@@ -249,7 +249,7 @@ class Statements:
     # --- other statements ---
 
     def _local(self, written: tree.Local) -> tuple[Statement, ...]:
-        kind = scalar_of(self.scope, written.type)
+        kind = scalar_of(self.scope, written.type, self.body)
         value = None
         if written.value is not None:
             initial = typed(self.scope, self.body, written.value, kind)
@@ -274,7 +274,7 @@ class Statements:
         values = []
         for label in written.values if subject is not None else ():
             assert subject is not None
-            value = constant(self.scope, label, subject.expr.type)
+            value = constant(self.scope, label, subject.expr.type, self.body)
             if value is None or not self._arm_fits(subject, value, label.span):
                 continue
             literal = value.literal().value
@@ -298,7 +298,7 @@ class Statements:
         return common_unit(self.scope, (subject, value), span) is not None
 
     def _for(self, written: tree.For) -> tuple[Statement, ...]:
-        low, high = constant(self.scope, written.low), constant(self.scope, written.high)
+        low, high = (constant(self.scope, end, body=self.body) for end in (written.low, written.high))
         if low is None or high is None:
             return ()
         ends = low.literal().value, high.literal().value

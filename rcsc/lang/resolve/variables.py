@@ -5,10 +5,11 @@ from dataclasses import replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, common_unit, kind_word, same_kind
-from rcsc.lang.expressions.scope import MOST_LEAVES, Body, Constant, Scope
-from rcsc.lang.expressions.typed import boolean, declare_set
-from rcsc.lang.expressions.types import constant, size, type_of
+from rcsc.lang.expressions.scope import MOST_LEAVES, Body, Constant, Scope, SetMember
+from rcsc.lang.expressions.typed import boolean, members_of
+from rcsc.lang.expressions.types import constant, point, size, type_of
 from rcsc.lang.model import (
     Admit,
     Array,
@@ -87,7 +88,35 @@ def declare_set_of(scope: Scope, written: tree.SetDecl) -> None:
         message = f"a set has values of a scalar type, `{written.name.text}` none"
         scope.report(Code.KIND, message, written.name.span)
         return
-    declare_set(scope, written, kind)
+    members = members_of(scope, written, kind)
+    if members is None:
+        return
+    resolved: list[SetMember] = []
+    for member in members:
+        if isinstance(member, tree.Mask):
+            resolved.append(member)
+            continue
+        ends = member if isinstance(member, tuple) else (member,)
+        known = [value for end in ends if (value := _of_set(scope, kind, end)) is not None]
+        if len(known) < len(ends):
+            return
+        resolved.append((known[0], known[1]) if len(known) > 1 else known[0])
+    scope.sets[written.name.text] = tuple(resolved)
+
+
+def _of_set(scope: Scope, kind: Scalar, member: Typed) -> Constant | None:
+    """A member or an end of a range as a value of the set's type, whose unit it has; None after an error."""
+    value, span = fold(member.expr), member.expr.span
+    if value is None:
+        scope.report(Code.NOT_CONSTANT, "the members of a set are constants", span)
+        return None
+    literal = Literal(value, point(member.expr.type, value), span)
+    if not fits(scope, kind, Typed(literal, member.bare), span):
+        return None
+    own = literal.type
+    if isinstance(kind, Int | Real) and isinstance(own, Int | Real) and kind.unit:
+        return Constant(replace(literal, type=replace(own, unit=kind.unit)), False)
+    return Constant(literal, member.bare)
 
 
 def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:

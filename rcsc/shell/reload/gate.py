@@ -8,7 +8,7 @@ Later cycles are covered by the difference (`rcsc.diff`), which is proved. A lev
 they may have effects.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
@@ -17,6 +17,7 @@ from rcsc.diff.changes.difference import Difference, ProgramDifference
 from rcsc.diff.compare import compare
 from rcsc.diff.present import Met, knows, within_reach
 from rcsc.diff.rows import headline, rows
+from rcsc.lang.hidden import hidden
 from rcsc.lang.interpret import (
     Fault,
     admit,
@@ -111,7 +112,8 @@ def judge(old: Running, new: RunningLevel, program: Program, buffers: Buffers) -
         wrong = old.level.sign.unfit(at, old.level.values)
         return Judged(notes, (f"what runs was not tried out, as it cannot go on from this state: {wrong}",))
     left = _tried(old.level, buffers, run=True).left
-    return Judged(notes, tuple(_otherwise(met, old.level, new, (left, tried.left))))
+    added = hidden(old.program) | hidden(program)
+    return Judged(notes, tuple(_otherwise(met, old.level, new, (left, tried.left), added)))
 
 
 # --- the next cycle --------------------------------------------------------------------
@@ -165,13 +167,21 @@ def model_of(program: Program, running: RunningLevel) -> Level:
 
 
 def _otherwise(
-    met: Sequence[Met], old: RunningLevel, new: RunningLevel, left: tuple[Values, Values]
+    met: Sequence[Met],
+    old: RunningLevel,
+    new: RunningLevel,
+    left: tuple[Values, Values],
+    added: Collection[str],
 ) -> Iterator[str]:
-    """Yield what the next cycle would leave otherwise; nothing where both leave the same."""
+    """Yield what the next cycle would leave otherwise; nothing where both leave the same.
+
+    States that the compiler adds, `added`, are compared by nobody: they may be fed with something else.
+    """
     old_words, new_words = (
         _words(level.sign, values) for level, values in zip((old, new), left, strict=True)
     )
-    differing = [name for name in old_words if name in new_words and old_words[name] != new_words[name]]
+    both = (name for name in old_words if name in new_words and name not in added)
+    differing = [name for name in both if old_words[name] != new_words[name]]
     faults = [
         FAULTS[int(values[len(level.sign.leaves) + 1])]
         for level, values in zip((old, new), left, strict=True)

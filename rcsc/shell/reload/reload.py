@@ -18,6 +18,7 @@ from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
 from rcsc.emit import TARGETS
 from rcsc.host.children import scratch
+from rcsc.lang.hidden import fed_with
 from rcsc.lang.interpret import holds
 from rcsc.lang.model import Program, Value
 from rcsc.lang.project import load
@@ -108,8 +109,14 @@ def program_of(plant: Origin, spec: LevelSpec, held: KeptSources | None) -> Prog
         return _resolved(there)
 
 
-def reload(plant: Origin, spec: LevelSpec, old: RunningLevel) -> Reloaded:
+def reload(plant: Origin, spec: LevelSpec, old: RunningLevel, runs: Callable[[], Program | None]) -> Reloaded:
     """The level with the tables as they are now.
+
+    Args:
+        plant: Where the system comes from.
+        spec: The level.
+        old: As it runs.
+        runs: Gives what its tables mean; None where their sources are not known.
 
     Raises:
         Refused: They are not proved, or the present state is not in what was proved.
@@ -131,7 +138,7 @@ def reload(plant: Origin, spec: LevelSpec, old: RunningLevel) -> Reloaded:
             raise _refused(spec.name, str(error) or "it has no such level") from error
         digest = fingerprints(there)[spec.program]
     _same_buffers(old, level)
-    carried = _carried(old, level)
+    carried = _carried(old, level, _histories(program, runs))
     _in_proof(level, program)
     return Reloaded(level, program, digest, sources, carried)
 
@@ -197,23 +204,44 @@ def _buffers(level: RunningLevel) -> dict[str, list[object]]:
     }
 
 
-def _carried(old: RunningLevel, new: RunningLevel) -> str:
-    """Put the old values into the new level, by name; return what became of them."""
+@dataclass(frozen=True, slots=True)
+class _Origin:
+    """The old leaf whose value a new one takes, empty for none; a counter goes no further than its new end."""
+
+    leaf: str
+    counts: bool = False
+
+
+def _histories(program: Program, runs: Callable[[], Program | None]) -> dict[str, _Origin]:
+    """The old leaf that holds what each new one looks back at, by what feeds both; none where that is not known."""
+    hidden = [variable for variable in program.variables if fed_with(variable) is not None]
+    before = runs() if hidden else None
+    known = {} if before is None else {fed_with(v): str(v.name) for v in before.variables}
+    return {str(v.name): _Origin(known.get(fed_with(v), ""), v.counts is not None) for v in hidden}
+
+
+def _carried(old: RunningLevel, new: RunningLevel, histories: Mapping[str, _Origin]) -> str:
+    """Put the old values into the new level, by name, or by what they look back at; return what became of them."""
+    origins = {leaf.name: histories.get(leaf.name, _Origin(leaf.name)) for leaf in new.sign.leaves}
+    added = [name for name, origin in origins.items() if origin.leaf not in old.sign.index]
     values: list[Value] = [
-        _value(old, leaf) if leaf.name in old.sign.index else leaf.initial for leaf in new.sign.leaves
+        leaf.initial if leaf.name in added else _value(old, leaf, origins[leaf.name])
+        for leaf in new.sign.leaves
     ]
     new.put_back(tuple(values))  # `_in_proof` looks at it
-    added = [leaf.name for leaf in new.sign.leaves if leaf.name not in old.sign.index]
-    gone = [leaf.name for leaf in old.sign.leaves if leaf.name not in new.sign.index]
+    taken = {origin.leaf for origin in origins.values()}
+    gone = [leaf.name for leaf in old.sign.leaves if leaf.name not in taken]
     parts = [f"{len(values) - len(added)} variables keep their values"]
     parts += [f"new: {', '.join(added)}"] if added else []
     parts += [f"gone: {', '.join(gone)}"] if gone else []
     return "; ".join(parts)
 
 
-def _value(old: RunningLevel, leaf: Leaf) -> Value:
+def _value(old: RunningLevel, leaf: Leaf, origin: _Origin) -> Value:
     """The old value as a value of the new leaf."""
-    before, value = old.sign.leaves[old.sign.index[leaf.name]], old.value(leaf.name)
+    before, value = old.sign.leaves[old.sign.index[origin.leaf]], old.value(origin.leaf)
+    if origin.counts and leaf.high is not None:
+        return min(value, int(leaf.high))
     if _form(before) != _form(leaf):
         raise _refused(old.name, f"`{leaf.name}` was {_form(before)} and is now {_form(leaf)}")
     shown = before.shown(value)
