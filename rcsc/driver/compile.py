@@ -63,13 +63,19 @@ def compile_(
     return Conclusion(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {folder}")
 
 
-def compile_system(path: Path) -> Conclusion:
+def compile_system(path: Path, *, only_check: bool = False) -> Conclusion:
     """Prove the tables of a system's levels anew, and write their executors and the system's C where its description says.
+
+    Args:
+        path: Of the description.
+        only_check: Whether nothing is written, and what is there is held against the tables.
 
     Raises:
         BadDescription: It is not in order.
     """
-    return compile_(Settings((str(path),), Options()), description(path).generated, TARGETS, only_check=False)
+    return compile_(
+        Settings((str(path),), Options()), description(path).generated, TARGETS, only_check=only_check
+    )
 
 
 def systems_in(paths: Iterable[str]) -> Iterator[Path]:

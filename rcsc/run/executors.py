@@ -6,6 +6,7 @@ order; both kinds give the same values, bit for bit.
 
 import ctypes
 import hashlib
+import importlib.machinery
 import importlib.util
 import shutil
 import struct
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
+from types import CodeType, ModuleType
 from typing import Protocol
 
 from rcsc.diagnostics.coded import CodedError
@@ -53,17 +55,35 @@ class Executor(Protocol):
         ...
 
 
+class _Source(importlib.machinery.SourceFileLoader):
+    """Runs a module's text itself, and nothing that lies beside it as that text compiled."""
+
+    def get_code(self, fullname: str) -> CodeType:  # noqa: ARG002  # as it is called
+        return self.source_to_code(content(Path(self.path)), self.path)
+
+
+def _module(name: str, path: Path) -> ModuleType:
+    """Return the module that a generated file is.
+
+    Raises:
+        NotBuilt: It cannot be read.
+    """
+    loader = _Source(name, str(path))
+    module = importlib.util.module_from_spec(importlib.machinery.ModuleSpec(name, loader, origin=str(path)))
+    try:
+        loader.exec_module(module)
+    except Malformed as error:
+        raise NotBuilt(f"`{path}` {error}") from error
+    return module
+
+
 class PythonExecutor:
     """A generated Python module with a state."""
 
     def __init__(self, generated: Path, sign: Signature, level: LevelSign) -> None:
         name = f"rcsc_generated_{sign.program}"
         *_, path = _files(generated, sign)
-        spec = importlib.util.spec_from_file_location(name, path)
-        if spec is None or spec.loader is None:
-            raise NotBuilt(f"no Python module for `{sign.program}`")
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+        module = _module(name, path)
         self._state = module.State()
         self._cycle = getattr(module, level.cycle.removeprefix(f"{sign.program}_"))
         self._check = module.check
@@ -143,7 +163,7 @@ def _built(compiler: str, generated: Path, signs: Sequence[Signature], layout: s
         shim.write_text(layout, encoding="utf-8")
         library = folder / "executors.so"
         sources = [str(_files(generated, sign)[0]) for sign in signs]
-        command = [compiler, *FLAGS, f"-I{generated / 'c'}", "-o", str(library), str(shim), *sources]
+        command = [compiler, *FLAGS, f"-iquote{generated / 'c'}", "-o", str(library), str(shim), *sources]
         ran = children.run(command)
         if ran.status != 0:
             raise NotBuilt(ran.err.strip().splitlines()[0] if ran.err.strip() else "the compiler failed")

@@ -561,7 +561,7 @@ def test_a_run_of_a_level_alone_that_ends_in_a_fault_replays(
     assert logs[0] == logs[1]
     for args in (["--executor", "c"], ["--executor", "python"]):
         whole = run("replay", log, "--generated", tmp_path, *args)
-        assert whole.output.startswith("3 ticks replayed: nothing differs; sealed: all ")
+        assert whole.stdout.startswith("3 ticks replayed: nothing differs; sealed: all ")
     last = run("replay", log, "--generated", tmp_path, "--at", 3, "--show", "lone").output
     assert f"  lone: {said}\n" in last
     assert f"the last: {said}" in run("log", log).output
@@ -656,7 +656,11 @@ def test_the_command_that_replays_a_log(tmp_path: Path, logged: Path) -> None:
         return run("replay", logged, "--generated", REPO / "generated", "--executor", "python", *args)
 
     whole, sealed = replayed(), f"sealed: all {logged.stat().st_size} bytes are as they were recorded"
-    assert (whole.return_value, whole.output) == (
+    assert (
+        whole.stderr
+        == f"note: the executors in `{REPO / 'generated'}` run as they lie there, held against no tables\n"
+    )
+    assert (whole.return_value, whole.stdout) == (
         0,
         f"{TICKS} ticks replayed: nothing differs; {sealed}\n",
     )
@@ -664,7 +668,7 @@ def test_the_command_that_replays_a_log(tmp_path: Path, logged: Path) -> None:
     assert moment.return_value == 0
     assert "gripper: " in moment.output
     assert "    primitive.opening_mm = " in moment.output
-    assert replayed("--find", "task.workstation.inc_command == 2").output.startswith("cycle 27, ")
+    assert replayed("--find", "task.workstation.inc_command == 2").stdout.startswith("cycle 27, ")
     assert replayed("--find", "task.fault == none and false").return_value == 1
     assert replayed("--find", "task.nothing").exit_code != 0
     assert replayed("--at", TICKS + 1).exit_code != 0

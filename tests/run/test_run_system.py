@@ -1,10 +1,13 @@
 """`rcsc run SYSTEM`: the docking robot with a plant of its own, by both executors, in one process and in several, by scripts of orders."""
 
 import csv
+import importlib.util
 import json
+import marshal
 import os
 import re
 import shutil
+import struct
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -97,6 +100,50 @@ def test_a_log_beside_its_system_is_replayed_without_a_word(
     assert run(["run", "dock.csv", "--no-compile", "-q", "--executor", "python"]) == 0
     assert run(["run", "dock", "--no-compile", "-q", "--executor", "python"]) == 0
     assert run(["run", "--no-compile", "-q", "--executor", "python", "--rate", "20"]) == 0
+
+
+TAMPERED = '#include <stdio.h>\n__attribute__((constructor)) static void tampered(void) { puts("TAMPERED"); fflush(stdout); }\n'
+
+
+def test_executors_that_the_tables_do_not_give_are_made_anew_or_said(
+    here: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """By what runs them; a header and a compiled module that lie beside them are nothing of theirs."""
+    assert run(["run", "dock", "-q", "--log", "run.mcap"]) == 0
+    python, c = here / "generated" / "python" / "drive.py", here / "generated" / "c" / "drive.c"
+    before = c.read_text(encoding="utf-8")
+    Path("other").mkdir()
+    shutil.copytree(here / "generated", "other/generated")
+    tampered = before.replace('#include "drive.h"\n', f'#include "drive.h"\n{TAMPERED}')
+    for path in (c, Path("other/generated/c/drive.c")):
+        path.write_text(tampered, encoding="utf-8")
+    (c.parent / "stdint.h").write_text("#error planted\n", encoding="utf-8")
+    planted_beside(python)
+    assert run(["replay", "run.mcap", "--system", "dock"]) == 1
+    assert "error[RCS501]" in capfd.readouterr().out
+    assert run(["replay", "run.mcap", "--generated", "other/generated"]) == 0
+    said = capfd.readouterr()
+    assert said.err.startswith("note: the executors in `other/generated` run as they lie there")
+    assert "ticks replayed, by other executors than ran then: nothing differs" in said.out
+    Path("script").write_text("step 3\n", encoding="utf-8")
+    for kind in ("c", "python"):
+        assert run(["shell", "dock", "--script", "script", "--executor", kind]) == 0
+    assert c.read_text(encoding="utf-8") == before
+    said = capfd.readouterr()
+    assert "cycle 3" in said.out
+    assert "TAMPERED" not in said.out
+
+
+def planted_beside(module: Path) -> None:
+    """Plant a compiled module that Python itself would take for that text."""
+    about = module.stat()
+    code = marshal.dumps(compile("import os; os._exit(9)", str(module), "exec"))
+    head = importlib.util.MAGIC_NUMBER + struct.pack(
+        "<III", 0, int(about.st_mtime), about.st_size & 0xFFFFFFFF
+    )
+    place = Path(importlib.util.cache_from_source(str(module)))
+    place.parent.mkdir(exist_ok=True)
+    place.write_bytes(head + code)
 
 
 @pytest.mark.slow

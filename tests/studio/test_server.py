@@ -412,6 +412,7 @@ def test_what_is_not_finite_is_sent_as_text() -> None:
     assert said == {"answer": {"x": "nan", "y": ["inf", 1.5, {"z": "-inf"}]}}
 
 
+@pytest.mark.needs("chromium")
 def test_a_browser_that_opens_the_file_comes_to_the_page() -> None:
     with serving(others=[Echo()]) as server, door(server.address) as path, Seat() as seat:
         seat.open(path.as_uri())

@@ -10,6 +10,7 @@ from rcsc.diagnostics.coded import CodedError
 from rcsc.host.described import nearest
 from rcsc.host.files.read import MOST_TOML_BYTES, Malformed, text, toml_of
 from rcsc.lang.project import SYSTEM_FILE
+from rcsc.run.description import description
 
 PLACES = ("system.toml", "tables/system.toml")
 """Where a folder has its description."""
@@ -28,6 +29,11 @@ EXECUTOR = click.option(
 DATABASE = click.option(
     "--database", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
     help="A database made by `rcsc db build`, used as it is; else it is made of the data when that changes.",
+)  # fmt: skip
+
+COMPILES = click.option(
+    "--compile/--no-compile", "compiles", default=True, show_default=True,
+    help="Prove and compile what changed before anything moves; else the executors run as they lie there.",
 )  # fmt: skip
 
 
@@ -163,13 +169,39 @@ def _is_script(path: Path) -> bool:
         return False
 
 
-def compiled(path: Path, quiet: bool) -> bool:
-    """Prove and compile what changed, and show findings; return whether it was in order."""
+def made(path: Path, *, compiles: bool, quiet: bool) -> bool:
+    """Have a system's executors be what its tables give, or say that nobody looked; return whether they may run.
+
+    Args:
+        path: Of the description.
+        compiles: Whether what changed is proved and compiled, and findings are shown.
+        quiet: Whether it is not told how many tables that were.
+    """
     from rcsc.driver.compile import compile_system  # only here: what is known already is printed without
 
+    if not compiles:
+        as_they_lie(description(path).generated)
+        return True
     conclusion = compile_system(path)
     if conclusion.report.failed:
         show(conclusion.report, "compile", Output())
     elif not quiet:
         click.echo(f"{len(conclusion.report.tables)} tables proved and compiled")
     return not conclusion.report.failed
+
+
+def fresh(path: Path) -> bool:
+    """Hold a system's executors against its tables, and show what differs; return whether nothing does."""
+    from rcsc.driver.compile import compile_system  # only here: what is known already is printed without
+
+    report = compile_system(path, only_check=True).report
+    if report.failed:
+        show(report, "compile", Output(quiet=True))
+    return not report.failed
+
+
+def as_they_lie(generated: Path) -> None:
+    """Say that executors are held against no tables."""
+    click.echo(
+        f"note: the executors in `{generated}` run as they lie there, held against no tables", err=True
+    )

@@ -31,7 +31,7 @@ from rcsc.campaign.worker_pool import WorkerPool, cluster, processes
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.options import cores
 from rcsc.commands.shared.show import Progress, put, writing
-from rcsc.commands.shared.systems import SYSTEM, compiled, meant, system_path
+from rcsc.commands.shared.systems import COMPILES, SYSTEM, made, meant, system_path
 from rcsc.diagnostics.codes import Code
 from rcsc.episodes.outcome import EpisodeFinding
 from rcsc.run.description import description
@@ -81,8 +81,7 @@ Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
               help="Play on the workers of this dask.distributed scheduler; they have the same rcsc and tables.")  # fmt: skip
 @click.option("--again", type=click.Path(exists=True, path_type=Path), default=None, metavar="FILE",
               help="Run a saved episode, and nothing else; 1 if a property does not hold.")  # fmt: skip
-@click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
-              help="Prove and compile what changed before anything moves.")  # fmt: skip
+@COMPILES
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     target: Path | None, system: Path | None, plant: str | None, script: str | None, episodes: int, workers: int | None,
     seed: int, executor: str | None, journal: Path | None, save: Path, json_: Path | None, limit_s: float,
@@ -106,7 +105,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     asked = CampaignOptions(
         rig, shlex.join(["rcsc", "campaign", *plays]), shlex.join(["rcsc", "replay", *shown]), save, json_
     )
-    if compiles and not compiled(path, quiet=True):
+    if not made(path, compiles=compiles, quiet=True):
         return 1
     if again is not None:
         return _again(again, rig, executor)

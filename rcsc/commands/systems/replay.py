@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from rcsc.commands.shared.logs import FILE, SHOWN, refuse, told
-from rcsc.commands.shared.systems import SYSTEM, NoSystem, system_path
+from rcsc.commands.shared.systems import SYSTEM, NoSystem, as_they_lie, fresh, system_path
 from rcsc.diagnostics.codes import Code
 from rcsc.run.description import BadDescription, description
 from rcsc.run.log.queries import predicate
@@ -32,7 +32,8 @@ Examples:
               help="What runs the levels.")  # fmt: skip
 @SYSTEM
 @click.option("--generated", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="FOLDER",
-              help="The executors; else the system's. Another folder than the run's own asks what its tables would have done.")  # fmt: skip
+              help="The executors, run as they lie there; else the system's, where they are what its tables give. Another folder than the "
+              "run's own asks what its tables would have done.")  # fmt: skip
 @click.option("--at", type=int, default=None, metavar="CYCLE", help="Run this cycle alone, and show it.")
 @click.option("--find", "find_", default=None, metavar="EXPR",
               help="Go to the first cycle, from --at on, in which EXPR holds, and show it.")  # fmt: skip
@@ -50,9 +51,12 @@ def command(
     tick = _wanted(log, at, find_)
     if level is not None and level not in {logged.name for logged in log.levels}:
         raise click.BadParameter(f"there is no level `{level}` in this log", param_hint="--show")
-    again = Replay(
-        log, generated or _executors_of(log, file, system), "python" if executor == "python" else "c"
-    )
+    folder = _executors_of(log, file, system) if generated is None else generated
+    if folder is None:
+        return 1
+    if generated is not None:
+        as_they_lie(folder)
+    again = Replay(log, folder, "python" if executor == "python" else "c")
     if tick == 0:
         click.echo(f"`{find_}` holds in no cycle")
         return 1
@@ -64,7 +68,8 @@ def command(
     if tick is None:
         lacking = again.lacking
         differs = "nothing that these tables have differs" if lacking else "nothing differs"
-        click.echo(f"{len(log.ticks)} ticks replayed: {differs}; {log.checked.text}")
+        other = "" if again.unchanged else ", by other executors than ran then"
+        click.echo(f"{len(log.ticks)} ticks replayed{other}: {differs}; {log.checked.text}")
         if lacking:
             more = f", and {len(lacking) - SHOWN} more" if len(lacking) > SHOWN else ""
             click.echo(f"not in these tables, and so not compared: {', '.join(lacking[:SHOWN])}{more}")
@@ -73,16 +78,23 @@ def command(
     return 0
 
 
-def _executors_of(log: Log, file: Path, system: Path | None) -> Path:
-    """The generated folder of the log's system: of the one that is named, else of that here or where the log lies."""
-    if system is not None:
-        return description(system_path(system)).generated
+def _executors_of(log: Log, file: Path, system: Path | None) -> Path | None:
+    """Return the generated folder of the log's system; None where it is not what its tables give, which is shown."""
+    path = _system_of(log, file) if system is None else system_path(system)
+    if path is None:
+        as_they_lie(Path("generated"))
+        return Path("generated")
+    return description(path).generated if fresh(path) else None
+
+
+def _system_of(log: Log, file: Path) -> Path | None:
+    """Return the description of the log's system, here or where the log lies; None where there is none."""
     for folder in (Path(), file.parent, file.parent.parent):
         with contextlib.suppress(NoSystem, BadDescription):
-            candidate = description(system_path(folder))
-            if candidate.name == log.facts["name"]:
-                return candidate.generated
-    return Path("generated")
+            path = system_path(folder)
+            if description(path).name == log.facts["name"]:
+                return path
+    return None
 
 
 def _wanted(log: Log, at: int | None, find_: str | None) -> int | None:

@@ -14,7 +14,7 @@ import click
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.played import with_ticks
 from rcsc.commands.shared.stopped import Stopped
-from rcsc.commands.shared.systems import DATABASE, EXECUTOR, PLANT, SYSTEM, compiled, meant
+from rcsc.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLANT, SYSTEM, made, meant
 from rcsc.diagnostics.codes import Code
 from rcsc.host.children import scratch
 from rcsc.host.files.read import content, json_of
@@ -101,8 +101,7 @@ Examples:
               help="Write a page about the run: its ticks, pictures, curves, lines, timing; one file that needs nothing else.")  # fmt: skip
 @click.option("--live", is_flag=True,
               help="Show the run in a browser's page, at --rate; to this machine only.")  # fmt: skip
-@click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
-              help="Prove and compile what changed before anything moves.")  # fmt: skip
+@COMPILES
 @click.option("--processes", is_flag=True,
               help="Each level in a process of its own, over shared memory, nothing else changed.")  # fmt: skip
 @click.option("--rate", type=click.FloatRange(min=0.1, max=20), default=None, metavar="N",
@@ -131,7 +130,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     if live:
         need("live")
     path, named = meant(target, system, script)
-    if compiles and not compiled(path, quiet):
+    if not made(path, compiles=compiles, quiet=quiet):
         return 1
     described = description(path)
     order = StageOrder(

@@ -8,7 +8,7 @@ from typing import Literal
 
 import click
 
-from rcsc.commands.shared.systems import EXECUTOR, PLANT, system_path
+from rcsc.commands.shared.systems import COMPILES, EXECUTOR, PLANT, made, system_path
 from rcsc.host.files.read import Malformed, lines_of, standard_input, text, typed
 from rcsc.run.orders.script import BadScript
 from rcsc.shell.opening import Opening, opened
@@ -37,18 +37,24 @@ In the shell:
               help="Do the commands of FILE, one a line; else they are read from standard input.")  # fmt: skip
 @EXECUTOR
 @PLANT
+@COMPILES
 @click.option("--alone", is_flag=True,
               help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
 @click.argument("system", required=False, type=click.Path(exists=True, path_type=Path), metavar="[SYSTEM]")
-def command(script: Path | None, executor: str, plant: str | None, alone: bool, system: Path | None) -> int:
+def command(
+    script: Path | None, executor: str, plant: str | None, compiles: bool, alone: bool, system: Path | None
+) -> int:
     """Run any module, procedure, owner, table or level of SYSTEM by name; look at and set any variable; step, run, undo.
 
-    SYSTEM is a system's description or a folder that has one; without it, system.toml here or in tables/. Generated executors
-    run, as they are, with the plant that the description declares.
+    SYSTEM is a system's description or a folder that has one; without it, system.toml here or in tables/. What changed is proved
+    and compiled, then the generated executors run with the plant that the description declares.
     """
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     written = None if script is None else _text(script)
-    commands = opened(Opening(system_path(system), kind, plant or "", alone=alone))
+    path = system_path(system)
+    if not made(path, compiles=compiles, quiet=True):
+        return 1
+    commands = opened(Opening(path, kind, plant or "", alone=alone))
 
     if written is None and typed() and _has_prompt():
         return converse(commands, click.echo, _complain)
