@@ -23,6 +23,7 @@ What a level assumes of its environment is the contract (`transition`):
   order is about the command of that order; (2) the number after the last one is not echoed; (3) once the last order
   is echoed, it stays so until another is given. Nothing about the status, about how long anything takes, or about
   reports on older orders;
+- of any level of which it says so in a declared assumption about one buffer: that what is published there is so (`contract.facts`);
 - of the database: the same question has the same answer;
 - of everything else: its declared range.
 

@@ -1,11 +1,15 @@
 """Facts about how inputs change from one cycle to the next: what `rcsc prove` shows from them, and only with them."""
 
+from pathlib import Path
+
 import pytest
 
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.proof.level import Verdict, prove_level
-from tests.support.programs.systems import LITTLE, alone
+from rcsc.compose.proof.system import SystemProof
+from tests.support.programs.systems import LITTLE, alone, small_level, small_system, small_text
 from tests.support.programs.texts import edited
+from tests.support.proved import prove_system
 
 THRESHOLDS = """
 input y : int 0 .. 100
@@ -148,3 +152,66 @@ def test_what_follows_from_a_fact_is_shown_and_nothing_more(text: str, weaker: t
 def test_cells_that_may_be_undefined_are_no_predicates() -> None:
     text = edited(THRESHOLDS, ("| y        ||", "| 100 / (y + 1) ||"))
     assert verdict(text) is Verdict.NOT_PROVED
+
+
+# --- facts about what another level writes --------------------------------------------------------
+
+
+def with_fact(folder: Path, fact: str) -> SystemProof:
+    """Prove the small system, of whose lower level the table assumes a fact."""
+    table = ("table go {", f"assume fact assumed : {fact}\ntable go assuming fact {{")
+    return prove_system(small_system(folder, lower=small_text("lower", table)), LITTLE)
+
+
+@pytest.mark.parametrize(
+    ("fact", "verdict"),
+    [
+        ("command.input_command in {pause, go}", Verdict.PROVED),
+        ("command.input_command = pause", Verdict.NOT_PROVED),  # also of the first values
+        ("command.inc_command < 60000", Verdict.NOT_PROVED),
+    ],
+)
+def test_a_fact_about_one_buffer_of_another_level_is_owed_there(
+    fact: str, verdict: Verdict, tmp_path: Path
+) -> None:
+    whole = with_fact(tmp_path, fact)
+    assert whole.of("upper", (Sort.OWED, "", "lower.fact")).verdict is verdict
+    assert "as it is declared" not in str(whole.closed)
+    assert whole.of("lower", (Sort.ASSUMPTION, "go", "fact")).proved == (verdict is Verdict.PROVED)
+    assert whole.proved == (verdict is Verdict.PROVED)
+
+
+@pytest.mark.parametrize(
+    ("fact", "trusted"),
+    [
+        ("command.input_command = go implies cur_state = going", False),  # own state: of another time
+        ("new_command implies command.input_command = go", False),
+        ("command.input_command = go implies not there", True),  # `there` alone can keep it
+        ("command.input_command = go or there", True),
+        ("(command.input_command = go) = new_command or there and not there", False),
+    ],
+)
+def test_a_fact_that_no_writer_can_owe_is_trusted_only_where_the_outside_can_keep_it(
+    fact: str, trusted: bool, tmp_path: Path
+) -> None:
+    ts = small_level(
+        tmp_path,
+        "lower",
+        lower=small_text("lower", ("table go {", f"assume fact assumed : {fact}\ntable go assuming fact {{")),
+    )
+    assert not ts.links.given
+    assert ts.trusted == (frozenset({"fact"}) if trusted else frozenset())
+
+
+@pytest.mark.parametrize(("first", "begins"), [("", False), (" = 4", True)])
+def test_a_fact_holds_of_what_the_reader_begins_with(first: str, begins: bool, tmp_path: Path) -> None:
+    """Before anything is published the reader sees its own first value."""
+    given = "input there : bool", f"input there : bool\ninput wide : int 0 .. 9{first}"
+    table = "table go {", "assume fact assumed : wide >= 4\ntable go assuming fact {"
+    upper = small_text("upper", ("input lower", "output wide : int 4 .. 9\ninput lower"))
+    path = small_system(tmp_path, upper=upper, lower=small_text("lower", given, table))
+    path.write_text(f'{path.read_text(encoding="utf-8")}"upper.wide" = "lower.wide"\n', encoding="utf-8")
+    whole = prove_system(path, LITTLE)
+    assert whole.of("upper", (Sort.OWED, "", "lower.fact")).verdict is Verdict.PROVED
+    assert whole.of("lower", (Sort.ASSUMPTION, "go", "fact")).proved == begins
+    assert whole.proved == begins

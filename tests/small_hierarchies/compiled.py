@@ -63,7 +63,8 @@ class Compiled:
         run: One cycle of the level, after which outputs do not show safe values yet.
         settle: Its first part: deferred states and preprocess; raises where an extern procedure is refused.
         in_range: Whether every leaf of a state is in range.
-        stated: Each invariant's condition, then each property's: of the state after a cycle and of that before it.
+        stated: Each invariant's condition, then each property's, then each that neighbours owe each other: of the state after a cycle and
+            of that before it.
     """
 
     run: Cycle
@@ -72,9 +73,9 @@ class Compiled:
     stated: tuple[Stated, ...]
 
 
-def compiled(program: Program, level: Level) -> Compiled:
-    """The functions of a level."""
-    writer = _Writer(program, level)
+def compiled(program: Program, level: Level, between: tuple[Expr, ...] = ()) -> Compiled:
+    """The functions of a level; conditions `between` levels are stated last."""
+    writer = _Writer(program, level, between)
     space: dict[str, Any] = {
         **{f"op_{op.name}": op.meaning for op in Op},
         **{f"extern_{at}": procedure for at, procedure in enumerate(program.procedures)},
@@ -82,7 +83,7 @@ def compiled(program: Program, level: Level) -> Compiled:
         "admitted": _admitted, "ExternError": ExternError, "Fault": Fault, "at": _at,
     }  # fmt: skip
     exec(compile("\n".join(writer.written()), f"<{level.name}>", "exec"), space)  # noqa: S102  # made here
-    many = len(program.invariants) + len(program.properties)
+    many = len(program.invariants) + len(program.properties) + len(between)
     stated = tuple(space[f"stated_{at}"] for at in range(many))
     return Compiled(space["run"], space["settle"], space["in_range"], stated)
 
@@ -100,6 +101,7 @@ class _Writer:
 
     program: Program
     level: Level
+    between: tuple[Expr, ...]
     inputs: frozenset[str] = field(init=False)
     _places: dict[str, int] = field(init=False)
     _procedures: dict[str, int] = field(init=False)
@@ -122,6 +124,7 @@ class _Writer:
         self._between = True
         conditions = [invariant.condition for invariant in self.program.invariants]
         conditions += [stated.condition for stated in self.program.properties]
+        conditions += self.between
         for at, condition in enumerate(conditions):
             yield f"def stated_{at}(s, b):"
             yield f"  return bool({self._of(condition)})"

@@ -302,7 +302,9 @@ class Role:
     @cached_property
     def compiled(self) -> Compiled:
         """Its cycle as Python functions."""
-        return compiled(self.program, self.level)
+        owes, given = self.links.owes, self.links.given
+        between = *(fact.condition for fact in owes), *(fact.condition for fact in given)
+        return compiled(self.program, self.level, between)
 
     def ways(self, state: Mapping[str, Value], read: set[str]) -> Iterator[Ran]:
         """One cycle from a state, with its inputs, for each way in which extern procedures may answer; takes what all of them read."""

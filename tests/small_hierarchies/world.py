@@ -6,7 +6,8 @@ another name for each number that the superior gave, and under a shift of those 
 last order; where a program computes with an echo (`Role.odd`), the ones near it are tried, too.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from itertools import chain, product
 
 from rcsc.compose.contract.environment import Below
@@ -30,7 +31,20 @@ def allowed(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value],
     above = role.links.above
     if above is not None and above.order != but and not ordered(role, before, taken):
         return False
+    if not all(owed(taken) for record, owed in facts(role) if record != but):
+        return False
     return all(answered(below, before, taken) for below in role.links.below if below.report != but)
+
+
+def facts(role: Role) -> Iterator[tuple[str, Callable[[Mapping[str, Value]], bool]]]:
+    """What is declared of inputs that another level writes, which owes it: the record, and whether it holds."""
+    conditions = role.compiled.stated[-len(role.links.given) :] if role.links.given else ()
+    for fact, condition in zip(role.links.given, conditions, strict=True):
+        yield fact.record, partial(_held, condition)
+
+
+def _held(condition: Stated, taken: Mapping[str, Value]) -> bool:
+    return condition(taken, taken)
 
 
 def ordered(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value]) -> bool:
@@ -69,6 +83,8 @@ def _fits(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], b
     """Whether the environment may give this record, of which alone it is asked (`allowed`)."""
     record = next(iter(taken)).partition(".")[0]
     above = role.links.above
+    if record != but and not all(owed(taken) for about, owed in facts(role) if about == record):
+        return False
     if above is not None and record == above.order and record != but:
         return ordered(role, before, taken)
     reports = [below for below in role.links.below if below.report == record != but]
@@ -142,6 +158,7 @@ def wanted(role: Role) -> frozenset[Key]:
     found |= {(Sort.DEFERRED, "", leaf) for leaf, _ in role.deferred}
     found |= {(Sort.INVARIANT, "", invariant.name) for invariant in role.program.invariants}
     found |= {(Sort.PROPERTY, "", stated.name) for stated in role.program.properties}
+    found |= {(Sort.OWED, "", fact.name) for fact in role.links.owes}
     return frozenset(found)
 
 
@@ -175,7 +192,10 @@ def _broken_stated(role: Role, before: Mapping[str, Value], after: Mapping[str, 
     for invariant, condition in zip(role.program.invariants, stated[:many], strict=True):
         if not (_true(condition, before, before) and _true(condition, after, before)):
             yield Sort.INVARIANT, "", invariant.name
-    for other, condition in zip(role.program.properties, stated[many:], strict=True):
+    for fact, condition in zip(role.links.owes, stated[many + len(role.program.properties) :], strict=False):
+        if not (_true(condition, before, before) and _true(condition, after, before)):
+            yield Sort.OWED, "", fact.name
+    for other, condition in zip(role.program.properties, stated[many:], strict=False):
         if not _true(condition, after, before):
             yield Sort.PROPERTY, "", other.name
 

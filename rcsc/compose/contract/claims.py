@@ -29,6 +29,7 @@ ENDING: Key = ("every command ends", "", "")
 RESTING: Key = ("the command that rests ends", "", "")
 """What it rests on where the level above fails orders that are not answered in time."""
 CONTRACT, UNREACHED, AGAIN = "the contract", "never reached", "does nothing when it matches again"
+GIVEN = "what another level writes is as it assumes"
 """Sorts of claims that are no obligations of one cycle."""
 
 
@@ -73,6 +74,7 @@ class Promise:
         begins: Whether both sides agree initially.
         outside: Whether the neighbour stands outside the levels, and must keep it by its own means.
         holds: Whether the neighbour's claims are accepted, given what they rest on; set once there are proofs.
+        fact: The declared assumption that it is; empty for what the protocol says.
     """
 
     level: str
@@ -84,6 +86,7 @@ class Promise:
     begins: bool = True
     outside: bool = False
     holds: bool = False
+    fact: str = ""
 
     @property
     def claim(self) -> tuple[Need, Claim]:
@@ -91,7 +94,8 @@ class Promise:
         trusts = self.reason.replace("stands outside the levels", "keeps to the protocol")
         verdict = Verdict.PROVED if self.begins else Verdict.NOT_PROVED
         claim = Claim(verdict, (*self.needs, *self.own), (trusts,) if self.outside else ())
-        return (self.level, (CONTRACT, "", self.record)), claim
+        key = (GIVEN, "", self.fact) if self.fact else (CONTRACT, "", self.record)
+        return (self.level, key), claim
 
 
 @dataclass(frozen=True, slots=True)

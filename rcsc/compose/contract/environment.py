@@ -6,9 +6,22 @@ order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_c
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from rcsc.lang.model import Enum, Int, Kind, Level, OneTable, Program, Real, Role, Roles, Scalar, Variable
+from rcsc.lang.model import (
+    Enum,
+    Expr,
+    Int,
+    Kind,
+    Level,
+    OneTable,
+    Program,
+    Real,
+    Role,
+    Roles,
+    Scalar,
+    Variable,
+)
 from rcsc.run.description import BadDescription, Description
 
 NUMBER, COMMAND = "inc_command", "input_command"
@@ -95,12 +108,43 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True)
+class Given:
+    """A declared assumption about one buffer that another level writes: that level owes it (`facts`).
+
+    Attributes:
+        name: The assumption.
+        record: The input that it is about; `writer`, the level that writes it.
+        condition: What it says, of this level's leaves.
+    """
+
+    name: str
+    record: str
+    writer: str
+    condition: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Owed:
+    """What a level that reads one of this level's outputs assumes of it.
+
+    Attributes:
+        name: `READER.ASSUMPTION`.
+        condition: What it says, of this level's leaves.
+    """
+
+    name: str
+    condition: Expr
+
+
+@dataclass(frozen=True, slots=True)
 class Links:
     """The environment of one level.
 
     Attributes:
         free: Inputs of which only the range is known.
         unread: Buffers that resemble orders and reports and are not recognised, each with what is missing.
+        written: Each input that a level of the system writes, with that level and its output: nothing is taken for granted of them.
+        given: What this level declares of them and their writers owe; `owes`, what it owes itself.
     """
 
     level: str
@@ -109,12 +153,23 @@ class Links:
     asked: tuple[Asked, ...]
     free: tuple[str, ...]
     unread: tuple[str, ...] = ()
+    written: tuple[tuple[str, str, str], ...] = ()
+    given: tuple[Given, ...] = ()
+    owes: tuple[Owed, ...] = ()
+
+    def written_as(self, leaf: str) -> tuple[str, str, str] | None:
+        """Return the input that this leaf is part of, its writer and the writer's output; None where no level writes it."""
+        return next((one for one in self.written if is_part(leaf, one[0])), None)
+
+
+def is_part(leaf: str, record: str) -> bool:
+    """Return whether the leaf is the variable, or a field or element of it."""
+    return leaf == record or leaf.startswith((f"{record}.", f"{record}["))
 
 
 def leaves_under(program: Program, record: str) -> tuple[str, ...]:
     """List the leaves of a record, array or scalar variable, in declared order."""
-    inside = (f"{record}.", f"{record}[")
-    return tuple(str(v.name) for v in program.variables if v.name == record or v.name.startswith(inside))
+    return tuple(str(v.name) for v in program.variables if is_part(v.name, record))
 
 
 def links(system: Description, level: str, program: Program) -> Links:
@@ -128,8 +183,14 @@ def links(system: Description, level: str, program: Program) -> Links:
     outputs = {_variable(w.source): _owner(w.target) for w in system.wires if _owner(w.source) == level}
     names = {str(v.name) for v in program.variables}
     levels = {spec.name for spec in system.levels}
+    written = tuple(
+        (_variable(w.target), _owner(w.source), _variable(w.source))
+        for w in system.wires
+        if _owner(w.target) == level and _owner(w.source) in levels
+    )
     if program.roles is not None:
-        return _declared(system, level, program, program.roles, inputs, outputs, levels)
+        declared = _declared(system, level, program, program.roles, inputs, outputs, levels)
+        return replace(declared, written=written)
     above: Above | None = None
     below: list[Below] = []
     used: set[str] = set()
@@ -158,7 +219,7 @@ def links(system: Description, level: str, program: Program) -> Links:
     unread = _unread(program, level, inputs, outputs, levels, {*seen, *(one.name for one in below)})
     if above is None and not isinstance(_level(program, level).tables, OneTable):
         unread = (*unread, f"no input has `{NUMBER}` and `{COMMAND}`, so that no order selects the table")
-    return Links(level, above, tuple(below), asked, free, unread)
+    return Links(level, above, tuple(below), asked, free, unread, written)
 
 
 def _declared(

@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from rcsc.compose.contract.claims import SAFE
 from rcsc.compose.contract.environment import Below, leaves_under
-from rcsc.compose.contract.properties import invariants, kept_within, properties
+from rcsc.compose.contract.properties import invariants, kept_within, owed, properties
 from rcsc.compose.contract.transition import Cycle, TableAt, TransitionSystem, successor
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.leaves import read_by
@@ -44,6 +44,7 @@ class Sort(StrEnum):
     OF_ITS_ORDER = "what is reported under the number of the last order is about that order"
     PAUSES = "a PAUSE is passed on in the cycle that takes it"
     DEFERRED = "no state is written directly while another is pending"
+    OWED = "its outputs are as other levels assume"
     INVARIANT = "invariant"
     PROPERTY = "property"
     ENDS = "the command ends"  # not a condition on one cycle: `termination`, `lasso`
@@ -60,6 +61,7 @@ BROKEN = {
     Sort.ONCE: "a command number is taken up again",
     Sort.ANSWERED: "the new command is passed over: seen once more, `{}` is down",
     Sort.DEFERRED: "`{}` is written directly while another value is pending",
+    Sort.OWED: "its outputs are not as `{}` says",
     Sort.INVARIANT: "invariant `{}` does not hold",
     Sort.PROPERTY: "property `{}` is broken",
     Sort.SAFE: "within it an invariant does not hold under which its operations are safe",
@@ -356,6 +358,8 @@ def _stated(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
         yield Obligation(Sort.INVARIANT, "", name, holds)
     for name, holds in properties(ts.program, cycle):
         yield Obligation(Sort.PROPERTY, "", name, holds)
+    for name, holds in owed(ts.links, cycle):
+        yield Obligation(Sort.OWED, "", name, holds)
     if ts.safety.within:
         yield Obligation(Sort.SAFE, "", "", kept_within(ts.program, cycle, ts.safety.invariants))
 

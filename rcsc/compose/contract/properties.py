@@ -11,6 +11,7 @@ condition (a division by zero, an index out of range) does not hold.
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
+from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.predicates import (
     Predicate,
     always_defined,
@@ -52,6 +53,12 @@ def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
             invariant.name,
             values.both(_true(invariant.condition, cycle.before), _true(invariant.condition, cycle.after)),
         )
+
+
+def owed(links: Links, cycle: Cycle) -> Iterator[tuple[str, Node]]:
+    """Yield what other levels assume of what the level writes: it may be read as it stood before the cycle, too."""
+    for fact in links.owes:
+        yield fact.name, values.both(_true(fact.condition, cycle.before), _true(fact.condition, cycle.after))
 
 
 def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
@@ -149,6 +156,7 @@ def _stated_conditions(ts: TransitionSystem) -> list[Expr]:
     return [
         *(invariant.condition for invariant in program.invariants),
         *(stated.condition for stated in program.properties),
+        *(fact.condition for fact in ts.links.owes),
     ]
 
 

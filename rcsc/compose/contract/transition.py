@@ -4,14 +4,16 @@ In: a program, its level, the links. Out: `Cycle`s. A cycle takes the inputs, se
 selected table and postprocess, exactly as `interpret.cycle` does; what the environment may do is a condition on what is taken.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
 from rcsc.compose.contract.environment import Below, Links
+from rcsc.compose.contract.facts import believed, outside_values
 from rcsc.lang.interpret import Fault, chosen_table
 from rcsc.lang.model import (  # fmt: skip
     Action,
+    Assumption,
     Bool,
     Call,
     Default,
@@ -175,7 +177,7 @@ class TransitionSystem:
     Attributes:
         kinds: The type of each leaf and ghost, by name.
         inputs: The leaves that each cycle takes, in declared order.
-        trusted: Assumptions about inputs that the tables declare: part of the contract.
+        trusted: Assumptions about what stands outside that the tables declare: part of the contract.
     """
 
     program: Program
@@ -199,22 +201,37 @@ class TransitionSystem:
         self.trusted = self._of_the_environment()
 
     def _of_the_environment(self) -> frozenset[str]:
-        """Find the *assumed* assumptions about what a cycle takes; those about state alone are to be proved."""
-        wanted = {
-            str(assumption.name) for assumption in self.program.assumptions if assumption.standing.believed
-        }
+        """Find the *assumed* assumptions about what comes from outside; others are proved, here or where what they speak of is written."""
+        given = {fact.name for fact in self.links.given}
+        wanted = [one for one in believed(self.program, self.level) if one.name not in given]
         if not wanted:
             return frozenset()
         cycle = self.cycle(self.havoc())
         # What tables before the last compute of inputs is the level's own: it is owed, not taken for granted.
         known = Run(self.procedures, self.kinds, dict(cycle.prepared))
-        return frozenset(
-            str(assumption.name)
-            for assumption in self.program.assumptions
-            if assumption.name in wanted
-            and any(assumption.name in at.assumptions for at in cycle.every)
-            and not set(values.variables([known.evaluate(assumption.condition)])) <= cycle.before.keys()
-        )
+        trusted = set[str]()
+        for assumption in wanted:
+            name = str(assumption.name)
+            read = values.variables([known.evaluate(assumption.condition)]).keys() - cycle.before.keys()
+            leaves = {leaf for leaf, node in cycle.taken.items() if read & values.variables([node]).keys()}
+            outside = {leaf for leaf in leaves if self.links.written_as(leaf) is None}
+            if read and (outside == leaves or self._keepable(assumption, outside)):
+                trusted.add(name)
+        return frozenset(trusted)
+
+    def _keepable(self, assumption: Assumption, outside: Collection[str]) -> bool:
+        """Return whether these inputs alone can make an assumption true wherever it stands, whatever the levels write."""
+        kinds = {leaf: self.kinds[leaf] for leaf in self.inputs if leaf in outside}
+        if not kinds:
+            return False
+        free = {leaf: values.variable(f"{leaf} taken", self.kinds[leaf]) for leaf in self.inputs}
+        for chosen in outside_values(assumption.condition, kinds):
+            taken = free | {leaf: values.constant(kinds[leaf], value) for leaf, value in chosen.items()}
+            every = self.cycle(self.havoc(), taken=taken).every
+            said = [node for at in every for name, node in at.assumptions.items() if name == assumption.name]
+            if all(node.known and node.low for node in said):
+                return True
+        return False
 
     def havoc(self) -> Leaves:
         """Return an arbitrary state: the start of a step of induction."""
@@ -287,7 +304,7 @@ class TransitionSystem:
         run = Run(self.procedures, self.kinds, dict(before), suffix=suffix, refusals=True)
         run.state.leaves.update(taken)
         ghosts, answers = self._database(before, taken)
-        contract = undeclared = values.both(self._protocol(before, taken), answers)
+        contract = undeclared = values.all_of((self._protocol(before, taken), answers, self._given(taken)))
         run.settle(self.program)
         settled = {**before, **run.state.leaves}
         run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
@@ -320,6 +337,11 @@ class TransitionSystem:
         return tuple(self._tables(run, choice))
 
     # --- the environment ---
+
+    def _given(self, taken: Leaves) -> Node:
+        """Return the condition that what other levels write is as they owe it."""
+        run = Run({}, {}, dict(taken))
+        return values.all_of(run.evaluate(fact.condition) for fact in self.links.given)
 
     def _trusted(self, tables: tuple[TableAt, ...]) -> Node:
         """Return the condition that declared assumptions hold whenever a table runs."""

@@ -291,6 +291,7 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool
             | Sort.ANSWERED
             | Sort.PAUSES
             | Sort.DEFERRED
+            | Sort.OWED
             | Sort.ENDS
             | Sort.PROTOCOL
         ):

@@ -13,6 +13,7 @@ from rcsc.compose.contract.claims import (
     CONTRACT,
     DECLARED,
     ENDING,
+    GIVEN,
     RESTING,
     RUNS,
     SAFE,
@@ -28,6 +29,8 @@ from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER
 from rcsc.compose.contract.obligations import Sort, asks, resting_table
 from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
+from rcsc.symbolic import values
+from rcsc.symbolic.execution import Run
 
 
 def agreements(systems: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Promise]:
@@ -103,6 +106,7 @@ def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     name, links = proof.level, ts.links
     ends = [*([] if links.above is None else [links.above.order]), *(below.report for below in links.below)]
     needs: list[Key] = [SAFE, *((CONTRACT, "", record) for record in ends)]
+    needs += [(GIVEN, "", fact.name) for fact in links.given]
     needs += [
         obligation.key
         for obligation, _ in proof.verdicts
@@ -153,6 +157,7 @@ def promises(systems: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
     for name, ts in systems.items():
         yield from _of_above(name, ts, systems)
         yield from _of_below(name, ts, systems)
+        yield from _of_facts(name, ts)
 
 
 def _of_below(name: str, ts: TransitionSystem, systems: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
@@ -202,6 +207,21 @@ def _of_above(name: str, ts: TransitionSystem, systems: Mapping[str, TransitionS
     keys.append((Sort.NEXT_NUMBER, "", upper.order))
     needs = tuple((above.name, key) for key in keys)
     yield Promise(name, above.order, words, f"proved of `{above.name}`: {Sort.NUMBERED.value}", needs)
+
+
+def _of_facts(name: str, ts: TransitionSystem) -> Iterator[Promise]:
+    """List what a level declares of what others write: its buffers begin so, and who writes them owes it."""
+    first = {str(v.name): values.constant(v.type, v.initial) for v in ts.program.variables}
+    for fact in ts.links.given:
+        yield Promise(
+            name,
+            fact.record,
+            f"what `{fact.writer}` writes is as `{fact.name}` says",
+            f"proved of `{fact.writer}`: {Sort.OWED.value}",
+            ((fact.writer, (Sort.OWED, "", f"{name}.{fact.name}")),),
+            begins=bool(Run({}, {}, first).evaluate(fact.condition).low),
+            fact=fact.name,
+        )
 
 
 def other_end(leaf: str, record: str, other: str) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, Need, Promise, closed
 from rcsc.compose.contract.environment import Links, check_ends, links
+from rcsc.compose.contract.facts import with_facts
 from rcsc.compose.contract.obligations import Obligation, obligations
 from rcsc.compose.contract.transition import Safety, TransitionSystem
 from rcsc.compose.invariant.search import Effort
@@ -111,6 +112,7 @@ def transition_systems_of(
     check_ends(system, programs)
     every = {name: links(system, name, program) for name, program in programs.items()}
     _check_ranks(every)
+    every = with_facts(every, programs)
     systems = {}
     for name, program in programs.items():
         level = next((level for level in program.levels if level.name == name), None)
