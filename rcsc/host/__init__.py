@@ -20,5 +20,5 @@ again.
 Modules: `files` reads within bounds and writes whole files, `described` reads TOML descriptions and names every fault
 with its line; `children` begins every process, `keeper` clears away what a killed one left; `tools` finds programs
 outside Python; `cache` keeps what earlier runs proved; `memory` suspends the collection of garbage; `guard` says who may see a page
-that is served to this machine.
+that is served to this machine, `trust` whether the code of a folder may run.
 """

@@ -4,7 +4,6 @@ In: commands, lines, functions that show. Out: 0, or 1 where a command failed. T
 asked only where there is a terminal.
 """
 
-import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from rcsc.host.trust import state_folder
 from rcsc.shell.commands import Commands
 from rcsc.shell.reload.refusal import Refused
 
@@ -107,9 +107,5 @@ def _history() -> "History":
 
 
 def history_path() -> Path:
-    """Where lines are kept from one session to the next.
-
-    Source: XDG Base Directory Specification 0.8, `XDG_STATE_HOME`.
-    """
-    state = os.environ.get("XDG_STATE_HOME") or "~/.local/state"
-    return Path(state).expanduser() / "rcsc" / "shell-history"
+    """Return where lines are kept from one session to the next."""
+    return state_folder() / "shell-history"

@@ -19,6 +19,7 @@ from rcsc.driver.compile import compile_system
 from rcsc.host.cache import open_cache
 from rcsc.host.children import WorkerEndedError, answer, executor, kill
 from rcsc.host.children import run as run_program
+from rcsc.host.trust import Agreement
 from rcsc.shell.reload.composed import prove_levels
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import LATER, TOLD_S, Ask, CancelledError, Handler, Hub, Json
@@ -27,6 +28,7 @@ from rcsc.studio.runs.live import Live
 
 LANE = "prove"
 NO_SYSTEM = "its tables belong to no system: a `system.toml` beside them says which levels run, and what lies between them"
+ASKS = "nobody agreed that the code of this folder runs: its plant, its extern procedures, the executors that are generated of its tables"
 FOUND = Path(".rcsc-cache") / "found"
 """Where findings are kept as logs, beside the system."""
 _COMMAND = "from rcsc.commands import main; main()"
@@ -40,17 +42,17 @@ class Build:
 
     name, lane = "build", LANE
 
-    def __init__(self, path: Path, hub: Hub, live: Live) -> None:
-        """Args: path: Of the description; hub: Of the studio; live: What runs what was compiled."""
-        self._path, self._hub, self._live = path, hub, live
-        self._said: Json = {"doing": ""}
+    def __init__(self, path: Path, hub: Hub, live: Live, agreement: Agreement) -> None:
+        """Args: path: Of the description; hub: Of the studio; live: What runs what was compiled; agreement: Whether it may run."""
+        self._path, self._hub, self._live, self._agreement = path, hub, live, agreement
+        self._said: Json = {"doing": "", "asks": ""}
         self._over = threading.Event()
         self._stop: Callable[[], None] = lambda: None
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
         """By kind."""
-        return {"build.open": self._open, "build.prove": self._prove}
+        return {"build.open": self._open, "build.prove": self._prove, "build.trust": self._trust}
 
     def prove_first(self, ask: Ask, then: Callable[[], Json]) -> Json:
         """Prove the levels together, beside them; then have something done in the lane `run`, and answer with that. From any lane."""
@@ -71,10 +73,15 @@ class Build:
         return self._said
 
     def begin(self) -> None:
-        """Compile, and open the system; where there are tables alone, say so."""
+        """Compile, and open the system; where there are tables alone, or its code was not agreed to, say so."""
         self._hub.watch(self._live.lane, self._live.held)
         if not self._path.is_file():
             self._hub.do(RUN, lambda: self._live.close_because(NO_SYSTEM))
+            return
+        if not self._agreement.given:
+            self._said = {**self._said, "asks": str(self._agreement.folder)}
+            self._hub.tell("build.state", self._said)
+            self._hub.do(RUN, lambda: self._live.close_because(ASKS))
             return
         try:
             self._compile(lambda work: self._waited(work, self._told))
@@ -98,7 +105,14 @@ class Build:
         """Compile what changed, and open the system anew."""
         if not self._path.is_file():
             raise Refused(Code.STUDIO, NO_SYSTEM)
+        if not self._agreement.given:
+            raise Refused(Code.STUDIO, ASKS, "agree to it in the page, or start the studio with `--trust`")
         return self._compile(lambda work: self._job(ask, work))
+
+    def _trust(self, ask: Ask) -> Json:
+        """Let the folder's code run, now and whenever it is opened; then compile and open the system."""
+        self._agreement.give()
+        return self._open(ask)
 
     def _job(self, ask: Ask, work: tuple[str, Callable[..., T], tuple[Any, ...]]) -> T:
         def told(text: str) -> None:
@@ -152,6 +166,7 @@ class Build:
         errors = [one for one in report["diagnostics"] if one["severity"] == "error"]
         self._said = {
             "doing": "",
+            "asks": "",
             "ok": report["ok"],
             "findings": report["diagnostics"],
             "tables": report["tables"],

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from rcsc.host.trust import Agreement
 from rcsc.shell.opening import Opening
 from rcsc.shell.session import Session
 from rcsc.studio.build import Build
@@ -26,6 +27,7 @@ from rcsc.studio.tables.writing import Writing
 def concerns(
     opening: Opening,
     hub: Hub,
+    agreement: Agreement,
     logs: Sequence[Path] = (),
     rate: float | None = WATCHED_RATE,
     drawer: Drawer | None = None,
@@ -36,6 +38,7 @@ def concerns(
     Args:
         opening: The system.
         hub: What tells the pages, and does things in lanes.
+        agreement: Whether the code of its folder may run.
         logs: That the user names; the first is shown at once.
         rate: How many times as fast as the clock the system runs at first; None for as fast as it goes.
         drawer: Draws a tick of the cell, where somebody can.
@@ -45,7 +48,7 @@ def concerns(
     time = TimeLine(live, hub.tell)
     folders = tuple(dict.fromkeys((Path.cwd(), opening.path.resolve().parent)))
     kept = Logs(folders, tuple(logs), lambda *shown: hub.do(LANE, lambda: time.show(*shown)))
-    build = Build(opening.path, hub, live)
+    build = Build(opening.path, hub, live, agreement)
     live.prove_first = build.prove_first
     desk = Desk(opening.path, hub.tell, hub.do, first)
     live.opened.append(lambda session: _sees(session, desk))

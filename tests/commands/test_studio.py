@@ -1,6 +1,7 @@
 """`rcsc studio` as a user starts it: one address, a page behind it, and an end at Ctrl-C."""
 
 import asyncio
+import contextlib
 import os
 import re
 import shutil
@@ -17,12 +18,14 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.commands.shared.systems import tables_meant
+from rcsc.host.trust import Agreement
 from rcsc.shell.opening import Opening
 from rcsc.studio.build import NO_SYSTEM
+from rcsc.studio.server import Server
 from tests.studio.served import Page, Refused, page, page_at, serving, until
 
 DOCK = Path(__file__).parents[1] / "data" / "dock"
-COMMAND = (sys.executable, "-c", "from rcsc.commands import main; main()", "studio")
+COMMAND = (sys.executable, "-c", "from rcsc.commands import main; main()", "studio", "--trust")
 
 
 NO_REQUESTS = (
@@ -63,6 +66,60 @@ def test_the_token_is_in_no_command_line(tmp_path: Path) -> None:
         studio.send_signal(signal.SIGINT)
         studio.wait(60)
         assert not path.parent.exists()
+
+
+def planted(folder: Path) -> Path:
+    """The docking robot with code of somebody's that leaves a mark; the mark."""
+    shutil.copytree(DOCK, folder, ignore=shutil.ignore_patterns("generated", ".rcsc-cache"))
+    mark = folder.parent / "ran"
+    base = folder / "base.py"
+    base.write_text(
+        f"import pathlib; pathlib.Path({str(mark)!r}).touch()\n{base.read_text(encoding='utf-8')}",
+        encoding="utf-8",
+    )
+    (folder / "sitecustomize.py").write_text(base.read_text(encoding="utf-8"), encoding="utf-8")
+    return mark
+
+
+def test_opening_a_folder_runs_none_of_its_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before somebody agreed, whatever a page asks; tables, proofs and graphs are there. Once a folder."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    folder = tmp_path / "dock"
+    mark = planted(folder)
+    opening = Opening(folder / "system.toml", ordered=True)
+    body = {
+        "file": "drive.rcs", "table": "dock", "line": "step 3", "name": "dock", "text": "drive", "part": "s", "version": 1, "tick": 1,
+        "level": "drive", "variable": "drive.fault", "rate": None, "to": 1,
+    }  # fmt: skip
+
+    async def asked(server: Server) -> None:
+        async with page(server) as one:
+            state = await one.heard("build.state", asks=str(folder))
+            assert not state["doing"]
+            await one.heard("run.state", open=False)
+            assert "drive.rcs" in str(await one.ask("tables.list"))
+            await one.ask("tables.open", file="drive.rcs")
+            await one.heard("tables.file/drive.rcs", known=True)
+            for kind in sorted(set(server.hub._handlers) - {"build.trust"}):
+                with contextlib.suppress(Refused):
+                    await one.ask(kind, **body)
+            with pytest.raises(Refused, match="nobody agreed"):
+                await one.ask("build.open")
+            assert not mark.exists()
+            assert not (folder / "generated").exists()
+            await one.ask("build.trust")
+            await one.heard("run.state", open=True)
+            assert mark.exists()
+
+    async def opened(server: Server) -> None:
+        async with page(server) as one:
+            await one.heard("run.state", open=True)
+
+    for does in (asked, opened):
+        agreement = Agreement(folder)
+        assert agreement.given == (does is opened)
+        with serving(opening, agreement=agreement) as server:
+            asyncio.run(does(server))
 
 
 def test_it_says_one_address_and_ends_at_an_interrupt(tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ from typing import Any, Self
 
 import aiohttp
 
+from rcsc.host.trust import Agreement
+from rcsc.lang.project import project_root
 from rcsc.shell.opening import Opening
 from rcsc.studio.hub import Concern
 from rcsc.studio.project import concerns
@@ -27,11 +29,17 @@ def serving(
     logs: Sequence[Path] = (),
     drawer: Drawer | None = None,
     first: Path | None = None,
+    agreement: Agreement | None = None,
 ) -> Iterator[Server]:
-    """A server with the studio's concerns for a system, or with others alone."""
+    """A server with the studio's concerns for a system, whose code may run, or with others alone."""
     server, opened = Server(), threading.Event()
     given = (
-        [*others] if opening is None else [*concerns(opening, server.hub, logs, None, drawer, first), *others]
+        [*others]
+        if opening is None
+        else [
+            *concerns(opening, server.hub, agreement or _agreed(opening), logs, None, drawer, first),
+            *others,
+        ]
     )
     thread = threading.Thread(target=server.serve, args=(given, lambda _: opened.set()), daemon=True)
     thread.start()
@@ -45,6 +53,10 @@ def serving(
         assert server.hub.ended(PATIENCE_S), (
             "a thread that still proves would ask the solver beside the next test"
         )
+
+
+def _agreed(opening: Opening) -> Agreement:
+    return Agreement(Path(project_root(str(opening.path))), given=True)
 
 
 async def until(holds: Callable[[], object]) -> None:

@@ -349,6 +349,7 @@ def test_what_nobody_saved_is_kept_when_the_studio_ends(how: str, tmp_path: Path
         "studio",
         str(system),
         "--alone",
+        "--trust",
     ]
     with subprocess.Popen(order, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as studio:
         assert studio.stdout

@@ -9,6 +9,8 @@ import click
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.systems import EXECUTOR, PLANT, SYSTEM, meant, tables_meant
 from rcsc.host.guard import door
+from rcsc.host.trust import Agreement
+from rcsc.lang.project import project_root
 from rcsc.run.description import description
 from rcsc.shell.opening import Opening
 
@@ -43,15 +45,18 @@ Examples:
     "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Where to listen; else a free one."
 )
 @click.option("--open", "opens", is_flag=True, help="Open the page in this machine's browser.")
+@click.option("--trust", "trusts", is_flag=True,
+              help="Agree that the code of SYSTEM's folder runs, now and later; else the page asks, once a folder.")  # fmt: skip
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str, by_hand: bool, alone: bool,
-    seed: int, logs: tuple[Path, ...], port: int, opens: bool,
+    seed: int, logs: tuple[Path, ...], port: int, opens: bool, trusts: bool,
 ) -> int:  # fmt: skip
     """Open one page for SYSTEM: its tables, their proof, the levels as they run, and what stands outside them.
 
     SYSTEM is a system's description or a folder that has one; SCRIPT names a script of the system that is here; TABLES is a file of
-    tables, or a folder of them that belongs to no system: nothing runs then. The page is for a browser on this machine; its address has
-    a token that nobody else knows. Ctrl-C ends it; what was typed and not saved is kept, and it says where.
+    tables, or a folder of them that belongs to no system: nothing runs then. Tables, proofs and graphs are shown at once; the folder's
+    plant, extern procedures and executors run when somebody has agreed to that, in the page or by --trust. The page is for a browser on
+    this machine; its address has a token that nobody else knows. Ctrl-C ends it; what was typed and not saved is kept, and it says where.
     """
     need("studio")
     from rcsc.studio.project import concerns  # of an extra
@@ -65,16 +70,22 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         description(path)  # what is wrong with it is told here; what is wrong with its tables, in the page
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     opening = Opening(path, kind, plant or "", named, alone, seed, ordered=not by_hand)
-    server = Server(port)
+    server, agreement = Server(port), Agreement(Path(project_root(str(path))))
+    if trusts:
+        agreement.give()
 
     def told(address: str) -> None:
         click.echo(f"the studio is at {address}")
+        if path.is_file() and not agreement.given:
+            click.echo(
+                f"none of the code in {agreement.folder} runs before the page, or --trust, says that it may"
+            )
         if opens:
             click.launch(held.enter_context(door(address)).as_uri())
 
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as held:
         first = Path(target) if target is not None and tables is not None else None
-        server.serve(concerns(opening, server.hub, logs, drawer=_drawer(path), first=first), told)
+        server.serve(concerns(opening, server.hub, agreement, logs, drawer=_drawer(path), first=first), told)
     click.echo("\n".join(("the studio is closed", *server.hub.partings)))
     return 0
 

@@ -93,11 +93,21 @@ function closed(bus) {
   const build = bus.latest("build.state") ?? {}, state = bus.latest("run.state") ?? {};
   const findings = (build.findings ?? []).filter(({ severity }) => severity === "error");
   return make("div", { class: "closed" },
+    build.asks && !build.doing ? asking(bus, build.asks) : null,
     make("h2", {}, build.doing ? `${build.doing[0].toUpperCase()}${build.doing.slice(1)}` : "No system runs"),
     build.doing ? null : make("p", { class: "pre" }, ...spoken(state.why ?? "not connected")),
     ...findings.slice(0, 20).map(finding),
     findings.length > 20 ? make("p", { class: "soft" }, `and ${findings.length - 20} more`) : null,
-    build.doing ? null : make("button", { type: "button", onclick: () => bus.try("build.open") }, "Prove, compile and open again"));
+    build.doing || build.asks ? null : make("button", { type: "button", onclick: () => bus.try("build.open") }, "Prove, compile and open again"));
+}
+
+// Asked once a folder, before any of its code runs.
+function asking(bus, folder) {
+  return make("section", { class: "asking" },
+    make("h2", {}, "May the code of this folder run?"),
+    make("p", {}, make("code", {}, folder)),
+    make("p", {}, "To run its levels starts its plant, its extern procedures and the executors that are generated of its tables, as yours. Agree where you trust who wrote them. Tables, proofs and graphs need none of it."),
+    make("button", { type: "button", onclick: () => bus.try("build.trust") }, "Agree, and run it"));
 }
 
 // What a check found: where, the least input that shows it, and what would mend it.
