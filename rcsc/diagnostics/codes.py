@@ -1528,6 +1528,13 @@ class Code(StrEnum):
             def step(self, seconds: float) -> None:
                 self.travelled += self.speed / 1000 * seconds
     """
+    LINKS_DIFFER = """RCS730: two levels declare the link between them differently
+
+    A superior and its subordinate each declare the link between them, in files of their own, and the two declarations differ: in a
+    command, a status, which status says *done*, *failed* or *executing*, a field of the order or the report, its type, its range, its
+    unit, or what it has after a restart. What the one says would mean something else to the other. Both declarations are shown where they
+    differ first. Declare the link, and the types that it names, once, in a file that both levels `use`.
+    """
     SHELL_NAME = """RCS731: the shell knows no such name
 
     `rcsc shell` was given a name that is no variable, level, line, module, procedure, owner or table of the level that is meant. Names

@@ -833,6 +833,24 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True)
+class LinkPart:
+    """What a link says of one thing: `what` it is about, what it `says` in words that do not depend on names of types, and where."""
+
+    what: str
+    says: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """What a superior and a subordinate say to each other, as one of them declares it: both have to declare the same parts."""
+
+    name: str
+    span: Span
+    parts: tuple[LinkPart, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Role:
     """A neighbour, as a program declares it: one that it serves, or one that it commands.
 
@@ -844,6 +862,7 @@ class Role:
         reason: The leaf that says why a command failed; None where there is none.
         late: Says that a subordinate has not echoed, or not answered, in time; None where it is waited for without end.
         answers_in_time: Whether an order is late that is not answered in time, too.
+        link: The link to it, as it is declared.
     """
 
     peer: str
@@ -856,6 +875,7 @@ class Role:
     reason: VariableName | None = None
     late: VariableName | None = None
     answers_in_time: bool = False
+    link: Link | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)

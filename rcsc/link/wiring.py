@@ -25,6 +25,7 @@ from rcsc.emit.scope import NameScope, c_scope
 from rcsc.host.files.read import CheckedFields, json_of
 from rcsc.lang.model import Array, Record, Type
 from rcsc.run.description import Description, LevelSpec, Wire
+from rcsc.run.links import check_links
 from rcsc.run.signature import LevelSign, Signature, signature_of
 from rcsc.run.system import check_fit
 
@@ -206,6 +207,7 @@ def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linke
         BadDescription: The description does not fit the programs.
     """
     programs = {name: _program(plan) for name, plan in plans.items()}
+    check_links(system, {name: plan.program for name, plan in plans.items()})
     check_fit(system, {name: program.sign for name, program in programs.items()})
     prefix = next((plan.prefix for plan in plans.values()), "")
     word = system_word(system.name, (program.names.program for program in programs.values()), prefix)

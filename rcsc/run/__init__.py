@@ -20,9 +20,10 @@ executors are behind one interface and leave the same bytes. Trusted: `system.to
 extern procedures do; logs and symbol files may come from anybody and are read within bounds. A tick copies each
 level's state; it does not depend on the number of lines.
 
-Source: Haynes et al. 1984, sections 8 and 9. Modules, in the order the data flows: `declared_plant` and `description`,
-`signature`, `executors` (`unproved` keeps forced ones out), `answers` (what externs give in a finding's run), `buffers`,
-`levels`, `adopt` (starting again), `faults` (of plants), `system`; rooms `orders` (scripts), `plant` (what moves), `log` and `processes`.
+Source: Haynes et al. 1984, sections 8 and 9. Modules, in the order the data flows: `declared_plant` and `description`, `links` (declared
+alike at both ends), `signature`, `executors` (`unproved` keeps forced ones out), `answers` (what externs give in a finding's run),
+`buffers`, `levels`, `adopt` (starting again), `faults` (of plants), `system`; rooms `orders` (scripts), `plant` (what moves), `log` and
+`processes`.
 """
 
 import sys

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.compose.proof.system import transition_systems
 from rcsc.diagnostics.codes import Code
 from rcsc.run.description import BadDescription, description
 from tests.support.programs.texts import edit_file
@@ -126,3 +127,62 @@ def test_what_contradicts_the_declarations_is_said_with_what_to_write(
 ) -> None:
     edit_file(dock.parent / file, (was, now))
     assert any(message in fault for fault in faults(dock)), faults(dock)
+
+
+# --- the same link, declared twice ----------------------------------------------------------------
+
+ALIKE = (
+    ("type distance = int 0 .. 20000 [mm]", "type reach = int 0 .. 10000 + 10000 [mm]"),
+    (
+        "target_mm : distance",
+        "target_mm : reach",
+    ),
+)
+OTHERWISE = [
+    (("done done failed failed executing executing\n  order", "done done failed executing executing failed\n  order"),
+     "failed: `executing` against `failed`"),
+    (("goto, align", "align, goto"), "the commands: `{stop, align, goto}` against `{stop, goto, align}`"),
+    (("done, executing, failed", "done, failed, executing"), "the statuses: `{done, failed, executing}` against"),
+    (("0 .. 20000", "0 .. 19999"), "`target_mm` of the order: `int 0 .. 19999 [mm]` against `int 0 .. 20000 [mm]`"),
+    (("int 0 .. 20000 [mm]", "real 0.0 .. 20000.0 [mm]"), "`target_mm` of the order: `real 0.0 .. 20000.0 [mm]` against"),
+    (("    target_mm", "    stream target_mm"), "`target_mm` of the order: `stream int 0 .. 20000 [mm]` against"),
+    (("    target_mm", "    more : bool\n    target_mm"), "the fields of the order: `more, target_mm` against `target_mm`"),
+    (("report {\n    reason", "report {\n    seen : bool\n    reason"), "the fields of the report: `seen, why` against `why`"),
+    (("no_beacon, blocked", "blocked, no_beacon"), "`why` of the report: `reason {none, blocked, no_beacon,"),
+    ((WHY := "reason why : why restart restarted\n  }\n}\n", WHY.replace("restarted", "blocked")), "restart blocked` against"),
+]  # fmt: skip
+
+
+def apart(path: Path, *edits: tuple[str, str]) -> Path:
+    """Let the drive declare the link in a file of its own."""
+    words = (path.parent / "words.rcs").read_text(encoding="utf-8")
+    for old, new in edits:
+        assert old in words
+        at = words.rindex(old)
+        words = words[:at] + new + words[at + len(old) :]
+    (path.parent / "own.rcs").write_text(words, encoding="utf-8")
+    real = "real" in words
+    kind = [("int 0 .. 20000 [mm] clamp", "real 0.0 .. 20000.0 [mm] clamp")] if real else []
+    edit_file(path.parent / "drive.rcs", ("use words", "use own"), *kind)
+    return path
+
+
+@pytest.mark.parametrize(("edit", "said"), OTHERWISE)
+def test_two_declarations_of_one_link_are_held_against_each_other(
+    edit: tuple[str, str], said: str, dock: Path
+) -> None:
+    with pytest.raises(BadDescription) as raised:
+        transition_systems(apart(dock, edit))
+    [found] = raised.value.diagnostics
+    assert found.code is Code.LINKS_DIFFER
+    assert said in found.message
+    places = [found.primary, *found.related]
+    assert [Path(label.span.file).name for label in places] == ["own.rcs", "words.rcs"]
+    assert all(label.span.file in raised.value.sources for label in places)
+
+
+@pytest.mark.parametrize("edits", [(), ALIKE])
+def test_two_declarations_that_say_the_same_are_one_link(
+    edits: tuple[tuple[str, str], ...], dock: Path
+) -> None:
+    assert transition_systems(apart(dock, *edits))

@@ -28,6 +28,7 @@ from rcsc.lang.meaning import with_stops
 from rcsc.lang.model import AssumptionName, Program
 from rcsc.lang.project import Loaded, load
 from rcsc.run.description import BadDescription, Description, description, places
+from rcsc.run.links import check_links
 from rcsc.symbolic.values import TRUE
 
 SHOWN_HERE = frozenset({Code.ASSUMPTION_NOT_PROVED, Code.INVARIANT_BROKEN, Code.TWO_WRITERS})
@@ -109,6 +110,7 @@ def transition_systems_of(
         BadDescription: The description says something that cannot be.
         NoProgramError: A program has no such level.
     """
+    check_links(system, programs)
     check_ends(system, programs)
     every = {name: links(system, name, program) for name, program in programs.items()}
     _check_ranks(every)

@@ -10,18 +10,25 @@ from rcsc.lang.expressions.typed import boolean, typed
 from rcsc.lang.model import (
     Assumption,
     AssumptionName,
+    Bool,
     Enum,
     Int,
     Kind,
+    Link,
+    LinkPart,
     Procedure,
     Read,
     Role,
     Roles,
+    Scalar,
+    Single,
     Standing,
     Table,
     Variable,
     VariableName,
     pending,
+    spell,
+    unit_text,
 )
 from rcsc.lang.protocol import Flags, Parties, Party, Watched, condition, in_step
 from rcsc.lang.resolve.variables import value_given
@@ -40,6 +47,56 @@ def roles_of(scope: Scope, parties: Parties) -> Roles | None:
     )
 
 
+def _link(link: tree.LinkDecl, order: str, report: str, scope: Scope) -> Link:
+    """Return what a link says, field by field, in words that two files have in common: of types their values, not their names."""
+    command, status = (
+        scope.leaves[leaf].type for leaf in (f"{order}.input_command", f"{report}.status_report")
+    )
+    parts = [
+        LinkPart("the commands", _kind(command), link.command.span),
+        LinkPart("the command that rests", link.rest.text, link.rest.span),
+        LinkPart("the statuses", _kind(status), link.status.span),
+        LinkPart("done", link.done.text, link.done.span),
+        LinkPart("failed", link.failed.text, link.failed.span),
+        LinkPart("executing", link.executing.text, link.executing.span),
+        *_fields("order", link.order, order, scope),
+        *_fields("report", link.report, report, scope),
+    ]
+    return Link(link.name.text, link.name.span, tuple(parts))
+
+
+def _fields(what: str, fields: Sequence[tree.LinkField], record: str, scope: Scope) -> Iterator[LinkPart]:
+    names = ", ".join(part.name.text for part in fields)
+    if fields:
+        span = fields[0].name.span.to(fields[-1].name.span)
+        yield LinkPart(f"the fields of the {what}", names, span)
+    for part in fields:
+        field = f"{record}.{part.name.text}"
+        leaves = {
+            name.removeprefix(field): leaf for name, leaf in scope.leaves.items() if _part_of(name, field)
+        }
+        kinds = "; ".join(f"{name.lstrip('.')} {_kind(leaf.type)}".lstrip() for name, leaf in leaves.items())
+        says = [*([part.word] if part.word else []), kinds]
+        only = next(iter(leaves.values()), None)
+        if part.restart is not None and only is not None:
+            value = value_given(scope, part.restart, only.type, "restart")
+            says.append("" if value is None else f"restart {spell(only.type, value)}")
+        yield LinkPart(f"`{part.name.text}` of the {what}", " ".join(says), part.name.span)
+
+
+def _kind(kind: Scalar) -> str:
+    """Spell a type by its values."""
+    match kind:
+        case Bool():
+            return "bool"
+        case Enum(members=members):
+            return f"{{{', '.join(members)}}}"
+        case _:
+            word = "int" if isinstance(kind, Int) else "single" if isinstance(kind, Single) else "real"
+            ends = f"{word} {spell(kind, kind.low)} .. {spell(kind, kind.high)}"
+            return f"{ends} [{unit_text(kind.unit)}]" if kind.unit else ends
+
+
 def _role(party: Party, order: str, report: str, scope: Scope) -> Role:
     records = [f"{order}.{part}" for part in party.numbered]
     numbered = tuple(
@@ -49,9 +106,9 @@ def _role(party: Party, order: str, report: str, scope: Scope) -> Role:
     reason = VariableName(f"{report}.{party.reason}") if party.reason is not None else None
     link = party.link
     words = link.rest.text, link.done.text, link.failed.text
-    return Role(
-        party.name, order, report, numbered, *words, reason, late, answers_in_time=party.answered is not None
-    )
+    in_time = party.answered is not None
+    said = _link(link, order, report, scope)
+    return Role(party.name, order, report, numbered, *words, reason, late, answers_in_time=in_time, link=said)
 
 
 def _part_of(leaf: str, record: str) -> bool:
