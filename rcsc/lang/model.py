@@ -206,6 +206,21 @@ def spell(kind: Scalar, value: Value) -> str:
             return repr(float(value))
 
 
+def unspelled(kind: Scalar, text: str) -> Value:
+    """Return the value that `spell` gives as this text."""
+    match kind:
+        case Bool():
+            return text == "true"
+        case Enum(members=members):
+            return members.index(text)
+        case Int():
+            return int(text)
+        case Single():
+            return single(float(text))
+        case Real():
+            return float(text)
+
+
 def unit_text(unit: Unit) -> str:
     """A unit without its brackets, as it would be declared; empty for none.
 
