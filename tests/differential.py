@@ -99,6 +99,13 @@ class Kind:
     high: float = 1
     members: tuple[str, ...] = ()
 
+    def zero(self) -> Value:
+        """What it starts with where nothing is said: 0, or what is nearest to it."""
+        if self.sort == "bool":
+            return False
+        nearest = self.low if self.low > 0 else min(self.high, 0)
+        return float(nearest) if self.sort in REALS else int(nearest)
+
     def literal(self, value: Value) -> str:
         """A value in the language."""
         if self.sort == "bool":
@@ -1363,8 +1370,8 @@ def begun(drawn: Drawn) -> State:
     state: State = {}
     for one in drawn.declared:
         for leaf in one.leaves:
-            zero: Value = False if leaf.kind.sort == "bool" else leaf.kind.low
-            state[leaf.name] = kept(zero if one.start is None else one.start)
+            begins = one.safe if one.start is None else one.start
+            state[leaf.name] = kept(leaf.kind.zero() if begins is None else begins)
             if one.until is not None:
                 state[f"{leaf.name}.next"] = state[leaf.name]
     state |= {kept_line(table): 0 for table in drawn.staged}
