@@ -7,7 +7,9 @@ What is compared, of every level of every hierarchy: the obligations themselves;
 state; each trace that is shown with the contract, with what the interpreter does on its inputs, and with the length of the shortest. That
 an obligation is *not proved* although it holds is counted (`incomplete`), and is no disagreement. A command that is shown to end may not
 go on for ever in any run. Where two neighbours agree, both run together with real buffers (`hierarchies_together`), and nothing that was
-proved of either may break.
+proved of either may break. Every odd seed draws a whole system instead (`tests.whole_systems`): levels that declare their protocol or
+write it, links, streams, plain buffers, facts, with refused inputs and results, and beginnings anew; each claim that is proved,
+whatever its sort, is held against what can happen to the levels together.
 """
 
 import argparse
@@ -44,6 +46,8 @@ from tests.small_hierarchies.text import files, written
 from tests.small_hierarchies.together import Pair, broken_together
 from tests.small_hierarchies.world import allowed, broken, wanted
 from tests.support.proved import shortest
+from tests.whole_systems.drawn import drawn
+from tests.whole_systems.held import held
 
 LITTLE = Effort(walks=6, cycles=20)
 MOST_CYCLES = 7
@@ -367,8 +371,18 @@ def _proved(proof: LevelProof, follows: Mapping[Need, Closed]) -> frozenset[Key]
 
 
 def judged_seed(seed: int) -> Judged:
-    """The hierarchy of a seed, judged; for a process of a pool."""
-    return judged(furnished(seed), seed)
+    """The hierarchy of a seed, judged, or of an odd one the whole system; for a process of a pool."""
+    return judged_whole(seed) if seed % 2 else judged(furnished(seed), seed)
+
+
+def judged_whole(seed: int) -> Judged:
+    """The whole system of a seed, judged."""
+    begun, counts = time.perf_counter(), Counter[str]()
+    try:
+        apart = tuple(Disagreement(*one) for one in held(drawn(seed), seed, counts))
+    except Exception as error:  # noqa: BLE001  # a long run is not to end with it
+        apart = (Disagreement("something raises", "", "", f"{type(error).__name__}: {error}"),)
+    return Judged(seed, counts, apart, seconds=time.perf_counter() - begun)
 
 
 def smaller(seed: int) -> tuple[Hierarchy, Judged]:
@@ -399,10 +413,15 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _show(seed: int) -> int:
-    made, found = smaller(seed)
-    for name, text in files(made).items():
+    if seed % 2:
+        whole, found = drawn(seed), judged_whole(seed)
+        texts, slips = dict(whole.files), whole.slips
+    else:
+        made, found = smaller(seed)
+        texts, slips = files(made), made.slips
+    for name, text in texts.items():
         sys.stdout.write(f"--- {name}\n{text}")
-    sys.stdout.write(f"slips: {made.slips}\n{dict(found.counts)}\n")
+    sys.stdout.write(f"slips: {slips}\n{dict(found.counts)}\n")
     for one in (*found.disagreements, *found.incomplete):
         sys.stdout.write(f"{one}\n")
     return int(bool(found.disagreements))

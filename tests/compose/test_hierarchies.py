@@ -19,7 +19,7 @@ from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
 from tests import hierarchies
 from tests.bench.growth import chain, costs
-from tests.hierarchies import Judged, forget, judged, judged_seed
+from tests.hierarchies import Judged, forget, judged
 from tests.small_hierarchies import together, world
 from tests.small_hierarchies.explored import TooManyError, explored
 from tests.small_hierarchies.level import Role
@@ -67,7 +67,7 @@ def plain(*tables: int) -> Hierarchy:
 
 
 def test_the_proof_and_the_enumeration_agree_of_random_hierarchies() -> None:
-    found = [judged_seed(seed) for seed in (*SMALL, *ANY)]
+    found = [judged(furnished(seed), seed) for seed in (*SMALL, *ANY)]
     assert [(one.seed, one.disagreements) for one in found if one.disagreements] == []
     counts = sum((one.counts for one in found), start=Judged(0).counts)
     assert counts["hierarchies with a fault"] > len(found) // 3  # neither all right nor all wrong

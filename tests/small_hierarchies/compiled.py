@@ -241,6 +241,7 @@ class _Writer:
 
     def _settle(self) -> Iterator[str]:
         yield "def settle(s, r, x):"
+        yield "  pass"
         later = [(v, v.deferred_until) for v in self.program.variables if v.deferred_until is not None]
         for at, (_, until) in enumerate(later):
             yield f"  ready{at} = {self._of(until)}"

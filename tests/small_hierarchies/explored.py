@@ -45,9 +45,17 @@ def adopted(
     role: Role, now: Mapping[str, Value], stands: Mapping[str, Value] | None = None
 ) -> dict[str, Value]:
     """A state as the system makes it when a level is started again; what its own buffers hold `stands`."""
-    sign = _signature(role.program)
+    sign = _signed(role)
     still = {sign.index[leaf]: value for leaf, value in (stands or {}).items()}
     return dict(zip(role.leaves, adopt(sign, tuple(now[leaf] for leaf in role.leaves), still), strict=True))
+
+
+def _signed(role: Role) -> Signature:
+    """What `adopt` is told of a level, made once."""
+    if role.signature is None:
+        object.__setattr__(role, "signature", _signature(role.program))
+    assert role.signature is not None
+    return role.signature
 
 
 def _signature(program: Program) -> Signature:

@@ -40,6 +40,7 @@ from rcsc.lang.model import (
     pending,
     value_of_key,
 )
+from rcsc.run.signature import Signature
 from tests.small_hierarchies.compiled import Compiled, compiled
 
 State = tuple[Value, ...]
@@ -167,6 +168,7 @@ class Role:
     links: Links
     odd: bool = False
     relied: frozenset[str] | None = None
+    signature: Signature | None = field(default=None, compare=False, repr=False)
 
     @cached_property
     def leaves(self) -> tuple[str, ...]:

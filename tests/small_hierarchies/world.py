@@ -166,6 +166,9 @@ def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], 
     """The obligations that a cycle breaks; one that a fault ends publishes nothing, and breaks those of its table only."""
     if ran.fault is UNDEFINED:
         return  # nobody can say what it does
+    if ran.fault is Fault.ADMIT:
+        yield from _broken_by_refusal(role, before, ran)
+        return
     table = role.tables[ran.table]
     yield from ((Sort.ASSUMPTION, ran.table, name) for name in ran.failed)
     if ran.fault is Fault.SEVERAL_LINES:
@@ -183,6 +186,17 @@ def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], 
             if ran.after[leaf] not in {ran.middle[leaf], ran.after[waiting]}:
                 yield Sort.DEFERRED, "", leaf
         yield from _broken_stated(role, before, ran.after)
+
+
+def _broken_by_refusal(role: Role, before: Mapping[str, Value], ran: Ran) -> Iterator[Key]:
+    """What a cycle breaks that an input ended: nothing of the order was taken, so what was published is to be as before."""
+    above = role.links.above
+    if above is not None and any(ran.after[leaf] != before[leaf] for leaf in role.report):
+        yield Sort.ECHOES, "", above.report
+    for _, number, fields in role.numbered:
+        if ran.after[number] == before[number]:
+            yield from ((Sort.NUMBERED, "", f) for f in fields if ran.after[f] != before[f])
+    yield from _broken_stated(role, before, ran.after)
 
 
 def _broken_stated(role: Role, before: Mapping[str, Value], after: Mapping[str, Value]) -> Iterator[Key]:

@@ -193,8 +193,7 @@ def _together(
 ) -> str:
     if len(best) < 2:
         return ""
-    left = left_by(ts.program, table, best) or "proved that no two lines match any more"
-    begins = f"the first help of each of these {len(best)} findings, all together: {left}"
+    begins = f"the first help of each of these {len(best)} findings, all together: {left_by(ts.program, table, best)}"
     if with_cells(ts.program, table, best) is None:
         return begins
     return f"{begins}; {tried(ts, table, tuple(best), kept, most).outcome(most)}"
