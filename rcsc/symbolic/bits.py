@@ -6,7 +6,7 @@ the same for what is built alike.
 Numbers are two's complement, lowest bit first, as wide as their bounds need; gates after Tseitin ("On the complexity of
 derivation in propositional calculus", 1968), each made once. Values that are only copied and compared for equality get as
 many bits as tell them apart (Pnueli, Rodeh, Shtrichman and Siegel, "Deciding equality formulas by small domains
-instantiations", 1999), and their ranges are forgotten.
+instantiations", 1999), and their ranges are forgotten where they have as many values.
 """
 
 import math
@@ -321,10 +321,19 @@ def few(nodes: Sequence[Node]) -> dict[Node, Few]:
         values = dict.fromkeys(node.low for node in member if node.op is Shape.CONSTANT)
         names = {node.name for node in member if node.op is Shape.VARIABLE}
         others = sum(not isinstance(node.op, Shape) for node in member)
-        width = max(1, (len(values) + len(names) + others - 1).bit_length())
+        wanted = len(values) + len(names) + others
+        if any(node.op is Shape.VARIABLE and _room(node) < wanted for node in member):
+            continue  # its range tells more than that values differ: it is one of 0, 1 and 2, and not a fourth
+        width = max(1, (wanted - 1).bit_length())
         shared = Few(width, {value: at for at, value in enumerate(values)})
         encodings |= dict.fromkeys(member, shared)
     return encodings
+
+
+def _room(node: Node) -> int:
+    """How many values a variable has."""
+    low, high = key_bounds(node.kind)
+    return high - low + 1
 
 
 @dataclass(slots=True)

@@ -56,6 +56,7 @@ from tests.support.programs.systems import (
     LITTLE,
     ORDER_AFTER_ORDER,
     SYSTEM,
+    alone,
     counting,
     proved_level,
     small_level,
@@ -152,6 +153,45 @@ def test_what_is_only_compared_holds_for_the_same_questions(truth: Node) -> None
     possible = any(meant(truth, dict(zip(reads, one, strict=True))) for one in product(*domains))
     assert sat.holds([]) or not possible  # ranges are forgotten: more may be possible, never less
     sat.close()
+
+
+@pytest.mark.parametrize(("high", "left"), [(1, False), (2, False), (3, True), (9, True), (4095, True)])
+def test_a_number_all_of_whose_values_are_named_has_no_other(high: int, left: bool) -> None:
+    kind = Int(0, high)
+    x, copy = values.variable("x", kind), values.variable("copy", Int(0, 9))
+    truth = values.all_of(
+        values.negation(values.equal(x, values.constant(kind, at))) for at in range(min(high, 2) + 1)
+    )
+    for asked in (truth, values.both(truth, values.equal(x, copy))):
+        bits = Bits.of((asked,))
+        sat = Sat([*bits.clauses, [bits.literal(asked)], *bits.clauses])
+        assert sat.holds([]) is left
+        sat.close()
+
+
+VALUES = """input happens : int 0 .. 3
+state x : bool
+assume only_then assumed : happens = 1 implies x
+table t assuming only_then {{
+| line | happens | x || x |
+{}
+}}
+level m {{ period 1 [s] table t }}
+"""
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "| none | 0 | || |\n| ends | 1 | true || false |\n| more | 2 | || true |\n| last | 3 | || true |",
+        "| none | 0, 2 | || |\n| ends | 1 | true || false |\n| more | 3 | || true |",
+        "| none | not in {1, 2} | || |\n| more | 1, 2 | || true |",
+    ],
+)
+def test_cells_that_name_each_value_of_an_input_are_proved(rows: str) -> None:
+    proof = prove_level(alone(VALUES.format(rows)), LITTLE)
+    open_ = [one.name for one, verdict in proof.verdicts if verdict is not Verdict.PROVED]
+    assert open_ == ["only_then"]  # as the text has it
 
 
 def test_numbers_that_are_only_compared_get_few_bits() -> None:
