@@ -20,7 +20,7 @@ from rcsc.compose.counterexample.finding import of_trace
 from rcsc.compose.counterexample.trace import Trace
 from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.proof.assume_guarantee import agreements
-from rcsc.compose.proof.level import LevelProof, Verdict, certificate, essential, prove_level
+from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
 from rcsc.compose.proof.system import NoProgramError, SystemProof, transition_systems, transition_systems_of
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Kind, Real
@@ -266,26 +266,17 @@ def test_a_restart_is_what_the_system_does(level: str) -> None:
 # --- the shipped levels -----------------------------------------------------------------------
 
 
-PLATE = {f"to_robot.plate[{i}]" for i in range(9)}
-NOT_NUMBERED = {
-    # said beside an order, not compared with the last one: nobody may rely on them
-    "task": {"to_emove.apoint_pos_flag", "to_emove.gripped_obj_ptr"},
-    "emove": {"to_vision.expected_range_mm", *(f"to_vision.expected_normal.{axis}" for axis in "xyz")},
-    "primitive": PLATE,  # poses follow one another under the number of FOLLOW
-}
-
-
 def proved_in_its_environment(level: str) -> None:
     """Prove a shipped level, and have cvc5 confirm it."""
     ts = transition_systems(SHIPPED)[level]
     proof = prove_level(ts)
-    assert essential(proof) == ()
-    assert {obligation.name for obligation in proof.open} == NOT_NUMBERED.get(level, set())
+    assert proof.open == ()
     assert {verdict for obligation, verdict in proof.verdicts if obligation.sort is Sort.ASSUMPTION} <= {
         Verdict.PROVED
     }
     assert proof.context is not None
     assert (proof.context.unreached, proof.context.restless) == ((), False)
+    assert proof.stands or level != "vision"  # EMOVE goes by what it saw
     again = {(one.table, one.line, one.leaves) for one in proof.context.repeated}
     assert again <= {("goto", "1", ("length_mm",)), ("gothru", "1", ("length_mm",))}
     assert {ending.table for ending in proof.endings if not ending.proved} == set()

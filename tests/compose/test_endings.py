@@ -47,6 +47,8 @@ from tests.support.programs.systems import (
 )
 from tests.support.programs.texts import edit_file, edited
 
+PROTOCOL = Path(__file__).parents[1] / "data" / "protocol"
+
 
 def ending(folder: Path, lower: str) -> Ending:
     """Prove this lower level; return how commands under `go` end."""
@@ -191,6 +193,41 @@ def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
     assert (work.proved, work.still) == (True, ("which",))
 
 
+def test_nothing_that_a_level_writes_is_taken_to_stand_still(tmp_path: Path) -> None:
+    """The lower level turns `which` in every cycle: the upper one orders for ever."""
+    turning = (
+        ("output report", "output which : bool\noutput report"),
+        (
+            "module answer reads command,",
+            "module turn reads which writes which { which := not which }\nmodule answer reads command,",
+        ),
+    )
+    lower = small_text("lower", *turning, ("postprocess answer", "postprocess answer, turn"))
+    path = small_system(tmp_path, upper=ordering_again(), lower=lower)
+    path.write_text(f'{path.read_text(encoding="utf-8")}"lower.which" = "upper.which"\n', encoding="utf-8")
+    found = prove_level(transition_systems(path)["upper"], LITTLE)
+    work = next(end for end in found.endings if end.table == "work")
+    assert found.open == ()
+    assert not work.proved
+    assert (work.still, work.settled) == ((), ())
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "stands"),
+    [
+        ("use words", "use words", True),
+        ("||                     | 0     | done", "|| blocked             | 0     | done", False),
+        ("stage(idle)         | 0     | done       |", "stage(moving)       | 0     | done       |", False),
+    ],
+)  # fmt: skip
+def test_a_report_stands_once_it_has_answered_or_is_not_said_to(
+    was: str, now: str, stands: bool, tmp_path: Path
+) -> None:
+    shutil.copytree(PROTOCOL, tmp_path, dirs_exist_ok=True)
+    edit_file(tmp_path / "drive.rcs", (was, now))
+    assert prove_level(transition_systems(tmp_path / "system.toml")["drive"], LITTLE).stands is stands
+
+
 def test_as_few_inputs_stand_still_as_will_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Some are tried without, knowing what a look at all of them left; what nobody reads again is not tried."""
     ts = small_level(tmp_path, "lower")
@@ -205,9 +242,10 @@ def test_as_few_inputs_stand_still_as_will_do(tmp_path: Path, monkeypatch: pytes
         looked.append(SimpleNamespace(still=still, endless={"there"} - set(still), counted=[], solver=still))
         return looked[-1]
 
+    outside = {"command", "there"}
     monkeypatch.setattr(ranking, "_Ranking", look)
     monkeypatch.setattr(ranking, "_read_again", lambda *_: {"command", "there", "gone"})
-    found = ranking.lines_that_stop(ts.program, asked, (), lambda still: still)  # type: ignore[arg-type,return-value]  # what stands for them
+    found = ranking.lines_that_stop(ts.program, asked, (), lambda still, _: still, outside, set())  # type: ignore[arg-type,return-value]  # what stands for them
     assert inputs(ts.program) == ("command", "there")
     assert [one.still for one in looked] == [(), ("command", "there"), ("there",)]
     assert (found.still, found.endless) == (("there",), ())

@@ -6,7 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.compose.contract.claims import CONTRACT, ENDING, RUNS, SAFE, Claim, Key, Promise, Verdict, spelled
+from rcsc.compose.contract.claims import (
+    CONTRACT,
+    ENDING,
+    RUNS,
+    SAFE,
+    STANDS,
+    Claim,
+    Key,
+    Promise,
+    Verdict,
+    spelled,
+)
 from rcsc.compose.contract.environment import Above, links
 from rcsc.compose.contract.obligations import Sort, Unstated, obligations, pairs, unstated
 from rcsc.compose.contract.properties import every_predicate
@@ -14,7 +25,7 @@ from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.proof.assume_guarantee import _of_ending, of_level, promises
 from rcsc.compose.proof.level import LevelProof, _of_possible, certificate
-from rcsc.compose.proof.termination import Flow
+from rcsc.compose.proof.termination import Ending, Flow
 from rcsc.lang.leaves import parts
 from rcsc.lang.meaning import spelled as spelled_expression
 from rcsc.lang.model import Bool, Int, OneTable, TableName, VariableName
@@ -207,13 +218,16 @@ def test_what_levels_assume_of_each_other_is_told_word_for_word(
 def test_an_ending_rests_on_those_of_levels_below_and_trusts_those_that_are_none(
     upper: TransitionSystem,
 ) -> None:
-    inside = _of_ending(upper, ("lower",), Verdict.PROVED)
-    still = "the values in `lower` of level `upper` stand still meanwhile"
-    assert inside == Claim(Verdict.PROVED, (("upper", RUNS), ("lower", ENDING)), (still,))
+    inside = _of_ending(upper, Ending("work", 0, still=("command",), settled=("lower",)), Verdict.PROVED)
+    still = "the values in `command` of level `upper` stand still meanwhile"
+    needs = ("upper", RUNS), ("lower", ENDING), ("lower", STANDS)
+    assert inside == Claim(Verdict.PROVED, needs, (still,))
     [below] = upper.links.below
     left = replace(upper, links=replace(upper.links, below=(replace(below, outside=True),)))
     answers = "`lower` answers every order that is not replaced, and stays so"
-    assert _of_ending(left, (), Verdict.PROVED) == Claim(Verdict.PROVED, (("upper", RUNS),), (answers,))
+    assert _of_ending(left, Ending("work", 0), Verdict.PROVED) == Claim(
+        Verdict.PROVED, (("upper", RUNS),), (answers,)
+    )
 
 
 # --- buffers ------------------------------------------------------------------------------
@@ -352,7 +366,7 @@ def test_what_an_extern_procedure_gives_in_one_cycle_is_not_what_it_gives_in_ano
     cycle = any_cycle(ts)
     asked = Confirmation((), (), cycle, cycle.cases, Keyed(), Limits())
     flow = Flow(ts, asked, [])
-    turns = flow._turns(1, ())
+    turns = flow._turns(1, (), ())
     given = [values.variables([turn.after["raw"]]) for turn in turns]
     mine = [{name for name in one if name.startswith("raw from ask")} for one in given]
     assert [len(one) for one in mine] == [1, 2, 3]  # one that is refused leaves what was given before

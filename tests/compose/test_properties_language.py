@@ -505,7 +505,7 @@ def test_features_that_come_later_come_last(upper: TransitionSystem) -> None:
 
 def chosen(ts: TransitionSystem, closely: int = 0) -> tuple[Predicate, ...]:
     start = ts.cycle(ts.havoc())
-    return every_predicate(ts, start, read(ts, start, obligations(ts, start)), closely)
+    return every_predicate(ts, start, read(start, obligations(ts, start)), closely)
 
 
 # --- invariants ---------------------------------------------------------------------------------

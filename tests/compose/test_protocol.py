@@ -11,10 +11,10 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.compose.contract.claims import Verdict
-from rcsc.compose.contract.obligations import Sort, unstated
+from rcsc.compose.contract.obligations import Sort, obligations, unstated
 from rcsc.compose.counterexample.trace import stopping
 from rcsc.compose.invariant.search import Effort
-from rcsc.compose.proof.level import essential, prove_level
+from rcsc.compose.proof.level import prove_level
 from rcsc.compose.proof.system import prove_transition_systems, transition_systems
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
@@ -67,8 +67,24 @@ def test_what_is_wrong_in_a_table_is_found(
 ) -> None:
     edit_file(dock.parent / f"{level}.rcs", (was, now))
     proof = prove_level(transition_systems(dock)[level], Effort(walks=6, cycles=40, looks=False))
-    broken = {(obligation.sort, obligation.name) for obligation in essential(proof)}
+    broken = {(obligation.sort, obligation.name) for obligation in proof.open}
     assert (sort, name) in broken, broken
+
+
+def test_every_field_of_an_order_is_numbered_but_a_declared_stream(tmp_path: Path, dock: Path) -> None:
+    """A target that changes under its number lets *done* of the last target be taken for the next: campaigns break it, too."""
+    by_hand = tmp_path / "by_hand"
+    shutil.copytree(DOCK.parent / "dock", by_hand, ignore=shutil.ignore_patterns(".rcsc-cache"))
+    edit_file(by_hand / "supervisor.rcs", (" or to_drive.target_mm /= old_order.target_mm", ""))
+    little = Effort(walks=6, cycles=40, looks=False)
+    proof = prove_level(transition_systems(by_hand / "system.toml")["supervisor"], little)
+    assert [(one.sort, one.name) for one in proof.open] == [(Sort.NUMBERED, "to_drive.target_mm")]
+    numbered = (Sort.NUMBERED, "", "to_drive.target_mm")
+    for owed in (True, False):
+        ts = transition_systems(dock)["supervisor"]
+        assert (numbered in {one.key for one in obligations(ts, ts.cycle(ts.havoc()))}) == owed
+        if owed:
+            edit_file(dock.parent / "words.rcs", ("    target_mm : ", "    stream target_mm : "))
 
 
 FORGETS = """
@@ -91,7 +107,7 @@ def test_a_table_that_looks_at_what_it_keeps_has_to_look_for_a_new_command(dock:
     begins = text.index("table goto"), text.index("table stop")
     drive.write_text(text[: begins[0]] + FORGETS + text[begins[1] :])
     proof = prove_level(transition_systems(dock)["drive"], Effort(walks=6, cycles=40, looks=False))
-    assert (Sort.ANSWERED, "goto") in {(one.sort, one.table) for one in essential(proof)}
+    assert (Sort.ANSWERED, "goto") in {(one.sort, one.table) for one in proof.open}
 
 
 BOUNDED = "else drive_silent answered within 250 cycles else drive_fault"

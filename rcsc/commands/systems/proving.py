@@ -37,7 +37,7 @@ from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
 from rcsc.compose.counterexample.trace import usual_length
 from rcsc.compose.invariant.cubes import shown
 from rcsc.compose.invariant.search import Effort
-from rcsc.compose.proof.level import LevelProof, besides, certificate
+from rcsc.compose.proof.level import LevelProof, certificate
 from rcsc.compose.proof.system import (
     SystemProof,
     lines_in,
@@ -221,17 +221,14 @@ def _of_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> It
                     f"  {sort.value:28} {obligation.name:24} {standing(whole, proof.level, obligation.key)}"
                 )
         elif obligations:
-            beside = [obligation.name for obligation in besides(proof) if obligation.sort is sort]
             good = [obligation for obligation in obligations if whole.of(proof.level, obligation.key).proved]
             trusts = trusting(whole, proof.level, [obligation.key for obligation in good])
-            yield f"  {sort.value}: {len(good)} of {len(obligations) - len(beside)} proved{trusts}"
+            yield f"  {sort.value}: {len(good)} of {len(obligations)} proved{trusts}"
             for obligation in obligations:
-                if obligation not in good and obligation.name not in beside:
+                if obligation not in good:
                     yield (
                         f"    {obligation.table or obligation.name or 'within a cycle'}: {standing(whole, proof.level, obligation.key)}"
                     )
-            if beside:
-                yield f"    beside the number, so that nobody relies on it: {', '.join(beside)}"
     for line in not_looked_at(proof):
         yield f"  {line}"
     many = len(proof.clauses)

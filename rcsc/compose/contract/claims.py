@@ -30,6 +30,8 @@ RESTING: Key = ("the command that rests ends", "", "")
 """What it rests on where the level above fails orders that are not answered in time."""
 CONTRACT, UNREACHED, AGAIN = "the contract", "never reached", "does nothing when it matches again"
 GIVEN = "what another level writes is as it assumes"
+STANDS: Key = ("its report stands once it has answered", "", "")
+"""What termination of a level above may rest on, where that reads more of it than echo and status."""
 """Sorts of claims that are no obligations of one cycle."""
 
 
@@ -175,6 +177,7 @@ def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> s
         SAFE: f"{sort} within a cycle",
         ENDING: "that its commands end was not looked at",
         RESTING: "that it comes to rest was not looked at",
+        STANDS: "that its report stands once it has answered was not shown",
     }
     words = phrases.get(need[1], " ".join(part for part in (sort, f"`{name}`" if name else "") if part))
     if sort == CONTRACT:

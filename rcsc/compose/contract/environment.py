@@ -80,11 +80,13 @@ class Below(Neighbour):
         late: The flag that it has not echoed in time; None where it is waited for without end.
         answers_in_time: Whether the flag says so, too, of an order that it has not answered in time.
         held: The command and the status that are held of its report; empty where the level holds them itself.
+        streams: Leaves of the order that are declared to change without a new number; a level that writes the protocol by hand has none.
     """
 
     late: str | None = None
     held: tuple[str, ...] = ()
     answers_in_time: bool = False
+    streams: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,17 +262,19 @@ def _declared(
                 failed=role.failed,
             )
         else:
-            below.append(_subordinate(owner, role, owner not in levels))
+            below.append(_subordinate(program, owner, role, owner not in levels))
     asked = _asked(system, level, program)
     used |= {leaf for one in asked for leaf in one.leaves}
     free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
     return Links(level, above, tuple(below), asked, free)
 
 
-def _subordinate(owner: str, role: Role, outside: bool) -> Below:  # as `Neighbour` has it
+def _subordinate(program: Program, owner: str, role: Role, outside: bool) -> Below:  # as `Neighbour` has it
     late = None if role.late is None else str(role.late)
     held = f"{role.peer}.command", f"{role.peer}.status"
-    own = late, held, role.answers_in_time
+    fixed = {f"{role.order}.{NUMBER}", *role.numbered}
+    streams = tuple(leaf for leaf in leaves_under(program, role.order) if leaf not in fixed)
+    own = late, held, role.answers_in_time, streams
     return Below(owner, role.order, role.report, outside, *own, done=role.done, failed=role.failed)
 
 

@@ -202,7 +202,7 @@ def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
         before, after = cycle.before[below.number], cycle.after[below.number]
         same = values.equal(before, after)
         for leaf in leaves_under(ts.program, below.order):
-            if leaf != below.number:
+            if leaf != below.number and leaf not in below.streams:
                 kept = values.equal(cycle.before[leaf], cycle.after[leaf])
                 yield Obligation(Sort.NUMBERED, "", leaf, values.follows(same, kept))
         yield Obligation(

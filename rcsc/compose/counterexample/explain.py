@@ -18,7 +18,7 @@ from rcsc.compose.counterexample.pair import followed_together
 from rcsc.compose.counterexample.repair import TRIED_CYCLES, helps, repairs
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_in_python, record
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, stopping, traces
-from rcsc.compose.proof.level import LevelProof, Verdict, essential
+from rcsc.compose.proof.level import LevelProof, Verdict
 from rcsc.compose.proof.system import SystemProof
 from rcsc.host.children import scratch
 from rcsc.run.description import Description
@@ -102,7 +102,7 @@ class TraceSettings:
 def explain(
     systems: Mapping[str, TransitionSystem], proof: SystemProof, settings: TraceSettings
 ) -> Iterator[Explanation]:
-    """Explain every essential obligation that is not proved, level by level.
+    """Explain every obligation that is not proved, level by level.
 
     Raises:
         NotBuilt: The C executors could not be built.
@@ -113,7 +113,7 @@ def explain(
         for level in proof.levels:
             for explanation in _level(systems, level, settings):
                 yield rerun.run(explanation)
-            for explanation in _together(systems, level.level, essential(level), settings):
+            for explanation in _together(systems, level.level, level.open, settings):
                 yield rerun.run(explanation)
             for explanation in _endless(systems[level.level], level, settings):
                 yield rerun.run(explanation)
@@ -122,7 +122,7 @@ def explain(
 def _level(
     systems: Mapping[str, TransitionSystem], proof: LevelProof, settings: TraceSettings
 ) -> Iterator[Explanation]:
-    wanted = essential(proof)
+    wanted = proof.open
     if not settings.most:
         yield from (Explanation(proof.level, obligation) for obligation in wanted)
         return

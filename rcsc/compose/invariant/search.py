@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from random import Random
 
-from rcsc.compose.contract.environment import COMMAND
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations
-from rcsc.compose.contract.predicates import CLOSELY, Predicate, compared, point
+from rcsc.compose.contract.predicates import CLOSELY, Predicate, point
 from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.contract.walk import Walk
@@ -93,10 +92,9 @@ def search(
     Raises:
         GaveUpError: The solver did.
     """
-    matter = [at for at, obligation in enumerate(wanted) if _matters(ts, obligation)]
-    reads = read(ts, cycle, wanted)
+    reads = read(cycle, wanted)
     states, ran = _walked(ts, effort)
-    invariant = FoundInvariant(open=frozenset(matter), states=states, ran=ran)
+    invariant = FoundInvariant(open=frozenset(range(len(wanted))), states=states, ran=ran)
     owed = [*(obligations(ts, first) for first in firsts), wanted]
     by_size = {
         len(chosen): chosen for chosen in (every_predicate(ts, cycle, reads, at) for at in range(CLOSELY + 1))
@@ -169,18 +167,9 @@ def _searched(
     return invariant, left_open
 
 
-def read(ts: TransitionSystem, cycle: Cycle, wanted: Sequence[Obligation]) -> list[Node]:
-    """Collect the obligations searched for and the contract; predicates are chosen from their cone."""
-    return [*(obligation.holds for obligation in wanted if _matters(ts, obligation)), cycle.contract]
-
-
-def _matters(ts: TransitionSystem, obligation: Obligation) -> bool:
-    """Return whether to search for an obligation: not for a field that the level never compares; nobody may rely on it."""
-    if obligation.sort is not Sort.NUMBERED:
-        return True
-    return obligation.name.endswith(f".{COMMAND}") or any(
-        obligation.name in pair for pair in compared(ts.program)
-    )
+def read(cycle: Cycle, wanted: Sequence[Obligation]) -> list[Node]:
+    """Collect the obligations and the contract; predicates are chosen from their cone."""
+    return [*(obligation.holds for obligation in wanted), cycle.contract]
 
 
 def _walked(

@@ -4,7 +4,7 @@ In: transition systems of all levels. Out: `Promise`s, each with the obligations
 they do. Source: Misra and Chandy, "Proofs of networks of processes", 1981; the induction over cycles is in `compose.__doc__`.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from rcsc.compose.contract.claims import (
@@ -17,6 +17,7 @@ from rcsc.compose.contract.claims import (
     RESTING,
     RUNS,
     SAFE,
+    STANDS,
     UNREACHED,
     Claim,
     Key,
@@ -29,6 +30,7 @@ from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER
 from rcsc.compose.contract.obligations import Sort, asks, resting_table
 from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
+from rcsc.compose.proof.termination import Ending
 from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
 
@@ -78,7 +80,9 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
             yield (AGAIN, "", ""), Claim(Verdict.PROVED, runs)
     for ending in proof.endings:
         verdict = Verdict.PROVED if ending.proved else Verdict.NOT_PROVED
-        yield (Sort.ENDS, ending.table, ""), _of_ending(ts, ending.still, verdict)
+        yield (Sort.ENDS, ending.table, ""), _of_ending(ts, ending, verdict)
+    if proof.stands and ts.links.above is not None:
+        yield STANDS, Claim(Verdict.PROVED, (*runs, (name, (Sort.ECHOES, "", ts.links.above.report))))
     if proof.endings:
         every = tuple((name, (Sort.ENDS, ending.table, "")) for ending in proof.endings)
         yield ENDING, Claim(Verdict.PROVED, every)
@@ -130,7 +134,7 @@ def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     yield SAFE, Claim(worst(within), rests)
 
 
-def _of_ending(ts: TransitionSystem, still: Iterable[str], verdict: Verdict) -> Claim:
+def _of_ending(ts: TransitionSystem, ending: Ending, verdict: Verdict) -> Claim:
     """Claim that a command ends, assuming that subordinates answer theirs and that some inputs stand still."""
     name, below = ts.level.name, ts.links.below
     trusts = [
@@ -140,13 +144,14 @@ def _of_ending(ts: TransitionSystem, still: Iterable[str], verdict: Verdict) -> 
         for other in below
         if other.outside
     ]
-    trusts += [f"the values in `{record}` of level `{name}` stand still meanwhile" for record in still]
+    trusts += [f"the values in `{record}` of level `{name}` stand still meanwhile" for record in ending.still]
     if asks(ts.program):
         trusts.append(f"extern procedures of level `{name}` are refused only finitely often")
     needs = tuple(
         (other.name, RESTING if other.answers_in_time else ENDING) for other in below if not other.outside
     )
-    return Claim(verdict, ((name, RUNS), *needs), tuple(trusts))
+    stand = tuple((other.name, STANDS) for other in below if other.report in ending.settled)
+    return Claim(verdict, ((name, RUNS), *needs, *stand), tuple(trusts))
 
 
 # --- what levels assume of each other ------------------------------------------------------

@@ -15,6 +15,7 @@ from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
@@ -105,10 +106,12 @@ def _starts(ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]
 
 def gives_an_order(ts: TransitionSystem, cycle: Cycle) -> Node:
     """Return the condition that the cycle gives an order."""
-    return values.any_of(
-        values.negation(values.equal(cycle.before[below.number], cycle.after[below.number]))
-        for below in ts.links.below
-    )
+    return values.any_of(orders_to(cycle, below) for below in ts.links.below)
+
+
+def orders_to(cycle: Cycle, below: Below) -> Node:
+    """Return the condition that the cycle gives this subordinate an order."""
+    return values.negation(values.equal(cycle.before[below.number], cycle.after[below.number]))
 
 
 def _lines(cycle: Cycle) -> Iterator[tuple[LineName, Node]]:

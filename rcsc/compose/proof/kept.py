@@ -18,7 +18,7 @@ from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.assume_guarantee import of_level
 from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import Context
-from rcsc.compose.proof.level import LevelProof, Verdict, essential
+from rcsc.compose.proof.level import LevelProof, Verdict
 from rcsc.compose.proof.standing import Verdicts, keep_verdicts
 from rcsc.compose.proof.termination import Ending
 from rcsc.host.cache import Cache
@@ -37,6 +37,7 @@ class _Kept:
     context: Context | None
     endings: tuple[Ending, ...]
     unstated: tuple[Unstated, ...]
+    stands: bool
 
 
 def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | None:
@@ -49,14 +50,14 @@ def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | N
     if [obligation.key for obligation in wanted] != [key for key, _ in kept.verdicts]:
         return None
     for closely in range(CLOSELY + 1):
-        chosen = every_predicate(ts, cycle, read(ts, cycle, wanted), closely)
+        chosen = every_predicate(ts, cycle, read(cycle, wanted), closely)
         if tuple(predicate.name for predicate in chosen) == kept.predicates:
             verdicts = tuple(
                 (goal, verdict) for goal, (_, verdict) in zip(wanted, kept.verdicts, strict=True)
             )
             proof = LevelProof(
                 ts.level.name, verdicts, chosen, kept.clauses, kept.walked, kept.learnt, kept.seconds, cached=True,
-                context=kept.context, endings=kept.endings, unstated=kept.unstated,
+                context=kept.context, endings=kept.endings, unstated=kept.unstated, stands=kept.stands,
             )  # fmt: skip
             keep_verdicts(cache, content(ts), _shortened(ts, proof))  # they may have been pruned
             return proof
@@ -70,7 +71,7 @@ def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) 
     kept = _Kept(
         tuple((obligation.key, verdict) for obligation, verdict in proof.verdicts),
         tuple(predicate.name for predicate in proof.predicates), proof.clauses, proof.walked, proof.learnt, proof.seconds,
-        proof.context, proof.endings, proof.unstated,
+        proof.context, proof.endings, proof.unstated, proof.stands,
     )  # fmt: skip
     cache.store(kept, *_key(ts, effort))
     keep_verdicts(cache, content(ts), _shortened(ts, proof))
@@ -81,7 +82,7 @@ def _shortened(ts: TransitionSystem, proof: LevelProof) -> Verdicts:
     claims = dict(of_level(ts, proof))
     return Verdicts(
         claims,
-        tuple(map(_with_table, essential(proof))),
+        tuple(map(_with_table, proof.open)),
         tuple(unstated.shown for unstated in proof.unstated if unstated.applies),
     )
 

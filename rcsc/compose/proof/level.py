@@ -12,7 +12,6 @@ from functools import partial
 
 from rcsc.compose.contract.claims import ACCEPTED
 from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of an obligation, too
-from rcsc.compose.contract.environment import COMMAND
 from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations, unstated
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
@@ -54,6 +53,7 @@ class LevelProof:
         context: Its lines in context; None if something is not proved.
         endings: Whether its commands end, table by table.
         unstated: Obligations that could not be stated, because part of the level was not recognised.
+        stands: Whether its report stands once it has answered.
     """
 
     level: str
@@ -67,6 +67,7 @@ class LevelProof:
     context: Context | None = None
     endings: tuple[Ending, ...] = ()
     unstated: tuple[Unstated, ...] = ()
+    stands: bool = False
 
     def verdict(self, sort: Sort, table: str = "", name: str = "") -> Verdict:
         """Return the verdict of an obligation.
@@ -83,21 +84,6 @@ class LevelProof:
     def open(self) -> tuple[Obligation, ...]:
         """The obligations that are not proved."""
         return tuple(obligation for obligation, verdict in self.verdicts if verdict not in ACCEPTED)
-
-
-def essential(proof: LevelProof) -> tuple[Obligation, ...]:
-    """List the open obligations except unnumbered fields, which nobody may assume; a command is always essential."""
-    beside = besides(proof)
-    return tuple(obligation for obligation in proof.open if obligation not in beside)
-
-
-def besides(proof: LevelProof) -> tuple[Obligation, ...]:
-    """List the order fields, commands apart, that change under the same number."""
-    return tuple(
-        obligation
-        for obligation in proof.open
-        if obligation.sort is Sort.NUMBERED and not obligation.name.endswith(f".{COMMAND}")
-    )
 
 
 def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache | None = None) -> LevelProof:
@@ -137,6 +123,7 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
     wanted = obligations(ts, cycle)
     seen: Context | None = None
     ends: tuple[Ending, ...] = ()
+    stands = False
     try:
         with smt.together(TOGETHER * effort.limits.steps):
             invariant = search(ts, firsts, cycle, wanted, effort, known.clauses)
@@ -145,7 +132,11 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
             looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open)
             flow = Flow(ts, asked, invariant.clauses)
             if looks and (
-                others := [*flow.no_loop_steps(), *never_run(asked, invariant.clauses, invariant.ran)]
+                others := [
+                    *flow.no_loop_steps(),
+                    *flow.wanted_to_stand(),
+                    *never_run(asked, invariant.clauses, invariant.ran),
+                ]
             ):
                 found = invariant.clauses
                 invariant = strengthened(ts, firsts, cycle, invariant, others)
@@ -156,9 +147,10 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
             verdicts = list(_verdicts(ts, asked, invariant, wanted))
             if looks:
                 seen, ends = context(ts, asked, invariant.clauses, invariant.ran), tuple(flow.endings())
+                stands = flow.report_stands()
             _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
-        invariant, seen, ends = FoundInvariant(), None, ()
+        invariant, seen, ends, stands = FoundInvariant(), None, (), False
         verdicts = [(obligation, Verdict.UNDECIDED) for obligation in wanted]
     return LevelProof(
         ts.level.name,
@@ -171,6 +163,7 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
         context=seen,
         endings=ends,
         unstated=(*unstated(ts), *(Unstated(Sort.ENDS, "", why) for why in no_answers(ts))),
+        stands=stands,
     )
 
 
@@ -302,8 +295,8 @@ def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS
     `first` and `restart`: such a cycle leads into the invariant; `step TABLE`: a later cycle in which this table runs keeps
     it; `goals first`, `goals restart`: such cycles fulfil the obligations that are proved; `goals SORT`: every cycle from the
     invariant fulfils those of one sort; `lines N`: the lines in their context; `ends TABLE N`: no step is taken that was not
-    found, counters rise, and there is no other loop. If lines or endings, asked again, differ from the proof, one question
-    has a model.
+    found, counters rise, and there is no other loop; `stands N`: the report stands once it has answered.
+    If lines or endings, asked again, differ from the proof, one question has a model.
     """
     cycle, firsts = ts.cycle(ts.havoc()), _firsts(ts)
     asked = _asked_anew(proof.predicates, tuple(firsts.values()), cycle, limits)
@@ -330,11 +323,13 @@ def _looked_again(ts: TransitionSystem, proof: LevelProof, asked: Confirmation) 
     assert proof.context is not None
     seen = replace(context(ts, asked, proof.clauses), unsure=proof.context.unsure)
     scripts = {f"lines {number}": text for number, text in enumerate(_refuted(asked), 1)}
-    ends = []
-    for ending in Flow(ts, asked, proof.clauses).endings():
+    ends, flow = [], Flow(ts, asked, proof.clauses)
+    for ending in flow.endings():
         ends.append(ending)
         scripts |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
-    if (seen, tuple(ends)) != (proof.context, proof.endings):
+    stands = flow.report_stands()
+    scripts |= {f"stands {number}": text for number, text in enumerate(_refuted(asked), 1)}
+    if (seen, tuple(ends), stands) != (proof.context, proof.endings, proof.stands):
         scripts["lines and endings as before"] = "(set-logic ALL)\n(check-sat)\n"
     return scripts
 

@@ -7,7 +7,7 @@ reachability", 2005): once one that never goes back is found, only cycles that l
 weights of a sum are guessed from cycles that the solver shows, and then asked about.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import product
@@ -67,6 +67,7 @@ class Turn:
         orders: That an order is given.
         unanswered: That the command is not answered.
         answered: That the last orders are answered.
+        ordered: For the report of each subordinate, that an order is given to that one.
     """
 
     at: TableAt
@@ -77,6 +78,7 @@ class Turn:
     orders: Node
     unanswered: Node
     answered: Node
+    ordered: Mapping[str, Node]
 
     @property
     def quiet(self) -> Node:
@@ -90,6 +92,7 @@ class Turn:
             self.orders,
             self.unanswered,
             self.answered,
+            *self.ordered.values(),
             *(when for _, when in self.at.lines),
         ]
         return asked + [leaves[name] for name, _ in owned(program) for leaves in (self.before, self.after)]
@@ -101,48 +104,75 @@ class StoppingLines:
 
     Attributes:
         counted: Lines that stop because of a counter; where one has several, the first that counts comes first.
-        still: Inputs whose values, echoes and statuses apart, are assumed constant meanwhile.
-        endless: Lines that are not shown to stop, even if all inputs are constant.
+        still: Inputs from outside the levels whose values, echoes and statuses apart, are assumed constant meanwhile.
+        settled: Reports of levels that are assumed to stand, as these get no order any more and have answered the last.
+        endless: Lines that are not shown to stop, even if all such inputs are constant.
     """
 
     counted: tuple[RisingLine, ...]
     still: tuple[str, ...]
     endless: tuple[str, ...]
+    settled: tuple[str, ...] = ()
 
 
-Turns: TypeAlias = Callable[[tuple[str, ...]], tuple[Turn, Turn, Turn]]
-"""Three cycles in a row in which these inputs keep their values, echoes and statuses apart."""
+Turns: TypeAlias = Callable[[tuple[str, ...], tuple[str, ...]], tuple[Turn, Turn, Turn]]
+"""Three cycles in a row in which inputs keep their values, echoes and statuses apart: some as they are, others as they are reports of
+subordinates that have answered and get no order."""
 
 
 def lines_that_stop(
-    program: Program, asked: Confirmation, clauses: Sequence[Clause], turns: Turns
+    program: Program,
+    asked: Confirmation,
+    clauses: Sequence[Clause],
+    turns: Turns,
+    outside: Container[str],
+    answering: Container[str],
 ) -> StoppingLines:
-    """Show that lines stop, with as few constant inputs as possible; follow reals only if something is left without."""
-    free = turns(())
+    """Show that lines stop, with as few constant inputs as possible; follow reals only if something is left without.
+
+    Only inputs from outside the levels are taken to be constant, and reports of subordinates that answer: for good, where no line may
+    give them orders for ever. Of what else a level writes nothing is taken for granted.
+    """
+    free = turns((), ())
     first = ranking = _Ranking(program, asked, clauses, free)
     still: tuple[str, ...] = ()
+    settled: tuple[str, ...] = ()
     rested_on = [ranking.solver]
     if ranking.endless and any(isinstance(kind, Real) for _, kind in owned(program)):
         first = ranking = _Ranking(program, asked.in_other_terms(Measured()), clauses, free, first)
         rested_on.append(ranking.solver)
     if ranking.endless:
         read = _read_again(program, free)
-        still = tuple(name for name in inputs(program) if name in read)
-        ranking = _Ranking(program, asked, clauses, turns(still), first)
+        still = tuple(name for name in inputs(program) if name in read and name in outside)
+        if still:
+            ranking = _Ranking(program, asked, clauses, turns(still, ()), first)
+        if ranking.endless and (settled := _settled(ranking, read, answering)):
+            rested_on.append(ranking.solver)
+            ranking = _Ranking(program, asked, clauses, turns(still, settled), first)
     if not ranking.endless:
 
         def stop(names: tuple[str, ...]) -> bool:
             nonlocal ranking
-            without = _Ranking(program, asked, clauses, turns(names), first)
+            without = _Ranking(program, asked, clauses, turns(names, settled), first)
             ranking = ranking if without.endless else without
             return not without.endless
 
         still = fewest(still, stop)
-    if still:
+    if still or settled:
         rested_on.append(ranking.solver)
     asked.rested_on += rested_on
     endless = tuple(str(first.turn.at.lines[line][0].name) for line in sorted(ranking.endless))
-    return StoppingLines(_first_of_each(ranking.counted), () if endless else still, endless)
+    taken = ((), ()) if endless else (still, settled)
+    return StoppingLines(_first_of_each(ranking.counted), taken[0], endless, taken[1])
+
+
+def _settled(ranking: "_Ranking", read: Container[str], answering: Container[str]) -> tuple[str, ...]:
+    """List the reports that are read of subordinates that answer and that no line may give orders for ever."""
+    return tuple(
+        report
+        for report in ranking.turn.ordered
+        if report in read and report in answering and not ranking.orders_for_ever(report)
+    )
 
 
 def _first_of_each(counted: Sequence[Sequence[RisingLine]]) -> tuple[RisingLine, ...]:
@@ -224,6 +254,7 @@ class _Ranking:
         term = asked.keyed.term
         stay = [term(turn.stays) for turn in turns]
         self.orders, self.quiet = term(self.turn.orders), smt.all_of([term(turn.quiet) for turn in turns])
+        self.ordered = {report: term(node) for report, node in self.turn.ordered.items()}
         waits = term(self.turn.unanswered)
         matches = [[term(match) for _, match in turn.at.lines] for turn in turns]
         self.numbers = [
@@ -264,6 +295,10 @@ class _Ranking:
     def endless(self) -> set[int]:
         """The lines that are not shown to stop."""
         return self.restless | self.unanswered
+
+    def orders_for_ever(self, report: str) -> bool:
+        """Return whether some lines may give the subordinate that reports so orders for ever."""
+        return bool(self._unstopped(self.always, smt.truth(True), self.ordered[report], None))
 
     def _unstopped(self, steps: set[LinePair], when: Term, then: Term, among: set[int] | None) -> set[int]:
         """Return the lines, of those in `among`, that may do `then` again and again on a loop of lines."""

@@ -18,7 +18,7 @@ from rcsc.compose.contract.transition import Safety, TransitionSystem
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements, claims, other_end
 from rcsc.compose.proof.kept import keep, recall
-from rcsc.compose.proof.level import LevelProof, Verdict, besides, essential, prove_level
+from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
@@ -54,19 +54,18 @@ class SystemProof:
 
     @property
     def proved(self) -> bool:
-        """Whether every essential obligation, and every agreement between levels, is accepted."""
-        return all(not essential(proof) for proof in self.levels) and all(
+        """Whether every obligation, and every agreement between levels, is accepted."""
+        return all(not proof.open for proof in self.levels) and all(
             agreement.holds for agreement in self.agreements
         )
 
     @property
     def whole(self) -> bool:
         """Whether it is proved, nothing is unstated, and nothing rests on what is not proved."""
-        besides_ = {(proof.level, obligation.key) for proof in self.levels for obligation in besides(proof)}
         return (
             self.proved
             and not any(missing.applies for proof in self.levels for missing in proof.unstated)
-            and all(claim.proved for need, claim in self.closed.items() if need not in besides_)
+            and all(claim.proved for claim in self.closed.values())
         )
 
     def of(self, level: str, key: Key) -> Closed:

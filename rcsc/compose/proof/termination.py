@@ -19,6 +19,9 @@ it is *unanswered* while it reports neither; no other status answers. The argume
   stops the line. A real has to move by a share of its range (`SMALLEST`), found in fractions
   (`measured`). Lines that stop are taken out, and what is left is examined again.
 - A line that gives orders must have one, at least for the cycles in which it does so. So orders end.
+- A line may give orders as what a subordinate reports changes. The report of a level that answers, and that no line gives orders for ever,
+  stands from some time on: that is asked of that level (`stands`). Values from outside may be assumed to stand still, which is printed;
+  of what else a level writes, such as a stream of the superior, nothing is.
 - Then answers come, and stay. The lines that are left may form no loop in answered cycles that give no order, except loops that
   leave the command unanswered only finitely often.
 
@@ -28,12 +31,20 @@ Lines for which this is not shown are named in `endless`: they wait for what the
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from rcsc.compose.contract.environment import ECHO, ECHOED, NUMBER, STATUS, Below, Neighbour
+from rcsc.compose.contract.environment import (
+    ECHO,
+    ECHOED,
+    NUMBER,
+    STATUS,
+    Below,
+    Neighbour,
+    leaves_under,
+)
 from rcsc.compose.contract.obligations import ANSWER, FLAG, SETTLES, command_stays
 from rcsc.compose.contract.transition import Cycle, Leaves, TableAt, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
-from rcsc.compose.proof.context import gives_an_order, of_lines
+from rcsc.compose.proof.context import gives_an_order, of_lines, orders_to
 from rcsc.compose.proof.ranking import RisingLine, Turn, lines_that_stop, parts
 from rcsc.compose.proof.staying import in_a_row, while_it_stays
 from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending
@@ -56,7 +67,8 @@ class Ending:
     Attributes:
         changes: How often the phase can change after the cycle that takes the command; None if phases or tables may loop.
         counted: Lines that stop because of a counter; of several of one line each counts while those before it stay.
-        still: Inputs whose values, echoes and statuses apart, are assumed constant meanwhile.
+        still: Inputs from outside the levels whose values, echoes and statuses apart, are assumed constant meanwhile.
+        settled: Reports of levels that have to stand once these have answered (`stands`).
         endless: Lines that are not shown to stop.
     """
 
@@ -65,6 +77,7 @@ class Ending:
     counted: tuple[RisingLine, ...] = ()
     still: tuple[str, ...] = ()
     endless: tuple[str, ...] = ()
+    settled: tuple[str, ...] = ()
 
     @property
     def proved(self) -> bool:
@@ -109,6 +122,36 @@ def answered(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
         return ended
     rests = values.equal(cycle.before[below.command], values.constant(ts.kinds[below.command], 0))
     return values.either(ended, values.both(cycle.middle[below.late], values.negation(rests)))
+
+
+def _says_more(ts: TransitionSystem, report: str) -> bool:
+    """Return whether a report has fields besides what it echoes and its status."""
+    made = {f"{report}.{part}" for part in (ECHO, ECHOED, STATUS)}
+    return not made.issuperset(leaves_under(ts.program, report))
+
+
+def stands(ts: TransitionSystem, cycle: Cycle) -> Node:
+    """Return the condition that a report which answers a command stays as it is while it is about that command.
+
+    Asked where the report echoes the order that was taken last (`ECHOES`); a cycle that ends early may have left an older one, whose
+    number does not come again.
+    """
+    above = ts.links.above
+    assert above is not None
+    rests = values.equal(cycle.before[above.echoed], values.constant(ts.kinds[above.command], 0))
+    failed = values.both(values.negation(rests), _says(ts, above.status, cycle.before, above.failed))
+    ended = values.either(_says(ts, above.status, cycle.before, above.done), failed)
+    again = values.all_of(
+        values.equal(cycle.before[here], there)
+        for here, there in (
+            (above.echo, cycle.after[above.echo]),
+            (above.echo, cycle.before[above.number]),
+            (above.echoed, cycle.before[above.command]),
+        )
+    )
+    leaves = leaves_under(ts.program, above.report)
+    same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in leaves)
+    return values.follows(values.both(ended, again), same)
 
 
 def _ended(ts: TransitionSystem, end: Neighbour, ordered: Leaves, reported: Leaves) -> Node:
@@ -187,10 +230,33 @@ class Flow:
     def _ending(self, number: int, *, loops: bool) -> Ending:
         changes = self._phases(number).changes
         stopping = lines_that_stop(
-            self.ts.program, self.staying(number), self.clauses, lambda still: self._turns(number, still)
+            self.ts.program,
+            self.staying(number),
+            self.clauses,
+            lambda still, settled: self._turns(number, still, settled),
+            from_outside(self.ts),
+            {each.report for each in self.ts.links.below if not (each.outside or each.answers_in_time)},
         )
         table = str(self.tables[number].table.name)
-        return Ending(table, None if loops else changes, stopping.counted, stopping.still, stopping.endless)
+        known = stopping.counted, stopping.still, stopping.endless, stopping.settled
+        return Ending(table, None if loops else changes, *known)
+
+    def wanted_to_stand(self) -> list[Node]:
+        """List the condition that the report stands, if a level above may go by its fields."""
+        above = self.ts.links.above
+        if above is None or above.outside or not reports(self.ts) or not _says_more(self.ts, above.report):
+            return []
+        return [stands(self.ts, self.asked.cycle)]
+
+    def report_stands(self) -> bool:
+        """Return whether the level's report stands once it has answered, as termination above may need it."""
+        if not reports(self.ts):
+            return False
+        solver = self.asked.known(self.clauses)
+        broken = self.asked.keyed.term(values.negation(stands(self.ts, self.asked.cycle)))
+        solver.add(*self.asked.keyed.ranges)
+        self.asked.rested_on.append(solver)
+        return not may(solver, broken)
 
     def no_loop_steps(self) -> list[Node]:
         """List the conditions to be proved: for each step on a loop of phases, that it is not taken."""
@@ -297,20 +363,28 @@ class Flow:
 
     # --- three cycles in a row ---
 
-    def _turns(self, number: int, still: tuple[str, ...]) -> tuple[Turn, Turn, Turn]:
-        """Return three cycles of a table in a row, from anywhere in the invariant, in which these inputs keep their values."""
+    def _turns(
+        self, number: int, still: tuple[str, ...], settled: tuple[str, ...]
+    ) -> tuple[Turn, Turn, Turn]:
+        """Return three cycles of a table in a row, from anywhere in the invariant, in which these inputs keep their values.
+
+        Those who report what is `settled` have answered, and get no order.
+        """
         first = self.staying(number).cycle
-        kept = {leaf: taken for leaf, taken in first.taken.items() if _stands_still(leaf, still)}
+        kept = {leaf: taken for leaf, taken in first.taken.items() if _stands_still(leaf, (*still, *settled))}
         row = in_a_row(self.ts, first, self._phases(number).leaves, kept)
-        one, two, three = (self._turn(cycle, number) for cycle in row)
+        one, two, three = (self._turn(cycle, number, settled) for cycle in row)
         return one, two, three
 
-    def _turn(self, cycle: Cycle, number: int) -> Turn:
+    def _turn(self, cycle: Cycle, number: int, settled: tuple[str, ...]) -> Turn:
         """Return the cycle of a table in which the command and the phase stay."""
         leaves = self._phases(number).leaves
         same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in leaves)
         at = cycle.tables[number]
-        stays = values.all_of((at.chosen, cycle.contract, command_stays(self.ts, cycle), same))
+        ordered = {below.report: orders_to(cycle, below) for below in self.ts.links.below}
+        has = {below.report: answered(self.ts, cycle, below) for below in self.ts.links.below}
+        rest = (values.both(has[report], values.negation(ordered[report])) for report in settled)
+        stays = values.all_of((at.chosen, cycle.contract, command_stays(self.ts, cycle), same, *rest))
         orders = gives_an_order(self.ts, cycle)
         return Turn(
             at,
@@ -320,7 +394,8 @@ class Flow:
             stays,
             orders,
             unanswered(self.ts, cycle),
-            values.all_of(answered(self.ts, cycle, below) for below in self.ts.links.below),
+            values.all_of(has.values()),
+            ordered,
         )
 
     # --- from table to table ---
@@ -362,6 +437,12 @@ def _are(nodes: Sequence[Node], phase: Phase) -> list[Node]:
         values.equal(node, values.constant(node.kind, value))
         for node, value in zip(nodes, phase, strict=True)
     ]
+
+
+def from_outside(ts: TransitionSystem) -> set[str]:
+    """Return the inputs, as records, that no level writes: of these alone it is taken for granted that they stand still."""
+    written = {leaf.partition(".")[0] for leaf in ts.inputs if ts.links.written_as(leaf) is not None}
+    return {leaf.partition(".")[0] for leaf in ts.inputs} - written
 
 
 def _stands_still(leaf: str, still: tuple[str, ...]) -> bool:
