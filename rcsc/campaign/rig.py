@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar
 
 from rcsc.episodes.outcome import EpisodeOutcome
+from rcsc.episodes.proved.claims import NOTHING, Claims
 from rcsc.host.files.read import MOST_OF_OURS, content
 from rcsc.run.description import BadDescription, description
 from rcsc.run.executors import NotBuilt
@@ -74,6 +75,7 @@ class EpisodeKind(Generic[E]):
             which is all that a kill loses.
         extra: The extra of the package that it needs.
         takes_script: Whether `draw` takes a script.
+        watched: As `run`, and watches what was proved of the system; None where episodes of the kind cannot.
         told: What happens in an episode, in words, a line each.
     """
 
@@ -89,6 +91,7 @@ class EpisodeKind(Generic[E]):
     extra: str = "log"
     takes_script: bool = True
     told: Callable[[E], tuple[str, ...]] = _untold
+    watched: Callable[[E, Path, Path | None, Claims], EpisodeOutcome] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +103,7 @@ class Rig(Generic[E]):
         plant: As `--plant` names it; empty for the description's first.
         script: What is ordered; empty where nobody says.
         limit_s: Seconds of the clock after which an episode hangs; generous, so that a busy machine changes nothing.
+        claims: What was proved of the system, to be watched.
     """
 
     kind: EpisodeKind[E]
@@ -108,6 +112,13 @@ class Rig(Generic[E]):
     executor: Kind = "c"
     script: str = ""
     limit_s: float = 120.0
+    claims: Claims = NOTHING
+
+    def run(self, episode: E, log: Path | None) -> EpisodeOutcome:
+        """Run an episode, with what was proved watched where its kind can."""
+        if self.kind.watched is None or not self.claims.levels:
+            return self.kind.run(episode, self.system, log)
+        return self.kind.watched(episode, self.system, log, self.claims)
 
     def episode(self, seed: int, index: int) -> E:
         """Episode `index` of the campaign of `seed`."""
@@ -158,6 +169,7 @@ def digest(rig: Rig[Any]) -> str:
     hashed = hashlib.sha256()
     for name, fingerprint in fingerprints(description(rig.system)).items():
         hashed.update(f"{name} {fingerprint}\n".encode())
+    hashed.update(f"claims {rig.claims.digest if rig.claims.levels else ''}\n".encode())
     for name, path in (("system", rig.system), *rig.kind.files(rig.system, rig.plant, rig.script)):
         held = content(path, MOST_OF_OURS) if path.is_file() else b""
         hashed.update(f"{name} {len(held)}\n".encode() + held)

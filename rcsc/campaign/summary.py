@@ -11,9 +11,23 @@ from typing import Any
 
 from rcsc.campaign.journal import EpisodeRecord
 from rcsc.campaign.rig import LineName
+from rcsc.episodes.proved.claims import Claim, Claims, Unwatched
+from rcsc.episodes.proved.watch import ProvedHolds
+from rcsc.episodes.stand import Stand
 
 NOMINAL = "nominal"
 _FIRST = ("done", "failed", "refused")
+_DIGITS = 16
+"""Of a proof's digest, as it is shown."""
+_KINDS = {
+    "SOME_LINE": "some line matches", "ONE_LINE": "no two match", "NO_DEFAULT": "DEFAULT unreachable", "UNREACHED": "lines never reached",
+    "ASSUMPTION": "assumptions", "INVARIANT": "invariants",
+    "OWED": "facts of other levels", "PROPERTY": "properties", "ENDS": "commands end", "CONTRACT": "agreements",
+    "SAFE": "values in range", "AGAIN": "lines that match again", "DEFERRED": "deferred states",
+    "ECHOES": "echoes", "NUMBERED": "numbered fields", "NEXT_NUMBER": "numbers", "WAITS": "waits for the echo",
+    "PAUSES": "PAUSE passed on", "ONCE": "taken up once", "ANSWERED": "no command passed over",
+}  # fmt: skip
+"""What a kind of claim is called where its claims are counted."""
 _WIDEST_SHOWN = 12
 """Lines of a table that are named where they were never reached."""
 
@@ -111,6 +125,65 @@ def as_text(summed: Summary) -> str:
     if summed.broken:
         parts.insert(1, _properties(summed.broken))
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What was proved of a system, and how much of it episodes watch.
+
+    Attributes:
+        watched: Claims that are, by level; `unwatched`, those that cannot be, each with why, `proofs` which proofs they are from.
+        why: Why there are none; empty where there are.
+    """
+
+    watched: Mapping[str, tuple[Claim, ...]]
+    unwatched: tuple[Unwatched, ...]
+    proofs: Mapping[str, str]
+    why: str = ""
+
+
+def watched(claims: Claims, its: Stand) -> Watched:
+    """Find which claims episodes on a stand watch."""
+    if not claims.levels:
+        return Watched({}, (), {}, claims.why)
+    holds = ProvedHolds(claims, its)
+    by_level = {
+        level.name: tuple(claim for claim in holds.watched if claim.level == level.name)
+        for level in claims.levels
+    }
+    proofs = {level.name: level.proof for level in claims.levels}
+    return Watched(by_level, tuple(holds.unwatched), proofs, claims.why)
+
+
+def watched_text(of: Watched) -> list[str]:
+    """Say which claims were watched, from which proof, and which could not be."""
+    if of.why:
+        return [f"no claim of a proof is watched: {of.why}"]
+    many = sum(map(len, of.watched.values()))
+    lines = [f"{many} of {many + len(of.unwatched)} claims that `rcsc prove` calls proved are watched"]
+    for level, claims in of.watched.items():
+        kinds = Counter(_KINDS.get(claim.kind, claim.kind) for claim in claims)
+        named = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+        lines.append(f"  level {level}, proof {of.proofs[level][:_DIGITS]}: {named or 'none'}")
+    lines += [f"  not watched: {level_claim(claim)}: {why}" for claim, why in of.unwatched]
+    return lines
+
+
+def level_claim(claim: Claim) -> str:
+    """Spell a claim with its level."""
+    return f"level `{claim.level}`: {claim.words}"
+
+
+def watched_json(of: Watched) -> dict[str, Any]:
+    """Return the same as JSON values."""
+    return {
+        "watched": {level: [claim.words for claim in claims] for level, claims in of.watched.items()},
+        "proofs": dict(of.proofs),
+        "not_watched": [
+            {"level": claim.level, "claim": claim.words, "why": why} for claim, why in of.unwatched
+        ],
+        "why_none": of.why,
+    }
 
 
 def as_json(summed: Summary) -> dict[str, Any]:

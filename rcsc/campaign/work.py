@@ -117,7 +117,7 @@ def attempt(rig: Rig[E], episode: E, log: Path | None = None) -> EpisodeOutcome:
     """
     try:
         with within(rig.limit_s):
-            return rig.kind.run(episode, rig.system, log)
+            return rig.run(episode, log)
     except _OutOfTime:
         return odd(HANG, EpisodeFinding(ENDS, 0, no_end(rig)))
     except rig.kind.not_in_order:

@@ -25,6 +25,6 @@ Trusted: that only what was proved is emitted, which the types say (`lower` take
 
 Modules, in the order the data flows: `settings` (what commands are given and hand back), `unchanged` (a whole check
 remembered), `proofs` (of one program), `pipeline` (read, resolve, prove), `outline` and `together` (what earlier proofs of
-the levels say); then one for each command: `check`, `compile`, `trials` (`rcsc test`), `certified` (`rcsc certify`),
-`reformat` (`rcsc fmt`).
+the levels say), `watched` (what was proved of them, for `rcsc campaign`); then one for each command: `check`, `compile`, `trials`
+(`rcsc test`), `certified` (`rcsc certify`), `reformat` (`rcsc fmt`).
 """

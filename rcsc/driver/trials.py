@@ -150,6 +150,7 @@ def _in_plant(path: Path, generated: Generated, effort: TestEffort) -> tuple[tup
 
 def _figure(word: str, its: Stand, searched: Searched, kinds: Sequence[str], spec: PlantSpec | None) -> str:
     """What was run of a system's episodes, and what was left out."""
+    ran = sum(bool(line) for _, _, line in searched.lines)  # a cycle that an input ended ran none
     lines = sum(
         len(its.signs[level.name].tables[table])
         for level in its.system.levels
@@ -159,7 +160,7 @@ def _figure(word: str, its: Stand, searched: Searched, kinds: Sequence[str], spe
     same = "C and Python the same" if len(kinds) > 1 else "in Python alone: extern procedures have no C here"
     excused = f", {searched.excused} with what a stale or forged value explains" if searched.excused else ""
     return (
-        f"system {word}: {searched.episodes} episodes {where}, {searched.cycles} cycles, {len(searched.lines)} of {lines} lines, "
+        f"system {word}: {searched.episodes} episodes {where}, {searched.cycles} cycles, {ran} of {lines} lines, "
         f"{same}{excused}"
     )
 

@@ -20,11 +20,15 @@ answered for good, every command ends in time once nothing goes wrong, and wheth
 plant's own methods with the result `Property` hold. Only an older value that comes again breaks what the proofs rest on; what follows
 from it is *excused*, with the fault that explains it, and so is what a false reading makes untrue of an assumption about it.
 
+Where no plant is given, what comes from outside moves in its range, and whoever is ordered obeys (`subordinates`). What was proved of the
+levels is watched as well (`proved`).
+
 The same seed draws the same episode; the same episode has the same outcome, with the executors in C and those in Python. Trusted:
 the plant, and the reference interpreter for what a property means. An episode proves nothing: that is `rcsc prove`. It costs some 0.1 ms a
 cycle and level.
 
 Modules, in the order the data flows: `episode` and `outcome` (values), `stand` (what a system declares), `harm` (buffers in which something
-goes wrong), `operator` (who orders), `cycle` (what a property sees), `properties`, `explain` (whose fault it is), `loop` (runs one),
-`sampling` (draws one), `search` (looks for one that breaks a property, with Hypothesis).
+goes wrong), `operator` (who orders), `subordinates` (who obeys, where there is no plant), `cycle` (what a property sees), `proved` (what
+was proved), `properties`, `explain` (whose fault it is), `loop` (runs one), `sampling` (draws one), `search` (looks for one that breaks a
+property, with Hypothesis).
 """

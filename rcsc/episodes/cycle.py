@@ -23,12 +23,14 @@ class Broken(NamedTuple):
         message: With the values that show it.
         level: Where it was seen; empty for what the plant itself says.
         leaves: That it is about, where only readings of these explain it; empty where any level that was misled does.
+        proved: Whether it was proved: then only older values that came again explain it.
     """
 
     property: str
     message: str
     level: str = ""
     leaves: tuple[str, ...] = ()
+    proved: bool = False
 
 
 @dataclass(slots=True)

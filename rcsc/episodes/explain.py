@@ -23,11 +23,13 @@ class Explanations:
     Attributes:
         misled: Levels that saw what no buffer may say, each with the fault.
         forged: By level, its leaves that did not come as the plant said, each with the fault.
+        repeated: Levels that were misled by older values that came again, each with the fault.
     """
 
     stand: Stand
     misled: dict[str, str] = field(default_factory=dict)
     forged: dict[str, dict[str, str]] = field(default_factory=dict)
+    repeated: dict[str, str] = field(default_factory=dict)
 
     def note(self, changed: Mapping[str, str], places: Mapping[str, Collection[int]] | None = None) -> None:
         """A tick is done.
@@ -37,13 +39,16 @@ class Explanations:
             places: Of such a buffer, the leaves that did not; none where all may not have.
         """
         for level, other in self._neighbours():
-            if level in self.misled:
-                self.misled.setdefault(other, self.misled[level])
+            for known in (self.misled, self.repeated):
+                if level in known:
+                    known.setdefault(other, known[level])
         for wire in self.stand.system.wires:
             because = changed.get(wire.source)
             level, _, variable = wire.target.partition(".")
             if because is None or level not in self.stand.signs:
                 continue
+            if not (places or {}).get(wire.source):
+                self.repeated.setdefault(level, because)
             if wire.source in self.stand.protocol or wire.source.partition(".")[0] in self.stand.signs:
                 self.misled.setdefault(level, because)
             else:
@@ -64,6 +69,8 @@ class Explanations:
 
     def because(self, broken: Broken) -> str:
         """The fault that explains it; empty for none."""
+        if broken.proved:
+            return self.repeated.get(broken.level, "")
         if not broken.level:
             faults = [
                 *self.misled.values(),

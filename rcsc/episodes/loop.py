@@ -5,7 +5,7 @@ In: an episode and the description of a system, compiled. Out: an `EpisodeOutcom
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rcsc.episodes.cycle import MOST_MESSAGE, Broken, Cycle
@@ -15,7 +15,9 @@ from rcsc.episodes.harm import HarmedMemory, Held
 from rcsc.episodes.operator import WAITING, EpisodeOperator, operator, value_of
 from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome, Excused
 from rcsc.episodes.properties import ENDS, NO_ERROR, properties, was_refused
+from rcsc.episodes.proved.claims import NOTHING, Claims
 from rcsc.episodes.stand import Field, Stand, stand
+from rcsc.episodes.subordinates import subordinates
 from rcsc.run.faults import faults_of, switch
 from rcsc.run.levels import BadState, RunningLevel, StateTableError, running_level
 from rcsc.run.orders.numbered import Latest
@@ -34,20 +36,23 @@ RAISES = "the plant raises nothing"
 RESTARTS = "starts anew"
 
 
-def run(episode: Episode, system: str | Path, log: Path | None = None) -> EpisodeOutcome:
+def run(
+    episode: Episode, system: str | Path, log: Path | None = None, claims: Claims = NOTHING
+) -> EpisodeOutcome:
     """Runs it to its end, with every property watching.
 
     Args:
         episode: What to run.
         system: The description; its generated executors are used as they are.
         log: Where to keep every cycle (MCAP); none by default.
+        claims: What was proved of the system, which is watched, too.
 
     Raises:
         CodedError: The system or its plant is not in order; nothing has moved.
         ValueError: The episode names what the system has not.
         OSError: The log cannot be written.
     """
-    loop = Loop(episode, stand(Path(system)))
+    loop = Loop(episode, stand(Path(system)), claims)
     if log is None:
         return loop.finish()
     from rcsc.run.log.recorder import Recorder  # of an extra
@@ -147,7 +152,7 @@ class Loop:
         CodedError, ValueError: As `check`.
     """
 
-    def __init__(self, episode: Episode, its: Stand) -> None:
+    def __init__(self, episode: Episode, its: Stand, claims: Claims = NOTHING) -> None:
         self.episode, self._its = episode, its
         self._stage, self.operator, fields = _checked(episode, its)
         refuse_unproved(its.system)
@@ -156,24 +161,27 @@ class Loop:
             buffer.name: tuple(leaf.initial for leaf in buffer.leaves) for buffer in its.outside
         }
         self._memory = HarmedMemory(episode.harms, (one for _, one in fields), first)
-        self._held, self._refused = fields, [(at, one) for at, one in fields if at.refuses(one.value)]
+        self._held = fields
         by_level = executors(its.system, its.signs, episode.executor)
         levels = tuple(
             running_level(spec, its.system, its.signs[spec.name], by_level[spec.name], self._stage.queries)
             for spec in its.system.levels
         )
-        parts: tuple[Outside, ...] = (self.operator, _Ordered(self._switch), *self._stage.outside)
+        others = self._stage.outside or subordinates(its, episode.seed)
+        parts: tuple[Outside, ...] = (self.operator, _Ordered(self._switch), *others)
         outside = Together(None, parts, first, frozenset(its.buffers))
         self.system = System(its.system, levels, (outside,), self._memory, watch=[self._after])
         self.cycle = Cycle(
             {level.name: level for level in levels}, self._stage.plants, self.operator, self._memory.said,
             {level.name: level.initial for level in levels},
         )  # fmt: skip
-        self._properties = properties(its, its.system.within)
+        self._properties = properties(its, its.system.within, claims)
         self._explained, self._seen = Explanations(its), _Seen()
         self._on = frozenset[str]()
         self._digest, self._end, self._cool = hashlib.blake2b(digest_size=16), "", COOL_TICKS
-        self._windows = tuple(_windows(episode))
+        # where no plant is given, a reading is what comes from outside, and no fault
+        real = episode if self._stage.outside else replace(episode, readings=())
+        self._windows = tuple(_windows(real))
         self._packed = {level.name: level.sign.packed for level in levels}
         self._by = {level.name: level.sign.index.get(level.level.by, -1) for level in levels}
 
@@ -268,10 +276,15 @@ class Loop:
         self.cycle.before[name] = level.values
 
     def _to_refuse(self, tick: int) -> Mapping[str, frozenset[str]]:
+        """Leaves that hold what their level must refuse, by level; of several readings of a field the last holds."""
+        held = {
+            (one.buffer, one.place): (its_field, one)
+            for its_field, one in self._held
+            if one.first_tick <= tick <= one.last_tick
+        }
         leaves: dict[str, set[str]] = {}
-        for its_field, one in self._refused:
-            seen = self._memory.latest(one.buffer)
-            if one.first_tick <= tick <= one.last_tick and seen is not None:
+        for its_field, one in held.values():
+            if its_field.refuses(one.value) and self._memory.latest(one.buffer) is not None:
                 leaves.setdefault(its_field.level, set()).add(its_field.leaf.name)
         return {level: frozenset(names) for level, names in leaves.items()}
 

@@ -3,8 +3,10 @@
 In: orders. Out: what stands in the order buffers, and how each order ended.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from random import Random
 
 from rcsc.episodes.episode import OrderSpec, Setting
 from rcsc.episodes.outcome import RowEnd
@@ -13,6 +15,8 @@ from rcsc.run.orders.operator import answer_reason, line_to
 from rcsc.run.orders.roles import COMMAND, DONE, FAILED, Served
 from rcsc.run.signature import REALS, Leaf, Value, Values
 
+NO_NUMBER = "nan"
+"""How an episode has a reading that is no number: JSON has none."""
 CHANGED, WAITING = "changed", "waiting"
 
 
@@ -26,6 +30,8 @@ def value_of(leaf: Leaf, setting: Setting) -> Value:
         if setting not in leaf.members:
             raise ValueError(f"`{setting}` is no value of `{leaf.name}`")
         return leaf.members.index(str(setting))
+    if leaf.c_type in REALS and setting == NO_NUMBER:
+        return math.nan
     if leaf.c_type in REALS and type(setting) in (int, float):
         return leaf.held(float(setting))
     if type(setting) is (bool if leaf.c_type == "bool" else int):
@@ -36,6 +42,16 @@ def value_of(leaf: Leaf, setting: Setting) -> Value:
 def setting_of(leaf: Leaf, value: Value) -> Setting:
     """The word or number that means a value."""
     return leaf.members[int(value)] if leaf.members and 0 <= value < len(leaf.members) else value
+
+
+def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
+    """A value of a leaf: mostly an edge, else anywhere in its range."""
+    low, high = leaf.low, leaf.high
+    if leaf.members or leaf.c_type == "bool" or low is None or high is None or random.random() < 0.6:
+        return random.choice(edges)
+    return (
+        leaf.held(random.uniform(low, high)) if leaf.c_type in REALS else random.randint(int(low), int(high))
+    )
 
 
 def order_of(served: Served, spec: OrderSpec) -> tuple[Value, ...]:

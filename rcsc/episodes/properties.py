@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 
 from rcsc.episodes.cycle import Broken, Cycle, Property
 from rcsc.episodes.operator import Given
+from rcsc.episodes.proved.claims import NOTHING, Claims
+from rcsc.episodes.proved.watch import ProvedHolds
 from rcsc.episodes.stand import Stand
 from rcsc.lang import model
 from rcsc.lang.interpret import UNDEFINED, holds
@@ -140,9 +142,9 @@ class TakesInTurn:
         if said is not None and int(said[self.link.number]) != self.latest:
             self.latest, self.count = int(said[self.link.number]), self.count + 1
             self.given[self.latest] = self.count
-        if level not in cycle.ran or level.fault:
+        if level not in cycle.ran:
             return
-        echo = int(level.values[self.at + self.link.echo])
+        echo = int(level.values[self.at + self.link.echo])  # a cycle that ends in a fault publishes, too
         if echo not in self.given:
             text = f"`{self.link.report}` answers order {echo}, which `{self.link.order}` never had"
             yield Broken(f"{self.link.level}: answers what was ordered", text, level.name)
@@ -287,12 +289,13 @@ def shown(sign: Signature, values: Values, names: tuple[str, ...]) -> str:
     )
 
 
-def properties(stand: Stand, within: int) -> list[Property]:
+def properties(stand: Stand, within: int, claims: Claims = NOTHING) -> list[Property]:
     """Everything that watches an episode of a system.
 
     Args:
         stand: The system.
         within: Cycles without a fault in which every command ends.
+        claims: What was proved of the system.
     """
     watching: list[Property] = [NoStateTableError(), Refuses(), AssumptionsHold(stand)]
     for name, program in stand.programs.items():
@@ -307,4 +310,5 @@ def properties(stand: Stand, within: int) -> list[Property]:
             watching.append(NumbersOrders(link, numbered(stand, link)))
         if stand.programs[link.level].roles is None:  # else its standard properties say it
             watching.append(AnswerStays(link, at, sign.index[link.order_leaves[0].name]))
-    return [*watching, Ends(within), PlantHolds()]
+    proved = [ProvedHolds(claims, stand)] if claims.levels else []
+    return [*watching, Ends(within), PlantHolds(), *proved]

@@ -19,13 +19,14 @@ from rcsc.episodes.episode import (
     OrderSpec,
     Reading,
     Restart,
+    Setting,
     Switch,
 )
-from rcsc.episodes.operator import setting_of
-from rcsc.episodes.stand import Stand, stand, switches
+from rcsc.episodes.operator import NO_NUMBER, between, setting_of
+from rcsc.episodes.stand import Field, Stand, stand, switches
 from rcsc.run.orders.roles import Served, field_of
 from rcsc.run.orders.script import read_script, script_path
-from rcsc.run.signature import REALS, Leaf, Value
+from rcsc.run.signature import Value
 
 NOMINAL, SCRIPTED, PLAIN = 0.2, 0.3, 0.5
 """How often nothing goes wrong, orders are those of a script, and a field is as at first."""
@@ -35,6 +36,12 @@ LATEST, SOON = 11.0, 300
 LASTING = (1, 2, 5, 20, 60, 200)
 LONG = (1000, 4000)
 """Ticks of a window: of a buffer, or else of a plant's fault too."""
+TOGETHER = 0.5
+"""How often a restart comes while an input is refused."""
+STILL, REFUSED = 0.15, 0.08
+"""Where no plant is given: how often a field from outside never moves, and how often a value of it is a refused one."""
+MOVING = (30, 100, 300)
+"""Ticks in which it does."""
 UNORDERED = (50, 200, 1000)
 """Ticks of an episode of a system that nobody orders."""
 
@@ -68,7 +75,8 @@ def draw_on(its: Stand, seed: int, plant: str = "", script: str = "") -> Episode
     random = Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
     orders = tuple(_orders(random, its, script, plant))
     ticks = 0 if orders else random.choice(UNORDERED)
-    episode = Episode(plant, seed=seed, orders=orders, ticks=ticks)
+    outside = () if its.stands_outside(plant) else tuple(moving(random, its))
+    episode = Episode(plant, seed=seed, orders=orders, readings=outside, ticks=ticks)
     adds = _kinds(its, switches(its, plant))
     if not adds or random.random() < NOMINAL:
         return episode
@@ -110,16 +118,6 @@ def _when(random: Random, often: float) -> tuple[int, bool]:
     if random.random() < often:
         return tick(random), True
     return random.choice((0, 0, 0, 1, 2, 30)), False
-
-
-def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
-    """A value of a leaf: mostly an edge, else anywhere in its range."""
-    low, high = leaf.low, leaf.high
-    if leaf.members or leaf.c_type == "bool" or low is None or high is None or random.random() < 0.6:
-        return random.choice(edges)
-    return (
-        leaf.held(random.uniform(low, high)) if leaf.c_type in REALS else random.randint(int(low), int(high))
-    )
 
 
 def scripted(its: Stand, script: str, plant: str = "") -> tuple[OrderSpec, ...]:
@@ -188,7 +186,13 @@ def _harm(random: Random, its: Stand, episode: Episode) -> Episode:
 
 
 def _restart(random: Random, its: Stand, episode: Episode) -> Episode:
-    restart = Restart(tick(random), random.choice(list(its.signs)))
+    """A level starts anew at any moment; where inputs are refused, often while one is."""
+    refused = [reading for reading in episode.readings if reading.refused]
+    at = tick(random)
+    if refused and random.random() < TOGETHER:
+        window = random.choice(refused)
+        at = random.randint(window.first_tick, window.last_tick)
+    restart = Restart(at, random.choice(list(its.signs)))
     return replace(episode, restarts=(*episode.restarts, restart))
 
 
@@ -200,11 +204,34 @@ def _reading(random: Random, its: Stand, episode: Episode) -> Episode:
 
 def _refused(random: Random, its: Stand, episode: Episode) -> Episode:
     field = random.choice([field for field in its.fields if field.refused])
+    value = refusable(random, field)
+    return _held(episode, Reading(field.name, value, *_window(random, LASTING), refused=True))
+
+
+def refusable(random: Random, field: Field) -> Setting:
+    """A value that the level refuses; what is no finite number is none at all, for JSON has no other."""
     value = random.choice(field.refused)
     if isinstance(value, float) and not math.isfinite(value):
-        value = (field.leaf.high or 0.0) + 1.0  # of what is refused; JSON has no NaN
-    window = _window(random, LASTING)
-    return _held(episode, Reading(field.name, setting_of(field.leaf, value), *window, refused=True))
+        return NO_NUMBER
+    return setting_of(field.leaf, value)
+
+
+def moving(random: Random, its: Stand) -> Iterator[Reading]:
+    """Yield what comes from outside where no plant is given: values that change at any moment, edges oftener, now and then refused ones."""
+    for field in its.fields:
+        if random.random() < STILL:
+            continue
+        at, last, lasting = 0, random.choice(MOVING), random.choice(LASTING)
+        while at < last:
+            ticks = random.choice((1, lasting, 2 * lasting))
+            refused = bool(field.refused) and random.random() < REFUSED
+            value = (
+                refusable(random, field)
+                if refused
+                else setting_of(field.leaf, between(random, field.leaf, field.edges))
+            )
+            yield Reading(field.name, value, at, at + ticks - 1, refused=refused)
+            at += ticks
 
 
 def _held(episode: Episode, reading: Reading) -> Episode:

@@ -4,13 +4,13 @@ In: a description, compiled, with the sources of its levels. Out: a `Stand`: sig
 there are, the values at which something may turn. It is read once as long as none of its files changes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
-from rcsc.lang.model import Admit, Program, Scalar, Value, VariableName, value_of_key
+from rcsc.lang.model import Admit, Program, Scalar, Value, Variable, VariableName, value_of_key
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.lang.restart import After
@@ -18,6 +18,7 @@ from rcsc.run.description import BadDescription, Description, description, place
 from rcsc.run.faults import faults_of
 from rcsc.run.orders.roles import PROTOCOL, Served, field_of, ordered
 from rcsc.run.orders.script import OutsideBuffer, outside_buffers
+from rcsc.run.plant.load import chosen
 from rcsc.run.plant.staging import StageOrder, staged
 from rcsc.run.signature import Leaf, Signature, generated_files
 from rcsc.run.system import signatures
@@ -47,6 +48,8 @@ class Field:
     def refuses(self, value: Value) -> bool:
         """Whether the level refuses a value."""
         leaf = self.leaf
+        if leaf.clamp:  # it is moved to the edge, unless it is no number
+            return bool(self.refused) and value != value  # noqa: PLR0124
         low, high = (0, len(leaf.members) - 1) if leaf.members else (leaf.low, leaf.high)
         return bool(self.refused) and low is not None and high is not None and not low <= value <= high
 
@@ -81,6 +84,14 @@ class Stand:
     def served(self) -> tuple[Served, ...]:
         """The levels that are ordered from outside."""
         return tuple(link for link in self.links if link.party not in self.signs)
+
+    def stands_outside(self, plant: str = "") -> bool:
+        """Whether a plant stands outside the levels.
+
+        Raises:
+            BadPlant: The description has none of that name.
+        """
+        return chosen(self.system, plant or None) is not None
 
     @property
     def protocol(self) -> frozenset[str]:
@@ -189,11 +200,16 @@ def _fields(
                 continue
             variable = programs[level].variable(leaf.name)
             asked = (level, leaf.name) in keys  # a feed is asked about it before the level refuses it
-            refused = outside(variable.type) if variable.admit is Admit.REJECT and not asked else ()
-            fields.append(
-                Field(column, buffer.name, place, level, leaf, edges[level][leaf.name], tuple(refused))
-            )
+            refused = () if asked else tuple(_refused(variable))
+            fields.append(Field(column, buffer.name, place, level, leaf, edges[level][leaf.name], refused))
     return fields
+
+
+def _refused(variable: Variable) -> Iterator[Value]:
+    """Yield values that a level refuses: those outside the range, or, where they are moved to its edge, what is no number."""
+    for value in outside(variable.type):
+        if variable.admit is Admit.REJECT or value != value:  # noqa: PLR0124
+            yield value
 
 
 _SWITCHES: dict[tuple[tuple[tuple[str, int], ...], str], tuple[str, ...]] = {}

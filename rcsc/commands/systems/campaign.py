@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from rcsc.campaign.counterexamples import (
 from rcsc.campaign.journal import EpisodeRecord, Journal, header, journal_path
 from rcsc.campaign.rig import EpisodeValue, Rig, known_lines
 from rcsc.campaign.runner import campaign as play
-from rcsc.campaign.summary import as_json, as_text, summary
+from rcsc.campaign.summary import Watched, as_json, as_text, summary, watched, watched_json, watched_text
 from rcsc.campaign.work import Shrunk
 from rcsc.campaign.worker_pool import WorkerPool, cluster, processes
 from rcsc.commands.shared.extras import need
@@ -34,6 +34,9 @@ from rcsc.commands.shared.show import Progress, put, writing
 from rcsc.commands.shared.systems import COMPILES, SYSTEM, made, meant, system_path
 from rcsc.diagnostics.codes import Code
 from rcsc.episodes.outcome import EpisodeFinding
+from rcsc.episodes.proved.claims import Claims
+from rcsc.episodes.stand import stand
+from rcsc.host.cache import open_cache
 from rcsc.run.description import description
 
 _TO = click.Path(dir_okay=False, path_type=Path)
@@ -82,17 +85,20 @@ Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
 @click.option("--again", type=click.Path(exists=True, path_type=Path), default=None, metavar="FILE",
               help="Run a saved episode, and nothing else; 1 if a property does not hold.")  # fmt: skip
 @COMPILES
+@click.option("--claims/--no-claims", "claims", default=True, show_default=True,
+              help="Watch each claim that `rcsc prove` calls proved of the levels; proves them where that was not done.")  # fmt: skip
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     target: Path | None, system: Path | None, plant: str | None, script: str | None, episodes: int, workers: int | None,
     seed: int, executor: str | None, journal: Path | None, save: Path, json_: Path | None, limit_s: float,
-    scheduler: str | None, again: Path | None, compiles: bool,
+    scheduler: str | None, again: Path | None, compiles: bool, claims: bool,
 ) -> int:  # fmt: skip
     """Run episodes of SYSTEM: orders, lost buffers, restarts and faults of its plant by seed, with every property watching.
 
     SYSTEM is a description (system.toml) or a folder that has one; without it, the system that is here. Each outcome goes into a
     journal at once, so that a campaign killed at any moment goes on where it was. Where a property does not hold, the episode
     is made as small as it gets and saved with its script and its log. An episode that takes its process with it, or does not end,
-    is a finding like any other.
+    is a finding like any other. Where there is no plant, what comes from outside moves in its declared ranges, and whoever is
+    ordered outside obeys. What was proved of the levels is watched, too: a claim that breaks is a mistake of rcsc's.
     """
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers are processes here; with --scheduler the cluster's are taken")
@@ -100,13 +106,14 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         raise click.UsageError(f"`{target}` is a system, and `--system` names another")
     path, named = meant(None, system_path(target or system), script)
     rig = _rig(path, plant, executor, named, limit_s)
+    if not made(path, compiles=compiles, quiet=True):
+        return 1
+    rig = replace(rig, claims=_claims(rig, wanted=claims, compiles=compiles))
     shown = ["--system", str(target or system)] if target or system else []
     plays = [*([str(target)] if target else shown), *(["--plant", plant] if plant else []), "--again"]
     asked = CampaignOptions(
         rig, shlex.join(["rcsc", "campaign", *plays]), shlex.join(["rcsc", "replay", *shown]), save, json_
     )
-    if not made(path, compiles=compiles, quiet=True):
-        return 1
     if again is not None:
         return _again(again, rig, executor)
     pool = _pool(scheduler, workers or cores())
@@ -148,6 +155,19 @@ def _rig(path: Path, plant: str | None, executor: str | None, script: str, limit
     return Rig(
         kind, path.resolve(), plant_name(spec), "python" if executor == "python" else "c", script, limit_s
     )
+
+
+def _claims(rig: Rig[Any], *, wanted: bool, compiles: bool) -> Claims:
+    """What was proved of the levels, as far as episodes of this kind watch it."""
+    if not wanted:
+        return Claims(why="--no-claims leaves them out")
+    if not compiles:
+        return Claims(why="--no-compile leaves executors that need not be those of what was proved")
+    if rig.kind.watched is None:
+        return Claims(why="the episodes of this plant are of a kind of their own")
+    from rcsc.driver.watched import claims_of  # proves
+
+    return claims_of(rig.system, open_cache(rig.system.parent))
 
 
 def _pool(scheduler: str | None, workers: int) -> AbstractContextManager[WorkerPool]:
@@ -246,7 +266,9 @@ def _sum_up(asked: CampaignOptions, records: list[EpisodeRecord], progress: _Epi
     rig = asked.rig
     figures = summary(records, known_lines(rig.system), rig.kind.faults(rig.system, rig.plant))
     seconds = max(progress.seconds, 1e-9)
+    of = watched(rig.claims, stand(rig.system)) if rig.claims.levels else Watched({}, (), {}, rig.claims.why)
     click.echo(as_text(figures))
+    click.echo("\n".join((*watched_text(of), "")))
     click.echo(
         f"{figures.episodes} episodes, {figures.cycles} cycles, {figures.with_findings} with findings; "
         f"{progress.here} played now in {_clock(seconds)}: {progress.here / seconds:.1f} a second, {progress.cycles / seconds:.0f} cycles"
@@ -258,7 +280,7 @@ def _sum_up(asked: CampaignOptions, records: list[EpisodeRecord], progress: _Epi
         "seconds": round(seconds, 3),
         "episodes_a_second": progress.here / seconds,
     }
-    put(json.dumps(as_json(figures) | clock, indent=1) + "\n", asked.json)
+    put(json.dumps(as_json(figures) | {"claims": watched_json(of)} | clock, indent=1) + "\n", asked.json)
     click.echo(f"wrote {asked.json}")
 
 

@@ -20,6 +20,7 @@ for each table, order, deferred state and statement of the program; pairs of lin
 
 Modules, in the order the data flows: `environment` (which buffers link which levels), `facts` (what is declared of
 them), `transition` (a cycle as nodes), `given` and `walk`
-(extern procedures, random runs), `predicates`, `properties` (invariants and properties that the program states), `obligations`, `claims`;
+(extern procedures, random runs), `predicates`, `properties` (invariants and properties that the program states), `obligations`, `claims`,
+`trusts` (what claims take for granted);
 `variants` are programs under other rules, `beginning` other values to search runs from.
 """

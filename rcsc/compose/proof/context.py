@@ -150,7 +150,7 @@ def _every_repeated(
         for line, leaves in _repeated(ts, asked, start):
             by_line.setdefault(line, set()).update(leaves)
     for where, changed in by_line.items():
-        yield RepeatedLine(*where, tuple(leaf for leaf in _of_lines(ts) if leaf in changed))
+        yield RepeatedLine(*where, tuple(leaf for leaf in lines_write(ts) if leaf in changed))
 
 
 def _repeated(
@@ -159,7 +159,7 @@ def _repeated(
     cycle, again, keyed = start.cycle, start.again, asked.keyed
     changed = {
         leaf: keyed.term(values.negation(values.equal(cycle.after[leaf], again.after[leaf])))
-        for leaf in _of_lines(ts)
+        for leaf in lines_write(ts)
     }
     lines = [
         (
@@ -213,7 +213,7 @@ def _shown(solver: Solver, changed: dict[str, Term]) -> Iterator[str]:
         left = {leaf: term for leaf, term in left.items() if leaf not in seen}
 
 
-def _of_lines(ts: TransitionSystem) -> list[str]:
+def lines_write(ts: TransitionSystem) -> list[str]:
     """List states and outputs, except those that only the preprocess writes: a test variable is no effect of a line.
 
     Nor is it one of a line that time goes on while an order is not echoed.

@@ -1,0 +1,98 @@
+"""What was proved of a system, for whoever plays episodes of it: the claims that `rcsc prove` calls proved, as values.
+
+In: a system's description and the cache. Out: `Claims`. The proof is the kept one where the levels were proved before, else it is
+made now with the effort that `rcsc prove` takes, and kept.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from rcsc.compose.contract.claims import AGAIN, CONTRACT, ENDING, RESTING, RUNS, SAFE, UNREACHED, Key, spelled
+from rcsc.compose.contract.environment import Above, Below
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.trusts import trust_of
+from rcsc.compose.proof.candidates import content
+from rcsc.compose.proof.context import lines_write
+from rcsc.compose.proof.level import LevelProof
+from rcsc.compose.proof.system import SystemProof, prove_transition_systems, read_systems
+from rcsc.diagnostics.coded import CodedError
+from rcsc.episodes.proved.claims import Claim, Claims, Neighbour, ProvedLevel, Trusted
+from rcsc.host.cache import Cache
+from rcsc.run.description import description
+
+_TOGETHER = frozenset({RUNS, ENDING, RESTING})
+"""Claims that are all of several others, which are watched one by one."""
+_NAMES = {CONTRACT: "CONTRACT", UNREACHED: "UNREACHED", AGAIN: "AGAIN", SAFE[0]: "SAFE"}
+
+
+def claims_of(path: Path, cache: Cache | None, jobs: int = 1) -> Claims:
+    """Return what is proved of a system; none, and why, where its levels cannot be read."""
+    try:
+        systems = read_systems(path)[0]
+    except CodedError as error:
+        return Claims(why=str(error))
+    proof = prove_transition_systems(systems, None, jobs, tuple(systems), None, cache)
+    return proved_claims(path, systems, proof)
+
+
+def proved_claims(path: Path, systems: dict[str, TransitionSystem], proof: SystemProof) -> Claims:
+    """Return the claims of a proof that are proved with all that they rest on."""
+    owners = {wire.target: wire.source.partition(".")[0] for wire in description(path).wires}
+    proofs = {level.level: level for level in proof.levels}
+    levels = []
+    for name, ts in systems.items():
+        filled = tuple(
+            target.partition(".")[2]
+            for target, owner in owners.items()
+            if owner in systems and target.startswith(f"{name}.")
+        )
+        claims = tuple(_claims(name, ts, proofs[name], proof))
+        above = None if ts.links.above is None else _above(ts.links.above)
+        below = tuple(map(_below, ts.links.below))
+        levels.append(ProvedLevel(name, content(ts), above, below, claims, filled))
+    return Claims(
+        tuple(levels), "" if any(level.claims for level in levels) else "nothing is proved of its levels"
+    )
+
+
+def _claims(name: str, ts: TransitionSystem, level: LevelProof, proof: SystemProof) -> Iterator[Claim]:
+    owed = {one.name: one.condition for one in ts.links.owes}
+    still = {ending.table: ending.still for ending in level.endings}
+    for (owner, key), closed in proof.closed.items():
+        if owner != name or key in _TOGETHER or not closed.proved or closed.verdict.value != "proved":
+            continue
+        if key[0] == AGAIN and not ts.links.below:
+            continue  # it is about levels that give orders
+        trusts = tuple(Trusted(*trust_of(words), words) for words in closed.trusts)
+        about: tuple[str, ...] = ()
+        if key[0] == Sort.ENDS:
+            about = still.get(key[1], ())
+        elif key[0] == AGAIN:
+            about = tuple(lines_write(ts))
+        yield Claim(
+            name, _kind(key), key[1], key[2], spelled((owner, key), name), trusts, about, owed.get(key[2])
+        )
+
+
+def _kind(key: Key) -> str:
+    return _NAMES.get(key[0]) or Sort(key[0]).name
+
+
+def _above(end: Above) -> Neighbour:
+    return Neighbour(
+        end.name, end.order, end.report, end.outside, end.done, end.failed, numbered=end.numbered
+    )
+
+
+def _below(end: Below) -> Neighbour:
+    return Neighbour(
+        end.name,
+        end.order,
+        end.report,
+        end.outside,
+        end.done,
+        end.failed,
+        late=end.late or "",
+        in_time=end.answers_in_time,
+    )

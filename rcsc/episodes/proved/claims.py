@@ -1,0 +1,146 @@
+"""What was proved of a system, as values that travel to who plays episodes: claims, what each trusts, and who orders whom.
+
+In: what `rcsc.driver.watched` makes of a proof. Out: `Claims`, with a digest. Nothing here knows how something is proved.
+"""
+
+import hashlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from rcsc.run.orders.roles import COMMAND, ECHO, NUMBER, STATUS
+
+if TYPE_CHECKING:
+    from rcsc.lang.model import Expr  # who plays other episodes knows no language
+
+ECHOED = "ref_command_echo"
+
+
+@dataclass(frozen=True, slots=True)
+class Trusted:
+    """Something that a claim takes for granted, for which no level is responsible.
+
+    Attributes:
+        kind: Which kind of trust, by its name in `rcsc.compose.contract.trusts`; empty for one that is not known there.
+        level: The level that it is about, or the neighbour.
+        name: The assumption or the record that it is about.
+        words: As `rcsc prove` prints it.
+    """
+
+    kind: str
+    level: str
+    name: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A claim that `rcsc prove` calls proved.
+
+    Attributes:
+        kind: Its sort, by the sort's name: `ECHOES`, `PROPERTY`, `UNREACHED`.
+        table, name: As the claim's key has them.
+        words: In words, without the level.
+        about: Leaves or inputs that it is about besides: those that no line changes again, or inputs that stand still.
+        stated: What another level assumes of its outputs, in its own leaves; None of all other kinds.
+    """
+
+    level: str
+    kind: str
+    table: str
+    name: str
+    words: str
+    trusts: tuple[Trusted, ...] = ()
+    about: tuple[str, ...] = ()
+    stated: "Expr | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbour:
+    """Somebody with whom a level exchanges orders and reports.
+
+    Attributes:
+        order, report: The level's records.
+        outside: Whether it stands outside the levels.
+        numbered: Leaves of an order that stay while its number does.
+        late: The flag that an answer is late; empty where it is waited for without end.
+        in_time: Whether a late answer counts as one.
+    """
+
+    name: str
+    order: str
+    report: str
+    outside: bool
+    done: str
+    failed: str
+    numbered: tuple[str, ...] = ()
+    late: str = ""
+    in_time: bool = False
+
+    @property
+    def number(self) -> str:
+        """The leaf with an order's number."""
+        return f"{self.order}.{NUMBER}"
+
+    @property
+    def command(self) -> str:
+        """The leaf with an order's command."""
+        return f"{self.order}.{COMMAND}"
+
+    @property
+    def echo(self) -> str:
+        """The leaf with the number that is reported about."""
+        return f"{self.report}.{ECHO}"
+
+    @property
+    def echoed(self) -> str:
+        """The leaf with the command that is reported about."""
+        return f"{self.report}.{ECHOED}"
+
+    @property
+    def status(self) -> str:
+        """The leaf with the reported status."""
+        return f"{self.report}.{STATUS}"
+
+
+@dataclass(frozen=True, slots=True)
+class ProvedLevel:
+    """A level with all that was proved of it.
+
+    Attributes:
+        proof: Digest of what the proof is about: the program, the level, its links.
+        filled: Inputs that other levels write.
+    """
+
+    name: str
+    proof: str
+    above: Neighbour | None
+    below: tuple[Neighbour, ...]
+    claims: tuple[Claim, ...]
+    filled: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Claims:
+    """All that was proved of a system.
+
+    Attributes:
+        why: Why there are none, in words; empty where there are.
+    """
+
+    levels: tuple[ProvedLevel, ...] = ()
+    why: str = ""
+
+    @property
+    def every(self) -> tuple[Claim, ...]:
+        """The claims about all levels."""
+        return tuple(claim for level in self.levels for claim in level.claims)
+
+    @property
+    def digest(self) -> str:
+        """The same for the same claims, wherever they were proved."""
+        return hashlib.sha256(repr(self.levels).encode()).hexdigest()
+
+
+Unwatched: TypeAlias = tuple[Claim, str]
+"""A claim that no episode can look at, and why."""
+NOTHING = Claims(why="nothing was proved")

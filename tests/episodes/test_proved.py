@@ -1,0 +1,268 @@
+"""What was proved, watched: claims of right tables on executors of wrong ones, false claims, what they trust; and no plant."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rcsc.campaign.summary import watched, watched_text
+from rcsc.commands import run as rcsc
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.trusts import Trust, trust_of
+from rcsc.episodes.episode import BufferFault, Episode, OrderSpec, Reading, Restart
+from rcsc.episodes.loop import Loop
+from rcsc.episodes.proved.checks import WATCHED
+from rcsc.episodes.proved.claims import Claim, Claims, ProvedLevel, Trusted
+from rcsc.episodes.proved.watch import PROVED
+from rcsc.episodes.sampling import draw_on
+from rcsc.episodes.stand import Stand, stand
+from tests.claims import WITHIN, drawn_episode, played, proved_claims_of
+from tests.small_hierarchies.made import Hierarchy, hierarchy
+from tests.small_hierarchies.text import files
+
+RIGHT = hierarchy(22, frozenset(range(9)))
+"""Three levels, as they have to be."""
+WRONG = [
+    ("l0", "echo", "", "ECHOES"),
+    ("l0", "next", "SENT", "NUMBERED"),
+    ("l0", "next", "SENT", "CONTRACT"),
+    ("l0", "next", "(SENT + 2) mod 65536", "NEXT_NUMBER"),
+    ("l0", "released", "begun", "WAITS"),
+    ("l0", "deferred", "new_command", "UNREACHED"),
+    ("l0", "deferred", "ECHO = SENT or status_in = done", "AGAIN"),
+    ("l1", "taken", "command.inc_command /= inc_command_seen or status_report = failed", "ONCE"),
+]
+"""A slip of the hand in a level, and a kind of claims that it makes false."""
+
+SAFE = {
+    "lv.rcs": """
+input x : int 0 .. 9
+input y : real 0.0 .. 1.0
+output o : int 0 .. 3 safe 3
+property rises : o = 2 implies was o = 1
+table t {
+  | line | o | x   || o |
+  |------|---|-----||---|
+  | up   | 0 | 0   || 1 |
+  | on   | 1 |     || 2 |
+  | back | 2 |     || 0 |
+  | safe | 3 |     || 0 |
+  | stay | 0 | > 0 || 0 |
+}
+level lv { period 40 [ms] table t }
+""",
+    "system.toml": 'name = "sn"\ngenerated = "generated"\ntick_ms = 40\n[[level]]\nname = "lv"\n'
+    '[buffers]\n"out.x" = "lv.x"\n"out.y" = "lv.y"\n' + WITHIN,
+}
+
+
+def written(folder: Path, texts: dict[str, str]) -> Path:
+    """The description of a system, written and compiled."""
+    folder.mkdir(exist_ok=True)
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    assert rcsc(["compile", "-q", str(folder)]) == 0
+    return folder / "system.toml"
+
+
+def of(made: Hierarchy) -> dict[str, str]:
+    texts = files(made)
+    return {**texts, "system.toml": texts["system.toml"] + WITHIN}
+
+
+def slipped(level: str, name: str, text: str, made: Hierarchy = RIGHT) -> Hierarchy:
+    """The hierarchy with this text in place of a module's part."""
+    return replace(
+        made,
+        levels=tuple(
+            replace(
+                one,
+                said=tuple(
+                    (said, text if (one.name, said) == (level, name) else right) for said, right in one.said
+                ),
+            )
+            for one in made.levels
+        ),
+    )
+
+
+def broken(its: Stand, claims: Claims, episodes: Iterator[Episode]) -> set[str]:
+    """Kinds of the claims that these episodes break."""
+    kinds = {f"{claim.level}: {PROVED}: {claim.words}": claim.kind for claim in claims.every}
+    found = set[str]()
+    for episode in episodes:
+        outcome = Loop(replace(episode, executor="python"), its, claims).finish()
+        found |= {kinds[finding.property] for finding in outcome.findings if finding.property in kinds}
+    return found
+
+
+@pytest.fixture(scope="module")
+def right(tmp_path_factory: pytest.TempPathFactory) -> tuple[Stand, Claims]:
+    """The right hierarchy, compiled, and what is proved of it."""
+    path = written(tmp_path_factory.mktemp("right"), of(RIGHT))
+    return stand(path), proved_claims_of(path)
+
+
+@pytest.fixture
+def safe(tmp_path: Path) -> Stand:
+    """A level whose output shows a safe value after a refused input, in a system without a plant."""
+    return stand(written(tmp_path, SAFE))
+
+
+def only(claim: Claim) -> Claims:
+    return Claims((ProvedLevel(claim.level, "0" * 64, None, (), (claim,)),))
+
+
+class TestClaimsOfRightTables:
+    """They hold on executors of those tables, and break on executors of others."""
+
+    def test_hold(self, right: tuple[Stand, Claims]) -> None:
+        its, claims = right
+        assert broken(its, claims, (drawn_episode(its, 5, at) for at in range(6))) == set()
+
+    @pytest.mark.parametrize(("level", "name", "text", "kind"), WRONG)
+    def test_break(
+        self, tmp_path: Path, right: tuple[Stand, Claims], level: str, name: str, text: str, kind: str
+    ) -> None:
+        its, claims = stand(written(tmp_path, of(slipped(level, name, text)))), right[1]
+        assert kind in broken(its, claims, (drawn_episode(its, 22, at) for at in range(4)))
+
+    def test_nothing_explains_it_but_older_values(self, right: tuple[Stand, Claims], tmp_path: Path) -> None:
+        its = stand(written(tmp_path, of(slipped("l0", "echo", ""))))
+        order = OrderSpec("l0", "work")
+        first = Loop(Episode(executor="python", orders=(order,)), its, right[1]).finish()
+        (name,) = (found.property for found in first.findings if "echoes the command" in found.property)
+        stale = BufferFault("station.order", "stale", 0, 60)
+        misled = Loop(
+            Episode(executor="python", orders=(order, order), harms=(stale,)), its, right[1]
+        ).finish()
+        assert name in {found.property for found in misled.excused} | {
+            found.property for found in misled.findings
+        }
+
+    def test_are_counted_with_their_proof(self, right: tuple[Stand, Claims]) -> None:
+        its, claims = right
+        said = watched_text(watched(claims, its))
+        assert (
+            said[0]
+            == f"{len(claims.every)} of {len(claims.every)} claims that `rcsc prove` calls proved are watched"
+        )
+        assert [line.split(":")[0] for line in said[1:]] == [
+            f"  level {level.name}, proof {level.proof[:16]}" for level in claims.levels
+        ]
+
+
+class TestFalseClaims:
+    """A claim that is false is found by what it leaves out."""
+
+    REFUSED = Episode(readings=(Reading("out.x", 10, 3, 3, refused=True),), ticks=12)
+
+    def test_of_a_property_after_a_refused_input(self, safe: Stand) -> None:
+        claim = Claim("lv", "PROPERTY", "", "rises", "property `rises`")
+        never = Claim("lv", "UNREACHED", "t", "safe", "line `safe` is never reached")
+        assert broken(safe, only(claim), iter((self.REFUSED,))) == set()
+        assert broken(safe, only(never), iter((self.REFUSED,))) == {"UNREACHED"}
+        assert broken(safe, only(never), iter((replace(self.REFUSED, readings=()),))) == set()
+
+    def test_one_that_trusts_that_nothing_is_refused(self, safe: Stand) -> None:
+        words = Trust.REFUSED.value.replace("LEVEL", "lv")
+        trusted = Trusted(*trust_of(words), words)
+        claim = Claim("lv", "UNREACHED", "t", "safe", "line `safe` is never reached", (trusted,))
+        assert trusted.kind == "REFUSED"
+        assert broken(safe, only(claim), iter((self.REFUSED,))) == set()
+
+    def test_one_that_trusts_what_nobody_knows_is_told(self, safe: Stand) -> None:
+        strange = Trusted(*trust_of("the moon is full"), "the moon is full")
+        of_ = watched(only(Claim("lv", "SAFE", "", "", "values", (strange,))), safe)
+        assert watched_text(of_)[-1] == "  not watched: level `lv`: values: it trusts that the moon is full"
+
+    def test_no_number_is_refused(self, safe: Stand) -> None:
+        never = Claim("lv", "UNREACHED", "t", "safe", "line `safe` is never reached")
+        episode = Episode(readings=(Reading("out.y", "nan", 3, 3, refused=True),), ticks=12)
+        assert Episode.from_json(episode.to_json()) == episode
+        assert broken(safe, only(never), iter((episode,))) == {"UNREACHED"}
+
+    def test_that_a_command_ends(self, tmp_path: Path) -> None:
+        """Without it the level takes every cycle's order as a new one, and begins again and again."""
+        bottom = hierarchy(1, frozenset(range(9)))
+        claims = proved_claims_of(written(tmp_path / "right", of(bottom)))
+        its = stand(written(tmp_path / "wrong", of(slipped("l0", "seen", "", bottom))))
+        assert "ENDS" in broken(its, claims, (drawn_episode(its, 1, at) for at in range(4)))
+
+
+class TestNobodyOutside:
+    """Without a plant, values from outside move in their ranges, and are refused now and then."""
+
+    def test_values_move(self, safe: Stand) -> None:
+        drawn = [draw_on(safe, seed) for seed in range(20)]
+        readings = [reading for episode in drawn for reading in episode.readings]
+        assert {reading.field for reading in readings} == {"out.x", "out.y"}
+        assert {reading.value for reading in readings if reading.field == "out.x"} >= {0, 1, 9, 10}
+        assert {reading.refused for reading in readings} == {True, False}
+        assert any(reading.value == "nan" for reading in readings)
+
+    def test_and_are_no_fault(self, safe: Stand) -> None:
+        loop = Loop(replace(TestFalseClaims.REFUSED, executor="python"), safe)
+        while not loop.over:
+            loop.step()
+            assert not loop.cycle.faulty
+        assert not loop.outcome().findings
+
+    def test_who_is_ordered_obeys(self, tmp_path: Path) -> None:
+        outside = hierarchy(4, frozenset(range(9)))
+        assert outside.outside
+        its = stand(written(tmp_path, of(outside)))
+        command = outside.levels[0].commands[-1]
+        ends = set()
+        for seed in range(12):
+            orders = (OrderSpec("l0", command),) * 2
+            outcome = Loop(Episode(executor="python", seed=seed, orders=orders), its).finish()
+            ends |= {row.state for row in outcome.rows}
+        assert {"done", "failed"} <= ends
+
+    def test_levels_restart_while_an_input_is_refused(self, safe: Stand) -> None:
+        together = 0
+        for seed in range(200):
+            episode = draw_on(safe, seed)
+            windows = [one for one in episode.readings if one.refused]
+            together += any(
+                one.first_tick <= restart.tick <= one.last_tick
+                for one in windows
+                for restart in episode.restarts
+            )
+        assert together >= 10
+
+
+def test_an_echo_that_goes_back_is_found_in_a_cycle_that_a_fault_ends(right: tuple[Stand, Claims]) -> None:
+    """A level that starts anew while an input is refused publishes, too."""
+    its, _ = right
+    loop = Loop(
+        Episode(executor="python", orders=(OrderSpec("l0", "pause"),) * 3, restarts=(Restart(9, "l2"),)), its
+    )
+    outcome = loop.finish()
+    assert not outcome.findings
+
+
+def test_every_sort_of_obligation_is_watched() -> None:
+    """But those that are several others, or that runs of two levels show."""
+    assert {sort.name for sort in Sort} - WATCHED == {"PROTOCOL", "SAME_ORDER", "OF_ITS_ORDER"}
+
+
+def test_every_trust_is_told_from_the_others() -> None:
+    for trust in Trust:
+        words = trust.value.replace("LEVEL", "some_level").replace("NAME", "record.field")
+        kind, level, name = trust_of(words)
+        assert kind == trust.name
+        assert (level, name) == (
+            "some_level" * ("LEVEL" in trust.value),
+            "record.field" * ("NAME" in trust.value),
+        )
+
+
+def test_the_command_plays_drawn_systems() -> None:
+    one = played(3, 2)
+    assert not one.broken
+    assert one.counts["systems"] == 1
+    assert one.counts["episodes"] == 2
+    assert one.counts["claims watched"] > 0
