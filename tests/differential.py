@@ -4,8 +4,10 @@
 
 A program is drawn as pairs of a text and a function: what stands in the table's language, and what it means, written down here a
 second time from the manual, without anything of rcsc's. Programs are safe by construction, so that they need no proof: values are
-pulled into their ranges, divisors are not zero, indices are taken modulo the length. Tables may have gaps and overlaps. The C of many
-programs is one shared library. tcc compiles most of them, in a fiftieth of the time that gcc takes.
+pulled into their ranges, divisors are not zero, indices are taken modulo the length. Tables may have gaps and overlaps, stand several
+in a cycle, and have lines above others, or that do the same; conditions look back (`was`, events, `for`), and at bits and named sets;
+locals have the names of constants, sets and members. The C of many programs is one shared library. tcc compiles most of them, in a
+fiftieth of the time that gcc takes.
 """
 
 import argparse
@@ -14,6 +16,7 @@ import gc
 import json
 import math
 import random
+import re
 import shutil
 import signal
 import struct
@@ -54,7 +57,7 @@ TINY = ("tcc",)
 """The compiler of the other batches; where it stands alone with a difference, the first of `BUILDS` judges."""
 
 Value = bool | int | float
-State = dict[str, Value]
+State = dict[str, Any]
 Locals = dict[str, Value]
 Meaning = Callable[[State, Locals], Any]
 Doing = Callable[[State, Locals], None]
@@ -73,6 +76,15 @@ def to_single(value: int | float) -> float:
     return math.copysign(float(digits * 2**size), value)
 
 
+PAST, LASTED = "@past", "@held"
+"""Keys of a state beside its leaves: the leaves after the cycle before, and for how many cycles each condition has held."""
+
+
+def kept_line(table: str) -> str:
+    """The key of the line that a table which others follow ran in this cycle: 0 for none, else one more than its position."""
+    return f"@line {table}"
+
+
 ROUNDED: dict[str, Callable[[float], float]] = {"real": float, "single": to_single}
 """What becomes of the exact result, or the double nearest to it, of an operation of this sort."""
 
@@ -86,6 +98,13 @@ class Kind:
     low: float = 0
     high: float = 1
     members: tuple[str, ...] = ()
+
+    def zero(self) -> Value:
+        """What it starts with where nothing is said: 0, or what is nearest to it."""
+        if self.sort == "bool":
+            return False
+        nearest = self.low if self.low > 0 else min(self.high, 0)
+        return float(nearest) if self.sort in REALS else int(nearest)
 
     def literal(self, value: Value) -> str:
         """A value in the language."""
@@ -132,8 +151,18 @@ class Elements:
 
 
 @dataclass(frozen=True)
+class NamedSet:
+    """A declared set: whether a value is of it, and some that are."""
+
+    name: str
+    kind: Kind
+    has: Callable[[Any], bool]
+    some: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
 class Declared:
-    """A variable: `input`, `state` or `output`, clamped or not, its initial value (scalars), the condition of its deferral."""
+    """A variable: `input`, `state` or `output`, clamped or not, its initial and safe values (scalars), the condition of its deferral."""
 
     name: str
     word: str
@@ -141,14 +170,16 @@ class Declared:
     clamp: bool = False
     start: Value | None = None
     until: Expr | None = None
+    safe: Value | None = None
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line: its conditions and what it does."""
+    """A line: its conditions and what it does; which lines, by position, run in its place where both match."""
 
     when: tuple[Expr, ...]
     does: tuple[Doing, ...]
+    upper: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -160,6 +191,10 @@ class Table:
     default: tuple[Doing, ...] | None
     assuming: tuple[str, ...]
     stops: tuple[str, ...]
+
+
+Stage = tuple[Leaf | None, tuple[int, ...]]
+"""What a level runs at one place of its cycle: one table, or the one that an input chooses; by position."""
 
 
 @dataclass
@@ -176,7 +211,15 @@ class Drawn:
     tables: list[Table] = field(default_factory=list)
     before: list[int] = field(default_factory=list)
     after: list[int] = field(default_factory=list)
-    by: tuple[Leaf, tuple[int, ...]] | None = None
+    stages: list["Stage"] = field(default_factory=list)
+    constants: list[tuple[str, Kind, Value]] = field(default_factory=list)
+    sets: list[NamedSet] = field(default_factory=list)
+    lasting: list[Expr] = field(default_factory=list)
+
+    @property
+    def staged(self) -> list[str]:
+        """Tables that others follow."""
+        return [self.tables[number].name for _, numbers in self.stages[:-1] for number in numbers]
 
     def leaves(self, *words: str) -> list[Leaf]:
         """The leaves of variables of these words; of all without one."""
@@ -261,11 +304,42 @@ class Maker:
         self.made = Drawn()
         self.locals: list[tuple[str, Kind, bool]] = []
         self.number = 0
+        self.back = False  # whether `was`, events and `for` may stand here
+        self.hidden: frozenset[str] = frozenset()  # variables that may not be read here
+        self.targets: frozenset[str] | None = None  # those that alone may be written here
+        self.callable: list[int] | None = None  # procedures that alone may be called here
+        self.bodies: dict[str, str] = {}
 
     def name(self, head: str) -> str:
         """A name of its own."""
         self.number += 1
         return self.words() if self.words else f"{head}{self.number}"
+
+    def local_name(self, head: str) -> str:
+        """A name of a local: its own, or that of a constant, a set or a member, which it hides."""
+        others = [*(one[0] for one in self.made.constants * 3), *(one.name for one in self.made.sets)]
+        others += [member for enum in self.enums for member in enum.members]
+        free = [name for name in others if all(name != one for one, _, _ in self.locals)]
+        return self.rng.choice(free) if free and self.rng.randrange(4) == 0 else self.name(head)
+
+    def visible(self, name: str) -> bool:
+        """Whether no local hides a constant or a set of this name."""
+        return all(name != one for one, _, _ in self.locals)
+
+    def speaks(self, text: str) -> bool:
+        """Whether a text is about a variable."""
+        return not {one.name for one in self.made.declared}.isdisjoint(WORDS.findall(text))
+
+    def readable(self, *words: str) -> list[Leaf]:
+        """Leaves that may be read here."""
+        return [leaf for leaf in self.made.leaves(*words) if root(leaf.name) not in self.hidden]
+
+    def writable(self) -> list[Leaf]:
+        """Leaves that may be written here."""
+        leaves = self.made.leaves("state", "output")
+        return (
+            leaves if self.targets is None else [leaf for leaf in leaves if root(leaf.name) in self.targets]
+        )
 
     # --- types ---
 
@@ -278,8 +352,8 @@ class Maker:
         if sort == "enum":
             return rng.choice(self.enums)
         if sort == "int":
-            ends = ((0, 9), (-5, 95), (7, 7), (0, 255), (0, 256), (-128, 127), (-129, 0), (-70000, 3), (0, 2**32), (-I64 - 1, I64),
-                    (0, U64), (I64 - 3, I64 + 3), (-I64 - 1, -I64 + 5), (U64 - 4, U64), (-3, -1))  # fmt: skip
+            ends = ((0, 9), (-5, 95), (7, 7), (0, 255), (0, 255), (0, 256), (-128, 127), (-129, 0), (-70000, 3), (0, 2**32),
+                    (-I64 - 1, I64), (0, U64), (I64 - 3, I64 + 3), (-I64 - 1, -I64 + 5), (U64 - 4, U64), (-3, -1))  # fmt: skip
             low, high = rng.choice(ends) if rng.randrange(3) else (rng.randint(-9, 3), rng.randint(3, 99))
             return Kind("int", f"int {low} .. {high}", low, high)
         reals = (
@@ -323,8 +397,10 @@ class Maker:
             start = self.value(kind) if rng.randrange(2) else None
             clamp = word == "input" and kind.sort not in {"bool", "enum"} and rng.randrange(2) == 0
             text = f"{word} {name} : {kind.text}" + ("" if start is None else f" = {kind.literal(start)}")
+            safe = self.value(kind) if word == "output" and rng.randrange(3) == 0 else None
+            text += "" if safe is None else f" safe {kind.literal(safe)}"
             self.made.text.append(text + (" clamp" if clamp else ""))
-            self.made.declared.append(Declared(name, word, (Leaf(name, kind),), clamp, start))
+            self.made.declared.append(Declared(name, word, (Leaf(name, kind),), clamp, start, safe=safe))
             return
         kind, length = self.kind(), rng.randint(1, 4)
         if shape == 0:
@@ -359,17 +435,33 @@ class Maker:
     # --- expressions ---
 
     def literal(self, kind: Kind) -> Expr:
-        """A constant."""
+        """A constant, by its name now and then."""
+        named = [
+            (name, value)
+            for name, one, value in self.made.constants
+            if alike(one, kind) and kind.sort != "single" and self.visible(name)
+        ]
+        if named and self.rng.randrange(3) == 0:
+            name, value = self.rng.choice(named)
+            if kind.sort in {"bool", "enum"} or kind.low <= value <= kind.high:
+                ends = (int(value), int(value)) if kind.sort == "int" else (0, 0)
+                return Expr(kind, name, lambda s, v: value, *ends)
         value = self.value(kind)
         ends = (int(value), int(value)) if kind.sort == "int" else (0, 0)
         return Expr(kind, kind.literal(value), lambda s, v: value, *ends)
 
     def read(self, kind: Kind) -> Expr:
         """A variable, an element or a local of a sort; a constant where there is none."""
-        same = [leaf for leaf in self.made.leaves() if alike(leaf.kind, kind)]
+        same = [leaf for leaf in self.readable() if alike(leaf.kind, kind)]
         chosen = [(name, one) for name, one, _ in self.locals if alike(one, kind)]
-        several = [one for _, one in self.made.elements if alike(one.kind, kind)]
+        several = [
+            one
+            for _, one in self.made.elements
+            if alike(one.kind, kind) and root(one.before) not in self.hidden
+        ]
         way = self.rng.randrange(6)
+        if self.back and (same or several) and self.rng.randrange(8) == 0:
+            return self.earlier(same, several)
         if way < 2 and chosen:
             name, one = self.rng.choice(chosen)
             return Expr(one, name, lambda s, v: v[name], *ends_of(one))
@@ -379,6 +471,85 @@ class Maker:
             leaf = self.rng.choice(same)
             return Expr(leaf.kind, leaf.name, lambda s, v: s[leaf.name], *ends_of(leaf.kind))
         return self.literal(kind)
+
+    def earlier(self, same: Sequence[Leaf], several: Sequence[Elements]) -> Expr:
+        """A leaf or an element as the cycle before left it."""
+        self.back = False
+        if several and (not same or self.rng.randrange(2)):
+            now = self.element(self.rng.choice(several))
+        else:
+            leaf = self.rng.choice(same)
+            now = Expr(leaf.kind, leaf.name, lambda s, v: s[leaf.name], *ends_of(leaf.kind))
+        self.back = True
+        return Expr(now.kind, f"(was {now.text})", lambda s, v: now.of(s[PAST], v), now.low, now.high)
+
+    def event(self) -> Expr:
+        """`was` of a condition, an event, or a condition that has held for a time."""
+        rng, way = self.rng, self.rng.randrange(5)
+        self.back, locals_ = False, self.locals
+        if way == 4:
+            self.locals = []
+        now = self.about(self.truth(1))
+        when = self.about(self.truth(1)) if rng.randrange(3) == 0 else None
+        value = self.about(self.read(self.kind()), now)
+        self.back, self.locals = True, locals_
+        if way == 0:
+            return Expr(BOOL, f"(was ({now.text}))", lambda s, v: now.of(s[PAST], v))
+        if way == 4:
+            return self.lasts(now)
+        word = ("@T", "@F", "@C")[way - 1]
+        happens: dict[str, Meaning] = {
+            "@T": lambda s, v: now.of(s, v) and not now.of(s[PAST], v),
+            "@F": lambda s, v: now.of(s[PAST], v) and not now.of(s, v),
+            "@C": lambda s, v: value.of(s, v) != value.of(s[PAST], v),
+        }
+        of, text = happens[word], f"{word}({(value if word == '@C' else now).text})"
+        if when is None:
+            return Expr(BOOL, text, lambda s, v: bool(of(s, v)))
+        return Expr(BOOL, f"({text} when ({when.text}))", lambda s, v: bool(of(s, v) and when.of(s[PAST], v)))
+
+    def about(self, one: Expr, other: Expr | None = None) -> Expr:
+        """The expression where it is about a variable, else another that is."""
+        if self.speaks(one.text):
+            return one
+        if other is not None:
+            return other
+        leaf = self.rng.choice(self.readable())
+        a = self.value(leaf.kind)
+        return Expr(BOOL, f"({leaf.name} = {leaf.kind.literal(a)})", lambda s, v: s[leaf.name] == a)
+
+    def lasts(self, now: Expr) -> Expr:
+        """A condition that holds, and held after each of so many cycles."""
+        number, cycles = len(self.made.lasting), self.rng.choice((1, 1, 2, 3))
+        self.made.lasting.append(now)
+        return Expr(
+            BOOL,
+            f"(({now.text}) for {10 * cycles} [ms])",
+            lambda s, v: bool(now.of(s, {})) and s[LASTED][number] >= cycles,
+        )
+
+    def of_set(self, depth: int) -> Expr:
+        """Whether a value is of a named set, or of one in braces with more."""
+        rng = self.rng
+        one = rng.choice(self.made.sets)
+        subject = self.integer(depth) if one.kind.sort == "int" and rng.randrange(2) else self.read(one.kind)
+        if one.kind.sort == "int" and not fits((subject.low, subject.high), (one.kind.low, one.kind.high)):
+            return self.read(BOOL)
+        turned = rng.randrange(3) == 0
+        word = "not in" if turned else "in"
+        if not self.visible(one.name) or rng.randrange(2):
+            return Expr(
+                BOOL,
+                f"({subject.text} {word} {one.name})",
+                lambda s, v: one.has(subject.of(s, v)) is not turned,
+            )
+        more = self.value(one.kind)
+        text = f"({subject.text} {word} {{{one.name}, {one.kind.literal(more)}}})"
+        return Expr(
+            BOOL,
+            text,
+            lambda s, v: (one.has(subject.of(s, v)) or subject.of(s, v) == more) is not turned,
+        )
 
     def element(self, one: Elements) -> Expr:
         """An element by a computed index."""
@@ -479,8 +650,8 @@ class Maker:
             return Expr(BOOL, f"({byte.text} = 0)", lambda s, v: byte.of(s, v) == 0)
         if "x" not in digits:
             return Expr(BOOL, f"{byte.text}[{place}]", lambda s, v: bool(byte.of(s, v) >> place & 1))
-        return Expr(BOOL, f"({byte.text} = 0b{''.join(digits)})",
-                    lambda s, v: all(digit in ("x", bit) for digit, bit in zip(digits, f"{byte.of(s, v):08b}", strict=True)))  # fmt: skip
+        mask = "".join(digits)
+        return Expr(BOOL, f"({byte.text} = 0b{mask})", lambda s, v: fits_mask(mask, byte.of(s, v)))
 
     def counted(self, depth: int) -> Expr:
         """How many of some conditions hold, or one condition as a number."""
@@ -548,6 +719,8 @@ class Maker:
         """A condition."""
         rng = self.rng
         way = rng.randrange(8) if depth > 0 else rng.randrange(3)
+        if self.back and depth > 0 and rng.randrange(7) == 0:
+            return self.event()
         if way == 0:
             return self.read(BOOL)
         if way == 3 and rng.randrange(2):
@@ -565,6 +738,8 @@ class Maker:
     def compared(self, depth: int) -> Expr:
         """A comparison, a set or a range."""
         rng = self.rng
+        if self.made.sets and rng.randrange(3 if self.locals else 5) == 0:
+            return self.of_set(depth)
         sort = rng.choice(("int", "int", "real", "single", "enum", "bool"))
         if sort == "enum":
             kind = rng.choice(self.enums)
@@ -614,8 +789,8 @@ class Maker:
             return self.assign()
         if way == 3:
             return self.local()
-        if way == 4 and self.made.procedures:
-            return self.call(self.rng.randrange(len(self.made.procedures)))
+        if way == 4 and self.calls():
+            return self.call(self.rng.choice(self.calls()))
         if way < 7:
             asked, (a, first), (b, second) = self.truth(2), self.block(depth - 1, 2), self.block(depth - 1, 2)
 
@@ -628,7 +803,11 @@ class Maker:
     def assign(self) -> tuple[str, Doing]:
         """An assignment to a leaf, an element or a local."""
         rng = self.rng
-        several = [one for word, one in self.made.elements if word == "state"]
+        several = [
+            one
+            for word, one in self.made.elements
+            if word == "state" and (self.targets is None or root(one.before) in self.targets)
+        ]
         local = [(name, kind) for name, kind, may in self.locals if may]
         if several and rng.randrange(3) == 0:
             one = rng.choice(several)
@@ -643,7 +822,7 @@ class Maker:
             name, kind = rng.choice(local)
             given = self.of_kind(kind, 2)
             return f"{name} := {given.text}", lambda s, v: v.__setitem__(name, kept(given.of(s, v)))
-        leaf = rng.choice(self.made.leaves("state", "output"))
+        leaf = rng.choice(self.writable())
         wanted = self.of_kind(leaf.kind, 3)
         late = any(one.until is not None and one.name == leaf.name for one in self.made.declared)
         where = f"{leaf.name}.next" if late else leaf.name
@@ -652,7 +831,7 @@ class Maker:
 
     def local(self) -> tuple[str, Doing]:
         """A local with a value."""
-        name, kind = self.name("k"), self.kind()
+        name, kind = self.local_name("k"), self.kind()
         value = self.of_kind(kind, 2)
         self.locals.append((name, kind, True))
         return f"local {name} : {kind.text} := {value.text}", lambda s, v: v.__setitem__(
@@ -682,7 +861,7 @@ class Maker:
         low = self.rng.choice((0, 0, 1, -2, I64 - 1, U64 - 1, -I64 - 1))
         high = low + self.rng.randint(-1, 2)
         high = max(min(high, U64 if low >= 0 else I64), -I64 - 1)
-        name = self.name("i")
+        name = self.local_name("i")
         self.locals.append((name, Kind("int", "", low, max(high, low)), False))
         text, body = self.block(depth - 1, 2)
         self.locals.pop()
@@ -694,6 +873,10 @@ class Maker:
 
         return f"for {name} in {low} .. {high} {{ {text} }}", run
 
+    def calls(self) -> list[int]:
+        """Procedures that may be called here."""
+        return [*range(len(self.made.procedures))] if self.callable is None else self.callable
+
     def call(self, number: int) -> tuple[str, Doing]:
         """A call of a procedure that is already there."""
         name, kinds, body = self.made.procedures[number]
@@ -704,12 +887,18 @@ class Maker:
     def procedure(self) -> None:
         """A procedure with parameters."""
         name, kinds = self.name("p"), tuple(self.kind() for _ in range(self.rng.randrange(3)))
-        params = [self.name("a") for _ in kinds]
-        self.locals = [(param, kind, False) for param, kind in zip(params, kinds, strict=True)]
+        params: list[str] = []
+        for kind in kinds:
+            params.append(self.local_name("a"))
+            self.locals.append((params[-1], kind, False))
+        self.back = self.rng.randrange(2) == 0
         text, body = self.block(self.rng.randrange(3), 3)
-        self.locals = []
+        self.locals, self.back = [], False
         said = ", ".join(f"{param} : {kind.text}" for param, kind in zip(params, kinds, strict=True))
         self.made.text.append(f"procedure {name}{f'({said})' if params else ''} {{ {text} }}")
+        self.bodies[name] = text
+        if self.callable is not None:
+            self.callable = [*self.callable, len(self.made.procedures)]
         self.made.procedures.append(
             (name, kinds, lambda s, given: body(s, dict(zip(params, given, strict=True))))
         )
@@ -722,6 +911,11 @@ class Maker:
         if rng.randrange(3) == 0:
             return "", None
         a, b = self.value(kind), self.value(kind)
+        named = self.set_cell(leaf)
+        if named is not None:
+            return named
+        if (kind.sort, kind.low, kind.high) == ("int", 0, 255) and rng.randrange(2):
+            return self.mask_cell(leaf)
         if kind.sort in ("bool", "enum"):
             return kind.literal(a), Expr(BOOL, "", lambda s, v: s[leaf.name] == a)
         if rng.randrange(3) == 0:
@@ -734,49 +928,125 @@ class Maker:
             return "", None
         return f"{word} {kind.literal(a)}", Expr(BOOL, "", lambda s, v: COMPARE[word](s[leaf.name], a))
 
+    def set_cell(self, leaf: Leaf) -> tuple[str, Expr | None] | None:
+        """`in NAME`, or `not in NAME`, where some value of the leaf satisfies it; None where no set is of its type."""
+        rng, kind = self.rng, leaf.kind
+        fitting = [one for one in self.made.sets if alike(one.kind, kind) and fits_kind(one.kind, kind)]
+        if not fitting or rng.randrange(3):
+            return None
+        one, turned = rng.choice(fitting), rng.randrange(3) == 0
+        near = [x for x in (*one.some, kind.low, kind.high) if kind.low <= x <= kind.high]
+        if not any(one.has(x) is not turned for x in near):
+            return None
+        word = "not in" if turned else "in"
+        return f"{word} {one.name}", Expr(BOOL, "", lambda s, v: one.has(s[leaf.name]) is not turned)
+
+    def mask_cell(self, leaf: Leaf) -> tuple[str, Expr | None]:
+        """Masks under a word of eight bits, in groups."""
+        masks = [
+            "".join(self.rng.choice("01x") for _ in range(7)) + "x" for _ in range(self.rng.randint(1, 2))
+        ]
+        if len(masks) == 2 and masks[0] == masks[1]:
+            del masks[1]
+        return ", ".join(f"{mask[:4]} {mask[4:]}" for mask in masks), Expr(
+            BOOL, "", lambda s, v: any(fits_mask(mask, s[leaf.name]) for mask in masks)
+        )
+
     def possible(self, condition: Expr | None) -> Expr | None:
         """The condition, where some drawn state satisfies it."""
         for _ in range(12 if condition else 0):
-            state: State = {leaf.name: self.value(leaf.kind) for leaf in self.made.leaves()}
-            if condition and condition.of(state, {}):
+            state, past = (
+                {leaf.name: self.value(leaf.kind) for leaf in self.made.leaves()} for _ in range(2)
+            )
+            held = [self.rng.randrange(4) for _ in self.made.lasting]
+            if condition and condition.of({**state, PAST: past, LASTED: held}, {}):
                 return condition
         return None
 
     def table(self) -> None:
         """A table: lines by a few leaves, and by whole conditions."""
         rng, made, name = self.rng, self.made, self.name("t")
-        columns = rng.sample(made.leaves(), min(rng.randint(1, 3), len(made.leaves())))
+        self.back = rng.randrange(2) == 0
+        leaves = self.readable()
+        columns = rng.sample(leaves, min(rng.randint(1, 3), len(leaves)))
         outputs = rng.sample(self.shown, rng.randint(0, len(self.shown)))
         heads = [*(leaf.name for leaf in columns), "when"]
         rows = [
             f"| line | {' | '.join(heads)} || procedures {''.join(f'| {leaf.name} ' for leaf in outputs)}|"
         ]
         lines, half = [], self.truth(2)
-        for number in range(rng.randint(1, 4)):
+        count = rng.randint(1, 4)
+        names = (
+            [str(n) for n in range(1, count + 1)]
+            if rng.randrange(5) == 0
+            else [self.name("l") for _ in range(count)]
+        )
+        marks, upper, same = self.ordered(names)
+        done: list[tuple[str, tuple[Doing, ...]]] = []
+        for number in range(count):
             cells = [self.cell(leaf) for leaf in columns]
             way = rng.randrange(4)  # two lines that part, more often than not
             when = self.possible((half, negated(half), self.truth(1), None)[way])
-            texts, does = self.actions(outputs)
+            done.append(done[same[number]] if number in same else self.actions(outputs))
+            texts, does = done[-1]
             rows.append(
-                f"| l{number} | {' | '.join(text for text, _ in cells)} | {when.text if when else ''} || {texts} |"
+                f"| {names[number]}{marks[number]} | {' | '.join(text for text, _ in cells)} | {when.text if when else ''} || {texts} |"
             )
-            lines.append(Line((*(one for _, one in cells if one), *([when] if when else [])), does))
+            whole = (*(one for _, one in cells if one), *([when] if when else []))
+            lines.append(Line(whole, does, frozenset(upper[number])))
         default = None
         if rng.randrange(3):
             texts, default = self.actions(outputs)
-            rows.append(f"| rest | DEFAULT | {'| ' * (len(heads) - 2)}|| {texts} |")
+            rows.append(f"| {self.name('rest')} | DEFAULT | {'| ' * (len(heads) - 2)}|| {texts} |")
+        self.back = False
         assuming = tuple(name for name, _ in made.assumptions if rng.randrange(2))
         stops = tuple(name for name in assuming if rng.randrange(3) == 0)
         relies = f"assuming {', '.join(assuming)} " if assuming else ""
         made.text.append(f"table {name} {relies}{{")
         made.text += [*rows, "}"]
+        self.bodies[f"table {name}"] = "\n".join(rows)
         made.tables.append(Table(name, tuple(lines), default, assuming, stops))
+
+    def ordered(self, names: Sequence[str]) -> tuple[list[str], list[set[int]], dict[int, int]]:
+        """What stands after the names of lines; the lines above each; of lines that do the same as an earlier one, which that is."""
+        rng, count = self.rng, len(names)
+        marks, upper = [""] * count, [set[int]() for _ in names]
+        way = rng.randrange(4)
+        if way == 0:  # only a line of a higher rank stands above another
+            ranked = rng.sample(range(count), count)
+            for at, low in enumerate(ranked[1:], 1):
+                for high in ranked[:at]:
+                    if rng.randrange(3) == 0:
+                        upper[low].add(high)
+            for line in range(count):
+                below = [names[low] for low in range(count) if line in upper[low]]
+                marks[line] = f" above {', '.join(below)}" if below else ""
+            whole = ranked[0]
+            if rng.randrange(3) == 0:
+                marks[whole] = " above all"
+                for low in ranked[1:]:
+                    upper[low].add(whole)
+            for low in ranked:  # those above what stands above it
+                upper[low] |= {high for middle in upper[low] for high in upper[middle]}
+            return marks, upper, {}
+        same: dict[int, int] = {}
+        if way == 1:
+            first = {line: line for line in range(count)}
+            for line in range(1, count):
+                if rng.randrange(2):
+                    other = rng.randrange(line)
+                    same[line] = other
+                    first[line] = first[other]
+                    marks[line] = f" same {names[other]}"
+            for line in range(count):
+                upper[line] = {other for other in range(line) if first[other] == first[line]}
+        return marks, upper, same
 
     def actions(self, outputs: Sequence[Leaf]) -> tuple[str, tuple[Doing, ...]]:
         """The action cells of a line."""
         text, does = "", list[Doing]()
-        if self.made.procedures and self.rng.randrange(4):
-            text, run = self.call(self.rng.randrange(len(self.made.procedures)))
+        if self.calls() and self.rng.randrange(4):
+            text, run = self.call(self.rng.choice(self.calls()))
             does.append(run)
         cells = [text]
         for leaf in outputs:
@@ -803,27 +1073,166 @@ class Maker:
             for name, size in sizes
         )
         made.text += [f"enum {enum.text} {{ {', '.join(enum.members)} }}" for enum in self.enums]
+        for _ in range(rng.randrange(3)):
+            self.constant()
+        for _ in range(rng.randrange(3)):
+            self.named_set()
         for word, count in (("input", 3), ("state", 3), ("output", 1)):
             for _ in range(rng.randint(1, count)):
                 self.declare(word)
         if rng.randrange(2):
             self.deferred()
         for _ in range(rng.randrange(3)):
+            self.back = rng.randrange(3) == 0
             condition, name = self.truth(2), self.name("h")
+            self.back = False
             made.text.append(f"assume {name} monitored : {condition.text}")
             made.assumptions.append((name, condition))
+        if rng.randrange(3) == 0:
+            self.staged()
+            return made
         for _ in range(rng.randint(1, 3)):
             self.procedure()
-        self.shown = []
-        for _ in range(rng.randint(1, 2)):  # only lines write these
-            kind, name = self.kind(), self.name("o")
-            made.text.append(f"output {name} : {kind.text}")
-            made.declared.append(Declared(name, "output", (Leaf(name, kind),)))
-            self.shown.append(Leaf(name, kind))
+        self.shown = self.only_lines(rng.randint(1, 2))
         for _ in range(rng.choice((1, 1, 2))):
             self.table()
         self.level()
         return made
+
+    def constant(self) -> None:
+        """A named constant."""
+        kind, name = self.kind(), self.name("c")
+        if kind.sort == "single":
+            return
+        value = self.value(kind)
+        self.made.text.append(f"const {name} = {kind.literal(value)}")
+        own = replace(kind, low=value, high=value) if kind.sort in {"int", "real"} else kind
+        self.made.constants.append((name, own, value))
+
+    def named_set(self) -> None:
+        """A named set of values, ranges, masks, and what another set has."""
+        rng, kind, name = self.rng, self.kind(), self.name("set")
+        if kind.sort == "bool":
+            return
+        texts, tests, some = list[str](), list[Callable[[Any], bool]](), list[Value]()
+        for _ in range(rng.randint(1, 3)):
+            one, other = sorted((self.value(kind), self.value(kind)))
+            way = rng.randrange(4)
+            inner = [each for each in self.made.sets if fits_kind(each.kind, kind) and alike(each.kind, kind)]
+            if way == 0 and kind.sort != "enum":
+                texts.append(f"{kind.literal(one)} .. {kind.literal(other)}")
+                tests.append(partial(between, one, other))
+                some += [one, other]
+            elif way == 1 and inner:
+                its = rng.choice(inner)
+                texts.append(its.name)
+                tests.append(its.has)
+                some += its.some
+            elif way == 2 and (kind.sort, kind.low, kind.high) == ("int", 0, 255):
+                mask = "".join(rng.choice("01x") for _ in range(7)) + "x"
+                texts.append(f"0b{mask}")
+                tests.append(partial(fits_mask, mask))
+                some.append(int(mask.replace("x", "0"), 2))
+            else:
+                member = self.literal(kind)
+                value = member.of({}, {})
+                texts.append(member.text)
+                tests.append(partial(is_same, value))
+                some.append(value)
+        self.made.text.append(f"set {name} : {kind.text} = {{{', '.join(texts)}}}")
+        self.made.sets.append(NamedSet(name, kind, lambda x: any(test(x) for test in tests), tuple(some)))
+
+    def only_lines(self, count: int) -> list[Leaf]:
+        """Outputs that only lines write."""
+        leaves = []
+        for _ in range(count):
+            kind, name = self.kind(), self.name("o")
+            safe = self.value(kind) if self.rng.randrange(3) == 0 else None
+            self.made.text.append(
+                f"output {name} : {kind.text}" + ("" if safe is None else f" safe {kind.literal(safe)}")
+            )
+            leaves.append(Leaf(name, kind))
+            self.made.declared.append(Declared(name, "output", (leaves[-1],), safe=safe))
+        return leaves
+
+    def staged(self) -> None:
+        """Several tables in one cycle: each writes variables of its own, and reads these and those of some before it."""
+        rng, made = self.rng, self.made
+        common = frozenset(one.name for one in made.declared if one.word != "input")
+        self.targets, self.callable = common, []
+        for _ in range(rng.randint(0, 2)):
+            self.procedure()
+        around = self.callable
+        groups = [self.group() for _ in range(rng.randint(2, 3))]
+        numbers: list[tuple[int, ...]] = []
+        by = [leaf for leaf in made.leaves("input") if leaf.kind.sort == "enum" and leaf.name.isidentifier()]
+        selector = rng.choice(by) if by and rng.randrange(2) else None
+        for at, group in enumerate(groups):
+            self.hidden = frozenset(leaf.name for later in groups[at + 1 :] for leaf in later)
+            self.targets, self.callable = frozenset(leaf.name for leaf in group), []
+            for _ in range(rng.randint(0, 1)):
+                self.procedure()
+            self.shown = group
+            first = len(made.tables)
+            choice = selector is not None and at == len(groups) - 1
+            for _ in range(2 if choice else 1):
+                self.table()
+            numbers.append(tuple(range(first, len(made.tables))))
+        self.hidden, self.targets, self.callable = frozenset(), None, None
+        made.stages = self.in_order(groups, numbers, selector)
+        self.level(around)
+
+    def group(self) -> list[Leaf]:
+        """Variables that one table of several writes."""
+        leaves = self.only_lines(self.rng.randint(1, 2))
+        if self.rng.randrange(2):
+            kind, name = self.kind(), self.name("g")
+            self.made.text.append(f"state {name} : {kind.text}")
+            leaves.append(Leaf(name, kind))
+            self.made.declared.append(Declared(name, "state", (leaves[-1],)))
+        return leaves
+
+    def in_order(
+        self, groups: Sequence[Sequence[Leaf]], numbers: Sequence[tuple[int, ...]], selector: Leaf | None
+    ) -> list[Stage]:
+        """The order in which they run: after what they read; else single tables as they are declared, and then a choice."""
+        reads = [
+            {
+                word
+                for number in group
+                for word in self.read_by(f"table {self.made.tables[number].name}", set())
+            }
+            for group in numbers
+        ]
+        waits = [
+            {
+                other
+                for other in range(len(groups))
+                if other != at and reads[at] & {leaf.name for leaf in groups[other]}
+            }
+            for at in range(len(groups))
+        ]
+        stages: list[Stage] = []
+        left = list(range(len(groups)))
+        while left:
+            ready = [at for at in left if waits[at].isdisjoint(left)]
+            at = min(ready, key=lambda at: (len(numbers[at]) > 1, numbers[at]))
+            left.remove(at)
+            if len(numbers[at]) == 1:
+                stages.append((None, numbers[at]))
+            else:
+                assert selector is not None
+                chosen = tuple(self.rng.choice(numbers[at]) for _ in selector.kind.members)
+                stages.append((selector, chosen))
+        return stages
+
+    def read_by(self, name: str, met: set[str]) -> set[str]:
+        """Words in a table, and in the procedures that it calls, but where only the cycle before is meant."""
+        words = set(WORDS.findall(now_only(self.bodies[name])))
+        for callee in words & self.bodies.keys() - met:
+            met.add(callee)
+            words |= self.read_by(callee, met)
+        return words
 
     def deferred(self) -> None:
         """A variable that takes its next value when a condition holds."""
@@ -834,28 +1243,81 @@ class Maker:
         )
         self.made.declared.append(Declared(name, "state", (Leaf(name, kind),), start=start, until=until))
 
-    def level(self) -> None:
-        """The level: what runs before and after, and which table."""
+    def level(self, around: Sequence[int] | None = None) -> None:
+        """The level: what runs before and after, and which tables."""
         made, rng = self.made, self.rng
-        plain = [at for at, (_, kinds, _) in enumerate(made.procedures) if not kinds]
+        may = range(len(made.procedures)) if around is None else around
+        plain = [at for at in may if not made.procedures[at][1]]
         made.before = [at for at in plain if rng.randrange(3) == 0]
         made.after = [at for at in plain if rng.randrange(3) == 0]
         by = [leaf for leaf in made.leaves("input") if leaf.kind.sort == "enum" and leaf.name.isidentifier()]
-        chosen = f"table {made.tables[0].name}"
-        if by and rng.randrange(2):
+        if not made.stages and by and rng.randrange(2):
             leaf = rng.choice(by)
-            numbers = tuple(rng.randrange(len(made.tables)) for _ in leaf.kind.members)
-            made.by = leaf, numbers
-            pairs = zip(leaf.kind.members, numbers, strict=True)
-            chosen = (
-                f"table by {leaf.name} {{ {'  '.join(f'{m} : {made.tables[n].name}' for m, n in pairs)} }}"
-            )
+            made.stages = [(leaf, tuple(rng.randrange(len(made.tables)) for _ in leaf.kind.members))]
+        made.stages = made.stages or [(None, (0,))]
+        chosen = [self.choice(stage) for stage in made.stages]
+        rng.shuffle(chosen)
         said = [made.procedures[at][0] for at in made.before], [made.procedures[at][0] for at in made.after]
         before, after = (
             f"{word} {', '.join(names)} " if names else ""
             for word, names in zip(("preprocess", "postprocess"), said, strict=True)
         )
-        made.text.append(f"level {self.name('level')} {{ period 10 [ms] {before}{chosen} {after}}}")
+        made.text.append(
+            f"level {self.name('level')} {{ period 10 [ms] {before}{'  '.join(chosen)} {after}}}"
+        )
+
+    def choice(self, stage: Stage) -> str:
+        """One table, or a choice, as a level lists it."""
+        leaf, numbers = stage
+        if leaf is None:
+            return f"table {self.made.tables[numbers[0]].name}"
+        pairs = zip(leaf.kind.members, numbers, strict=True)
+        return (
+            f"table by {leaf.name} {{ {'  '.join(f'{m} : {self.made.tables[n].name}' for m, n in pairs)} }}"
+        )
+
+
+WORDS = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_EARLIER = re.compile(r"\bwas |\bwhen \(")
+
+
+def root(leaf: str) -> str:
+    """The variable that a leaf is of."""
+    return leaf.partition(".")[0].partition("[")[0]
+
+
+def now_only(text: str) -> str:
+    """The text without what is said of the cycle before: behind `was`, and behind the `when` of an event."""
+    while found := _EARLIER.search(text):
+        start = found.end() - (found[0] == "when (")
+        end, depth = start, 0
+        while end < len(text) and (
+            depth or end == start or text[end] in ".[" or text[end].isalnum() or text[end] == "_"
+        ):
+            depth += (text[end] in "([") - (text[end] in ")]")
+            end += 1
+        text = text[: found.start()] + " " + text[end:]
+    return text
+
+
+def fits_mask(mask: str, value: Any) -> bool:
+    """Whether a number has the digits of the mask."""
+    return all(digit in ("x", bit) for digit, bit in zip(mask, f"{int(value):0{len(mask)}b}", strict=True))
+
+
+def between(low: Any, high: Any, value: Any) -> bool:
+    """Whether it lies in a range with both ends."""
+    return bool(low <= value <= high)
+
+
+def is_same(one: Any, value: Any) -> bool:
+    """Whether it is this value."""
+    return bool(one == value)
+
+
+def fits_kind(inner: Kind, outer: Kind) -> bool:
+    """Whether all values of the one are of the other."""
+    return outer.low <= inner.low and inner.high <= outer.high
 
 
 def alike(one: Kind, other: Kind) -> bool:
@@ -893,14 +1355,14 @@ def bits(value: Value) -> object:
 
 
 def order(drawn: Drawn) -> list[tuple[str, Kind]]:
-    """Leaves with the pending ones, in declared order."""
+    """Leaves with the pending ones, in declared order; then the lines that are kept."""
     found = []
     for one in drawn.declared:
         for leaf in one.leaves:
             found.append((leaf.name, leaf.kind))
             if one.until is not None:
                 found.append((f"{leaf.name}.next", leaf.kind))
-    return found
+    return found + [(kept_line(table), Kind("int", "")) for table in sorted(set(drawn.staged))]
 
 
 def begun(drawn: Drawn) -> State:
@@ -908,11 +1370,12 @@ def begun(drawn: Drawn) -> State:
     state: State = {}
     for one in drawn.declared:
         for leaf in one.leaves:
-            zero: Value = False if leaf.kind.sort == "bool" else leaf.kind.low
-            state[leaf.name] = kept(zero if one.start is None else one.start)
+            begins = one.safe if one.start is None else one.start
+            state[leaf.name] = kept(leaf.kind.zero() if begins is None else begins)
             if one.until is not None:
                 state[f"{leaf.name}.next"] = state[leaf.name]
-    return state
+    state |= {kept_line(table): 0 for table in drawn.staged}
+    return {**state, PAST: dict(state), LASTED: [0 for _ in drawn.lasting]}
 
 
 def admitted(one: Declared, leaf: Leaf, value: Value) -> Value | None:
@@ -927,35 +1390,63 @@ def admitted(one: Declared, leaf: Leaf, value: Value) -> Value | None:
 
 
 def evaluated(drawn: Drawn, state: State) -> tuple[Seen, State]:
-    """One cycle by this evaluator: steps 1 to 7 of the manual."""
+    """One cycle by this evaluator: steps 1 to 8 of the manual, and what a fault leaves."""
+    told, now = _cycle(drawn, state)
+    fault, about, line, failed = told
+    if fault:
+        now |= {one.name: kept(one.safe) for one in drawn.declared if one.safe is not None}
+    else:
+        now[LASTED] = [now[LASTED][at] + 1 if one.of(now, {}) else 0 for at, one in enumerate(drawn.lasting)]
+        now[PAST] = {name: value for name, value in now.items() if name not in {PAST, LASTED}}
+    return seen(drawn, fault, about, line, failed, now), now
+
+
+def _cycle(drawn: Drawn, state: State) -> tuple[tuple[int, str, int, tuple[str, ...]], State]:
+    """Steps 1 to 7: the fault, what it is about, the line, failed assumptions; and the state."""
     now = dict(state)
     for one in drawn.declared:
         if one.word == "input":
             for leaf in one.leaves:
                 value = admitted(one, leaf, state[leaf.name])
                 if value is None:
-                    return seen(drawn, 1, leaf.name, -1, (), state), state
+                    return (1, leaf.name, -1, ()), dict(state)
                 now[leaf.name] = value
     ready = [one.name for one in drawn.declared if one.until is not None and one.until.of(now, {})]
     now |= {name: now[f"{name}.next"] for name in ready}
+    now |= {kept_line(table): 0 for table in drawn.staged}
     for at in drawn.before:
         drawn.procedures[at][2](now, [])
-    table = drawn.tables[0 if drawn.by is None else drawn.by[1][int(now[drawn.by[0].name])]]
+    failed: tuple[str, ...] = ()
+    at = -1
+    for place, (selector, numbers) in enumerate(drawn.stages):
+        table = drawn.tables[numbers[0 if selector is None else int(now[selector.name])]]
+        last = place == len(drawn.stages) - 1
+        fault, about, at, here = matched(drawn, table, now)
+        failed = tuple(name for name, _ in drawn.assumptions if name in {*failed, *here})
+        if fault:
+            return (fault, about if last or fault == 5 else table.name, -1, failed), now
+        if not last:
+            now[kept_line(table.name)] = at + 1
+        for does in table.lines[at].does if at < len(table.lines) else table.default or ():
+            does(now, {})
+    for number in drawn.after:
+        drawn.procedures[number][2](now, [])
+    return (0, "", at, failed), now
+
+
+def matched(drawn: Drawn, table: Table, now: State) -> tuple[int, str, int, tuple[str, ...]]:
+    """The fault of a table at its place, what it is about, the line that matches, and the assumptions that fail."""
     failed = tuple(
         name for name, condition in drawn.assumptions if name in table.assuming and not condition.of(now, {})
     )
     stopped = [name for name in failed if name in table.stops]
     if stopped:
-        return seen(drawn, 5, stopped[0], -1, failed, now), now
-    matching = [at for at, line in enumerate(table.lines) if all(cell.of(now, {}) for cell in line.when)]
-    if len(matching) > 1 or (not matching and table.default is None):
-        return seen(drawn, 3 if matching else 2, "", -1, failed, now), now
-    at = matching[0] if matching else len(table.lines)
-    for does in table.lines[at].does if matching else table.default or ():
-        does(now, {})
-    for number in drawn.after:
-        drawn.procedures[number][2](now, [])
-    return seen(drawn, 0, "", at, failed, now), now
+        return 5, stopped[0], -1, failed
+    raw = {at for at, line in enumerate(table.lines) if all(cell.of(now, {}) for cell in line.when)}
+    runs = [at for at in sorted(raw) if raw.isdisjoint(table.lines[at].upper)]
+    if len(runs) > 1 or (not runs and table.default is None):
+        return 3 if runs else 2, "", -1, failed
+    return 0, "", runs[0] if runs else len(table.lines), failed
 
 
 def seen(drawn: Drawn, fault: int, about: str, line: int, failed: tuple[str, ...], state: State) -> Seen:
@@ -1001,7 +1492,13 @@ def interpreted(drawn: Drawn, program: Program, state: State) -> tuple[Seen, Sta
     """One cycle by the interpreter."""
     did = cycle(program, program.levels[0], state)
     now = dict(did.snapshot)
-    return seen(drawn, int(did.fault), did.fault_at, did.line_index, did.failed_assumptions, now), now
+    shown = {**now, **lines_of(program, now)}
+    return seen(drawn, int(did.fault), did.fault_at, did.line_index, did.failed_assumptions, shown), now
+
+
+def lines_of(program: Program, state: Mapping[Any, Value]) -> State:
+    """The lines that tables ran which others follow, by this evaluator's keys."""
+    return {kept_line(table): state[leaf] for table, leaf in program.line_leaves.items()}
 
 
 class InPython:
@@ -1033,8 +1530,10 @@ def traced(one: Built, fault: int, at: int, line: int, failed: int, state: State
     """The trace of an executor in names."""
     checked = one.symbols["monitored"]
     about = one.symbols["leaves"][at]["name"] if fault == 1 else checked[at] if fault == 5 else ""
+    if fault in (2, 3) and at >= 0:
+        about = str([*one.program.line_leaves][at])
     names = tuple(name for bit, name in enumerate(checked) if failed >> bit & 1)
-    return seen(one.drawn, fault, about, line, names, state)
+    return seen(one.drawn, fault, about, line, names, {**state, **lines_of(one.program, state)})
 
 
 def driver_c(one: Built) -> Iterator[str]:
@@ -1137,8 +1636,10 @@ def compare(one: Built, made: ctypes.CDLL, rng: random.Random, count: Counter[st
     state, state_of_model = begun(one.drawn), dict(initial(one.program))
     python, in_c = InPython(one), InC(one, made)
     held = {leaf["name"]: HELD.get(leaf["c_type"], (0, 0)) for leaf in one.symbols["leaves"]}
+    inputs: State = {}
     for number in range(CYCLES):
-        inputs = readings(one.drawn, held, rng)
+        if not number or rng.randrange(3):
+            inputs = readings(one.drawn, held, rng)
         right, state = evaluated(one.drawn, {**state, **inputs})
         other, state_of_model = interpreted(one.drawn, one.program, {**state_of_model, **inputs})
         for who, found in (("interpreter", other), ("Python", python.run(inputs)), ("C", in_c.run(inputs))):

@@ -160,7 +160,8 @@ OURS = frozenset(
     """input state output table level procedure module owner extern enum record type unit const use assume invariant property
     was then reads writes python c bool int real true false and or xor not implies in mod abs min max if else case for next
     local call array of period preprocess postprocess by reject clamp deferred until assumed monitored proved assuming when
-    line procedures DEFAULT unreachable rest command_out status_out""".split()
+    line procedures DEFAULT unreachable rest command_out status_out above same all set safe restart count single until upon then again
+    property link serves commands adopt""".split()
 )
 """Words of the language, and headings."""
 KEPT = sorted(
@@ -172,6 +173,20 @@ KEPT = sorted(
 ODD = """s v_x x X x_ _x __x __slots__ __init__ _value_ _missing_ State IntEnum copy_in copy_out fault fault_at assumptions_failed ready0
     i0 w0 given subject chosen more_i INT_MAX EOF E2BIG A I B0 None_ mro self m t t0 do run exact bit32 admit settle init class_x_0 K0_0
     G0 O0 l1 Il _Bool _Generic __LINE__ _ __ e1 x1e5 f u8 L R lines step cycle name value""".split()  # fmt: skip
+MADE = (
+    "was_{}",
+    "held_{}",
+    "line_of_{}",
+    "to_{}",
+    "last_{}",
+    "none_{}",
+    "line_{}",
+    "keep_previous",
+    "none",
+    "was_v",
+    "line_of_t",
+)
+"""What the compiler calls the states, procedures and members that it adds."""
 ENDINGS = "_ _2 _line _lines _step _cycle _next _t _0 _1 _LINES _ACTIONS _out __ _K0_0".split()
 DOCS = (
     "*/ int evil(void); /*",
@@ -207,6 +222,7 @@ def hostile_words(rng: random.Random) -> Callable[[], str]:
                     f"run_{near}",
                     f"do_{near}",
                     f"_{near}",
+                    *(made.format(near) for made in MADE),
                 )
                 name = rng.choice(ways)
             if name.isidentifier() and name.isascii() and name not in OURS and name not in given:

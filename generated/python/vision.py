@@ -121,7 +121,7 @@ class flash(IntEnum):
     line = 2
 
 
-DIGEST = 0x3806e1b0
+DIGEST = 0xaf4c3900
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 38
 """What `check` gives of a state that other tables made."""
@@ -195,17 +195,17 @@ class State:
         self.emove_input_command = 0  # Orders of emove.
         self.emove_obj_ptr = 0  # Orders of emove.
         self.emove_expected_range_mm = 0.0  # Orders of emove.
-        self.emove_expected_normal_x = -1.0  # Orders of emove.
-        self.emove_expected_normal_y = -1.0  # Orders of emove.
-        self.emove_expected_normal_z = -1.0  # Orders of emove.
+        self.emove_expected_normal_x = 0.0  # Orders of emove.
+        self.emove_expected_normal_y = 0.0  # Orders of emove.
+        self.emove_expected_normal_z = 0.0  # Orders of emove.
         self.to_emove_inc_command_echo = 0  # Reports to emove.
         self.to_emove_ref_command_echo = 0  # Reports to emove.
         self.to_emove_status_report = 0  # Reports to emove.
         self.to_emove_failure = 0  # Reports to emove.
-        self.to_emove_x_mm = -500.0  # Reports to emove.
-        self.to_emove_y_mm = -500.0  # Reports to emove.
-        self.to_emove_c = -1.0  # Reports to emove.
-        self.to_emove_s = -1.0  # Reports to emove.
+        self.to_emove_x_mm = 0.0  # Reports to emove.
+        self.to_emove_y_mm = 0.0  # Reports to emove.
+        self.to_emove_c = 0.0  # Reports to emove.
+        self.to_emove_s = 0.0  # Reports to emove.
         self.to_emove_range_mm = 0.0  # Reports to emove.
         self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
         self.answered = False  # A line has answered the new command.
@@ -213,14 +213,14 @@ class State:
         self.inc_command_seen = 0  # Number of the order that was taken last.
         self.camera_number = 0  # From the image processing.
         self.camera_matched = False  # From the image processing.
-        self.camera_x_mm = -500.0  # From the image processing.
-        self.camera_y_mm = -500.0  # From the image processing.
-        self.camera_c = -1.0  # From the image processing.
-        self.camera_s = -1.0  # From the image processing.
+        self.camera_x_mm = 0.0  # From the image processing.
+        self.camera_y_mm = 0.0  # From the image processing.
+        self.camera_c = 0.0  # From the image processing.
+        self.camera_s = 0.0  # From the image processing.
         self.camera_range_mm = 0.0  # From the image processing.
-        self.camera_normal_x = -1.0  # From the image processing.
-        self.camera_normal_y = -1.0  # From the image processing.
-        self.camera_normal_z = -1.0  # From the image processing.
+        self.camera_normal_x = 0.0  # From the image processing.
+        self.camera_normal_y = 0.0  # From the image processing.
+        self.camera_normal_z = 0.0  # From the image processing.
         self.cur_state = 0
         self.arrived = False  # The picture that was asked for is there.
         self.fits = False  # Its range is the expected one; its surface faces as expected.

@@ -879,6 +879,21 @@ class Code(StrEnum):
         }
         level watch { period 40 [ms] table watches }
     """
+    NO_START = """RCS318: a number of which nothing says with what it starts
+
+    A number starts at 0, an output with a safe value at that. Where 0 is not in its range it starts with what is nearest to 0, which
+    nobody may have meant. A warning: say with what it starts, after the type of the variable, or of the field of its record or link.
+
+        record gains { p : real 0.1 .. 9.0 }
+        state speed : int 1 .. 9 = 3
+        state gain : gains
+
+    warning: nothing says with what `gain.p` starts: 0 is not in 0.1 .. 9.0, so that it is 0.1
+
+        record gains { p : real 0.1 .. 9.0 = 1.0 }
+        state speed : int 1 .. 9 = 3
+        state gain : gains
+    """
     GAP = """RCS401: an input that no line matches
 
     Exactly one line matches in every cycle; here is an input that none matches: on the robot this is a STATE-TABLE error. The least

@@ -62,18 +62,29 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """What would mend a finding: `help` says it for people.
+    """What would mend a finding: `help` says it for people, or a note.
 
     Attributes:
         title: What to do, in the imperative.
-        proved: What is proved of it; empty where nothing is.
+        proved: What is to be proved of it.
         changes: To be made together.
+        told: What is said of it, in two pieces between which stands whether it is proved; in one where that is not said.
+        whole: Whether it is to mend all that was found of this kind: every overlap of the table, not these two lines alone.
+        certain: Whether it is proved: of the text that it makes (`table.mending`).
     """
 
     title: str
     table: str
     proved: str
     changes: tuple[Change, ...]
+    told: tuple[str, ...] = ()
+    whole: bool = True
+    certain: bool = False
+
+    @property
+    def said(self) -> str:
+        """What is said of it; empty where a help says it in general."""
+        return ("proved" if self.certain else "not proved").join(self.told)
 
 
 MOST_SHOWN = 3

@@ -13,5 +13,5 @@ it costs: about the proof of both versions; parts that are equal as text cost no
 
 Modules, in the order the data flows: `sides` finds what is to be compared (`revision` lays out an old one), `compare`
 gives the difference, which `changes` computes; `rows` and `jsonform` show it, `present` says what of it a level meets
-that runs. `upgrade` rewrites older forms where both versions resolve to the same program.
+that runs. `upgrade` rewrites older forms where both versions resolve to the same program, `starts` writes out with what they started.
 """

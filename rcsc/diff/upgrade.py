@@ -2,13 +2,14 @@
 
 In: loaded files. Out: `Upgraded`, with the trees of those that change, what became of them, and what was left.
 
-Three forms are rewritten, each where nothing comes to mean something else:
+Four forms are rewritten, each where nothing comes to mean something else:
 
 | before | after |
 |---|---|
 | a state that takes a value after a restart because of its name | `restart VALUE` |
 | `deferred until` the condition that every last order is echoed | `deferred` |
 | a procedure that the protocol makes where none is declared | nothing |
+| what started with the least of its type, and would start otherwise now | `= VALUE` (`starts`) |
 
 A program means the same when it resolves to the same program, but for the order of its procedures and for who says what it adopts
 after a restart: no solver is asked. A protocol that a level writes by hand is left as it is. Numbers, echoes and what is held are
@@ -21,12 +22,13 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diff.starts import started_otherwise, written_out
 from rcsc.lang.model import Enum, Program, VariableName
 from rcsc.lang.project import Loaded
 from rcsc.lang.resolve import closure, resolve
 from rcsc.lang.restart import Fixed
 from rcsc.lang.syntax import tree
-from rcsc.lang.syntax.spell import spell_expr, spell_type
+from rcsc.lang.syntax.spell import spell_expr, spell_field, spell_type
 
 _NUMBER, _COMMAND = "inc_command", "input_command"
 _ECHO, _ECHOED, _STATUS = "inc_command_echo", "ref_command_echo", "status_report"
@@ -71,7 +73,7 @@ def upgrade(loaded: Loaded, names: Sequence[str]) -> Upgraded:
     ]
     programs: dict[str, Program] = {}
     for root in roots:
-        program = resolve(root, loaded)
+        program = resolve(root, loaded, least_first=True)
         if not isinstance(program, Program):
             return Upgraded({}, diagnostics=tuple(program))
         programs[root] = program
@@ -79,8 +81,12 @@ def upgrade(loaded: Loaded, names: Sequence[str]) -> Upgraded:
     kept = work.kept([each for name in names for each in work.rewritings(name)])
     left = tuple(text for root in roots if (text := _draft(root, loaded, programs[root], names)))
     changed = {each.file for each in kept}
-    files = {name: tree_ for name, tree_ in work.files(kept).items() if name in changed}
-    return Upgraded(files, tuple(f"{each.file}: {each.words}" for each in kept), left)
+    rewritten = replace(loaded, files=work.files(kept))
+    started, values = written_out(rewritten, names, programs)
+    rewritten = replace(rewritten, files={**rewritten.files, **started})
+    files = {name: rewritten.files[name] for name in (*changed, *started)}
+    done = (*(f"{each.file}: {each.words}" for each in kept), *values)
+    return Upgraded(files, done, (*left, *started_otherwise(rewritten, programs)))
 
 
 @dataclass(slots=True)
@@ -129,7 +135,7 @@ class _Upgrade:
         """Whether every program means the same with them."""
         loaded = replace(self.loaded, files=self.files(rewritings))
         for root, before in self.meaning.items():
-            after = resolve(root, loaded)
+            after = resolve(root, loaded, least_first=True)
             if not isinstance(after, Program) or _meaning(after) != before:
                 return False
         return True
@@ -272,8 +278,8 @@ def _field(side: str, part: tree.FieldDecl, members: Mapping[str, tuple[str, ...
     kind = spell_type(part.type)
     own = members.get(kind, ())
     if side == "report" and ("restart" in own or own[:1] == ("none",)):
-        return f"reason {part.name.text} : {kind}" + (" restart restart" if "restart" in own else "")
-    return f"{part.name.text} : {kind}"
+        return f"reason {spell_field(part)}" + (" restart restart" if "restart" in own else "")
+    return spell_field(part)
 
 
 def _member(word: str, members: tuple[str, ...]) -> str:

@@ -23,6 +23,7 @@ from rcsc.procedures.invariants import properties_elsewhere
 from rcsc.procedures.obligations import called_by_lines
 from rcsc.solvers.options import Options
 from rcsc.table.certificate import must_cover
+from rcsc.table.mending import mended
 from rcsc.table.program import prove_program
 from rcsc.table.verdict import DeadLine, Gap, SolversDisagree, TableVerdict, Undecided
 
@@ -41,7 +42,8 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
             resting(table_report(table_verdict, program), verdict.unproved, verdict.unsafe)
             for table_verdict in verdict.tables
         )
-        return Proof(root, verdict.findings, program, tables, verdict.proved, lambda: verdict.certificate)
+        findings = mended(verdict, root, loaded, options)
+        return Proof(root, findings, program, tables, verdict.proved, lambda: verdict.certificate)
     memory = _Memory(program, loaded, options, cache)
     known = {table.name: kept for table in program.tables if (kept := memory.table(table)) is not None}
     missing = [table for table in program.tables if table.name not in known]
@@ -55,7 +57,8 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
         table_verdict.table.name: _Kept(table_report(table_verdict, program), ())
         for table_verdict in verdict.tables
     }
-    return _proof(root, program, verdict.findings, {**known, **new}, verdict.unproved, verdict.unsafe)
+    findings = mended(verdict, root, loaded, options)
+    return _proof(root, program, findings, {**known, **new}, verdict.unproved, verdict.unsafe)
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ from rcsc.lang.interpret import (
     initial,
     matching_lines,
 )
-from rcsc.lang.model import Bool, Enum, Int, Line, LineName, Procedure, Program, Scalar, Table, Value, spell
+from rcsc.lang.model import Line, LineName, Procedure, Program, Scalar, Table, Value, spell, unspelled
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
 
@@ -122,7 +122,7 @@ def run_at(program: Program, table: Table, values: Sequence[tuple[str, str]]) ->
         values: Name and text of the variables that are known; the others are as a program begins with them.
     """
     kinds = {str(each.name): each.type for each in program.variables}
-    now = initial(program) | {name: value_of(kinds[name], text) for name, text in values}
+    now = initial(program) | {name: unspelled(kinds[name], text) for name, text in values}
     yield "input: " + ", ".join(f"{name} = {text}" for name, text in values)
     try:
         matching = matching_lines(table, now)
@@ -173,19 +173,6 @@ def _first_that_fails(table: Table, line: Line, now: Mapping[str, Value]) -> str
             value = spell(column.subject.type, evaluate(column.subject, now))
             return f"under `{column.heading}` stands `{test.text}`, and it is {value}"
     return "nothing fails"
-
-
-def value_of(kind: Scalar, text: str) -> Value:
-    """The value that `spell` gives as this text."""
-    match kind:
-        case Bool():
-            return text == "true"
-        case Enum(members=members):
-            return members.index(text)
-        case Int():
-            return int(text)
-        case _:
-            return float(text)
 
 
 def mended(workspace: Workspace, file: str) -> tuple[str, int]:

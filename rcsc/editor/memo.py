@@ -8,15 +8,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.diagnostic import Diagnostic, Proposal
 from rcsc.driver.proofs import moved
 from rcsc.lang.model import Program, Table
 from rcsc.solvers import smt
 from rcsc.symbolic.remembered import Answers
+from rcsc.table.mending import Outcome
 from rcsc.table.verdict import TableVerdict
 
 T = TypeVar("T")
 
+MOST_PROPOSALS = 200
+"""Proposals of which it is kept what came of them."""
 MOST_RESTS, MOST_EACH = 8, 8
 """Rests of programs that are kept, and versions of a table in each: of the last minutes of typing."""
 
@@ -43,6 +46,7 @@ class _Versions:
     rest: Program
     verdicts: dict[str, list[TableVerdict]] = field(default_factory=dict)
     told: dict[str, list[_Told]] = field(default_factory=dict)
+    outcomes: dict[Proposal, list[tuple[Table, Outcome]]] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -103,6 +107,27 @@ class Memo:
         if self.keeps_all or smt.unanswered() == before:
             _keep(kept, _Told(verdict, unproved, shape, tuple(diagnostics), span.start))
         return diagnostics
+
+    def outcome(
+        self, program: Program, table: Table, proposal: Proposal, make: Callable[[], Outcome]
+    ) -> Outcome:
+        """What came of a proposal for an equal table, else what comes of it now.
+
+        Raises:
+            OutdatedError: Nobody waits for it.
+        """
+        self.asked()
+        known = self._of(program).outcomes
+        kept = known.setdefault(proposal, [])
+        for before, outcome in kept:
+            if before == table:
+                return outcome
+        outcome = make()
+        self.asked()
+        _keep(kept, (table, outcome))
+        while len(known) > MOST_PROPOSALS:
+            del known[next(iter(known))]
+        return outcome
 
     def forget(self) -> None:
         """Forget every verdict."""

@@ -34,6 +34,7 @@ from rcsc.lang.written.tables import WrittenTable, tables_of
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.symbolic.remembered import remembering
+from rcsc.table.mending import COUNTED, key, mended, serious
 from rcsc.table.program import prove_program
 
 if TYPE_CHECKING:
@@ -290,20 +291,20 @@ class Workspace:
 
     def _check(self, reading: Reading, options: Options) -> Checked:
         if reading.program is not None:
-            found, reports = self._proved(reading.program, options)
+            found, reports = self._proved(reading, reading.program, options)
             every = tuple(sorted({*reading.wrong, *found}, key=sort_key))
             return Checked(reading, every, (), reports)
         assert reading.rest is not None
         found = (
             ()
             if reading.rest.program is None
-            else self._proved(reading.rest.program, options, reading.rest.harmed)[0]
+            else self._proved(reading, reading.rest.program, options, reading.rest.harmed)[0]
         )
-        more = {*reading.rest.wrong, *_serious(found)} - set(reading.wrong)
+        more = {*reading.rest.wrong, *serious(found)} - set(reading.wrong)
         return Checked(reading, reading.wrong, tuple(sorted(more, key=sort_key)), {})
 
     def _proved(
-        self, program: Program, options: Options, harmed: Sequence[Span] = ()
+        self, reading: Reading, program: Program, options: Options, harmed: Sequence[Span] = ()
     ) -> tuple[tuple[Diagnostic, ...], dict[tuple[str, str], TableReport]]:
         """What is found in a program, and a report of each table; of a declaration that is not as it stands nothing."""
         names = [table.name for table in program.tables if not _inside(table.span, harmed)]
@@ -312,7 +313,8 @@ class Workspace:
         for each in verdict.tables:
             report = resting(table_report(each, program), verdict.unproved, verdict.unsafe)
             reports[report.file, report.table] = report
-        told = verdict.findings
+        loaded = reading.loaded if reading.rest is None else reading.rest.loaded
+        told = mended(verdict, reading.path, loaded, options, self.memo)
         if harmed:
             told = tuple(each for each in told if not _inside(each.primary.span, harmed))
         return told, reports
@@ -367,7 +369,7 @@ class Workspace:
             outcome = None if text is None else self._outcome(checked, source, told, text)
             if text is not None and outcome is not None:
                 edits = difference(source.name, Lines(source.text), text)
-                yield Repair(proposal.title, proposal.proved, edits, outcome, certain=True)
+                yield Repair(proposal.title, proposal.proved, edits, outcome, certain=proposal.certain)
         spelt = with_spelling(source, told)
         if spelt is not None:
             text, meant = spelt
@@ -378,25 +380,14 @@ class Workspace:
         """Whether nothing is wrong with the table in a text; None where the finding is still there, or another has come."""
         trial = self.trial({source.name: text})
         after = trial.checked(checked.reading.path)
-        before = {_key(each) for each in _serious(checked.diagnostics)}
-        now = {_key(each) for each in _serious(after.diagnostics)}
-        gone = _key(told) not in now or (told.code in _COUNTED and told.message not in _messages(after))
+        before = {key(each) for each in serious(checked.diagnostics)}
+        now = {key(each) for each in serious(after.diagnostics)}
+        gone = key(told) not in now or (told.code in COUNTED and told.message not in _messages(after))
         if after.reading.program is None or not gone or now - before:
             return None
         table = told.proposals[0].table
-        wrong = any(table in _names_in(after.reading.loaded, each) for each in _serious(after.diagnostics))
+        wrong = any(table in _names_in(after.reading.loaded, each) for each in serious(after.diagnostics))
         return not wrong
-
-
-_COUNTED = {Code.GAP, Code.DEFAULT_REACHED}
-"""Findings whose message counts inputs: of a table there is one."""
-
-
-def _key(diagnostic: Diagnostic) -> tuple[str, str]:
-    """What a finding is about, whatever it counts."""
-    counts = diagnostic.code in _COUNTED or diagnostic.only_listed
-    table = next((witness.table for witness in diagnostic.witnesses), "")
-    return diagnostic.code.value, table if counts else diagnostic.message
 
 
 def _messages(checked: Checked) -> set[str]:
@@ -406,10 +397,6 @@ def _messages(checked: Checked) -> set[str]:
 def _inside(span: Span, wholes: Iterable[Span]) -> bool:
     """Whether a place is in one of several declarations."""
     return any(whole.file == span.file and whole.start <= span.start < whole.end for whole in wholes)
-
-
-def _serious(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
-    return [each for each in diagnostics if each.severity is not Severity.NOTE]
 
 
 def _read(path: str, loaded: Loaded, overlay: Mapping[str, str]) -> Reading:

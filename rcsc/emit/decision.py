@@ -17,6 +17,7 @@ where it can, and does not keep many on both sides.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import accumulate
 from operator import or_
 from typing import TypeAlias
@@ -105,6 +106,8 @@ class _Grower:
 
     def grown(self, lines: int, spans: Spans, deep: int) -> Decision:
         """The tree for the lines that may match within these classes."""
+        for every, (low, high) in zip(self.probes, spans, strict=True):
+            lines &= reduce(or_, every[low:high], 0)  # one that matches nowhere here is not waited for
         cut = None if lines.bit_count() <= self.few else self._best(lines, spans)
         if cut is None:
             self.left -= 1

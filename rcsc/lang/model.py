@@ -103,11 +103,12 @@ class Array:
 
 @dataclass(frozen=True, slots=True)
 class RecordField:
-    """A named part of a record."""
+    """A named part of a record; `initial` is what it, or each element of it, starts with where that is written."""
 
     name: str
     type: "Type"
     doc: str = ""
+    initial: Value | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +207,21 @@ def spell(kind: Scalar, value: Value) -> str:
             return repr(float(value))
 
 
+def unspelled(kind: Scalar, text: str) -> Value:
+    """Return the value that `spell` gives as this text."""
+    match kind:
+        case Bool():
+            return text == "true"
+        case Enum(members=members):
+            return members.index(text)
+        case Int():
+            return int(text)
+        case Single():
+            return single(float(text))
+        case Real():
+            return float(text)
+
+
 def unit_text(unit: Unit) -> str:
     """A unit without its brackets, as it would be declared; empty for none.
 
@@ -242,6 +258,16 @@ def value_of_text(kind: Scalar, text: str) -> Value | None:
         return None
 
 
+def start(kind: Scalar) -> Value:
+    """What a variable of the type starts with where nothing is written: 0, or what is nearest to it; the first member; false."""
+    match kind:
+        case Int(low, high) | Real(low, high):
+            zero = 0.0 if isinstance(kind, Real) else 0
+            return min(max(zero, low), high)
+        case _:
+            return value_of_key(kind, key_bounds(kind)[0])
+
+
 # --- variables -----------------------------------------------------------------------
 
 
@@ -267,7 +293,7 @@ class Variable:
     Attributes:
         name: Its path. The pending value of a deferred variable `x` is a state leaf of its
             own, named `x.next`, directly after `x`.
-        initial: Its value before the first cycle (inputs too).
+        initial: Its value before the first cycle (inputs too): what is written, else the safe value, else `start`.
         deferred_until: For a deferred variable: at the start of a cycle, when this holds of
             the snapshot, `x` takes the value of `x.next`. `next x := e` writes `x.next`.
         safe: What an output shows after a cycle that ended in a fault; None where it stays as it is.
@@ -275,7 +301,7 @@ class Variable:
         line_of: Of a hidden state, the table whose line of this cycle it holds: 0 for none, else one more than the line's position.
         counts: Of a hidden state that counts cycles, the condition that has held for so many.
         restart: What it has when the level starts anew; None where it is then as it is initially, or as `Program.restart` says.
-        given: Whether its initial value is written; else it has the least of its type, which nobody meant.
+        given: Whether its initial value is written, or its safe one is it; else it starts with what `start` says, which nobody meant.
     """
 
     name: VariableName

@@ -139,6 +139,14 @@ def prefix(root: str) -> str:
     return said if isinstance(said, str) and PREFIX.fullmatch(said) else ""
 
 
+def starts_at_zero(root: str) -> bool:
+    """Whether the file of the project in the folder `root` says that its tables were written since numbers start at 0."""
+    try:
+        return toml_of(Path(root, PROJECT_FILE).read_text(encoding="utf-8")).get("starts_at_zero") is True
+    except (OSError, ValueError, Malformed):
+        return False
+
+
 @dataclass(frozen=True, slots=True)
 class _Unread:
     """Why a file was not read; told again at every `use` of it."""
@@ -256,7 +264,7 @@ class _Loader:
             self.report(Code.PROJECT_FILE, message, Span(path, where, where))
             return ()
         patterns = settings.get("exclude", [])
-        unknown = sorted(settings.keys() - {"name", "exclude", "prefix"})
+        unknown = sorted(settings.keys() - {"name", "exclude", "prefix", "starts_at_zero"})
         wrong = f"`{unknown[0]}` is not a setting" if unknown else ""
         if not isinstance(settings.get("name", ""), str):
             wrong = "`name` is a text"
@@ -265,8 +273,10 @@ class _Loader:
         begins = settings.get("prefix", "")
         if not isinstance(begins, str) or not PREFIX.fullmatch(begins):
             wrong = "`prefix` is a letter, and at most seven letters, digits and `_` after it"
+        if not isinstance(settings.get("starts_at_zero", True), bool):
+            wrong = "`starts_at_zero` is true or false"
         if wrong:
-            helps = "the settings are `name`, `exclude` and `prefix`"
+            helps = "the settings are `name`, `exclude`, `prefix` and `starts_at_zero`"
             self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), helps)
             return ()
         return tuple(patterns)

@@ -42,6 +42,7 @@ class Options:
         jobs: Processes that prove tables.
         cpu_s: The backstop of a question, in seconds; 0 for one that the steps do not need.
         brief: Whether what would mend a finding, and whether lines that overlap do the same, is left for later.
+        bare: Whether it is enough to know what is wrong, at any input: the least one, and the region around it, are not looked for.
     """
 
     steps: int = STEPS
@@ -50,6 +51,7 @@ class Options:
     jobs: int = 1
     cpu_s: float = 0.0
     brief: bool = False
+    bare: bool = False
 
     @property
     def limits(self) -> Limits:

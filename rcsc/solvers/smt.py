@@ -84,7 +84,9 @@ def leave_open(why: str) -> None:
     _open.append(why)
 
 
-@dataclass(slots=True)
+@dataclass(
+    slots=True, eq=False
+)  # each is itself: of two that are as far spent, one inside the other, either ends by itself
 class Budget:
     """What all questions that are asked inside `together` may cost.
 
@@ -100,7 +102,7 @@ class Budget:
         return self.left <= 0
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Until(Budget):
     """No steps, but something that happens, in place of a budget: for who shows what is known so far, or gives up."""
 

@@ -35,5 +35,6 @@ undecided, and fails.
 
 Modules, in the order the data flows: `program` (a whole program), `decide` (which way), `boxes`, `relational`,
 `confirm` (Z3), `cover` (where a condition holds), `verdict` (findings as data), `certificate` (which `rcsc.certify`
-checks anew), `cells` (keys as cells), `repair` (proved before shown), `findings` (which to tell), `diagnose`.
+checks anew), `cells` (keys as cells), `repair` (proved before shown), `findings` (which to tell), `diagnose`,
+`mending` (what is proposed, tried in the text).
 """

@@ -37,7 +37,7 @@ from rcsc.table.certificate import must_cover
 from rcsc.table.findings.groups import grouped, names_of
 from rcsc.table.findings.likely import likely
 from rcsc.table.regions import partition
-from rcsc.table.repair import NewLine, PartingCell, left_by, new_line, parting, parting_cells
+from rcsc.table.repair import NewLine, PartingCell, changes_of, left_by, new_line, parting, parting_cells
 from rcsc.table.verdict import (
     ContradictoryAssumptions,
     DeadLine,
@@ -80,7 +80,11 @@ def diagnostics(
         last = max(
             (at for at, each in enumerate(shown) if not each.told_with), key=lambda at: sort_key(shown[at])
         )
-        shown[last] = replace(shown[last], notes=(*shown[last].notes, together))
+        shown[last] = replace(
+            shown[last],
+            notes=(*shown[last].notes, together.said),
+            proposals=(*shown[last].proposals, *((together,) if together.changes else ())),
+        )
     if len(overlaps) > MOST_PAIRS:
         least = "at least " if len(overlaps) == partition.MOST_PAIRS else ""
         message = (
@@ -139,7 +143,7 @@ def _others(
             notes=_under(table, unproved),
             help=helps,
             severity=Severity.WARNING,
-            proposals=(Proposal(title, str(table.name), "no input falls to it", (change,)),),
+            proposals=(Proposal(title, str(table.name), "no input falls to it", (change,), helps),),
         )
 
 
@@ -211,6 +215,7 @@ def _overlap(program: Program, table: Table, overlap: Overlap, options: Options)
     column = _column(program, table, overlap.witness, (overlap.first, overlap.second), overlap.region)
     repair = None if options.brief else parting(program, table, overlap)
     effects = _effects(program, table, overlap, options)
+    proposals = () if options.brief else _proposals(table, (first, second), repair, effects)
     return Diagnostic(
         Code.OVERLAP,
         f"lines `{first.name}` and `{second.name}` of table `{table.name}` both match some input",
@@ -220,10 +225,10 @@ def _overlap(program: Program, table: Table, overlap: Overlap, options: Options)
             *_far(table, (first, second), repair),
         ),
         notes=() if effects is None else (str(effects),),
-        help=(*(() if repair is None else (repair.shown(table),)), *_as_same(first, second, effects)),
+        help=tuple(proposal.said for proposal in proposals),
         witnesses=(column,),
         effects=effects,
-        proposals=_proposals(table, (first, second), repair, effects),
+        proposals=proposals,
     )
 
 
@@ -235,11 +240,15 @@ def _proposals(
     proposals = []
     if repair is not None:
         proved = f"it parts the two lines, and line `{table.lines[repair.other].name}` takes what `{table.lines[repair.line].name}` loses"
-        proposals.append(Proposal(repair.write(table), str(table.name), proved, (repair.change(table),)))
+        changes = (repair.change(table),)
+        title, told = repair.write(table), repair.told(table)
+        proposals.append(Proposal(title, str(table.name), proved, changes, told, whole=False))
     if effects is not None and effects.same:
         title = f"say that line `{second.name}` does the same as `{first.name}`"
         change = Change(Place.SAME, str(second.name), texts=(str(first.name),))
-        proposals.append(Proposal(title, str(table.name), "both do the same wherever both match", (change,)))
+        keep = f"or keep both, and say that they do the same: `{second.name} same {first.name}`"
+        proved = "both do the same wherever both match"
+        proposals.append(Proposal(title, str(table.name), proved, (change,), (keep,), whole=False))
     return tuple(proposals)
 
 
@@ -261,12 +270,6 @@ def _effects(program: Program, table: Table, overlap: Overlap, options: Options)
     return alike(program, table, (overlap.first, overlap.second), few, near=overlap.witness)
 
 
-def _as_same(first: Line, second: Line, effects: Effects | None) -> tuple[str, ...]:
-    """Propose to say that two lines do the same, where they do."""
-    same = f"or keep both, and say that they do the same: `{second.name} same {first.name}`"
-    return (same,) if effects is not None and effects.same else ()
-
-
 def _most_overlapping(table: Table, overlaps: Sequence[Overlap]) -> str:
     """Name the lines that overlap with the most others: mending these mends the most."""
     counts = Counter(line for overlap in overlaps for line in (overlap.first, overlap.second))
@@ -277,13 +280,21 @@ def _most_overlapping(table: Table, overlaps: Sequence[Overlap]) -> str:
     return f"which lines overlap with the most others: {', '.join(most)}"
 
 
-def _together(program: Program, table: Table, overlaps: Sequence[Overlap]) -> str:
-    """Say what the repairs of several overlaps do together; empty for fewer than two."""
+def _together(program: Program, table: Table, overlaps: Sequence[Overlap]) -> Proposal | None:
+    """Propose the repairs of several overlaps together, or say what they leave; None for fewer than two."""
     first = [next(iter(parting_cells(program, table, overlap)), None) for overlap in overlaps]
     chosen = [cell for cell in first if cell is not None and not cell.falls]
     if len(chosen) < 2:
-        return ""
-    return f"the helps of these {len(chosen)} overlaps together: {left_by(program, table, chosen)}"
+        return None
+    title = f"the helps of these {len(chosen)} overlaps together"
+    left = left_by(program, table, chosen)
+    if left:
+        return Proposal(title, str(table.name), "", (), (f"{title}: {left}",))
+    changes = changes_of(program, table, chosen)
+    if not changes:
+        return None
+    proved = "no two lines match any more"
+    return Proposal(title, str(table.name), proved, changes, (f"{title}: ", f" that {proved}"))
 
 
 # --- gaps ----------------------------------------------------------------------------
@@ -306,7 +317,7 @@ def _gap(program: Program, table: Table, gap: Gap, options: Options) -> Diagnost
             message,
             Label(table.span),
             notes=notes,
-            help=(str(repair),) if repair else (),
+            help=() if repair is None else (_adding(table, repair).said,),
             witnesses=columns,
             more=_more(program, gap),
             proposals=() if repair is None else (_adding(table, repair),),
@@ -336,7 +347,8 @@ def _adding(table: Table, row: NewLine) -> Proposal:
     title = f"add a line to table `{table.name}` for {which} of the inputs that no line matches"
     proved = "it closes the gap" if row.closes else "it closes this part of the gap"
     change = Change(Place.LINE, texts=row.cells)
-    return Proposal(title, str(table.name), f"{proved} and overlaps no other line", (change,))
+    proved += " and overlaps no other line"
+    return Proposal(title, str(table.name), proved, (change,), (f"{row.told}: ", ""), row.closes)
 
 
 def _patterns(gap: Gap) -> tuple[str, ...]:

@@ -31,6 +31,7 @@ from rcsc.solvers.smt import Answer
 from rcsc.table.certificate import program_certificate, with_witness
 from rcsc.table.decide import prove_table
 from rcsc.table.diagnose import diagnostics
+from rcsc.table.findings.declared import declared_badly
 from rcsc.table.verdict import ContradictoryAssumptions, TableFinding, TableVerdict, Undecided
 
 TOO_MANY_STEPS = f"the questions about it take, together, more than {TOGETHER} times the steps of one"
@@ -104,7 +105,7 @@ def prove_program(
     Tables may rely on the invariants: they are shown in the same step, by induction over cycles.
     """
     before = known or Nothing()
-    findings = [*at_first(program), *properties_elsewhere(program)]
+    findings = [*at_first(program), *properties_elsewhere(program), *declared_badly(program)]
     owed = Obligations(program, options)
     wanted = [table for table in program.tables if only is None or table.name in only]
     findings += owed.prove(wanted)

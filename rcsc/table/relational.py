@@ -316,7 +316,7 @@ class _Decision:
         if self.options.brief and len(pairs) > 1:
             smt.leave_open("where else two lines meet")
         for first, second in sorted(pairs):
-            grown = len(found) < (1 if self.options.brief else _MOST_GROWN)
+            grown = len(found) < (1 if self.options.brief else _MOST_GROWN) and not self.options.bare
             found.append(self.overlap(first, second, search.overlaps.get((first, second)), grown=grown))
         return found
 
@@ -360,7 +360,7 @@ class _Decision:
 
     def overlap(self, first: int, second: int, known: Point | None, *, grown: bool) -> _Found:
         """A pair of lines that overlaps, at its least input; at the one that is known where nobody waits for the least."""
-        if known is not None and smt.gives_up("the least input"):
+        if known is not None and (self.options.bare or smt.gives_up("the least input")):
             return _Found(Overlap(first, second, self.snapshot(known)))
         both = [self.line(first), self.line(second)]
         point = least(self.universe, [*both, *self.assumed], self.columns)
@@ -390,7 +390,7 @@ class _Decision:
             if len(settled) == len(points):
                 point = min(settled, key=lambda candidate: [candidate[column] for column in self.columns])
                 lines = [] if many else [[whole(line)] for line in self.clauses]
-                grow = None if many else partial(self.around, point, lines)
+                grow = None if many or self.options.bare else partial(self.around, point, lines)
                 return [_Found(Gap((self.snapshot(point),), (None,)), grow)]
         seen += [snapshot for snapshot in self.tried if not self.matching(snapshot)]
         if covered and not search.gaps and not seen:
@@ -453,7 +453,8 @@ class _Decision:
         self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]
     ) -> Snapshot | None:
         """Return the least input for which the terms hold; where Z3 gives up, the least one known."""
-        witness = None if smt.gives_up("the least input") else self._least(seen, terms)
+        known = bool(seen) and self.options.bare
+        witness = None if known or smt.gives_up("the least input") else self._least(seen, terms)
         if witness is None and seen:
             best = min(seen, key=lambda snapshot: [key_of(v.type, snapshot[v.name]) for v in self.variables])
             witness = {v.name: best[v.name] for v in self.variables}

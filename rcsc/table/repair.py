@@ -4,6 +4,7 @@ In: a finding of a table. Out: a cell or a line to write, and the sentence that 
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
@@ -80,7 +81,11 @@ class PartingCell:
     falls: bool
 
     def shown(self, table: Table) -> str:
-        """Say what to write, which line then runs, and what it does otherwise than the line that does not."""
+        """Say what to write and that it is proved, which line then runs, and what it does otherwise than the line that does not."""
+        return "proved".join(self.told(table))
+
+    def told(self, table: Table) -> tuple[str, str]:
+        """Say it in two pieces, between which stands whether it is proved."""
         line, other = table.lines[self.line], table.lines[self.other]
         does, did = ({action.heading: action.text for action in of.actions} for of in (other, line))
         headings = [heading for heading in dict.fromkeys((*did, *does)) if heading != "procedures"]
@@ -91,7 +96,8 @@ class PartingCell:
         ]
         beside = f" ({'; '.join(instead)})" if instead else ""
         rest = "; DEFAULT takes what else it loses" if self.falls else ""
-        return f"{self.write(table)}: proved to part the two lines; line `{other.name}` then runs where both match{beside}{rest}"
+        runs = f"line `{other.name}` then runs where both match{beside}{rest}"
+        return f"{self.write(table)}: ", f" to part the two lines; {runs}"
 
     def write(self, table: Table) -> str:
         """Say what to write."""
@@ -194,7 +200,7 @@ def _with_cell(program: Program, old: Test | None, cell: PartingCell) -> Test | 
 
 
 def left_by(program: Program, table: Table, changed: Sequence[PartingCell]) -> str:
-    """Say whether lines still overlap, or never match, when all these cells are changed."""
+    """Say that lines still overlap, or never match, when all these cells are changed; empty where neither is so."""
     after = with_cells(program, table, changed)
     if after is None:
         return "they contradict each other: a line would never match"
@@ -203,7 +209,33 @@ def left_by(program: Program, table: Table, changed: Sequence[PartingCell]) -> s
     if left is not None:
         first, second = (table.lines[at].name for at in left)
         return f"lines `{first}` and `{second}` still both match some input"
-    return "proved that no two lines match any more"
+    return ""
+
+
+def changes_of(program: Program, table: Table, changed: Sequence[PartingCell]) -> tuple[Change, ...]:
+    """Return the changes of the text that all these cells are; of one changed twice what both take, none where no cell says that."""
+    after = with_cells(program, table, changed)
+    if after is None:
+        return ()
+    often = Counter((cell.line, cell.column) for cell in changed)
+    texts = {(cell.line, cell.column): cell.text for cell in changed}
+    kinds = {str(v.name): v.type for v in program.variables}
+    for line, column in (place for place, many in often.items() if many > 1):
+        test, name = after.lines[line].tests[column], table.columns[column].variable
+        text = (
+            None
+            if test is None or test.box is None
+            else cells.cell(kinds[str(name)], test.box)
+            if name
+            else None
+        )
+        if text is None:
+            return ()
+        texts[line, column] = text
+    return tuple(
+        Change(Place.CELL, str(table.lines[line].name), column, (text,))
+        for (line, column), text in texts.items()
+    )
 
 
 def _says(number: Expr, box: Box) -> Expr:
@@ -239,9 +271,14 @@ class NewLine:
     cells: tuple[str, ...]
     closes: bool
 
-    def __str__(self) -> str:
+    @property
+    def told(self) -> str:
+        """Say what it is and does."""
         what = "closes the gap" if self.closes else "closes this part of the gap"
-        return f"a line `| {' | '.join(('new', *self.cells))} || ... |` {what} and overlaps no other: proved"
+        return f"a line `| {' | '.join(('new', *self.cells))} || ... |` {what} and overlaps no other"
+
+    def __str__(self) -> str:
+        return f"{self.told}: proved"
 
 
 def closing_line(program: Program, table: Table, gap: Gap) -> str | None:

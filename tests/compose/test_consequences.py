@@ -259,7 +259,7 @@ def test_the_best_repairs_are_tried_together(mended: Repairs) -> None:
 def test_the_smallest_repairs_together_report_executing_after_failed(task: TransitionSystem) -> None:
     [table] = task.program.tables
     smallest = cells_of(task, *((line, "14") for line in LATER), ("14", "15"))
-    assert left_by(task.program, table, smallest) == "proved that no two lines match any more"
+    assert left_by(task.program, table, smallest) == ""
     trial = tried(task, table, smallest, [], 4)
     assert trial.rank[:2] == (1, 0)
     [breaks] = trial.breaks

@@ -35,7 +35,7 @@ state r : real 0.0 .. 500.0
 state xs : array[4] of int 0 .. 9
 state late : int 0 .. 9 deferred until yes
 output out : int 0 .. 9
-output shown : int 0 .. 9 safe 9
+output shown : int 0 .. 9 = 0 safe 9
 invariant small : n <= 5 and shown <= 5
 invariant apart : late <= 8 and n + late <= 12
 invariant begins : r > 1.0

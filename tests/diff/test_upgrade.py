@@ -7,6 +7,9 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.driver.reformat import Formatted, reformat
+from rcsc.lang.model import Program, Value
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
 from rcsc.lang.restart import After, Fixed, SameAs
 from tests.support.programs.stages import program_of, shipped
 from tests.support.programs.texts import edited
@@ -197,3 +200,89 @@ def test_the_other_names_go_on_meaning_what_they_do(tmp_path: Path) -> None:
     after = shipped("task/task.rcs", tmp_path / "tables")
     assert after.adopted == before
     assert any(isinstance(value, After) for value in before.values()) or after.roles is not None
+
+
+STARTS = """
+enum light { red, green }
+record place { x : real -500.0 .. 500.0  near : array[2] of int -9 .. 9  gain : real 0.5 .. 2.0  fine : int 0 .. 9 = 3 }
+link below {
+  command : order rest rest
+  status : status done done failed failed executing executing
+  order { depth : int -7 .. 7  stream heat : single -20.5 .. 90.0 }
+  report { reason why : why restart restart }
+}
+commands arm : below
+input seen : place
+input width : int 5 .. 9 [mm] clamp
+output speed : int -400 .. 400 [mm/s] safe 0
+output shown : light safe green
+output lamp : bool safe true
+output set : int -4 .. 4 = 1 safe 2
+state at : array[3] of array[2] of int -3 .. 3
+state least : int -9223372036854775808 .. 9223372036854775807
+state held : int -6 .. 6 deferred
+state plain : int 0 .. 9
+table t {
+  | line | when ||
+  |------|------||
+  | only | true ||
+}
+level own {
+  period 40 [ms]
+  table t
+}
+"""
+WRITTEN = (
+    "  x : real -500.0 .. 500.0 = -500.0\n  near : array[2] of int -9 .. 9 = -9\n  gain : real 0.5 .. 2.0 = 0.5\n  fine : int 0 .. 9 = 3\n",
+    "    depth : int -7 .. 7 = -7\n    stream heat : single -20.5 .. 90.0 = -20.5\n",
+    "input seen : place\n",
+    "input width : int 5 .. 9 [mm] = 5 clamp\n",
+    "output speed : int -400 .. 400 [mm/s] = -400 safe 0\n",
+    "output shown : light = red safe green\n",
+    "output lamp : bool = false safe true\n",
+    "output set : int -4 .. 4 = 1 safe 2\n",
+    "state at : array[3] of array[2] of int -3 .. 3 = -3\n",
+    "state least : int -9223372036854775808 .. 9223372036854775807 = -9223372036854775808\n",
+    "state held : int -6 .. 6 = -6 deferred\n",
+    "state plain : int 0 .. 9\n",
+)
+
+
+def starts(text: str, *, least_first: bool = False) -> dict[str, Value]:
+    """With what the leaves of a text's program start."""
+    loaded = load(["-"], stdin=text, stdin_name="a.rcs")
+    program = resolve("a.rcs", loaded, least_first=least_first)
+    assert isinstance(program, Program), program
+    return {str(variable.name): variable.initial for variable in program.variables}
+
+
+def test_what_started_with_the_least_of_its_type_still_does(tmp_path: Path) -> None:
+    formatted, text = upgraded(tmp_path, WORDS + STARTS)
+    assert [line for line in WRITTEN if line not in text] == []
+    assert starts(text) == starts(WORDS + STARTS, least_first=True)
+    assert any("`seen.x`" in words for words in formatted.upgraded) is False  # the record says it, once
+    assert "`place.x` says `= -500.0`, with which it started" in "\n".join(formatted.upgraded)
+    again, same = upgraded(tmp_path, text)
+    assert (same, again.changed) == (text, 0)
+
+
+def test_a_project_written_since_keeps_its_starts(tmp_path: Path) -> None:
+    path = tmp_path / "a.rcs"
+    path.write_text("output speed : int -400 .. 400 safe 0\n", encoding="utf-8")
+    (tmp_path / "rcsc.toml").write_text("starts_at_zero = true\n", encoding="utf-8")
+    reformat((str(path),), None, write=True, older=True)
+    assert path.read_text(encoding="utf-8") == "output speed : int -400 .. 400 safe 0\n"
+
+
+def test_what_another_file_declares_is_told(tmp_path: Path) -> None:
+    (tmp_path / "rcsc.toml").write_text("", encoding="utf-8")
+    (tmp_path / "words.rcs").write_text("record place { x : int -5 .. 5 }\n", encoding="utf-8")
+    (tmp_path / "a.rcs").write_text("use words\nstate here : place\n", encoding="utf-8")
+    formatted = reformat((str(tmp_path / "a.rcs"),), None, write=True, older=True)
+    assert [words.partition(": ")[2] for words in formatted.upgraded] == [
+        "`here.x` starts at 0, and not at -5 as before"
+    ]
+    both = reformat((str(tmp_path),), None, write=True, older=True)
+    assert [words.partition(": ")[2] for words in both.upgraded] == [
+        "`place.x` says `= -5`, with which it started"
+    ]

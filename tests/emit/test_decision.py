@@ -289,6 +289,15 @@ def test_windows_are_found_by_wide_numbers_and_reals_and_fall_to_default() -> No
     assert len(answers) > 80
 
 
+def test_a_line_that_matches_nowhere_is_not_waited_for() -> None:
+    """No such table is proved; what executors find out of one while they run is still right."""
+    text = "input a : int 0 .. 3\ntable t {\n| line | a | when ||\n| one | 1 | a in {0, 3} ||\n| two | 2 | a = 2 ||\nREST}"
+    for rest in ("", "| rest | DEFAULT | ||\n"):
+        program = program_of(text.replace("REST", rest))
+        assert set(compared(program, 40)) == {1, 2 if rest else NONE}
+    assert compared(program_of(text.replace("| two | 2 | a = 2 ||\nREST", "")), 40) == Counter({NONE: 40})
+
+
 @pytest.mark.needs("valgrind")
 @pytest.mark.parametrize(
     ("lines", "variables", "most"), [(64, 7, 36), (256, 20, 115), (1024, 20, 160)], ids=str

@@ -1,10 +1,12 @@
 """Short runs of the fuzzers; the long ones are `python -m tests.fuzz` and `python -m tests.differential`."""
 
 import os
+import re
 import signal
 from collections import Counter
 from itertools import product
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -25,8 +27,18 @@ def test_mutated_tables_and_garbage_give_only_coded_errors() -> None:
 
 def test_cycles_of_drawn_programs_are_the_same_to_all() -> None:
     told = differential.campaign(count=40, seed=20261122)
-    assert told["programs"] > 35
+    assert told["programs"] > 32
     assert all(told[f"fault {number}"] > 5 for number in (0, 1, 2, 3, 5))
+
+
+def test_drawn_programs_have_all_that_the_evaluator_knows() -> None:
+    texts = ["\n".join(differential.Maker(Random(f"kinds {number}")).draw().text) for number in range(60)]  # noqa: S311  # repeatable
+    wanted = (
+        r"\(was v", r"\bwas \(", "@T", "@F", "@C", r"\) when \(", r" for \d+ \[ms\]", " above l", " above all", " same ", r"^set ",
+        r"not in set", r"in \{set", r"^const", r" safe ", "clamp", r"table \w+  table", "table by", r"^\| 1 ", "= 0b", r"\)\[\d\.\.",
+        r"\| [01x]{4} [01x]{4}", r"single\(", "deferred until", r"(local|\(|for) ?c\d+ (:|in)",
+    )  # fmt: skip
+    assert not [kind for kind in wanted if not any(re.search(kind, text, re.MULTILINE) for text in texts)]
 
 
 def test_a_program_whose_c_does_not_end_is_told_and_the_others_are_compared(
@@ -43,8 +55,8 @@ def test_a_program_whose_c_does_not_end_is_told_and_the_others_are_compared(
 
     monkeypatch.setattr(differential, "compare", misled)
     monkeypatch.setattr(differential, "LONGEST_CPU_S", 0.5)
-    texts = [*differential.compared(0, 7, 3, told)]
-    assert [text.split(",")[0] for text in texts] == ["program 2 of seed 3", "program 4 of seed 3"]
+    texts = [*differential.compared(0, 7, 4, told)]
+    assert [text.split(",")[0] for text in texts] == ["program 2 of seed 4", "program 4 of seed 4"]
     assert sum(many for word, many in told.items() if word.startswith("fault ")) == 5 * differential.CYCLES
 
 
@@ -110,10 +122,12 @@ def test_what_an_input_s_type_can_hold_is_admitted_alike(tmp_path: Path) -> None
         drawn.declared.append(differential.Declared(name, "input", (differential.Leaf(name, kind),), clamp))
     drawn.text += ["table t {", "| line | v0 ||", "| l | ||", "}", "level top { period 10 [ms] table t }"]
     drawn.tables.append(differential.Table("t", (differential.Line((), ()),), None, (), ()))
+    drawn.stages.append((None, (0,)))
     one = differential.built(drawn, "ends")
     assert isinstance(one, differential.Built)
     in_c, python = differential.InC(one, differential.library([one], tmp_path)), differential.InPython(one)
-    start = differential.begun(drawn)
+    whole = differential.begun(drawn)
+    start = {leaf.name: whole[leaf.name] for leaf in drawn.leaves()}
     for leaf in one.symbols["leaves"]:
         least, most = differential.HELD[leaf["c_type"]]
         ends = {
@@ -126,6 +140,6 @@ def test_what_an_input_s_type_can_hold_is_admitted_alike(tmp_path: Path) -> None
         }
         for value in (one for one in sorted(ends) if least <= one <= most):
             inputs = {**start, leaf["name"]: value}
-            right, _ = differential.evaluated(drawn, inputs)
+            right, _ = differential.evaluated(drawn, {**whole, **inputs})
             assert differential.interpreted(one.drawn, one.program, inputs)[0] == right
             assert (in_c.run(inputs), python.run(inputs)) == (right, right), (leaf["name"], value)

@@ -91,7 +91,7 @@ def test_c_promotes_nothing_to_double(text: str, doubles: bool, tmp_path: Path) 
 
 
 NARROW = """
-input x : single 0.5 .. 1.0
+input x : single 0.5 .. 1.0 = 0.5
 output o : bool
 table t {
   | line | when          || o     |

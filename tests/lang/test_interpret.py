@@ -149,11 +149,11 @@ def test_zero_has_one_sign_where_it_is_kept() -> None:
     assert [math.copysign(1, float(kept[name])) for name in "xy"] == [1, 1]
 
 
-def test_initial_values_are_as_declared_or_the_least() -> None:
+def test_initial_values_are_as_declared_or_nearest_to_zero() -> None:
     text = (
-        "enum e { a, b }\nstate s : e = b\nstate f : bool\ninput n : int -3 .. 3\nstate x : real -2.5 .. 1.0"
+        "enum e { a, b }\nstate s : e = b\nstate f : bool\ninput n : int -3 .. 3\nstate x : real -2.5 .. -1.0"
     )
-    assert initial(program_of(text)) == {"s": 1, "f": False, "n": -3, "x": -2.5}
+    assert initial(program_of(text)) == {"s": 1, "f": False, "n": 0, "x": -1.0}
 
 
 # --- what comes from outside ---

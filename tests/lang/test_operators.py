@@ -764,7 +764,7 @@ def test_no_table_is_proved_that_an_edge_refutes(one: str, two: str, sign: str) 
 
 def test_a_line_that_a_nan_does_not_match_leaves_it_to_default() -> None:
     text = (
-        "input x : real 8.988465674311579e307 .. 8.98846567431158e307\ntable t {\n  | line | when ||\n"
+        "input x : real 8.988465674311579e307 .. 8.98846567431158e307 = 8.988465674311579e307\ntable t {\n  | line | when ||\n"
         "  | a | min((x + x) - (x + x), 1.0) <= 1.0 ||\n  | d | DEFAULT unreachable ||\n}\n"
     )
     program = program_of(text)

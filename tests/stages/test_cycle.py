@@ -338,3 +338,19 @@ def inputs_of(program: Program) -> dict[str, Value]:
 def test_a_planted_fault_in_the_cycle_is_found(text: str, planted: Callable[[str], str]) -> None:
     with executors_of(proved_of(text), c=planted) as executors:
         assert list(found_of(executors, AgreementCount(), 60, "cycle"))
+
+
+def test_lines_that_are_called_by_numbers_have_members_that_can_be_written() -> None:
+    """`1 = 1` cannot be loaded as Python, nor be told from a number in a property."""
+    text = (
+        "input x : bool\nstate m : bool\noutput y : bool\nproperty p : line_of_first = line_1_2 implies m\n"
+        "table first {\n| line | x || m |\n| 1 | true || true |\n| line_1 | false || false |\n}\n"
+        "table second {\n| line | m || y |\n| 1 | true || true |\n| 2 | false || false |\n}\n"
+        "level a { period 40 [ms] table first table second }\n"
+    )
+    program = proved_of(text)
+    kind = program.variable("line_of_first").type
+    assert isinstance(kind, Enum)
+    assert kind.members == ("none", "line_1_2", "line_1")
+    with executors_of(program) as executors:
+        assert list(found_of(executors, AgreementCount(), 20)) == []

@@ -26,7 +26,7 @@ from rcsc.table.regions import holes, partition
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench.made import families
-from tests.support.programs.stages import BOXES, drawn_program, program_of, verdict_of
+from tests.support.programs.stages import BOXES, drawn_program, program_of, reported
 from tests.support.programs.texts import table as table_text
 from tests.support.steps import counted
 
@@ -561,10 +561,10 @@ def test_ranges_that_touch_over_the_widest_types_are_told_in_few_steps(kind: str
     """Two overlaps have helps of one cell, and what these do together walks no range of keys."""
     low, high = TOUCHING[kind]
     with counted(400_000):
-        found = verdict_of(
+        found = reported(
             f"input x : {kind}\ninput y : {kind}\noutput o : bool\ntable t {{\n  | line | x | y || o |\n"
             f"  | a | <= {low} | || true |\n  | b | {low} .. {high} | || false |\n  | c | >= {high} | /= {low} || true |\n}}\n"
-        ).findings
+        )
     overlaps = [each for each in found if each.code is Code.OVERLAP]
     assert len(overlaps) == 2
     assert any("together: proved that no two lines match any more" in note for note in overlaps[-1].notes)

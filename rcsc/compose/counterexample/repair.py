@@ -193,7 +193,8 @@ def _together(
 ) -> str:
     if len(best) < 2:
         return ""
-    begins = f"the first help of each of these {len(best)} findings, all together: {left_by(ts.program, table, best)}"
+    left = left_by(ts.program, table, best) or "proved that no two lines match any more"
+    begins = f"the first help of each of these {len(best)} findings, all together: {left}"
     if with_cells(ts.program, table, best) is None:
         return begins
     return f"{begins}; {tried(ts, table, tuple(best), kept, most).outcome(most)}"

@@ -27,7 +27,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.syntax import tree
-from rcsc.lang.syntax.spell import spell_expr, spell_type
+from rcsc.lang.syntax.spell import spell_expr, spell_field, spell_type
 
 MOST = 6
 """Members, writers and the like that are named; then how many more."""
@@ -69,7 +69,9 @@ def _head(name: Occurrence, source: Source) -> str:
             return f"{name.text}   # {at + 1} of {len(members)} of enum {declared.text}"
         case tree.Row():
             return f"line {name.text} of table {name.owner}"
-        case tree.Parameter(declared, kind) | tree.FieldDecl(declared, kind) | tree.Local(declared, kind):
+        case tree.FieldDecl():
+            return spell_field(name.node)
+        case tree.Parameter(declared, kind) | tree.Local(declared, kind):
             return f"{declared.text} : {spell_type(kind)}"
         case tree.ConstDecl(declared, value):
             return f"const {declared.text} = {spell_expr(value)}"

@@ -144,6 +144,7 @@ class _Walk:
         for part in fields:
             yield self.name(Space.FIELD, part.name, part)
             yield from self.type(part.type)
+            yield from self.exprs((part.initial,))
             if isinstance(part, tree.LinkField):
                 yield from self.exprs((part.restart,))
 

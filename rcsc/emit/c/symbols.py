@@ -165,7 +165,7 @@ _Writers = tuple[tuple[tuple[str, tuple[str, ...]], ...], tuple[str, ...]]
 def _unset(program: Program) -> list[dict[str, object]]:
     """Return the numbers that nobody has set when the program starts, those with the same writers together.
 
-    They have no initial value of their own, but the least of their type, which means nothing until a line, a procedure of the cycle
+    They have no initial value of their own, but 0, which means nothing until a line, a procedure of the cycle
     or a buffer writes it. Members of enumerations and bools mean something from the start.
 
     Returns:

@@ -124,7 +124,11 @@ def piped(file: IO[bytes], most: int = MOST_BYTES) -> bytes:
 
 def standard_input() -> BinaryIO:
     """Return the standard input; one without anything in it where the process was started without."""
-    return io.BytesIO() if sys.stdin is None else sys.stdin.buffer
+    if sys.stdin is None:
+        return io.BytesIO()
+    if isinstance(sys.stdin, io.StringIO):  # who calls a command within Python gives it a text
+        return io.BytesIO(sys.stdin.read().encode())
+    return sys.stdin.buffer
 
 
 def typed() -> bool:

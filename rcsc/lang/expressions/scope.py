@@ -80,6 +80,7 @@ class Scope:
         untimed: Why `for` cannot stand in the table that is being resolved; empty where it can.
         in_property: Whether a property is being resolved, which has both cycles before it and needs no hidden state.
         no_before: Why `was` cannot stand in the expression that is being resolved; empty where it can.
+        least_first: Whether what has no initial value starts with the least of its type, as in files from before 0 was it.
     """
 
     diagnostics: list[Diagnostic] = field(default_factory=list)
@@ -117,6 +118,7 @@ class Scope:
     untimed: str = ""
     in_property: bool = False
     no_before: str = ""
+    least_first: bool = False
 
     def report(
         self, code: Code, message: str, span: Span, *helps: str, related: tuple[Label, ...] = ()

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from rcsc.lang.protocol.roles import STANDARD, Parties, Party
 from rcsc.lang.syntax import tree
-from rcsc.lang.syntax.spell import spell_expr, spell_type
+from rcsc.lang.syntax.spell import spell_expr, spell_field
 
 BEFORE, AFTER = "take_orders", "give_orders"
 """The modules that every level of the program runs first and last."""
@@ -29,7 +29,7 @@ def records(link: tree.LinkDecl) -> Iterator[str]:
 def _fields(fields: Sequence[tree.LinkField]) -> Iterator[str]:
     for part in fields:
         yield from (f"  ## {line}" for line in part.doc)
-        yield f"  {part.name.text} : {spell_type(part.type)}"
+        yield f"  {spell_field(part)}"
 
 
 def superior(party: Party) -> Iterator[str]:

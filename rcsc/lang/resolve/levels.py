@@ -354,10 +354,23 @@ def lines_kept(scope: Scope, levels: Iterable[Level], tables: Iterable[Table], f
     return tuple(_line_kept(scope, table, file) for table in tables if table.name in staged)
 
 
+def _members(lines: Sequence[str]) -> Iterator[str]:
+    """A member for none of the lines, and one for each: its name, or `line_1` where that is a number."""
+    taken = set(lines)
+
+    def free(word: str) -> str:
+        name = next(
+            name for name in chain((word,), (f"{word}_{number}" for number in count(2))) if name not in taken
+        )
+        taken.add(name)
+        return name
+
+    yield free("none")
+    yield from (free(f"line_{line}") if line[0].isdigit() else line for line in lines)
+
+
 def _line_kept(scope: Scope, table: Table, file: str) -> Enum:
-    lines = [str(line.name) for line in (*table.lines, table.default) if line is not None]
-    others = (f"none_{number}" for number in count(2))
-    none = next(word for word in chain(("none",), others) if word not in lines)
+    none, *lines = _members([str(line.name) for line in (*table.lines, table.default) if line is not None])
     name = fresh(scope, f"line_of_{table.name}")
     kind = Enum(name, (none, *lines), file)
     leaf, doc = (

@@ -35,8 +35,11 @@ from rcsc.lang.resolve.tables import table
 from rcsc.lang.syntax import tree
 
 
-def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
-    """The program of the file `root`, or every diagnostic of it and of the files it uses, by position."""
+def resolve(root: str, loaded: Loaded, *, least_first: bool = False) -> Program | tuple[Diagnostic, ...]:
+    """The program of the file `root`, or every diagnostic of it and of the files it uses, by position.
+
+    With `least_first` it is read as files from before: what has no initial value starts with the least of its type.
+    """
     files = closure(root, loaded)
     wrong = tuple(d for d in loaded.diagnostics if d.primary.span.file in files)
     if wrong:
@@ -45,7 +48,7 @@ def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
     limits: dict[str, int] = {}
     with uncollected():
         while True:
-            resolver = _Resolver(root, limits)
+            resolver = _Resolver(root, limits, least_first)
             program = resolver.program(declarations, loaded.files[root])
             limits = resolver.scope.limits
             if all(held.limit == limits[key] for key, held in resolver.scope.held.items()):
@@ -77,9 +80,9 @@ def closure(root: str, loaded: Loaded) -> list[str]:
 class _Resolver:
     """Works through the declarations, kind by kind, so that their order in the text is free."""
 
-    def __init__(self, root: str, limits: Mapping[str, int]) -> None:
+    def __init__(self, root: str, limits: Mapping[str, int], least_first: bool) -> None:
         self.root = root
-        self.scope = Scope(limits=dict(limits))
+        self.scope = Scope(limits=dict(limits), least_first=least_first)
 
     def program(self, all_: list[tree.Declaration], root: tree.File) -> Program | tuple[Diagnostic, ...]:
         """The program, or what is wrong."""

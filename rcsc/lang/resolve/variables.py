@@ -30,6 +30,7 @@ from rcsc.lang.model import (
     key_bounds,
     pending,
     spell,
+    start,
     value_of_key,
 )
 from rcsc.lang.syntax import tree
@@ -61,9 +62,10 @@ def declare_record(scope: Scope, written: tree.RecordDecl) -> None:
     parts: dict[str, RecordField] = {}
     for part in written.fields:
         kind = type_of(scope, part.type)
+        first = value_given(scope, part.initial, element(kind), "initial")
         if part.name.text in parts:
             scope.report(Code.DUPLICATE_NAME, f"`{part.name.text}` is a field twice", part.name.span)
-        parts.setdefault(part.name.text, RecordField(part.name.text, kind, " ".join(part.doc)))
+        parts.setdefault(part.name.text, RecordField(part.name.text, kind, " ".join(part.doc), first))
     record = Record(written.name.text, tuple(parts.values()), written.name.span.file)
     if size(record) > MOST_LEAVES:
         message = f"a type has at most {MOST_LEAVES} scalar parts"
@@ -128,27 +130,30 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
         )
         return
     flat = list(_leaves(written.name.text, kind))
-    if max((len(name) for name, _ in flat), default=0) > MOST_NAME:
+    if max((len(name) for name, _, _ in flat), default=0) > MOST_NAME:
         message = f"a part of `{written.name.text}`, written out, has more than {MOST_NAME} characters"
         scope.report(Code.LONG_NAME, message, written.name.span)
         return
-    initial, safe = value_given(scope, written.initial, kind, "initial"), _safe(scope, written, kind)
+    initial = value_given(scope, written.initial, element(kind), "initial")
+    safe = _safe(scope, written, kind)
     restart = _restart(scope, written, kind)
     deferred = written.deferred_until is not None and _may_be_deferred(scope, written, kind)
-    for name, leaf in flat:
-        least = value_of_key(leaf, key_bounds(leaf)[0])
+    own = initial if initial is not None or scope.least_first else safe
+    for name, leaf, first in flat:
+        meant = first if own is None else own
+        begins = value_of_key(leaf, key_bounds(leaf)[0]) if scope.least_first else start(leaf)
         variable = Variable(
             VariableName(name),
             Kind(written.kind),
             leaf,
-            least if initial is None else initial,
+            begins if meant is None else meant,
             _admit(scope, written, leaf),
             None,
             " ".join(written.doc),
             written.name.span,
             safe,
             restart,
-            given=initial is not None,
+            given=meant is not None,
         )
         scope.leaves[name] = variable
         if deferred:
@@ -158,7 +163,7 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
         written.name.text,
         Kind(written.kind),
         kind,
-        tuple(VariableName(name) for name, _ in flat),
+        tuple(VariableName(name) for name, _, _ in flat),
         " ".join(written.doc),
         written.name.span,
     )
@@ -174,24 +179,39 @@ def settle_deferred(scope: Scope, written: tree.VariableDecl) -> None:
         scope.leaves[name] = replace(scope.leaves[name], deferred_until=until)
 
 
-def _leaves(name: str, kind: Type) -> Iterator[tuple[str, Scalar]]:
+def _leaves(name: str, kind: Type, first: Value | None = None) -> Iterator[tuple[str, Scalar, Value | None]]:
+    """Yield the scalar parts, each with the value with which its record says that it starts."""
     match kind:
-        case Array(length, element):
+        case Array(length, inner):
             for at in range(length):
-                yield from _leaves(f"{name}[{at}]", element)
+                yield from _leaves(f"{name}[{at}]", inner, first)
         case Record(fields=fields):
             for part in fields:
-                yield from _leaves(f"{name}.{part.name}", part.type)
+                yield from _leaves(f"{name}.{part.name}", part.type, part.initial)
         case _:
-            yield name, kind
+            yield name, kind, first
+
+
+def element(kind: Type) -> Type:
+    """What an array, or an array of arrays, has; the type itself where it is no array."""
+    while isinstance(kind, Array):
+        kind = kind.element
+    return kind
 
 
 def value_given(scope: Scope, written: tree.Expr | None, kind: Type, what: str) -> Value | None:
-    """Return the initial, safe or restart value; None where none is written, or no valid one."""
+    """Return the initial, safe or restart value; None where none is written, or no valid one.
+
+    The initial value of an array is that of each element.
+    """
     if written is None:
         return None
     if not isinstance(kind, Bool | Enum | Int | Real):
-        scope.report(Code.KIND, f"a record or array has no {what} value of its own", written.span)
+        scope.report(
+            Code.KIND,
+            f"a record{'' if what == 'initial' else ' or array'} has no {what} value of its own",
+            written.span,
+        )
         return None
     value = constant(scope, written, kind)
     if value is None or not fits(scope, kind, value, written.span):

@@ -114,7 +114,10 @@ class Build:
 
     def _field(self, node: ParseNode) -> tree.FieldDecl:
         head = self._head(node)
-        return tree.FieldDecl(self._name(node.children[0]), self.type(node.children[1]), **head)
+        name, kind, *begins = node.children
+        return tree.FieldDecl(
+            self._name(name), self.type(kind), self.expr(begins[1]) if begins else None, **head
+        )
 
     def _unit_decl(self, node: ParseNode) -> tree.UnitDecl:
         return tree.UnitDecl(self._name(node.children[0]), **self._head(node))
@@ -230,9 +233,14 @@ class Build:
             (str(self._kind(node.children, w)) for w in ("STREAM", "REASON") if self._kind(node.children, w)),
             "",
         )
-        name, kind, *again = node.children[bool(word) :]
-        adopted = self.expr(again[1]) if again else None
-        return tree.LinkField(self._name(name), self.type(kind), word, adopted, **head)
+        name, kind, *values = node.children[bool(word) :]
+        given = {
+            str(getattr(mark, "type", "")): self.expr(value)
+            for mark, value in zip(values[::2], values[1::2], strict=True)
+        }
+        return tree.LinkField(
+            self._name(name), self.type(kind), given.get("EQUAL"), word, given.get("RESTART"), **head
+        )
 
     def _serves_decl(self, node: ParseNode) -> tree.ServesDecl:
         peer, link, *without = node.children

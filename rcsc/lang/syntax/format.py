@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from rcsc.lang.operator_table import SUM
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.layout import WIDTH, table_rows
-from rcsc.lang.syntax.spell import spell_expr, spell_req, spell_set, spell_statement, spell_type
+from rcsc.lang.syntax.spell import spell_expr, spell_field, spell_req, spell_set, spell_statement, spell_type
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.SetDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
          tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl, tree.AdoptDecl)  # fmt: skip
@@ -104,7 +104,7 @@ def _record(record: tree.RecordDecl) -> Iterator[str]:
     yield f"record {record.name.text} {{"
     for part in record.fields:
         yield from _above(part.comments, part.doc, "  ")
-        yield f"  {part.name.text} : {spell_type(part.type)}"
+        yield f"  {spell_field(part)}"
     yield "}"
 
 
@@ -118,8 +118,7 @@ def _link(one: tree.LinkDecl) -> Iterator[str]:
             for part in fields:
                 yield from _above(part.comments, part.doc, "    ")
                 adopted = f" restart {spell_expr(part.restart)}" if part.restart is not None else ""
-                name = f"{part.word} {part.name.text}" if part.word else part.name.text
-                yield f"    {name} : {spell_type(part.type)}{adopted}"
+                yield f"    {part.word}{' ' if part.word else ''}{spell_field(part)}{adopted}"
             yield "  }"
     yield "}"
 

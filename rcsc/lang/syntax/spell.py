@@ -150,6 +150,12 @@ def _factor(factor: tree.UnitFactor, sign: int) -> str:
     return factor.name.text if power == 1 else f"{factor.name.text}^{power}"
 
 
+def spell_field(part: tree.FieldDecl) -> str:
+    """A field of a record or a link: its name, its type, and with what it starts."""
+    begins = "" if part.initial is None else f" = {spell_expr(part.initial)}"
+    return f"{part.name.text} : {spell_type(part.type)}{begins}"
+
+
 def spell_type(kind: tree.TypeExpr) -> str:
     """A type."""
     match kind:

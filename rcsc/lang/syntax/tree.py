@@ -561,10 +561,11 @@ class TypeDecl(Documented):
 
 @dataclass(frozen=True, slots=True)
 class FieldDecl(Documented):
-    """`name : type` in a record."""
+    """`name : type [= initial]` in a record."""
 
     name: Name
     type: TypeExpr
+    initial: Expr | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -580,8 +581,8 @@ class VariableDecl(Documented):
     """`input|state|output name : type = initial [safe value] [restart value] [clamp|reject] [deferred [until expr]]`.
 
     `deferred` says that it stands without `until`: then it waits for the echoes of all the last orders. `admit` is "", "clamp" or
-    "reject" and only for inputs, `safe` only for outputs. A missing initial value means the least value of the type (first member,
-    low bound, false).
+    "reject" and only for inputs, `safe` only for outputs. A missing initial value means the safe value, else 0 of a number, the first
+    member, or false.
     """
 
     kind: str  # input, state, output
@@ -679,7 +680,7 @@ class TableDecl(Required):
 
 @dataclass(frozen=True, slots=True)
 class LinkField(FieldDecl):
-    """`[stream|reason] name : type [restart value]` in a link's order or report.
+    """`[stream|reason] name : type [= initial] [restart value]` in a link's order or report.
 
     A `stream` changes without a new number, and is looked at as it comes; the `reason` says why a command failed.
     """

@@ -16,6 +16,7 @@ from rcsc.lang.model import Program, ProvedProgram, seal_of_proof
 from rcsc.lang.project import load
 from rcsc.lang.resolve import compile_text, resolve
 from rcsc.solvers.options import Options
+from rcsc.table.mending import mended
 from rcsc.table.program import ProgramVerdict, prove_program
 
 BOXES = Options(solver="boxes")
@@ -63,8 +64,11 @@ def verdict_of(text: str, options: Options = BOXES) -> ProgramVerdict:
 
 def reported(text: str, options: Options = BOXES) -> tuple[Diagnostic, ...]:
     """Return what `rcsc check` reports of a text: of reading it, or else of proving it."""
-    program = compile_text(text)
-    return prove_program(program, options).findings if isinstance(program, Program) else tuple(program)
+    loaded = load(["-"], stdin=text, stdin_name="case.rcs")
+    program = loaded.diagnostics or resolve(loaded.roots[0], loaded)
+    if not isinstance(program, Program):
+        return tuple(program)
+    return mended(prove_program(program, options), loaded.roots[0], loaded, options)
 
 
 def proved_of(text: str) -> Program:

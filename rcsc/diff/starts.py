@@ -1,0 +1,135 @@
+"""Start values written out: of what starts otherwise now than in the version in which it was written.
+
+In: files, and their programs as they were read before, when what had no initial value started with the least of its type. Out: the
+files with `= VALUE` after the type of each variable, field of a record and field of a link that starts otherwise now: numbers that
+can be negative or have no 0, and outputs whose safe value is not the least.
+
+Which version a file was written for stands nowhere in it. A project whose `rcsc.toml` says `starts_at_zero = true` was written, or
+written out, since then, and is left as it is.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+from rcsc.lang.model import (
+    Bool,
+    Enum,
+    Int,
+    Program,
+    Real,
+    Scalar,
+    Type,
+    Value,
+    key_bounds,
+    spell,
+    start,
+    value_of_key,
+)
+from rcsc.lang.project import Loaded, project_root, starts_at_zero
+from rcsc.lang.resolve import closure, resolve
+from rcsc.lang.resolve.variables import element
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.spell import spell_expr
+
+FieldT = TypeVar("FieldT", bound=tree.FieldDecl)
+
+
+def written_out(
+    loaded: Loaded, names: Sequence[str], programs: Mapping[str, Program]
+) -> tuple[dict[str, tree.File], list[str]]:
+    """Return the files of `names` that change, and what was written, in words."""
+    files: dict[str, tree.File] = {}
+    words: list[str] = []
+    users = {name: root for root in programs for name in closure(root, loaded)}
+    for name in names:
+        if starts_at_zero(project_root(name)):
+            continue
+        work = _File(programs[users[name]])
+        before = loaded.files[name]
+        after = replace(before, declarations=tuple(map(work.declaration, before.declarations)))
+        if work.words:
+            files[name] = after
+            words += [f"{name}: {each}" for each in work.words]
+    return files, words
+
+
+def started_otherwise(loaded: Loaded, programs: Mapping[str, Program]) -> Iterator[str]:
+    """Yield what still starts otherwise than it did in `programs`, in words: what files say that were not to be changed."""
+    told: dict[str, None] = {}
+    for root, before in programs.items():
+        after = resolve(root, loaded)
+        if not isinstance(after, Program):
+            told |= dict.fromkeys(f"{each.primary.span.file}: {each.message}" for each in after)
+            continue
+        now = {variable.name: variable.initial for variable in after.variables}
+        for variable in before.variables:
+            if now.get(variable.name, variable.initial) != variable.initial:
+                kind, first = variable.type, variable.initial
+                words = f"`{variable.name}` starts at {spell(kind, now[variable.name])}, and not at {spell(kind, first)} as before"
+                told[f"{variable.span.file}: {words}"] = None
+    yield from told
+
+
+@dataclass(slots=True)
+class _File:
+    """One file, in the words of a program that uses it."""
+
+    program: Program
+    words: list[str] = field(default_factory=list)
+
+    def declaration(self, written: tree.Declaration) -> tree.Declaration:
+        """The declaration with the values written out."""
+        match written:
+            case tree.VariableDecl(initial=None):
+                name = written.name.text
+                kind = next(
+                    (declared.type for declared in self.program.declared if declared.name == name), None
+                )
+                safe = next((leaf.safe for leaf in self.program.variables if leaf.name == name), None)
+                return replace(written, initial=self._first(name, kind, safe))
+            case tree.RecordDecl(name, fields):
+                return replace(written, fields=self._fields(name.text, name.text, fields))
+            case tree.LinkDecl(name):
+                order, report = (
+                    self._fields(name.text, f"{name.text}_{word}", fields)
+                    for word, fields in (("order", written.order), ("report", written.report))
+                )
+                return replace(written, order=order, report=report)
+            case _:
+                return written
+
+    def _fields(self, owner: str, record: str, fields: Sequence[FieldT]) -> tuple[FieldT, ...]:
+        known = next((kind for kind in self.program.records if kind.name == record), None)
+        kinds = {} if known is None else {part.name: part.type for part in known.fields}
+        return tuple(
+            part
+            if part.initial is not None
+            else replace(part, initial=self._first(f"{owner}.{part.name.text}", kinds.get(part.name.text)))
+            for part in fields
+        )
+
+    def _first(self, place: str, kind: Type | None, safe: Value | None = None) -> tree.Expr | None:
+        """What is to be written; None where it starts as it did."""
+        scalar = None if kind is None else element(kind)
+        if not isinstance(scalar, Bool | Enum | Int | Real):
+            return None
+        least = value_of_key(scalar, key_bounds(scalar)[0])
+        said = safe is not None or not isinstance(scalar, Int | Real) or scalar.low <= 0 <= scalar.high
+        if said and (start(scalar) if safe is None else safe) == least:
+            return None
+        value = _spelled(scalar, least)
+        self.words.append(f"`{place}` says `= {spell_expr(value)}`, with which it started")
+        return value
+
+
+def _spelled(kind: Scalar, value: Value) -> tree.Expr:
+    match kind:
+        case Bool():
+            return tree.BoolLiteral(bool(value))
+        case Enum():
+            return tree.Reference(tree.Name(spell(kind, value)))
+        case Int() | Real():
+            text = spell(kind, abs(value))
+            number = tree.IntLiteral(text) if isinstance(kind, Int) else tree.RealLiteral(text)
+            return tree.Unary("-", number) if value < 0 else number

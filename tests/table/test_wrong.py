@@ -1,0 +1,60 @@
+"""Wrong tables: every command ends within a bound in steps, and what is called proved holds of the text that it makes."""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from rcsc.diagnostics.diagnostic import Diagnostic
+from tests import wrong
+from tests.support.programs.stages import reported
+from tests.support.steps import counted
+
+MOST_STEPS = 3_000_000
+"""Lines of Python that a command may run on a small table: some hundred milliseconds."""
+
+
+def said(found: tuple[Diagnostic, ...]) -> list[str]:
+    return [each for finding in found for each in (*finding.help, *finding.notes) if "proved" in each]
+
+
+def test_a_help_that_another_line_makes_wrong_is_not_offered() -> None:
+    """Where `p` is narrowed, `q`, which stands below it, matches more: that overlaps with `r`."""
+    rows = "| p above q | <= 2 || 1 |\n| q | >= 2 || 2 |\n| r | = 2 || 3 |\n"
+    text = f"input a : int 0 .. 3\noutput o : int 0 .. 9\ntable t {{\n| line | a || o |\n{rows}}}\n"
+    found = reported(text)
+    assert [each.code for each in found if each.witnesses] == ["RCS402"]
+    assert said(found) == []
+    plain = reported(text.replace(" above q", ""))
+    assert len(said(plain)) >= 2
+
+
+def test_a_help_past_the_budget_is_said_to_be_not_proved(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rcsc.table.mending.MOST_TRIED", 0)
+    rows = "| p | <= 2 || 1 |\n| q | >= 2 || 2 |\n"
+    [found] = reported(
+        f"input a : int 0 .. 3\noutput o : int 0 .. 9\ntable t {{\n| line | a || o |\n{rows}}}\n"
+    )
+    assert found.help[0].startswith("in line `q` write `3` under `a`: not proved to part the two lines")
+    assert not any(each.certain for each in found.proposals)
+
+
+@pytest.mark.parametrize("number", range(200, 206))
+def test_what_is_called_proved_holds_when_it_is_written(number: int, tmp_path: Path) -> None:
+    """`python -m tests.wrong --helps --count 1000` writes a thousand."""
+    rng = random.Random(f"1 {number}")  # noqa: S311 - a draw that repeats
+    (tmp_path / "rcsc.toml").touch()
+    wrong.held(tmp_path / "wrong.rcs", wrong.drawn(rng, small=True), rng)
+
+
+@pytest.mark.parametrize("number", [301, 302, 303, 304, 305, 307])
+def test_every_command_ends_on_a_wrong_table(number: int, tmp_path: Path) -> None:
+    """`python -m tests.wrong --count 10000` runs ten thousand."""
+    rng = random.Random(f"1 {number}")  # noqa: S311 - a draw that repeats
+    (tmp_path / "rcsc.toml").touch()
+    for name, does in wrong.commands(tmp_path, wrong.drawn(rng, small=True), rng):
+        if name in ("check", "fmt --expanded", "graph", "diff", "editor", "witness"):
+            with counted(MOST_STEPS):
+                does()
+        else:
+            does()

@@ -1,0 +1,550 @@
+"""Wrong tables, drawn, through every command that looks at one: each ends within its bound, and none with a bug.
+
+`python -m tests.wrong --count 10000 --seed 1` for a long run, in which a command has seconds of the processor; `--helps` writes each
+proposal out and has the whole `rcsc check` look at it. `tests/table/test_wrong.py` makes short ones in the suite, with a bound in steps.
+
+Each table has several mistakes: its cells are drawn about a few cuts a column, so that lines overlap, touch, leave gaps or never
+match; over truth values, small and large enumerations, whole numbers of up to 64 bits, doubles and singles, words and their bits, sums,
+elements of arrays, sets, assumptions, events, `above` and `same`.
+"""
+
+import argparse
+import contextlib
+import io
+import os
+import random
+import re
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import FrameType
+
+from rcsc.commands import run
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Proposal, Severity
+from rcsc.diagnostics.report import Report
+from rcsc.driver.check import check
+from rcsc.driver.settings import Settings
+from rcsc.editor.lenses import witness_run
+from rcsc.editor.workspace import Workspace
+from rcsc.lang.interpret import UNDEFINED, matching_lines
+from rcsc.lang.model import Program
+from rcsc.lang.resolve import compile_text
+from rcsc.lang.written.changes import with_proposal
+from rcsc.solvers.options import Options
+from rcsc.testing.inputs.sampling import declarations, snapshot
+
+MOST_CPU_S = 2.0
+"""Of one command, on one table."""
+HANGS_S = 20
+"""Past so much it is broken off."""
+NAMES = "abcdefgh"
+Rng = random.Random
+
+
+class HangsError(AssertionError):
+    """A command did not come to an end."""
+
+
+# --- drawing -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """A column: what is looked at, and cells that may stand there."""
+
+    text: str
+    cells: Callable[[Rng], str]
+
+
+INTS = (
+    (0, 9), (-5, 5), (0, 255), (0, 65535), (-(2**31), 2**31 - 1), (-(2**63), 2**63 - 1), (0, 2**64 - 1),
+    (0, 2**63 - 1), (1, 60_000),
+)  # fmt: skip
+REALS = (
+    ("0.0", "1.0"),
+    ("-100.0", "100.0"),
+    ("-1e308", "1e308"),
+    ("0.0", "5e-324"),
+    ("1.0", "1.0000000000000004"),
+)
+SINGLES = (("0.0", "1.0"), ("-100.0", "100.0"), ("-3e38", "3e38"), ("0.0", "1e-40"))
+
+
+def numbers(points: Sequence[str], rng: Rng) -> str:
+    """A cell that compares a number with one or two cuts."""
+    one, two, three = (rng.choice(points) for _ in range(3))
+    low, high = sorted((one, two), key=float)
+    words = (
+        f"<= {one}", f">= {one}", f"< {one}", f"> {one}", one, f"/= {one}", f"{low} .. {high}", f"{low} .. {high}",
+        f"not in {low} .. {high}", f"in {{{one}, {three}}}", f"not in {{{one}, {two}}}", f"in {{{low} .. {high}, {three}}}",
+    )  # fmt: skip
+    return rng.choice(words)
+
+
+def of_numbers(points: Sequence[str]) -> Callable[[Rng], str]:
+    """Cells about these cuts."""
+    return lambda rng: numbers(points, rng)
+
+
+def of_members(members: Sequence[str]) -> Callable[[Rng], str]:
+    """Cells about the members of an enumeration."""
+
+    def cell(rng: Rng) -> str:
+        few = rng.sample(members, min(len(members), rng.randint(1, 4)))
+        return rng.choice(
+            (few[0], f"/= {few[0]}", f"in {{{', '.join(few)}}}", f"not in {{{', '.join(few)}}}")
+        )
+
+    return cell
+
+
+def of_bits(width: int, lead: str = "0b") -> Callable[[Rng], str]:
+    """Masks of so many bits."""
+
+    def cell(rng: Rng) -> str:
+        digits = "".join(rng.choice("xxx01") for _ in range(width))
+        return f"{lead}{digits}" if rng.randrange(4) else f"/= {lead}{digits}"
+
+    return cell
+
+
+def truths(rng: Rng) -> str:
+    """A truth value."""
+    return rng.choice(("true", "false"))
+
+
+@dataclass(slots=True)
+class Draw:
+    """One text being drawn."""
+
+    rng: Rng
+    declared: list[str]
+    headings: list[Heading]
+    whole: list[str]
+    real: list[str]
+    conditions: list[str]
+
+    def variable(self, name: str) -> None:
+        """Declare an input of some type, and a column about it."""
+        rng = self.rng
+        sort = rng.choice(("bool", "enum", "int", "int", "word", "real", "real", "single", "array", "set"))
+        word = rng.choice(("input", "input", "state"))
+        if sort == "bool":
+            self.declared.append(f"{word} {name} : bool")
+            self.headings.append(Heading(name, truths))
+            self.conditions += [name, f"@T({name})", f"was {name}", f"{name} for 300 [ms]"]
+        elif sort == "enum":
+            members = [f"{name}_{at}" for at in range(rng.choice((2, 3, 6, 40, 300)))]
+            self.declared += [f"enum e_{name} {{ {', '.join(members)} }}", f"{word} {name} : e_{name}"]
+            self.headings.append(Heading(name, of_members(members)))
+            self.conditions += [f"{name} = {members[0]}", f"@C({name})"]
+        elif sort == "real":
+            self._reals(name, word, rng.choice(REALS))
+        elif sort == "single":
+            self._singles(name, word, rng.choice(SINGLES))
+        elif sort == "word":
+            self._word(name, word)
+        else:
+            self._ints(name, word, sort)
+
+    def _ints(self, name: str, word: str, sort: str) -> None:
+        rng = self.rng
+        low, high = rng.choice(INTS)
+        cuts = {
+            rng.choice((low, high, rng.randint(low, high), rng.randint(low, high)))
+            for _ in range(rng.randint(2, 4))
+        }
+        points = [str(cut) for cut in cuts]
+        if sort == "array":
+            self.declared.append(f"{word} {name} : array[3] of int {low} .. {high}")
+            self.headings.append(Heading(f"{name}[{rng.randrange(3)}]", of_numbers(points)))
+            return
+        self.declared.append(f"{word} {name} : int {low} .. {high}")
+        self.headings.append(Heading(name, of_numbers(points)))
+        if high - low < 2**40:
+            self.whole.append(name)
+            self.conditions += [f"{name} > {points[0]}", f"{name} mod 3 = 1"]
+        if sort == "set":
+            one, two = sorted(rng.choices(sorted(cuts), k=2))
+            self.declared.append(f"set s_{name} : int {low} .. {high} = {{{one} .. {two}}}")
+            self.headings.append(Heading(name, lambda rng: rng.choice((f"in s_{name}", f"not in s_{name}"))))
+
+    def _word(self, name: str, word: str) -> None:
+        rng = self.rng
+        width = rng.choice((4, 8, 16, 32, 63, 64))
+        self.declared.append(f"{word} {name} : int 0 .. {2**width - 1}")
+        ways = [
+            Heading(name, of_bits(width)),
+            Heading(f"{name}[{width - 1}..0]", of_bits(width)),
+            Heading(f"{name}[3..0]", of_numbers(["0", "3", "8", "15"])),
+            Heading(f"{name}[3..0]", of_bits(4)),
+            Heading(f"{name}[{width - 1}]", truths),
+            Heading(name, of_numbers(["0", "1", str(2**width - 1), str(2 ** (width - 1))])),
+        ]
+        self.headings += rng.sample(ways, rng.randint(1, 2))
+
+    def _reals(self, name: str, word: str, ends: tuple[str, str]) -> None:
+        low, high = map(float, ends)
+        points = [
+            repr(low + part * (high / 2 - low / 2)) for part in self.rng.sample((0.0, 0.5, 1.0, 1.5, 2.0), 3)
+        ]
+        self.declared.append(f"{word} {name} : real {ends[0]} .. {ends[1]}")
+        self.headings.append(Heading(name, of_numbers(points)))
+        self.real.append(name)
+        self.conditions.append(f"{name} * 2.0 > {points[0]}")
+
+    def _singles(self, name: str, word: str, ends: tuple[str, str]) -> None:
+        points = self.rng.sample([*ends, *(("0.5", "0.25") if ends[0] == "0.0" else ("1.5", "-7.0"))], 3)
+        points = [each for each in points if float(ends[0]) <= float(each) <= float(ends[1])]
+        self.declared.append(f"{word} {name} : single {ends[0]} .. {ends[1]}")
+        self.headings.append(Heading(name, of_numbers(points)))
+
+    def across(self) -> None:
+        """Perhaps a column about several variables, or none."""
+        rng = self.rng
+        if len(self.whole) > 1 and rng.randrange(2):
+            one, two = rng.sample(self.whole, 2)
+            points = [str(rng.randint(-9, 9)) for _ in range(3)]
+            sums = (
+                f"{one} - {two}",
+                f"{one} + {two}",
+                f"2 * {one} - {two}",
+                f"min({one}, {two})",
+                f"abs({one} - {two})",
+            )
+            self.headings.append(Heading(rng.choice(sums), of_numbers(points)))
+            self.conditions += [f"{one} < {two}", f"{one} + {two} /= 3"]
+        if len(self.real) > 1 and rng.randrange(2):
+            one, two = rng.sample(self.real, 2)
+            self.headings.append(
+                Heading(
+                    rng.choice((f"{one} - {two}", f"{one} + {two}", f"{one} * 1e308 - {two} * 1e308")),
+                    of_numbers(["0.0", "0.5", "-1.0"]),
+                )
+            )
+            self.conditions.append(f"{one} < {two}")
+        if self.whole and not rng.randrange(6):
+            one = rng.choice(self.whole)
+            self.headings.append(
+                Heading(f"single({one}) * 2e38 - single({one}) * 2e38", of_numbers(["0.0", "1.0"]))
+            )
+        if self.conditions and rng.randrange(2):
+            given = list(self.conditions)
+
+            def cell(rng: Rng) -> str:
+                one, two = rng.choice(given), rng.choice(given)
+                return rng.choice((one, f"not ({one})", f"{one} or {two}", f"{one} implies {two}"))
+
+            self.headings.append(Heading("when", cell))
+
+
+def drawn(rng: Rng, *, small: bool = False) -> str:
+    """Draw a text with one table, or two of one level; nearly always one that is in order but for what is to be proved."""
+    text = _drawn(rng, small)
+    for _ in range(rng.choice((0, 20, 20, 20, 20, 20))):
+        if isinstance(compile_text(text), Program):
+            break
+        text = _drawn(rng, small)
+    return text
+
+
+def _drawn(rng: Rng, small: bool) -> str:
+    draw = Draw(rng, [], [], [], [], [])
+    for name in NAMES[: rng.choice((1, 2) if small else (1, 1, 2, 2, 3, 4, 6))]:
+        draw.variable(name)
+    draw.across()
+    assumed = [
+        f"assume f_{at} : {rng.choice(draw.conditions)}"
+        for at in range(rng.choice((0, 0, 0, 1, 2)))
+        if draw.conditions
+    ]
+    named = [each.split()[1] for each in assumed if "for 300" not in each]
+    lines = (2, 3, 4, 5) if small else (2, 3, 3, 4, 5, 6, 8, 14, 30)
+    tables = [_table("t", draw, named, rng, rng.choice(lines))]
+    if not rng.randrange(8):
+        tables.append(_table("u", draw, named, rng, rng.choice(lines)))
+    shown = [
+        f"level l {{ period 100 [ms] {' '.join(f'table {name}' for name in ('t', 'u')[: len(tables)])} }}"
+    ]
+    outputs = ["output o : int 0 .. 9", "state p : bool", "procedure q { p := not p }"]
+    return "\n".join([*draw.declared, *outputs, *assumed, *tables, *shown, ""])
+
+
+def _table(name: str, draw: Draw, assumed: Sequence[str], rng: Rng, many: int) -> str:
+    heads = rng.sample(draw.headings, min(len(draw.headings), rng.randint(1, 6)))
+    rows = [f"  | line | {' | '.join(each.text for each in heads)} || procedures | o |"]
+    names = [f"n{at}" for at in range(many)]
+    for at, each in enumerate(names):
+        cells = [head.cells(rng) if rng.randrange(3) else "" for head in heads]
+        order = _order(names[:at], names[at + 1 :], rng)
+        rows.append(
+            f"  | {each}{order} | {' | '.join(cells)} || {rng.choice(('', '', 'q'))} | {rng.randrange(3)} |"
+        )
+    if not rng.randrange(4):
+        blank = "|".join(" " for _ in heads[1:])
+        default = rng.choice(("DEFAULT", "DEFAULT", "DEFAULT unreachable"))
+        rows.append(f"  | rest | {default} |{blank}{'|' if blank else ''}| | 1 |")
+    rests = f" assuming {', '.join(assumed)}" if assumed and rng.randrange(3) else ""
+    return "\n".join([f"table {name}{rests} {{", *rows, "}"])
+
+
+def _order(before: Sequence[str], after: Sequence[str], rng: Rng) -> str:
+    """What a line stands above, and does the same as: no circle, as it is above later ones alone."""
+    said = ""
+    if after and not rng.randrange(5):
+        said += f" above {', '.join(rng.sample(after, min(len(after), rng.randint(1, 3))))}"
+    elif before and not rng.randrange(10):
+        said += f" same {rng.choice(before)}"
+    return said
+
+
+def mutant(text: str, rng: Rng) -> str:
+    """The text with one cell blank, or one line less."""
+    rows = text.split("\n")
+    places = [at for at, row in enumerate(rows) if row.startswith("  | n")]
+    at = rng.choice(places)
+    if rng.randrange(2) and len(places) > 2:
+        return "\n".join([*rows[:at], *rows[at + 1 :]])
+    left, bars, right = rows[at].partition("||")
+    cells = left.split("|")
+    cells[rng.randrange(2, max(3, len(cells) - 1))] = "  "
+    rows[at] = "|".join(cells) + bars + right
+    return "\n".join(rows)
+
+
+# --- what is done with one ---------------------------------------------------------------
+
+
+def commands(folder: Path, text: str, rng: Rng) -> Iterator[tuple[str, Callable[[], object]]]:
+    """Yield each command on a text, by what it is called; a status of 3 is a bug in rcsc."""
+    file, other = folder / "wrong.rcs", folder / "other.rcs"
+    file.write_text(text, encoding="utf-8")
+    other.write_text(mutant(text, rng), encoding="utf-8")
+
+    def rcsc(*given: str) -> Callable[[], object]:
+        return lambda: _run(given)
+
+    yield "check", rcsc("check", "--no-cache", str(file))
+    form = rng.choice(("json", "sarif", "line", "github"))
+    yield f"check --format {form}", rcsc("check", "--no-cache", "--format", form, str(file))
+    yield "fmt --expanded", rcsc("fmt", "--expanded", str(file))
+    yield "graph", rcsc("graph", str(file) + ":t", "--form", rng.choice(("mermaid", "dot", "scxml")))
+    yield "graph --lines", rcsc("graph", str(file) + ":t", "--lines", "--form", "mermaid")
+    yield "diff", rcsc("diff", str(file), str(other))
+    workspace = Workspace()
+    path = str(file)
+    workspace.open(path, text)
+    yield "glance", lambda: workspace.glance(path)
+    yield "editor", lambda: workspace.check(path)
+    answer = workspace.check(path)
+    for finding in [each for each in answer.findings if each.mendable][:3]:
+        yield "repairs", partial(workspace.repairs, finding)
+    yield "witness", lambda: witness_run(workspace.checked(path), "t")
+
+
+def _run(given: Sequence[str]) -> None:
+    out, wrong = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(wrong):
+        status = run(given)
+    assert status in (0, 1, 2), f"status {status}: {wrong.getvalue()[-3000:]}"
+
+
+@contextlib.contextmanager
+def ending(most_s: float = HANGS_S) -> Iterator[None]:
+    """Break off what takes more of the processor.
+
+    Raises:
+        HangsError: It does.
+    """
+
+    def late(_number: int, _frame: FrameType | None) -> None:
+        raise HangsError(f"more than {most_s} s of the processor")
+
+    before = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, most_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+@dataclass(slots=True)
+class Seen:
+    """What a campaign came to.
+
+    Attributes:
+        slowest: By command, seconds of the processor, and the number of the table.
+        late: Tables with a command that took longer than it may.
+        failed: What ended otherwise.
+        codes: How many tables have a finding of this code; `wrong`, how many have two and more.
+    """
+
+    slowest: dict[str, tuple[float, int]]
+    late: dict[int, list[str]]
+    failed: dict[int, str]
+    codes: Counter[str]
+
+
+def campaign(count: int, seed: int, first: int = 0) -> Seen:
+    """Draw tables and run every command on each."""
+    seen = Seen({}, {}, {}, Counter())
+    for number in range(first, first + count):
+        rng = random.Random(f"{seed} {number}")
+        text = drawn(rng)
+        with tempfile.TemporaryDirectory(prefix="rcsc-wrong-") as place:
+            try:
+                _one(Path(place), text, rng, number, seen)
+            except Exception as bug:  # noqa: BLE001  # whatever it is, it is told with its number
+                seen.failed[number] = f"{type(bug).__name__}: {str(bug)[-1500:]}"
+        told = seen.late.get(number) or seen.failed.get(number)
+        if told:
+            print(f"table {number}: {told}", file=sys.stderr, flush=True)
+    return seen
+
+
+# --- what is called proved -----------------------------------------------------------------
+
+
+def _report(file: Path) -> Report:
+    return check(Settings((str(file),), Options(), use_cache=False))
+
+
+def _wrong(report: Report) -> set[tuple[str, str]]:
+    """What is wrong in a report, whatever is counted."""
+    return {
+        (each.code.value, re.sub(r"matches .*|, but .*", "", each.message))
+        for each in report.diagnostics
+        if each.severity is not Severity.NOTE
+    }
+
+
+def held(file: Path, text: str, rng: Rng) -> int:
+    """Write out each proposal that is called proved, check the whole anew, and try inputs; how many there were.
+
+    Raises:
+        AssertionError: One does not do what is said of it, or something else is called proved.
+    """
+    file.write_text(text, encoding="utf-8")
+    before = _report(file)
+    many = 0
+    for finding in before.diagnostics:
+        certain = [each for each in finding.proposals if each.certain]
+        said = [
+            each for each in (*finding.help, *finding.notes) if re.search(r"(?<!not )\bproved\b(?! or)", each)
+        ]
+        told = {each.said for each in certain}
+        assert all(each in told or "that is then proved" in each for each in said), (said, told)
+        for proposal in certain:
+            new = with_proposal(before.sources[finding.primary.span.file], proposal)
+            assert new is not None, proposal
+            file.write_text(new, encoding="utf-8")
+            _holds(finding, proposal, before, _report(file), rng)
+            many += 1
+    return many
+
+
+def _holds(finding: Diagnostic, proposal: Proposal, before: Report, after: Report, rng: Rng) -> None:
+    """Raise where a finding is still there, another has come, or some input is matched otherwise than is said."""
+    source = after.sources[finding.primary.span.file]
+    where = f"{proposal.title!r} written:\n{source.text}"
+    wrong, now = _wrong(before), _wrong(after)
+    capped = any(each.only_listed for each in before.diagnostics)
+    assert capped or not now - wrong, (now - wrong, where)
+    program = compile_text(source.text, source.name)
+    assert isinstance(program, Program), where
+    table = next(each for each in program.tables if each.name == proposal.table)
+    pairs = [{line.name for line in each.lines} for each in finding.witnesses if len(each.lines) == 2]
+    if finding.code is Code.OVERLAP and "overlaps together" in proposal.title:
+        assert not any(code == Code.OVERLAP.value and f"`{table.name}`" in told for code, told in now), where
+    elif finding.code is Code.OVERLAP:
+        assert not any(each.message == finding.message for each in after.diagnostics), where
+    elif finding.code is Code.GAP and proposal.whole:
+        assert not any(
+            each.code is Code.GAP and f"`{table.name}`" in each.message for each in after.diagnostics
+        ), where
+    known = declarations(program)
+    for _ in range(60):
+        try:
+            matching = set(matching_lines(table, snapshot(known, table, rng)))
+        except UNDEFINED:
+            continue
+        assert not any(pair <= matching for pair in pairs), (matching, where)
+
+
+def helps_campaign(count: int, seed: int, first: int = 0) -> tuple[int, int, dict[int, str]]:
+    """Draw tables until so many proposals were written out; how many these were, of how many tables, and what does not hold."""
+    many, number, failed = 0, first, dict[int, str]()
+    while many < count:
+        rng = random.Random(f"{seed} {number}")
+        with tempfile.TemporaryDirectory(prefix="rcsc-wrong-") as place:
+            try:
+                many += held(Path(place) / "wrong.rcs", drawn(rng), rng)
+            except Exception as bug:  # noqa: BLE001  # whatever it is, it is told with its number
+                failed[number] = f"{type(bug).__name__}: {str(bug)[-2500:]}"
+                print(f"table {number}: {failed[number]}", file=sys.stderr, flush=True)
+        number += 1
+    return many, number - first, failed
+
+
+def _one(place: Path, text: str, rng: Rng, number: int, seen: Seen) -> None:
+    (place / "rcsc.toml").touch()
+    for name, does in commands(place, text, rng):
+        begun = time.process_time()
+        try:
+            with ending():
+                does()
+        except Exception as bug:
+            raise AssertionError(f"{name}: {type(bug).__name__}: {bug}") from bug
+        took_s = time.process_time() - begun
+        seen.slowest[name] = max(seen.slowest.get(name, (0.0, -1)), (took_s, number))
+        if took_s > MOST_CPU_S:
+            seen.late.setdefault(number, []).append(f"{name} {took_s:.1f} s")
+    answer = Workspace().check(str(place / "wrong.rcs"))
+    errors = [each.code for each in answer.findings if each.severity == Severity.ERROR]
+    seen.codes.update(set(errors))
+    seen.codes["two and more"] += len(errors) > 1
+
+
+def main() -> None:
+    """A long run, by command."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--count", type=int, default=1_000)
+    arguments.add_argument("--seed", type=int, default=1)
+    arguments.add_argument("--first", type=int, default=0, help="the number of the first")
+    arguments.add_argument(
+        "--helps", action="store_true", help="write out so many proposals that are called proved"
+    )
+    arguments.add_argument("--show", action="store_true", help="print the first, and no more")
+    given = arguments.parse_args()
+    os.environ["NO_COLOR"] = "1"
+    if given.show:
+        print(drawn(random.Random(f"{given.seed} {given.first}")))
+        return
+    if given.helps:
+        many, tables, failed = helps_campaign(given.count, given.seed, given.first)
+        print(
+            f"{many} proposals of {tables} tables, seed {given.seed}: {len(failed)} tables of which something does not hold"
+        )
+        return
+    seen = campaign(given.count, given.seed, given.first)
+    for name, (took_s, number) in sorted(seen.slowest.items(), key=lambda each: -each[1][0]):
+        print(f"{name:24} at most {took_s:6.2f} s of the processor, table {number}")
+    for code, many in sorted(seen.codes.items()):
+        print(f"{code:24} {many:6}")
+    for number, what in seen.late.items():
+        print(f"table {number} is late: {', '.join(what)}")
+    for number, why in seen.failed.items():
+        print(f"table {number} failed: {why}")
+    print(f"{given.count} tables, seed {given.seed}: {len(seen.late)} late, {len(seen.failed)} failed")
+
+
+if __name__ == "__main__":
+    main()
