@@ -44,6 +44,7 @@ from rcsc.lang.model import (
     Variable,
     pending,
 )
+from rcsc.lang.restart import Fixed
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,8 @@ class Debts:
     def all(self) -> Iterator[Debt]:
         """Every debt."""
         yield self._first()
+        if self.program.levels:
+            yield self._begun_anew()
         yield from self._conditions()
         yield self._deferred()
         yield self._safe_values()
@@ -116,6 +119,18 @@ class Debts:
             ]
             good_ = self.terms.false if inputs else Run.evaluate(_at(run), condition)
             run.owe(f"invariant `{name}` holds", good_)
+        return Debt((), tuple(run.owed))
+
+    def _begun_anew(self) -> Debt:
+        """The values after a restart, where they are constants; what is adopted from a buffer is owed of the levels together."""
+        adopted = self.program.adopted
+        fixed = {leaf: what.value for leaf, what in adopted.items() if isinstance(what, Fixed)}
+        run = Run(self.start, "after a restart")
+        for variable in self.program.variables:
+            self._set(run, variable, fixed.get(str(variable.name), variable.initial))
+        for name, condition, reads in self.invariants:
+            if reads.isdisjoint(adopted.keys() - fixed.keys()):
+                run.owe(f"invariant `{name}` holds", Run.evaluate(_at(run), condition))
         return Debt((), tuple(run.owed))
 
     def _defined(self, condition: Expr, what: str, known: Sequence[Term], cell: Written) -> Debt:

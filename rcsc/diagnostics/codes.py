@@ -1186,7 +1186,7 @@ class Code(StrEnum):
     """
     INVARIANT_INITIAL = """RCS416: an invariant false at first
 
-    An invariant holds of the initial values, before the first cycle.
+    An invariant holds of the initial values, before the first cycle, and of those after a restart: a level may begin anew at any moment.
 
         state n : int 0 .. 9
         invariant some : n > 0

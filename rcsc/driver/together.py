@@ -12,7 +12,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.compose.contract.claims import UNREACHED, Promise
-from rcsc.compose.proof.standing import ASSUMPTION, PROPERTY, Known, KnownSystem, LevelOutline
+from rcsc.compose.proof.standing import (
+    ASSUMPTION,
+    ONE_LINE,
+    PROPERTY,
+    SOME_LINE,
+    Known,
+    KnownSystem,
+    LevelOutline,
+)
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
 from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport, named, trusting
@@ -25,6 +33,8 @@ from rcsc.run.description import BadDescription, description, places
 
 DECLARED_PROVED = "proved"
 """The standing of what declared ranges and invariants ensure."""
+_BY_MATCHING = {Code.GAP: SOME_LINE, Code.OVERLAP: ONE_LINE}
+"""Findings about matching, and what is proved of a level that never meets one."""
 MOST_OPEN = 5
 """Things that are shown of a level that is not proved; then how many more."""
 
@@ -150,6 +160,8 @@ class _Seen:
         """The finding, with a note where its DEFAULT never runs here, or where its properties are proved."""
         if diagnostic.code is Code.PROPERTY_ELSEWHERE:
             return self._elsewhere(diagnostic)
+        if diagnostic.code in _BY_MATCHING and diagnostic.witnesses:
+            return self._never_comes(diagnostic)
         if diagnostic.code is not Code.DEFAULT_COVERS or not diagnostic.witnesses:
             return diagnostic
         system = self.idle.get((diagnostic.primary.span.file, diagnostic.witnesses[0].table))
@@ -157,6 +169,30 @@ class _Seen:
             return diagnostic
         note = f"none of them comes in {system}: proved of the levels together"
         return replace(diagnostic, notes=(*diagnostic.notes, note))
+
+    def _never_comes(self, diagnostic: Diagnostic) -> Diagnostic:
+        """The finding, with what its file has to say where the levels together are proved to keep such inputs away."""
+        file = os.path.realpath(diagnostic.primary.span.file)
+        table = str(diagnostic.witnesses[0].table)
+        places_ = [
+            (
+                system,
+                level.name,
+                known_system.of_obligation(level.name, (_BY_MATCHING[diagnostic.code], table, "")),
+            )
+            for (system, _), (known_system, level) in self.levels.items()
+            if any((outline.file, outline.name) == (file, table) for outline in level.tables)
+        ]
+        if _worst({state for *_, state in places_}) not in {Known.PROVED, Known.TRUSTED}:
+            return diagnostic
+        systems = ", ".join(dict.fromkeys(system for system, *_ in places_))
+        note = f"none comes in {systems}: proved of the levels together; what this file says does not show it"
+        helps = tuple(
+            f"have the file say it: `rcsc prove {system} --level {level} --invariants` prints what keeps such inputs away "
+            "as an `invariant`, which is then proved here, or refused"
+            for system, level, _ in places_
+        )
+        return replace(diagnostic, notes=(*diagnostic.notes, note), help=(*diagnostic.help, *helps))
 
     def _elsewhere(self, diagnostic: Diagnostic) -> Diagnostic:
         """The finding, with where its properties are proved, if each is in every level that states it."""

@@ -1,9 +1,9 @@
-"""Invariants and assumptions as a whole: true at first, and satisfiable together; and that properties are proved elsewhere.
+"""Invariants and assumptions as a whole: true at first and after a restart, and satisfiable together; properties are proved elsewhere.
 
 In: a program. Out: diagnostics. That every run keeps each invariant is shown with the run (`obligations`).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
@@ -20,8 +20,10 @@ from rcsc.lang.model import (
     Table,
     Value,
     key_bounds,
+    spell,
     value_of_key,
 )
+from rcsc.lang.restart import Fixed
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer
 
@@ -33,6 +35,8 @@ def at_first(program: Program) -> Iterator[Diagnostic]:
         if fold(invariant.condition, start) is False:
             message = f"the initial values do not satisfy invariant `{invariant.name}`"
             yield Diagnostic(Code.INVARIANT_INITIAL, message, Label(invariant.span))
+        elif program.levels and fold(invariant.condition, begun_anew := _begun_anew(program)) is False:
+            yield _broken_by_a_restart(program, invariant, begun_anew)
     inputs = {variable.name for variable in program.variables if variable.kind is Kind.INPUT}
     for assumption in program.assumptions:
         if inputs.isdisjoint(read_by(assumption.condition)) and fold(assumption.condition, start) is False:
@@ -40,6 +44,35 @@ def at_first(program: Program) -> Iterator[Diagnostic]:
             helps = ("give a variable another initial value, or weaken the assumption",)
             label = Label(assumption.span)
             yield Diagnostic(Code.ASSUMPTION_INITIAL, message, label, help=helps, severity=Severity.WARNING)
+
+
+def _begun_anew(program: Program) -> dict[str, Value]:
+    """Return the values after a restart, as far as they are constants: what is adopted from a buffer is left out."""
+    start: dict[str, Value] = dict(initial(program))
+    for leaf, adopted in program.adopted.items():
+        if isinstance(adopted, Fixed):
+            start[leaf] = adopted.value
+        else:
+            start.pop(leaf, None)
+    return start
+
+
+def _broken_by_a_restart(
+    program: Program, invariant: Invariant, begun_anew: Mapping[str, Value]
+) -> Diagnostic:
+    reads = frozenset(read_by(invariant.condition))
+    read = [variable for variable in program.variables if variable.name in reads]
+    values = ", ".join(f"{v.name} = {spell(v.type, begun_anew[v.name])}" for v in read)
+    return Diagnostic(
+        Code.INVARIANT_INITIAL,
+        f"the values after a restart do not satisfy invariant `{invariant.name}`",
+        Label(invariant.span),
+        tuple(
+            Label(v.span, "begins anew otherwise than at first") for v in read if v.name in program.adopted
+        ),
+        notes=(f"after a restart {values}",),
+        help=("give a variable another value for `restart`, or weaken the invariant",),
+    )
 
 
 def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:

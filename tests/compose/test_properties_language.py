@@ -511,7 +511,7 @@ def chosen(ts: TransitionSystem, closely: int = 0) -> tuple[Predicate, ...]:
 # --- invariants ---------------------------------------------------------------------------------
 
 
-def test_an_invariant_that_check_proves_may_be_false_after_a_restart(tmp_path: Path) -> None:
+def test_an_invariant_that_a_restart_breaks_is_told_by_check_and_shown(tmp_path: Path) -> None:
     """Nothing that the lower level does fails; but it begins anew with a failure, as `run.adopt` says."""
     ts = with_properties(
         tmp_path,
@@ -519,10 +519,10 @@ def test_an_invariant_that_check_proves_may_be_false_after_a_restart(tmp_path: P
         "invariant never_fails : status_report /= failed\ninvariant under_way : cur_state /= f_state implies status_report /= failed\n",
     )
     assert [
-        finding
+        finding.message
         for finding in prove_program(ts.program, Options()).findings
         if finding.severity is Severity.ERROR
-    ] == []
+    ] == ["the values after a restart do not satisfy invariant `never_fails`"]
     assert verdicts(prove_level(ts, LITTLE)) == {"never_fails": False, "under_way": True}
     obligation = stated(ts)["never_fails"]
     assert shortest(ts, obligation) is None
@@ -551,7 +551,11 @@ def test_prove_shows_what_breaks_as_the_executors_ran_it(
     assert re.search(r"property +goes_on +not proved", said.out)
     assert "not proved: property `goes_on`" in said.err
     assert "it says: to_lower.input_command = go then to_lower.input_command = go" in said.err
-    assert "broken in cycle 2, as the interpreter, the Python and the C executors run it" in said.err
+    alone = (
+        "broken in cycle 2 of level `upper` alone, as the interpreter, the Python and the C executors run it"
+    )
+    assert alone in said.err
+    assert "supposed, and not shown of the system: `lower` gives such `lower`" in said.err
     [case] = cases.iterdir()
     assert run(["prove", "--case", str(case)]) == 1
     edit_file(tmp_path / "upper.rcs", ("go then to", "go then was to"))

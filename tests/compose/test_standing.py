@@ -60,6 +60,48 @@ def prove(*args: str) -> int:
     return run(["prove", "system.toml", "--trace", "0", *args])
 
 
+NEVER_TOLD_TO_STOP = """\
+enum phase { off, on }
+input stop : bool
+state now : phase
+output works : bool
+assume stops_what_works assumed : stop implies works
+table work assuming stops_what_works {
+  | line  | now | stop  || now | works |
+  |-------|-----|-------||-----|-------|
+  | begin | off | false || on  | true  |
+  | goes  | on  | false ||     |       |
+  | end   | on  | true  || off | false |
+}
+level machine { period 10 [ms] table work }
+"""
+
+
+def test_what_was_proved_together_is_told_with_what_to_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Alone the table has a gap that no cycle comes to: with the invariant that `rcsc prove` prints it is proved alone, too."""
+    monkeypatch.delenv("RCSC_CACHE_DIR", raising=False)
+    monkeypatch.chdir(tmp_path)
+    table = tmp_path / "machine.rcs"
+    table.write_text(NEVER_TOLD_TO_STOP, encoding="utf-8")
+    wires = '[buffers]\n"a.stop" = "machine.stop"\n"machine.works" = "a.works"\n'
+    head = 'name = "s"\ngenerated = "generated"\ntick_ms = 10\n[[level]]\nname = "machine"\n'
+    (tmp_path / "system.toml").write_text(head + wires, encoding="utf-8")
+    assert run(["check", "machine.rcs"]) == 1
+    assert "proved of the levels together" not in capfd.readouterr().out
+    assert prove("--invariants") == 0
+    [said] = [
+        line for line in capfd.readouterr().out.splitlines() if line.startswith("  invariant of_machine : ")
+    ]
+    assert run(["check", "machine.rcs"]) == 1
+    out = capfd.readouterr().out
+    assert "none comes in system.toml: proved of the levels together" in out
+    assert "`rcsc prove system.toml --level machine --invariants`" in out
+    table.write_text(f"{NEVER_TOLD_TO_STOP}{said.strip()}\n", encoding="utf-8")
+    assert run(["check", "machine.rcs"]) == 0
+
+
 def reported_table(form: str, name: str = "work") -> dict[str, Any]:
     found: dict[str, Any] = next(one for one in json.loads(form)["tables"] if one["table"] == name)
     return found

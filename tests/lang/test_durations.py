@@ -118,6 +118,21 @@ def test_properties_over_times_are_proved() -> None:
     assert verdicts["never_two"] is Verdict.NOT_PROVED
 
 
+def test_a_property_names_the_counter_and_nothing_else_does() -> None:
+    """As witnesses and logs name it."""
+    text = edited(TEXT, ("assume brief monitored : not (b for 1 [s])\n", ""), (" assuming brief", ""))
+    counter = "held_b"
+    proof = prove_level(
+        alone(
+            text + f"property all_of_it : mode = 3 implies {counter} >= 6\nproperty some : {counter} < 6\n"
+        ),
+        LITTLE,
+    )
+    verdicts = {obligation.name: verdict for obligation, verdict in proof.verdicts}
+    assert (verdicts["all_of_it"], verdicts["some"]) == (Verdict.PROVED, Verdict.NOT_PROVED)
+    assert "RCS201" in codes(reported(text + f"invariant kept : {counter} >= 0\n"))
+
+
 def test_a_run_that_takes_the_time_is_found_without_a_word() -> None:
     text = edited(TEXT, ("assume brief monitored : not (b for 1 [s])\n", ""), (" assuming brief", ""))
     ts = alone(text + "property never_three : mode /= 3\n")

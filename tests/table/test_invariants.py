@@ -30,6 +30,31 @@ def test_an_invariant_is_kept_by_every_line() -> None:
     assert errors(verdict_of(COUNTER).findings) == []
 
 
+BEGUN_ANEW = """\
+input heard : bool
+state place : int 0 .. 100 restart 50
+state counts : array[8] of int 0 .. 9
+output silent : int 0 .. 9
+invariant inside : place < 8
+table t {
+  | line | heard || procedures          | silent        |
+  | yes  | true  || counts[place] := 3  | 0             |
+  | no   | false ||                     | counts[place] |
+}
+level m { period 1 [s] table t }
+"""
+
+
+def test_an_invariant_holds_after_a_restart_too() -> None:
+    """A level may begin anew at any moment: an operation that rests on the invariant would be undefined."""
+    [found] = verdict_of(BEGUN_ANEW).findings
+    assert (found.code.value, found.notes) == ("RCS416", ("after a restart place = 50",))
+    assert "after a restart" in found.message
+    assert [BEGUN_ANEW[label.span.start : label.span.end] for label in found.related] == ["place"]
+    for kept in ("restart 7", "restart 0", ""):
+        assert errors(verdict_of(edited(BEGUN_ANEW, ("restart 50", kept))).findings) == []
+
+
 @pytest.mark.parametrize(
     ("old", "new", "code"),
     [

@@ -1,10 +1,12 @@
 """What `rcsc prove` says of lines in their context, of how commands end, and of the system as a whole."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from operator import attrgetter
 from typing import Any
+
+import click
 
 from rcsc.compose.contract.claims import AGAIN, ENDING, RUNS, UNREACHED, Key, Need, declared, spelled
 from rcsc.compose.contract.obligations import Sort, pause_of
@@ -16,6 +18,7 @@ from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.proof.termination import Ending
 from rcsc.diagnostics import report
 from rcsc.solvers.smtlib import CVC5_STEPS, cvc5_refutes
+from rcsc.testing.figures import counted
 
 
 def standing(whole: SystemProof, level: str, key: Key) -> str:
@@ -100,20 +103,66 @@ def trusted(whole: SystemProof) -> Iterator[str]:
         yield from (f"  {trust}" for trust in every)
 
 
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What is proved of a system, as one line says it.
+
+    Attributes:
+        claims: How many there are, agreements between levels counted; `proved`, how many of them are, and `open`, how many are not.
+        lacks: What else is not shown, kind by kind: it ends with status 1 under `--strict` alone.
+    """
+
+    claims: int
+    proved: int
+    open: int
+    lacks: tuple[str, ...]
+
+    def status(self, *, strict: bool) -> int:
+        """The exit status."""
+        return 1 if self.open or (strict and self.lacks) else 0
+
+    def line(self, *, strict: bool) -> str:
+        """The verdict, with its colour."""
+        many = counted(self.proved, "claim")
+        rest = ", ".join(self.lacks)
+        if self.open:
+            text = f"not proved: {self.open} of {counted(self.claims, 'claim')}"
+            return click.style(text, fg="red", bold=True) + (f"; also {rest}" if rest else "")
+        if not self.lacks:
+            return click.style(f"proved: {many}", fg="green", bold=True)
+        text = click.style(f"proved in part: {many}", fg="yellow", bold=True)
+        return f"{text}, but {rest}: status {'1' if strict else '0, and 1 with --strict'}"
+
+
+def summary(whole: SystemProof) -> Summary:
+    """Count what is proved of a system, and what is not."""
+    claims = [(level.level, obligation.key) for level in whole.levels for obligation, _ in level.verdicts]
+    still_open = sum(len(level.open) for level in whole.levels)
+    not_agreed = sum(not agreement.holds for agreement in whole.agreements)
+    proved = sum(whole.of(*need).proved for need in claims) + len(whole.agreements) - not_agreed
+    return Summary(
+        len(claims) + len(whole.agreements), proved, still_open + not_agreed, tuple(_lacking(whole))
+    )
+
+
+def _lacking(whole: SystemProof) -> Iterator[str]:
+    contexts = [level.context for level in whole.levels if level.context is not None]
+    counts = {
+        "not looked at": sum(missing.applies for level in whole.levels for missing in level.unstated),
+        "resting on what is not known": sum(map(len, _resting(whole).values())),
+        "not shown to end": sum(not ending.proved for level in whole.levels for ending in level.endings),
+        "never reached": sum(len(seen.unreached) for seen in contexts),
+        "not shown to be reached": sum(len(seen.unsure) for seen in contexts),
+    }
+    nouns = {"not shown to end": "command", "never reached": "line", "not shown to be reached": "line"}
+    return (f"{counted(many, nouns.get(what, 'claim'))} {what}" for what, many in counts.items() if many)
+
+
 def left_out(whole: SystemProof) -> Iterator[str]:
-    """Say that a system is not wholly proved, and why, where no finding does."""
-    if whole.whole or not whole.proved:
-        return
-    unstated = sum(missing.applies for level in whole.levels for missing in level.unstated)
-    resting = _resting(whole)
-    rests = sum(map(len, resting.values()))
-    ends = sum(not ending.proved for level in whole.levels for ending in level.endings)
-    reasons = [
-        f"{unstated} not looked at" if unstated else "",
-        f"{rests} rest on what is not known" if rests else "",
-        f"{ends} not shown to end" if ends else "",
-    ]
-    yield f"not wholly proved: {', '.join(reason for reason in reasons if reason)}"
+    """Say which claims rest on what is not known, and on what."""
+    resting = _resting(whole) if whole.proved else {}
+    if resting:
+        yield "resting on what is not known"
     for lacks, claims in resting.items():
         yield f"  {report.named(claims)}: {'rests' if len(claims) == 1 else 'rest'} on {lacks}"
 
@@ -130,14 +179,11 @@ def _resting(whole: SystemProof) -> dict[str, list[str]]:
 
 def _ends(ending: Ending) -> str:
     if ending.changes is None:
-        return "is not shown to end: its states may go round"
+        return f"is not shown to end: {'; '.join(ending.rounds)}"
     changes = "one change" if ending.changes == 1 else f"{ending.changes} changes"
     text = f"ends, once taken, after at most {changes} of state"
     if ending.endless:
-        lines = ", ".join(f"`{line}`" for line in ending.endless)
-        return (
-            f"is not shown to end: {'line' if len(ending.endless) == 1 else 'lines'} {lines} may run for ever"
-        )
+        return f"is not shown to end: {'; '.join(ending.rounds)}"
     if ending.counted:
         by_line = groupby(ending.counted, key=attrgetter("line"))
         text += "; meanwhile " + ", ".join(_counted(line, tuple(counters)) for line, counters in by_line)

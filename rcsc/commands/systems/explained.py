@@ -11,12 +11,11 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from rcsc.compose.contract.claims import SAFE
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.consequence import MOST, Consequence, How, spelled_leaves, told
-from rcsc.compose.counterexample.explain import Explanation
-from rcsc.compose.counterexample.finding import Finding, TimeLineRow, beginnings, rows
+from rcsc.compose.counterexample.explain import Explanation, runs_on_executors
+from rcsc.compose.counterexample.finding import TimeLineRow, beginnings, rows
 from rcsc.diagnostics.codes import Code
 
 ALIKE = 2
@@ -51,12 +50,12 @@ def say_explanation(
         )
     if stated := _stated(systems, explanation):
         click.echo(f"  = note: it says: {stated}", err=True)
-    for line in explanation.beside:
+    for line in explanation.beside if not explanation.undefined else ():
         click.echo(f"  = note: {line}", err=True)
     if explanation.finding is not None and not explanation.beside:
-        _say_finding(systems, explanation.finding, in_c=explanation.in_c)
+        _say_finding(systems, explanation)
         _say_consequences(systems, explanation, further)
-    elif explanation.guessed and explanation.obligation.key == SAFE:
+    elif explanation.undefined:
         click.echo("  = note: the run that shows it meets an operation that is not defined", err=True)
     elif explanation.guessed:
         click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
@@ -72,6 +71,7 @@ def say_explanation(
     elif cycles and not explanation.beside:
         click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
         _say_supposed(systems, explanation)
+    _say_notes(explanation, cycles)
     for line in explanation.helps:
         click.echo(f"  = help: {line}", err=True)
     if explanation.together:
@@ -106,12 +106,26 @@ def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -
     )
 
 
-def _say_finding(systems: Mapping[str, TransitionSystem], finding: Finding, *, in_c: bool) -> None:
+def _say_notes(explanation: Explanation, cycles: int) -> None:
+    """Say what is known without a run."""
+    for note in explanation.notes:
+        click.echo(f"  = note: {note}", err=True)
+    if explanation.notes and explanation.warns:
+        click.echo(
+            "  = help: let the lines count: a number that only falls, or only rises, while they run; "
+            f"`--trace {4 * cycles}` looks at longer runs",
+            err=True,
+        )
+
+
+def _say_finding(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> None:
     """Print the finding's time line."""
+    finding, in_c = explanation.finding, explanation.in_c
+    assert finding is not None
     begins = ", after a restart" if finding.restarted else ""
     legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
     run_by = "as the interpreter, the Python and the C executors run it"
-    if finding.obligation.key == SAFE:
+    if not runs_on_executors(systems, finding):
         run_by = "as the interpreter runs it; executors are to run nothing that is not safe"
     elif not in_c:
         run_by = "as the interpreter and the Python executor run it (no C function can give what is refused)"
@@ -120,7 +134,14 @@ def _say_finding(systems: Mapping[str, TransitionSystem], finding: Finding, *, i
         if finding.lasso
         else f"broken in cycle {finding.broken_at}"
     )
-    click.echo(f"  = note: {what}{begins}, {run_by}{legal}", err=True)
+    alone = f" of level `{finding.level}` alone" if explanation.supposes else ""
+    click.echo(f"  = note: {what}{alone}{begins}, {run_by}{legal}", err=True)
+    if explanation.supposes:
+        gives = "; ".join(
+            f"`{owner}` gives such {', '.join(f'`{name}`' for name in names)}"
+            for owner, names in explanation.supposes.items()
+        )
+        click.echo(f"  = note: supposed, and not shown of the system: {gives}", err=True)
     _say_time_line((*beginnings(systems, finding), *rows(systems, finding)))
 
 
@@ -222,6 +243,8 @@ def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Ex
         "reproduces": finding is not None and not explanation.beside,
         "beside": list(explanation.beside),
         "restarted": finding is not None and finding.restarted,
+        "supposes": {owner: list(names) for owner, names in explanation.supposes.items()},
+        "notes": list(explanation.notes),
         "lap": 0 if finding is None else finding.lasso,
         "time_line": []
         if finding is None

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from rcsc.commands.shared.proved import (
     pauses,
     reaction,
     standing,
+    summary,
     trusted,
     trusting,
 )
@@ -35,7 +36,7 @@ from rcsc.compose.counterexample.explain import Explanation, TraceSettings, expl
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
 from rcsc.compose.counterexample.trace import usual_length
-from rcsc.compose.invariant.cubes import shown
+from rcsc.compose.invariant.cubes import as_condition, shown
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import LevelProof, certificate
 from rcsc.compose.proof.system import (
@@ -114,10 +115,11 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     refused = _refused(systems, proof, quiet=asked.as_json) if asked.confirms else []
     if refused or any(explanation.bug for explanation in explanations):
         return 3
-    good = proof.whole or (proof.proved and not asked.strict)
-    if cache is not None and good and not explanations:
+    status = 0 if proof.proved and (proof.whole or not asked.strict) else 1
+    status = max(status, summary(proof).status(strict=asked.strict))
+    if cache is not None and not status and not explanations:
         keep_lines(cache, path, key, tuple(_lines(path, systems, _recalled(proof), asked)), stood, loaded)
-    return 0 if good else 1
+    return status
 
 
 def _say(lines: Iterable[str]) -> None:
@@ -141,10 +143,11 @@ def _lines(
     if asked.as_json:
         yield json.dumps(_as_json(proof, systems, explanations), indent=2)
         return
+    yield summary(proof).line(strict=asked.strict)
     for level_proof in proof.levels:
         yield from _of_level(systems[level_proof.level], proof, level_proof)
     if asked.invariants:
-        yield from _invariants(proof)
+        yield from _invariants(systems, proof)
     yield from _agreements(proof)
     yield from _whole(systems, proof)
     yield from _unconnected(systems, description(path))
@@ -239,12 +242,22 @@ def _of_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> It
         yield f"  {line}"
 
 
-def _invariants(proof: SystemProof) -> Iterator[str]:
+def _invariants(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
 
     for level in proof.levels:
         yield f"invariant of level {level.level}: never"
         for clause in level.clauses:
             yield f"  {shown(level.predicates, clause)}"
+        program = systems[level.level].program
+        own = {
+            str(leaf)
+            for declared in program.declared
+            if declared.kind is not Kind.INPUT
+            for leaf in declared.leaves
+        }
+        if condition := as_condition(level.predicates, level.clauses, own):
+            yield "of it, what a program can say of its own values:"
+            yield f"  invariant of_{level.level} : {condition}"
 
 
 def _whole(systems: dict[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
@@ -396,6 +409,7 @@ def _as_json(
     return {
         "proved": proof.proved,
         "whole": proof.whole,
+        "counts": asdict(summary(proof)),
         "findings": [explanation_as_json(systems, explanation) for explanation in explanations],
         "levels": [
             {

@@ -76,6 +76,12 @@ class Predicate:
             return f"({self.leaf} is as `{self.module.name}` computes it)"
         return f"({self.leaf} = {self.other})" if self.other else self.leaf
 
+    def of(self, leaves: Container[str]) -> bool:
+        """Return whether it speaks of these leaves alone, in words that the language has."""
+        if self.condition is not None:
+            return all(str(name) in leaves for name in read_by(self.condition))
+        return self.module is None and self.leaf in leaves and (not self.other or self.other in leaves)
+
     @property
     def size(self) -> int:
         """How many values it has."""

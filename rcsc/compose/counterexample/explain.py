@@ -10,9 +10,10 @@ from pathlib import Path
 
 from rcsc.compose.contract.beginning import Starts
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, pairs
+from rcsc.compose.contract.properties import invariant_kept
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.consequence import Consequence, consequences
-from rcsc.compose.counterexample.finding import Finding, of_trace
+from rcsc.compose.counterexample.finding import Finding, of_trace, supposed
 from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
 from rcsc.compose.counterexample.pair import followed_together
 from rcsc.compose.counterexample.repair import TRIED_CYCLES, helps, repairs
@@ -20,7 +21,9 @@ from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_i
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, stopping, traces
 from rcsc.compose.proof.level import LevelProof, Verdict
 from rcsc.compose.proof.system import SystemProof
+from rcsc.diagnostics.codes import Code
 from rcsc.host.children import scratch
+from rcsc.procedures.invariants import at_first
 from rcsc.run.description import Description
 
 
@@ -42,6 +45,9 @@ class Explanation:
             there is a finding, or none was looked for.
         together: What the first repairs of all findings of its table do together, at the last of them.
         follows: What comes of it, each with a run that the executors repeated, too; None if that was not looked for.
+        supposes: Of a run of one level alone: for each other level, the inputs for which it gives values that are supposed of it.
+        notes: What is known of it without a run: what may go on for ever, or that the values after a restart break it.
+        undefined: Whether the run that was found meets an operation that is not defined.
     """
 
     level: str
@@ -56,6 +62,9 @@ class Explanation:
     follows: tuple[Consequence, ...] | None = None
     together: str = ""
     supposed: Finding | None = None
+    supposes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    undefined: bool = False
 
     @property
     def warns(self) -> bool:
@@ -111,12 +120,12 @@ def explain(
     with scratch("findings") as kept:
         rerun = _Rerun(systems, settings, settings.log or kept)
         for level in proof.levels:
-            for explanation in _level(systems, level, settings):
-                yield rerun.run(explanation)
-            for explanation in _together(systems, level.level, level.open, settings):
-                yield rerun.run(explanation)
-            for explanation in _endless(systems[level.level], level, settings):
-                yield rerun.run(explanation)
+            for explanation in (
+                *_level(systems, level, settings),
+                *_together(systems, level.level, level.open, settings),
+                *_endless(systems[level.level], level, settings),
+            ):
+                yield rerun.run(_supposing(systems, explanation, settings.system))
 
 
 def _level(
@@ -141,11 +150,31 @@ def _level(
             yield from _with_repairs(ts, every_pair, proof, settings)
         else:
             explanation = _explanation(ts, obligation, results.get(obligation.key))
+            explanation = replace(explanation, notes=_as_it_begins(ts, obligation))
             yield (
                 replace(explanation, supposed=_supposed(ts, obligation, proof))
                 if obligation.key not in results
                 else explanation
             )
+
+
+def _as_it_begins(ts: TransitionSystem, obligation: Obligation) -> tuple[str, ...]:
+    """Say that the values at first, or after a restart, break an invariant."""
+    found = at_first(ts.program) if obligation.sort is Sort.INVARIANT else ()
+    return tuple(
+        " ".join((finding.message, *(f"({note})" for note in finding.notes)))
+        for finding in found
+        if finding.message.endswith(f"`{obligation.name}`") and finding.code is Code.INVARIANT_INITIAL
+    )
+
+
+def _supposing(
+    systems: Mapping[str, TransitionSystem], explanation: Explanation, system: Description
+) -> Explanation:
+    """Add what the run of one level alone supposes of the others."""
+    if explanation.finding is None:
+        return explanation
+    return replace(explanation, supposes=supposed(system, systems, explanation.finding))
 
 
 def _supposed(ts: TransitionSystem, obligation: Obligation, proof: LevelProof) -> Finding | None:
@@ -209,7 +238,11 @@ def _explanation(ts: TransitionSystem, obligation: Obligation, result: TraceResu
             return Explanation(level, obligation)
         case NotReproducedError():
             return Explanation(
-                level, obligation, beside=result.beside or (str(result),), guessed=result.guessed
+                level,
+                obligation,
+                beside=result.beside or (str(result),),
+                guessed=result.guessed,
+                undefined=result.undefined,
             )
         case _:
             return Explanation(level, obligation, of_trace(ts, obligation, result))
@@ -250,7 +283,8 @@ def _together(
 
 def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -> Iterator[Explanation]:
     """Explain each command that is not shown to end by a run after which it may go on for ever."""
-    tables = [ending.table for ending in proof.endings if not ending.proved]
+    open_endings = {ending.table: ending for ending in proof.endings if not ending.proved}
+    tables = list(open_endings)
     results: dict[str, Lasso | NotReproducedError] = {}
     for search in settings.searches(proof.level) if settings.most else ():
         results |= lassos(ts, [table for table in tables if table not in results], search)
@@ -262,7 +296,7 @@ def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -
                     proof.level, obligation, replace(of_trace(ts, obligation, lasso.trace), lasso=lasso.first)
                 )
             case other:
-                yield _explanation(ts, obligation, other)
+                yield replace(_explanation(ts, obligation, other), notes=open_endings[table].rounds)
 
 
 @dataclass(slots=True)
@@ -280,7 +314,7 @@ class _Rerun:
         finding = explanation.finding
         if finding is None:
             return explanation
-        if explanation.obligation.sort is Sort.SAFE:  # no executor may run what is not safe
+        if not runs_on_executors(self.systems, finding):
             return explanation
         system = replace(self.settings.system, generated=self.folder / "generated")
         programs = {name: self.systems[name].program for name in finding.levels if name not in self._ready}
@@ -318,6 +352,16 @@ class _Rerun:
             numbered = f"{name}_{number}"
         self._names.add(numbered)
         return numbered
+
+
+def runs_on_executors(systems: Mapping[str, TransitionSystem], finding: Finding) -> bool:
+    """Return whether executors may run it: not where an invariant is broken on which the safety of an operation rests."""
+    return finding.obligation.sort is not Sort.SAFE and all(
+        invariant_kept(systems[name], invariant, step.before, step.before)
+        for tick in finding.ticks
+        for name, step in tick.items()
+        for invariant in systems[name].safety.invariants
+    )
 
 
 def file_name(finding: Finding) -> str:

@@ -3,7 +3,7 @@
 In: traces. Out: `Finding`s; rows and lines of text, in the tables' words.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from rcsc.compose.contract.obligations import BROKEN, Obligation, Sort
@@ -12,6 +12,7 @@ from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle
 from rcsc.compose.counterexample.trace import Trace
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Value, key_bounds, key_of, spell
+from rcsc.run.description import Description
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,33 @@ class Finding:
     def start(self, level: str) -> Mapping[str, Value]:
         """Return every leaf of a level before its first cycle."""
         return next(tick[level].before for tick in self.ticks if level in tick)
+
+
+def supposed(system: Description, levels: Container[str], finding: Finding) -> dict[str, tuple[str, ...]]:
+    """Return what a run of one level alone supposes of other levels: whose outputs, as which inputs, take other values than at first.
+
+    Nothing where levels ran together: then each gave what the others took.
+    """
+    if len(finding.levels) > 1:
+        return {}
+    start = finding.start(finding.level)
+    moved = {
+        name
+        for tick in finding.ticks
+        for name, value in tick[finding.level].taken.items()
+        if value != start[name] or finding.restarted
+    }
+    given: dict[str, list[str]] = {}
+    for wire in system.wires:
+        owner, (reader, _, into) = wire.source.partition(".")[0], wire.target.partition(".")
+        inside = (f"{into}.", f"{into}[")
+        if (
+            reader == finding.level
+            and owner in levels
+            and any(name == into or name.startswith(inside) for name in moved)
+        ):
+            given.setdefault(owner, []).append(into)
+    return {owner: tuple(inputs) for owner, inputs in given.items()}
 
 
 def of_trace(ts: TransitionSystem, obligation: Obligation, trace: Trace) -> Finding:

@@ -97,7 +97,7 @@ def _reproduced(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) ->
         steps = ran_on(ts, start, given)
         first = lasso_of(ts, table, steps)
     except UNDEFINED:
-        return NotReproducedError(shown, guessed=True)
+        return NotReproducedError(shown, undefined=True)
     if first is None:
         return NotReproducedError(shown, guessed=run.guessed)
     return Lasso(Trace(shown, steps, run.search.restarted, run.search.legal), first)

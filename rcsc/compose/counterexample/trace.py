@@ -41,12 +41,15 @@ class NotReproducedError(Exception):
 
     Attributes:
         guessed: Whether an operation was left open (`keyed`), so that it need not be a bug.
+        undefined: Whether the run meets an operation that is not defined.
         beside: Where solver and interpreter differ, a line each.
     """
 
-    def __init__(self, obligation: str, *, guessed: bool = False, beside: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, obligation: str, *, guessed: bool = False, beside: tuple[str, ...] = (), undefined: bool = False
+    ) -> None:
         super().__init__(obligation)
-        self.guessed, self.beside = guessed, beside
+        self.guessed, self.beside, self.undefined = guessed or undefined, beside, undefined
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +237,7 @@ class Unrolled:
         try:
             trace = _ran(self.ts, obligation, given, start, self.search)
         except UNDEFINED:  # `SAFE` says so
-            return NotReproducedError(obligation.shown, guessed=True)
+            return NotReproducedError(obligation.shown, undefined=True)
         if _breaks(self.ts, obligation, trace, len(given)):
             return trace
         beside = self._beside(trace) if self._run.holds(settled.given) else ()

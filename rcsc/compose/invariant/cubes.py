@@ -4,7 +4,7 @@ In: predicates and states (`predicates.point`). Out: `Cube`s, and answers about 
 value, or a few values that it does not have; so one clause can forbid many members of an enumeration.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
@@ -20,11 +20,23 @@ Cube = tuple[Pair, ...]
 
 def shown(chosen: Sequence[Predicate], clause: Cube) -> str:
     """Spell a combination in the tables' words."""
+    return _joined(chosen, clause, "{} is none of {}")
+
+
+def as_condition(chosen: Sequence[Predicate], clauses: Iterable[Cube], nameable: Container[str]) -> str:
+    """Return the condition in the language that the clauses say, as far as it speaks of these leaves; empty if of none."""
+    said = [clause for clause in clauses if all(chosen[at].of(nameable) for at, _ in clause)]
+    return " and ".join(f"not ({_joined(chosen, clause, 'not ({} in {{{}}})')})" for clause in said)
+
+
+def _joined(chosen: Sequence[Predicate], clause: Cube, none_of: str) -> str:
     by_predicate = groupby(clause, key=lambda pair: pair[0])
-    return " and ".join(_spelled(chosen[at], [value for _, value in pairs]) for at, pairs in by_predicate)
+    return " and ".join(
+        _spelled(chosen[at], [value for _, value in pairs], none_of) for at, pairs in by_predicate
+    )
 
 
-def _spelled(predicate: Predicate, values: Sequence[int]) -> str:
+def _spelled(predicate: Predicate, values: Sequence[int], none_of: str) -> str:
     """Spell one predicate's value, or the values that it has not."""
     if values[0] >= 0:
         return f"{predicate.name} = {predicate.shown(values[0])}"
@@ -32,7 +44,7 @@ def _spelled(predicate: Predicate, values: Sequence[int]) -> str:
     return (
         f"{predicate.name} /= {others[0]}"
         if len(others) == 1
-        else f"{predicate.name} is none of {', '.join(others)}"
+        else none_of.format(predicate.name, ", ".join(others))
     )
 
 

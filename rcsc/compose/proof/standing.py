@@ -27,6 +27,7 @@ from rcsc.compose.contract.claims import UNKNOWN as UNLOOKED_AT
 from rcsc.host.cache import Cache
 
 ASSUMPTION, PROPERTY = "assumption", "property"
+SOME_LINE, ONE_LINE = "some line matches", "no two lines match"
 """Sorts of obligations: a table's assumption, a property."""
 
 

@@ -47,7 +47,7 @@ from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.proof.context import gives_an_order, of_lines, orders_to
 from rcsc.compose.proof.ranking import RisingLine, Turn, lines_that_stop, parts
 from rcsc.compose.proof.staying import in_a_row, while_it_stays
-from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending
+from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending, spell
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Answer
 from rcsc.symbolic import values
@@ -70,6 +70,7 @@ class Ending:
         still: Inputs from outside the levels whose values, echoes and statuses apart, are assumed constant meanwhile.
         settled: Reports of levels that have to stand once these have answered (`stands`).
         endless: Lines that are not shown to stop.
+        loops: For each loop of phases that may leave the command unanswered, its states in words; for one of tables, theirs.
     """
 
     table: str
@@ -78,6 +79,14 @@ class Ending:
     still: tuple[str, ...] = ()
     endless: tuple[str, ...] = ()
     settled: tuple[str, ...] = ()
+    loops: tuple[str, ...] = ()
+
+    @property
+    def rounds(self) -> tuple[str, ...]:
+        """What may go on for ever, in words."""
+        lines = ", ".join(f"`{line}`" for line in self.endless)
+        again = f"{'line' if len(self.endless) == 1 else 'lines'} {lines} may run for ever"
+        return (*(f"it may go round: {loop}" for loop in self.loops), *([again] if lines else []))
 
     @property
     def proved(self) -> bool:
@@ -239,7 +248,8 @@ class Flow:
         )
         table = str(self.tables[number].table.name)
         known = stopping.counted, stopping.still, stopping.endless, stopping.settled
-        return Ending(table, None if loops else changes, *known)
+        around = (*([self._tables_in_words()] if loops else []), *self._loops_in_words(number))
+        return Ending(table, None if loops else changes, *known, around)
 
     def wanted_to_stand(self) -> list[Node]:
         """List the condition that the report stands, if a level above may go by its fields."""
@@ -257,6 +267,26 @@ class Flow:
         solver.add(*self.asked.keyed.ranges)
         self.asked.rested_on.append(solver)
         return not may(solver, broken)
+
+    def _tables_in_words(self) -> str:
+        names = (f"`{self.tables[number].table.name}`" for number in sorted(self._looping_tables()))
+        return f"tables {', '.join(names)}"
+
+    def _loops_in_words(self, number: int) -> Iterator[str]:
+        """Spell the states of each loop on which the command may be unanswered: the leaves that are not the same in all."""
+        phases = self._phases(number)
+        for part, waits in phases.loops:
+            if waits:
+                moving = [at for at in range(len(phases.leaves)) if len({phase[at] for phase in part}) > 1]
+                yield "; ".join(
+                    ", ".join(
+                        f"`{phases.leaves[at]}` = {spell(self.ts.kinds[phases.leaves[at]], phase[at])}"
+                        for at in moving
+                    )
+                    for phase in sorted(part)
+                )
+        if phases.steps is None:
+            yield f"its states are more than {MOST_STEPS} steps apart, or the solver gave up"
 
     def no_loop_steps(self) -> list[Node]:
         """List the conditions to be proved: for each step on a loop of phases, that it is not taken."""

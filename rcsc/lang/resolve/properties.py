@@ -10,7 +10,8 @@ In: a declaration. Out: a `Property`, whose one condition says all of it, or dia
 - `P upon Q` is `P implies was P or Q`: once P does not hold it begins no sooner than in the cycle in which Q holds.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
@@ -49,7 +50,7 @@ def resolve_property(scope: Scope, written: tree.PropertyDecl) -> Property | Non
 def _condition(scope: Scope, written: tree.Expr, why_no_before: str) -> Expr | None:
     """A condition that speaks of something."""
     scope.in_property = True
-    with without_before(scope, why_no_before):
+    with without_before(scope, why_no_before), _with_counters(scope):
         condition = boolean(scope, Body(), written)
     scope.in_property = False
     if condition is not None and next(read_by(condition), None) is None:
@@ -57,6 +58,18 @@ def _condition(scope: Scope, written: tree.Expr, why_no_before: str) -> Expr | N
         scope.report(Code.NO_PROPERTY, message, written.span)
         return None
     return condition
+
+
+@contextmanager
+def _with_counters(scope: Scope) -> Iterator[None]:
+    """Inside, a counter that the compiler keeps for a `for` can be named, as witnesses and logs name it."""
+    counters = {declared.name: declared for declared in scope.kept if scope.leaves[declared.leaves[0]].counts}
+    scope.declared |= counters
+    try:
+        yield
+    finally:
+        for name in counters:
+            del scope.declared[name]
 
 
 def _then(first: Expr, other: Expr) -> Expr:
