@@ -34,7 +34,8 @@ What it costs: a walk of each tree, and of the cases that are tried; what is too
 
 Not claimed, and so not checked: that no line is dead, and what `rcsc prove` shows of levels together, properties included.
 
-The modules in the order in which data flows: `values`, `execution`, `owed`, `table`, `known`, `settle`.
+The modules in the order in which data flows: `shape` passes over nothing that is said; `values`, `execution`, `owed`, `table`, `known`,
+`settle`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -47,9 +48,11 @@ from rcsc.certify.execution import Owed, Start
 from rcsc.certify.known import Known
 from rcsc.certify.owed import Debt, Debts
 from rcsc.certify.settle import Ask, CaseAnswer, Fails, Left, Outcome, Settler, Shown, values_in, variables
+from rcsc.certify.shape import WITNESS, check_shape, check_used
 from rcsc.certify.table import RejectedError, TableChecker
 from rcsc.certify.values import BOOL, INT, REAL, REALS, SINGLE, Term, nearest_single
 from rcsc.diagnostics.source import Span
+from rcsc.lang.leaves import read_by
 from rcsc.lang.meaning import digest, relying
 from rcsc.lang.model import (
     AssumptionName,
@@ -66,7 +69,6 @@ from rcsc.lang.model import (
 
 __all__ = ["Ask", "CaseAnswer", "Certified", "Unchecked", "certify", "check_certificate"]
 
-VERSION = 2
 MOST_WORK = 50_000_000
 """Spans of terms, and what costs as much, that are computed for one certificate; what is left then is not checked."""
 
@@ -153,8 +155,7 @@ class _Check:
         ask: Ask | None,
         stops: Mapping[str, tuple[AssumptionName, ...]] | None,
     ) -> None:
-        if certificate["format"] != "rcsc-certificate" or certificate["version"] != VERSION:
-            raise RejectedError("not a certificate of this version")
+        check_shape(certificate, program.name)
         entries: Sequence[Mapping[str, Any]] = certificate["tables"]
         names = [str(entry["table"]) for entry in entries]
         if sorted(names) != sorted(str(table.name) for table in program.tables):
@@ -196,6 +197,7 @@ class _Check:
         """Exactly one line matches, and the assumptions do not contradict each other."""
         checker = TableChecker(self.start, table, entry)
         checker.check()
+        check_used(entry)
         self.checked[f"table `{table.name}`: exactly one line matches"] = None
         for debt in checker.questions:
             self.settle(debt)
@@ -209,21 +211,23 @@ class _Check:
             self.rests[f"table `{table.name}`: a cycle in which `{name}` fails is stopped"] = None
         if table.assumptions:
             self.consistent(table, entry)
+        elif WITNESS in entry:
+            raise RejectedError("it has no assumptions, and values are given for them")
 
     def consistent(self, table: Table, entry: Mapping[str, Any]) -> None:
         """At the values that the certificate names, every assumption of the table and every invariant holds."""
         name = f"table `{table.name}`: its assumptions do not contradict each other"
-        given = dict(entry["witness"])
+        given = dict(entry[WITNESS])
         for leaf in self.program.variables:
             if leaf.name in given and not _is_value(leaf.type, given[leaf.name]):
                 raise RejectedError(f"`{leaf.name}` cannot have the value {given[leaf.name]!r}"[:200])
         conditions = [
-            self.start.condition(assumption.condition)
-            for assumption in self.relying.assumptions
-            if assumption.name in table.assumptions
+            *(one.condition for one in self.relying.assumptions if one.name in table.assumptions),
+            *(invariant.condition for invariant in self.program.invariants),
         ]
-        invariants = [invariant.condition for invariant in self.program.invariants]
-        whole = self.start.terms.every((*conditions, *map(self.start.condition, invariants)))
+        if given.keys() != {str(name) for condition in conditions for name in read_by(condition)}:
+            raise RejectedError("values of others than its assumptions and invariants read are given")
+        whole = self.start.terms.every(map(self.start.condition, conditions))
         values = {
             term: _column(term, given.get(term.name, self.settler.first[term.name]))
             for term in variables(whole)

@@ -10,7 +10,7 @@ point, `["a", k]` assumption k is false, `["l", i]` line i alone (-1: DEFAULT wi
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import prod
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.leaves import read_by
@@ -21,8 +21,10 @@ from rcsc.table.regions.atoms import Universe
 from rcsc.table.regions.partition import MANY, parting
 from rcsc.table.regions.region import Counted, Empty, Node, Only, Open, OutsideAssumption, Rests, Split
 
-VERSION = 2
+VERSION = 3
 Certificate: TypeAlias = Mapping[str, object]
+Shown: TypeAlias = list[Any]
+"""A node."""
 
 
 def box_certificate(program: Program, table: Table) -> Certificate:
@@ -84,17 +86,41 @@ def must_cover(table: Table) -> bool:
 def _certificate(
     table: Table,
     columns: Sequence[str],
-    forms: Sequence[object],
-    tree: Sequence[object],
+    forms: Sequence[Sequence[Sequence[int]]],
+    tree: Sequence[Shown],
     assumptions: Sequence[AssumptionName],
 ) -> Certificate:
+    used = sorted(_used(tree))
+    needed = sorted({column for form in used for column, _ in forms[form]})
+    number = {form: at for at, form in enumerate(used)}
+    place = {column: at for at, column in enumerate(needed)}
     return {
         "table": table.name,
         "assumptions": list(assumptions),
-        "columns": list(columns),
-        "forms": list(forms),
-        "tree": list(tree),
+        "columns": [columns[column] for column in needed],
+        "forms": [[[place[column], k] for column, k in forms[form]] for form in used],
+        "tree": [_renumbered(node, number) for node in tree],
     }
+
+
+def _used(tree: Sequence[Shown]) -> set[int]:
+    """Return the forms that nodes name; a certificate has no other."""
+    used: set[int] = set()
+    for kind, *rest in tree:
+        used |= {rest[0]} if kind == "s" else {at for at, _ in rest[0]} if kind == "e" else set()
+        used |= set(rest[1] or ()) if kind == "b" else set()
+    return used
+
+
+def _renumbered(node: Shown, number: Mapping[int, int]) -> Shown:
+    match node:
+        case ["s", form, cut]:
+            return ["s", number[form], cut]
+        case ["e", multipliers]:
+            return ["e", [[number[form], k] for form, k in multipliers]]
+        case ["b", count, parts]:
+            return ["b", count, None if parts is None else [number[form] for form in parts]]
+    return node
 
 
 def _tests(table: Table, extents: Mapping[str, tuple[int, int]]) -> Iterator[Test]:
@@ -120,7 +146,7 @@ def _box_lines(
     return lines
 
 
-def _shown(node: Node) -> list[object]:
+def _shown(node: Node) -> Shown:
     match node:
         case Split(form, cut):
             return ["s", form, cut]

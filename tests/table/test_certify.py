@@ -4,6 +4,7 @@ import ast
 import copy
 import json
 import random
+from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from itertools import combinations_with_replacement, product
 from math import isnan
@@ -21,6 +22,7 @@ from rcsc.certify.known import Known
 from rcsc.certify.settle import script, values_in
 from rcsc.certify.table import TableChecker
 from rcsc.certify.values import INT, Term, Terms, parts_first, spanned
+from rcsc.host.files.read import Malformed, json_of
 from rcsc.lang.interpret import call, evaluate, holds, matching_lines
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import AssumptionName, Program, Read, Table, Value, key_bounds, key_of, value_of_key
@@ -520,13 +522,13 @@ def test_the_judge_of_the_attacks_tells_true_from_false(
         entry = {
             "table": "t",
             "assumptions": [],
-            "columns": ["b"],
-            "forms": [[[0, 1]]],
+            "columns": [],
+            "forms": [],
             "tree": [["b", 2, None]],
         }
         made = {
             "format": "rcsc-certificate",
-            "version": 2,
+            "version": 3,
             "program": "case",
             "tables": [{**entry, "stops": []}],
         }
@@ -710,7 +712,7 @@ def test_a_split_is_of_whole_numbers_inside_its_region(cut: Any) -> None:
         "input a : int 0 .. 9\ntable t {\n| line | a ||\n| one | < 5 ||\n| two | > 5 ||\n}\n"
     )
     entry = {"table": "t", "assumptions": [], "stops": [], "columns": ["a"], "forms": [[[0, 1]]]}
-    made = {"format": "rcsc-certificate", "version": 2, "program": "case"}
+    made = {"format": "rcsc-certificate", "version": 3, "program": "case"}
     tree = [["s", 0, cut], ["l", 0], ["l", 1]]
     assert certify(program, signed(program, {**made, "tables": [{**entry, "tree": tree}]})).problems
     good = program_of("input a : int 0 .. 9\ntable t {\n| line | a ||\n| one | < 5 ||\n| two | >= 5 ||\n}\n")
@@ -722,7 +724,7 @@ def test_a_region_with_one_point_is_not_empty() -> None:
     head = "input x : int -5 .. 5\ninput y : int -5 .. 5\ntable t {\n| line | when ||\n| two | x - y < 0 ||\n"
     entry: dict[str, Any] = {"table": "t", "assumptions": [], "stops": [], "columns": ["x", "y"]}
     entry["forms"] = [[[0, 1], [1, -1]], [[0, 1]], [[1, 1]]]
-    made = {"format": "rcsc-certificate", "version": 2, "program": "case"}
+    made = {"format": "rcsc-certificate", "version": 3, "program": "case"}
     empty = ["e", [[0, -1], [1, 1], [2, -1]]]  # x - y >= 0, x <= 0 and y >= 0 leave the point 0, 0
     for condition, last, right in (
         ("x - y >= 0", ["l", 1], True),
@@ -734,7 +736,7 @@ def test_a_region_with_one_point_is_not_empty() -> None:
         tree = [["s", 0, -1], ["l", 0], ["s", 1, 0], ["s", 2, -1], ["l", 1], last, ["l", 1]]
         found = certify(program, signed(program, {**made, "tables": [{**entry, "tree": tree}]}))
         assert found.whole is right, found
-        assert right or "['e'" in found.problems[0]
+        assert right or "['e'" in found.problems[0] or "malformed tree" in found.problems[0]
 
 
 @pytest.mark.parametrize(("more", "right"), [("", True), (" and (y > 0 or x < -2)", False)])
@@ -747,11 +749,11 @@ def test_only_boxes_are_counted(more: str, right: bool) -> None:
         "table": "t",
         "assumptions": [],
         "stops": [],
-        "columns": ["x", "y"],
+        "columns": [],
         "forms": [],
         "tree": [["b", 11, None]],
     }
-    made = {"format": "rcsc-certificate", "version": 2, "program": "case", "tables": [entry]}
+    made = {"format": "rcsc-certificate", "version": 3, "program": "case", "tables": [entry]}
     assert certify(program, signed(program, made)).whole is right
 
 
@@ -1062,3 +1064,82 @@ def _quotient(a: int, b: int) -> int:
 
 def _remainder(a: int, b: int) -> int:
     return a - b * _quotient(a, b)
+
+
+# --- nothing in a certificate is passed over -------------------------------------------------
+
+
+def changes(node: Any) -> Iterator[tuple[str, Any]]:
+    """Every way to say one thing otherwise, or more; how, and the whole as it is then."""
+    others: list[tuple[str, Any]] = [("odd", "x"), ("odd", None), ("odd", []), ("odd", {})]
+    if type(node) is int:
+        others += [("type", float(node)), *([("type", bool(node))] if node in {0, 1} else [])]
+    yield from ((how, other) for how, other in others if other != node or type(other) is not type(node))
+    if isinstance(node, dict):
+        yield "more", node | {"more": 1}
+        yield from (("less", {key: value for key, value in node.items() if key != name}) for name in node)
+    if isinstance(node, list):
+        yield "more", [*node, 0]
+        yield "more", [*node, *node[-1:]] if node else ["x"]
+    parts = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for at, part in parts:
+        for how, other in changes(part):
+            made = copy.copy(node)
+            made[at] = other
+            yield how, made
+
+
+WITNESSED = """
+input a : int 0 .. 9
+input b : int 0 .. 9
+state s : int 0 .. 9
+invariant low : s <= 8
+assume apart monitored : a < b
+table t assuming apart {
+| line | a - b || s |
+| one  | < -3  ||   |
+| two  | >= -3 ||   |
+| more | > 0   || 2 |
+}
+"""
+
+
+@pytest.mark.parametrize(
+    "text", [BOXES, RELATED, WITNESSED, STOPPED], ids=["boxes", "related", "witnessed", "stopped"]
+)
+def test_whatever_is_said_otherwise_or_besides_is_refused(text: str) -> None:
+    """Also where the values are equal for Python; but for another proof of the same, each part of which is checked."""
+    program = program_of(text)
+    certificate = certificate_of(program)
+    assert certify(program, certificate).whole
+    accepted = [
+        (how, made) for how, made in changes(certificate) if made != certificate or how == "type"
+        if not certify(program, made).problems
+    ]  # fmt: skip
+    assert accepted == []
+
+
+@pytest.mark.parametrize("of", ["form", "column", "assumption", "program", "witness", "twice"])
+def test_what_a_proof_does_not_use_is_in_no_certificate(of: str, tmp_path: Path) -> None:
+    program = program_of(RELATED)
+    made = copy.deepcopy(certificate_of(program))
+    [entry] = made["tables"]
+    if of == "form":
+        entry["forms"].append([[0, 1], [len(entry["columns"]) - 1, 7]])
+    elif of == "column":
+        entry["columns"].append("far")
+    elif of == "assumption":
+        entry["assumptions"].append(entry["assumptions"][0])
+    elif of == "program":
+        made["program"] = "another"
+    elif of == "witness":
+        entry["witness"]["far"] = True
+    else:
+        text = json.dumps(made)
+        (tmp_path / "c.json").write_text(
+            text[:-1] + f', "meaning": {json.dumps(made["meaning"])}}}', encoding="utf-8"
+        )
+        with pytest.raises(Malformed, match="two values for `meaning`"):
+            json_of((tmp_path / "c.json").read_bytes())
+        return
+    assert certify(program, made).problems

@@ -192,12 +192,24 @@ def json_of(document: str | bytes, deepest: int = DEEPEST, *, plain: bool = True
     text = document if isinstance(document, str) else decoded(document)
     _check_depth(_JSON.finditer(text), deepest)
     try:
-        value = json.loads(text)
+        value = json.loads(text, object_pairs_hook=_once)
+    except Malformed:
+        raise
     except ValueError as error:
         raise Malformed(f"is not JSON: {error}") from error
     if plain:
         _check_texts(value)
     return value
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object whose names are there once: of two values, others may believe the other."""
+    table = dict(pairs)
+    if len(table) != len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for at, name in enumerate(names) if name in names[:at])
+        raise Malformed(f"has two values for {shown(twice)}")
+    return table
 
 
 def toml_of(document: str | bytes) -> dict[str, Any]:
