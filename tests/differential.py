@@ -1048,15 +1048,24 @@ class Maker:
         if self.calls() and self.rng.randrange(4):
             text, run = self.call(self.rng.choice(self.calls()))
             does.append(run)
-        cells = [text]
-        for leaf in outputs:
-            if self.rng.randrange(3) == 0:
-                cells.append("")
-                continue
-            given = self.of_kind(leaf.kind, 2)
-            cells.append(given.text)
-            does.append(self._put(leaf.name, given))
-        return " | ".join(cells), tuple(does)
+        given = {leaf.name: self.of_kind(leaf.kind, 2) for leaf in outputs if self.rng.randrange(3)}
+        does += [self._put(name, value) for name, value in given.items()]
+        if self.reads_written(bool(text), given):  # what a cell reads no cell before it has written
+            one = "; ".join(
+                [*([text] if text else []), *(f"{name} := {e.text}" for name, e in given.items())]
+            )
+            return " | ".join([one, *("" for _ in outputs)]), tuple(does)
+        values = (given[leaf.name].text if leaf.name in given else "" for leaf in outputs)
+        return " | ".join([text, *values]), tuple(does)
+
+    def reads_written(self, called: bool, given: Mapping[str, Expr]) -> bool:
+        """Whether a value may read what was written before it: by a call anything, by a value its leaf."""
+        names = {one.name for one in self.made.declared if one.word != "input"} if called else set[str]()
+        for name, value in given.items():
+            if names & set(re.findall(r"\w+", value.text)):
+                return True
+            names.add(re.split(r"[.\[]", name)[0])
+        return False
 
     @staticmethod
     def _put(name: str, given: Expr) -> Doing:

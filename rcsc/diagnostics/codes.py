@@ -626,6 +626,36 @@ class Code(StrEnum):
         output go : bool
         invariant off req "SR-12", "SR-13" : go in {true, false}
     """
+    READ_AFTER_WRITE = """RCS219: a cell that reads what an earlier cell of its line wrote
+
+    The actions of a line run from left to right, so that the cell means the new value; people mean the one before the line. For that
+    one let the column stand further to the left; to mean the new one, write both in one cell, one after the other. What a procedure
+    reads that a cell calls is what stands when it runs, and no error.
+
+        enum mode { manual, circle }
+        input radio : bool
+        state mode : mode
+        state saved : mode
+        table short {
+          | line | radio || mode   | saved |
+          |------|-------||--------|-------|
+          | lost | false || circle | mode  |
+          | back | true  || saved  |       |
+        }
+
+    error: `mode` under `saved` reads `mode`, which `circle` under `mode` has written
+
+        enum mode { manual, circle }
+        input radio : bool
+        state mode : mode
+        state saved : mode
+        table short {
+          | line | radio || saved | mode   |
+          |------|-------||-------|--------|
+          | lost | false || mode  | circle |
+          | back | true  ||       | saved  |
+        }
+    """
     KIND = """RCS301: the wrong kind of value
 
     A bool, a number, a member of an enumeration stands where another kind is wanted. Nothing converts by itself: compare (`n > 0`) to

@@ -679,11 +679,12 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """One action of a line: a call or an assignment, and the heading it stands under."""
+    """One action of a line: a call or an assignment, and the heading it stands under; `column` counts these from 0."""
 
     heading: str
     text: str
     statement: Statement
+    column: int = field(default=0, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)

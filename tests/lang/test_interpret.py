@@ -209,11 +209,11 @@ procedure act { log := log * 10 + 2 }
 procedure behind { log := log * 10 + 4 }
 procedure defer { next a := 3  next b := 4 }
 table t assuming calm, quiet {
-  | line | seen | k || procedures | out | log          |
-  | low  | < 3  | 0 || act; defer | a   | log * 10 + 3 |
-  | mid  | < 6  | 0 || act        | 1   |              |
-  | high | > 8  | 0 || act        |     |              |
-  | rest | DEFAULT | || act       | 9   |              |
+  | line | seen | k || procedures                       | out |
+  | low  | < 3  | 0 || act; defer; log := log * 10 + 3  | a   |
+  | mid  | < 6  | 0 || act                              | 1   |
+  | high | > 8  | 0 || act                              |     |
+  | rest | DEFAULT | || act                             | 9   |
 }
 table u {
   | line | k  || out |

@@ -212,7 +212,7 @@ table t {
         ("set_out(a)", "9 - a", True),
         ("set_out(a); set_out(3)", "", True),
         ("n := a; set_out(n)", "a", False),
-        ("set_out(n); n := 0", "n", True),
+        ("set_out(n); n := 0; set_out(n)", "", True),
     ],
 )
 def test_two_actions_of_a_line_give_an_output_one_value(high: str, out: str, wrong: bool) -> None:

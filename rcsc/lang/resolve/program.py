@@ -31,6 +31,7 @@ from rcsc.lang.resolve.levels import Declarations, level, lines_kept, periods
 from rcsc.lang.resolve.owners import Owners
 from rcsc.lang.resolve.properties import resolve_property
 from rcsc.lang.resolve.roles import offered, restart_of, roles_of
+from rcsc.lang.resolve.sequence import in_sequence
 from rcsc.lang.resolve.tables import table
 from rcsc.lang.syntax import tree
 
@@ -111,6 +112,7 @@ class _Resolver:
         invariants = self._invariants(all_)
         tables = self._tables(all_, {a.name for a in assumptions}, run)
         if not scope.diagnostics:
+            in_sequence(scope, tables, procedures)
             more, tables = offered(scope, parties, deferred, tables, procedures)
             assumptions += more
         levels = self._levels(

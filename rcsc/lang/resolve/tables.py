@@ -156,7 +156,7 @@ class _Cells:
                 self.scope.cell = None
             heading = self.headings[column]
             for text, statement in self.resolved[key]:
-                result.append(Action(heading, text, placed_statement(statement, cell)))
+                result.append(Action(heading, text, placed_statement(statement, cell), column))
         return tuple(result)
 
     def _actions(
