@@ -20,13 +20,29 @@ _FIRST = ("done", "failed", "refused")
 _DIGITS = 16
 """Of a proof's digest, as it is shown."""
 _KINDS = {
-    "SOME_LINE": "some line matches", "ONE_LINE": "no two match", "NO_DEFAULT": "DEFAULT unreachable", "UNREACHED": "lines never reached",
-    "ASSUMPTION": "assumptions", "INVARIANT": "invariants",
-    "OWED": "facts of other levels", "PROPERTY": "properties", "ENDS": "commands end", "CONTRACT": "agreements",
-    "SAFE": "values in range", "AGAIN": "lines that match again", "DEFERRED": "deferred states",
-    "ECHOES": "echoes", "NUMBERED": "numbered fields", "NEXT_NUMBER": "numbers", "WAITS": "waits for the echo",
-    "PAUSES": "PAUSE passed on", "ONCE": "taken up once", "ANSWERED": "no command passed over",
-}  # fmt: skip
+    "SOME_LINE": "some line matches",
+    "ONE_LINE": "no two match",
+    "NO_DEFAULT": "DEFAULT unreachable",
+    "UNREACHED": "lines never reached",
+    "ASSUMPTION": "assumptions",
+    "INVARIANT": "invariants",
+    "OWED": "facts owed",
+    "GIVEN": "facts of other levels",
+    "STANDS": "answers stand",
+    "PROPERTY": "properties",
+    "ENDS": "commands end",
+    "CONTRACT": "agreements",
+    "SAFE": "values in range",
+    "AGAIN": "lines that match again",
+    "DEFERRED": "deferred states",
+    "ECHOES": "echoes",
+    "NUMBERED": "numbered fields",
+    "NEXT_NUMBER": "numbers",
+    "WAITS": "waits for the echo",
+    "PAUSES": "PAUSE passed on",
+    "ONCE": "taken up once",
+    "ANSWERED": "no command passed over",
+}
 """What a kind of claim is called where its claims are counted."""
 _WIDEST_SHOWN = 12
 """Lines of a table that are named where they were never reached."""

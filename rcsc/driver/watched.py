@@ -7,7 +7,19 @@ made now with the effort that `rcsc prove` takes, and kept.
 from collections.abc import Iterator
 from pathlib import Path
 
-from rcsc.compose.contract.claims import AGAIN, CONTRACT, ENDING, RESTING, RUNS, SAFE, UNREACHED, Key, spelled
+from rcsc.compose.contract.claims import (
+    AGAIN,
+    CONTRACT,
+    ENDING,
+    GIVEN,
+    RESTING,
+    RUNS,
+    SAFE,
+    STANDS,
+    UNREACHED,
+    Key,
+    spelled,
+)
 from rcsc.compose.contract.environment import Above, Below
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
@@ -23,7 +35,15 @@ from rcsc.run.description import description
 
 _TOGETHER = frozenset({RUNS, ENDING, RESTING})
 """Claims that are all of several others, which are watched one by one."""
-_NAMES = {CONTRACT: "CONTRACT", UNREACHED: "UNREACHED", AGAIN: "AGAIN", SAFE[0]: "SAFE"}
+_NAMES = {
+    CONTRACT: "CONTRACT",
+    GIVEN: "GIVEN",
+    STANDS[0]: "STANDS",
+    UNREACHED: "UNREACHED",
+    AGAIN: "AGAIN",
+    SAFE[0]: "SAFE",
+}
+"""What sorts are called that are no obligation's."""
 
 
 def claims_of(path: Path, cache: Cache | None, jobs: int = 1) -> Claims:
@@ -58,7 +78,7 @@ def proved_claims(path: Path, systems: dict[str, TransitionSystem], proof: Syste
 
 def _claims(name: str, ts: TransitionSystem, level: LevelProof, proof: SystemProof) -> Iterator[Claim]:
     owed = {one.name: one.condition for one in ts.links.owes}
-    still = {ending.table: ending.still for ending in level.endings}
+    endings = {ending.table: ending for ending in level.endings}
     for (owner, key), closed in proof.closed.items():
         if owner != name or key in _TOGETHER or not closed.proved or closed.verdict.value != "proved":
             continue
@@ -66,17 +86,19 @@ def _claims(name: str, ts: TransitionSystem, level: LevelProof, proof: SystemPro
             continue  # it is about levels that give orders
         trusts = tuple(Trusted(*trust_of(words), words) for words in closed.trusts)
         about: tuple[str, ...] = ()
+        stands: tuple[str, ...] = ()
         if key[0] == Sort.ENDS:
-            about = still.get(key[1], ())
+            about, stands = endings[key[1]].still, endings[key[1]].settled
         elif key[0] == AGAIN:
             about = tuple(lines_write(ts))
-        yield Claim(
-            name, _kind(key), key[1], key[2], spelled((owner, key), name), trusts, about, owed.get(key[2])
-        )
+        words = spelled((owner, key), name)
+        yield Claim(name, _kind(key), key[1], key[2], words, trusts, about, stands, owed.get(key[2]))
 
 
 def _kind(key: Key) -> str:
-    return _NAMES.get(key[0]) or Sort(key[0]).name
+    """The name of a claim's sort; empty of one that is not known here, which is told to be watched by nobody."""
+    known = {sort.value: sort.name for sort in Sort} | _NAMES
+    return known.get(key[0], "")
 
 
 def _above(end: Above) -> Neighbour:

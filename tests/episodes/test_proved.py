@@ -141,6 +141,12 @@ class TestClaimsOfRightTables:
             found.property for found in misled.findings
         }
 
+    def test_are_all_of_a_kind_that_is_watched(self, right: tuple[Stand, Claims]) -> None:
+        its, claims = right
+        assert {claim.kind for claim in claims.every} <= WATCHED
+        assert not watched(claims, its).unwatched
+        assert all(trust.kind for claim in claims.every for trust in claim.trusts)
+
     def test_are_counted_with_their_proof(self, right: tuple[Stand, Claims]) -> None:
         its, claims = right
         said = watched_text(watched(claims, its))

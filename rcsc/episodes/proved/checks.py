@@ -320,6 +320,32 @@ def _fits(below: Neighbour, reader: Reader) -> Check:
     return check
 
 
+def _given(claim: Claim, reader: Reader, level: ProvedLevel) -> Check:
+    """What is declared of a buffer that another level writes holds of what is taken."""
+    stated = next(fact.condition for fact in reader.program.assumptions if fact.name == claim.name)
+    holds_ = _owed(replace(claim, stated=stated), reader, level)
+    return lambda now: holds_(now) if now.took else ""
+
+
+def _stands(_: Claim, reader: Reader, level: ProvedLevel) -> Check:
+    """A report that answers a command stays as it is while it is about that command."""
+    above = level.above
+    assert above is not None
+    report = reader.record(above.report)
+    number, command, echo, echoed = map(reader.at, (above.number, above.command, above.echo, above.echoed))
+    status = reader.at(above.status)
+
+    def check(now: Now) -> str:
+        was, is_ = now.before, now.values
+        said = reader.sign.leaves[status].shown(was[status])
+        ended = said == above.done or (said == above.failed and was[echoed] != 0)
+        about = was[echo] == is_[echo] == now.stood[number] and was[echoed] == now.stood[command]
+        same = was[report.start : report.stop] == is_[report.start : report.stop]
+        return "" if same or not (ended and about) else f"`{above.report}` changes once it has said {said}"
+
+    return check
+
+
 def _contract(claim: Claim, reader: Reader, level: ProvedLevel) -> Check:
     return contract(claim.name, reader, level)
 
@@ -368,6 +394,8 @@ _MAKERS: Mapping[str, Callable[[Claim, Reader, ProvedLevel], Check]] = {
     "DEFERRED": _deferred,
     "ANSWERED": _answered,
     "CONTRACT": _contract,
+    "GIVEN": _given,
+    "STANDS": _stands,
     "AGAIN": _again,
 }
 WATCHED = frozenset({*_MAKERS, "ENDS"})

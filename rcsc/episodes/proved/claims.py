@@ -41,6 +41,7 @@ class Claim:
         table, name: As the claim's key has them.
         words: In words, without the level.
         about: Leaves or inputs that it is about besides: those that no line changes again, or inputs that stand still.
+        stands: Records of levels that stand once these have answered, of a command that ends.
         stated: What another level assumes of its outputs, in its own leaves; None of all other kinds.
     """
 
@@ -51,6 +52,7 @@ class Claim:
     words: str
     trusts: tuple[Trusted, ...] = ()
     about: tuple[str, ...] = ()
+    stands: tuple[str, ...] = ()
     stated: "Expr | None" = None
 
 

@@ -67,7 +67,8 @@ class Endings:
         leaves = self.reader.sign.leaves
         self._kept = tuple(at for at, leaf in enumerate(leaves) if leaf.name not in moving)
         still = {record for claim in self.claims.values() for record in claim.about}
-        own = still - set(self.level.filled)  # what a level writes, that level has to keep
+        own = still - set(self.level.filled)  # what a level writes is nobody's to hold still
+        own |= {record for claim in self.claims.values() for record in claim.stands}
         self._records = {
             record: tuple(at for at in self.reader.record(record) if not _speaks(leaves[at]))
             for record in own
@@ -134,7 +135,7 @@ class Endings:
         echoed = tuple(
             now.values[at(below.echo)] == now.values[at(below.number)] for below in self.level.below
         )
-        held = [record for record in claim.about if record in self._records]
+        held = [record for record in (*claim.about, *claim.stands) if record in self._records]
         for first in reversed(self._places.get(after, [])[-MOST_ROUNDS:]):
             steps, begun = self._steps[first:], self._steps[first]
             if any(len({step.held[record] for step in steps}) > 1 for record in held):
