@@ -38,6 +38,12 @@ static int32_t nbs_robot_restart_task(nbs_robot_t *s)
     now = s->task;
     now.inc_command_seen = now.workstation.inc_command;
     now.to_workstation.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    if (s->tick != UINT64_C(0)) {
+        now.to_workstation.inc_command_echo = s->out.workstation.report.inc_command_echo;
+    }
+    if (s->tick != UINT64_C(0)) {
+        now.to_workstation.ref_command_echo = s->out.workstation.report.ref_command_echo;
+    }
     now.to_workstation.failure = VOCABULARY_REASON_RESTART;
     now.to_emove.input_command = VCBLRY_EMOVE_CMND_PAUSE;
     number = (uint64_t)now.from_emove.inc_command_echo;
@@ -113,6 +119,12 @@ static int32_t nbs_robot_restart_emove(nbs_robot_t *s)
     now = s->emove;
     now.inc_command_seen = now.task.inc_command;
     now.to_task.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    if (s->tick != UINT64_C(0)) {
+        now.to_task.inc_command_echo = s->between.emove_to_task.inc_command_echo;
+    }
+    if (s->tick != UINT64_C(0)) {
+        now.to_task.ref_command_echo = s->between.emove_to_task.ref_command_echo;
+    }
     now.to_task.failure = VOCABULARY_REASON_RESTART;
     now.to_primitive.input_command = VCBLRY_PRIMITIVE_COMMAND_PAUSE;
     number = (uint64_t)now.from_primitive.inc_command_echo;
@@ -181,6 +193,12 @@ static int32_t nbs_robot_restart_vision(nbs_robot_t *s)
     now = s->vision;
     now.inc_command_seen = now.emove.inc_command;
     now.to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    if (s->tick != UINT64_C(0)) {
+        now.to_emove.inc_command_echo = s->between.vision_to_emove.inc_command_echo;
+    }
+    if (s->tick != UINT64_C(0)) {
+        now.to_emove.ref_command_echo = s->between.vision_to_emove.ref_command_echo;
+    }
     now.to_emove.failure = VOCABULARY_REASON_RESTART;
     now.cur_state = VISION_VISION_STATE_F_STATE;
     number = (uint64_t)now.camera.number;
@@ -247,6 +265,12 @@ static int32_t nbs_robot_restart_primitive(nbs_robot_t *s)
     now = s->primitive;
     now.inc_command_seen = now.emove.inc_command;
     now.to_emove.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    if (s->tick != UINT64_C(0)) {
+        now.to_emove.inc_command_echo = s->between.primitive_to_emove.inc_command_echo;
+    }
+    if (s->tick != UINT64_C(0)) {
+        now.to_emove.ref_command_echo = s->between.primitive_to_emove.ref_command_echo;
+    }
     now.to_emove.failure = VOCABULARY_REASON_RESTART;
     now.to_robot.input_command = VOCABULARY_ROBOT_COMMAND_HOLD;
     number = (uint64_t)now.from_robot.inc_command_echo;
@@ -314,6 +338,12 @@ static int32_t nbs_robot_restart_gripper(nbs_robot_t *s)
     now = s->gripper;
     now.inc_command_seen = now.primitive.inc_command;
     now.to_primitive.status_report = VOCABULARY_LEVEL_STATUS_FAILED;
+    if (s->tick != UINT64_C(0)) {
+        now.to_primitive.inc_command_echo = s->between.gripper_to_primitive.inc_command_echo;
+    }
+    if (s->tick != UINT64_C(0)) {
+        now.to_primitive.ref_command_echo = s->between.gripper_to_primitive.ref_command_echo;
+    }
     now.to_primitive.failure = VOCABULARY_REASON_RESTART;
     now.cur_state = GRIPPER_GRIPPER_STATE_F_STATE;
     at = gripper_check(&now);

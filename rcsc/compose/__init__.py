@@ -25,19 +25,22 @@ What a level assumes of its environment is the contract (`transition`):
   reports on older orders;
 - of any level of which it says so in a declared assumption about one buffer: that what is published there is so (`contract.facts`);
 - of the database: the same question has the same answer;
-- of everything else: its declared range.
+- of everything else: its declared range. What no level writes may also come as a value that is *refused*: that cycle takes nothing
+  (`rcsc.lang.environment`), as often as the environment likes. Claims are proved of such an environment first. Only what is not proved
+  there is proved once more as if nothing were refused, and then says so, whatever its kind (`proof.level`).
 
 Why the contract may be assumed. Let a superior U publish orders, a subordinate D take them and publish reports,
 through buffers that hold the latest value, whole (`run.buffers`; processes copy under a sequence lock,
-`run.processes.memory`). What D takes was published by U, never older than what it took before; likewise back. Suppose that
-up to some cycle every level has kept its guarantees. U's orders are then numbered one after the other: two
+`run.processes.memory`). What D takes was published by U, never older than what it took before; likewise back. Suppose
+that up to some cycle every level has kept its guarantees. U's orders are then numbered one after the other: two
 orders under one number are the same, or 65536 numbers apart. D's report echoes the order that it took: so what is
 reported under number *n* is about order *n* (1); no number is echoed that was not sent (2); as D takes no older
-order, it keeps echoing the last one (3); and an order taken twice under one number is one order. So the contract
-holds up to the next cycle, in which, by the proofs of the levels, every guarantee is kept again; at first it holds
-because both begin with the same order (checked, `system`). This is induction over cycles of all levels at once: a
-guarantee in a cycle rests on contracts about what was published before it. So levels are proved one by one, and the
-cost grows with their number.
+order, it keeps echoing the last one (3); and an order taken twice under one number is one order. A cycle that is
+refused changes neither orders nor reports: for its neighbours the level is late by a cycle, and what it takes next is
+compared with what it took last. So the contract holds up to the next cycle, in which, by the proofs of the levels,
+every guarantee is kept again; at first it holds because both begin with the same order (checked, `system`). This is
+induction over cycles of all levels at once: a guarantee in a cycle rests on contracts about what was published before
+it. So levels are proved one by one, and the cost grows with their number.
 
 Further assumptions:
 
@@ -45,14 +48,16 @@ Further assumptions:
   is so late that all numbers go round meanwhile, which takes at least 65536 cycles, 43 minutes at 40 ms. A level that
   waits for echoes before it orders again cannot come near it (`WAITS`).
 - *Restarts.* A level may begin anew at any moment as `run.adopt` does: its order is PAUSE under the number after the
-  order in its buffer, or after the echo if the buffer is empty, and what it takes counts as seen. Such a
-  beginning is proved like the first. To its neighbours it is an order that is superseded, or a report that failed.
+  order in its buffer, or after the echo if the buffer is empty, what it takes counts as seen, and its report echoes what it echoed,
+  so that no echo goes back even if its first cycles are refused. Such a beginning is proved like the first. To its neighbours
+  it is an order that is superseded, or a report that failed.
   If the buffer is empty, freshness requires more: no earlier order of the level that is not echoed yet may still
   be on its way, because its number is now used again.
 - *Reals* and arithmetic are followed as far as `symbolic.keyed` does, and `symbolic.measured` for termination; the rest may take
   any value.
 - *Termination* assumes more than the contract: an order that is not replaced is eventually answered, and stays so. That is
-  shown in turn of every subordinate that is a level. If it is printed, the values in an input stay the same meanwhile, too.
+  shown in turn of every subordinate that is a level. No level's inputs are refused for ever; after the last refusal all is as if there
+  had been none, from a state within the invariant. If it is printed, the values in an input stay the same meanwhile, too.
 - *Neighbours outside the levels* (workstation, robot, hand, camera) keep to the same contract by their own means; they are
   listed, not proved.
 

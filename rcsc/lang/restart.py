@@ -38,7 +38,12 @@ class After:
     leaf: str
 
 
-Adopted: TypeAlias = Fixed | SameAs | After
+@dataclass(frozen=True, slots=True)
+class Stands:
+    """What stands of the leaf itself in the level's own buffer; where nothing stands, its initial value."""
+
+
+Adopted: TypeAlias = Fixed | SameAs | After | Stands
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +63,8 @@ class Part:
 _ORDER = "to_"
 _ECHOES = {"inc_command": "inc_command_echo", "number": "number"}
 """How an order is numbered, and where the level below repeats the number; the camera's pictures are numbered, too."""
+ECHOED = ("inc_command_echo", "ref_command_echo")
+"""Of a report, the order that it answers: it never goes back, not even if the first cycle takes nothing."""
 _FAILED = {
     "status_report": "failed",
     "failure": "restart",
@@ -69,7 +76,7 @@ _FAILED = {
 
 def by_names(parts: Mapping[str, Part]) -> dict[str, Adopted]:
     """What a program adopts that does not declare it; what it has no variable for, or one of another type, it does not adopt."""
-    return dict((*_failed(parts), *_seen(parts), *_orders(parts)))
+    return dict((*_failed(parts), *_seen(parts), *_reports(parts), *_orders(parts)))
 
 
 def _failed(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
@@ -84,6 +91,12 @@ def _seen(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
         return
     if seen.whole[0] <= taken.whole[0] and taken.whole[1] <= seen.whole[1]:
         yield "inc_command_seen", SameAs("command.inc_command")
+
+
+def _reports(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
+    for name, part in parts.items():
+        if part.output and name.rpartition(".")[2] in ECHOED:
+            yield name, Stands()
 
 
 def _orders(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:

@@ -32,7 +32,7 @@ from rcsc.emit.rendering import render
 from rcsc.emit.translate import constant
 from rcsc.lang.model import Admit, Array, Bool, Enum, Real, Record, Scalar, Type, Value
 from rcsc.link.wiring import BETWEEN, IN, OUT, OWN, TICK, Buffer, End, LevelProgram, Linked, LinkedLevel
-from rcsc.run.adopt import NUMBERS, Copied, Fixed, Numbered, Start, adoption
+from rcsc.run.adopt import NUMBERS, Copied, Fixed, Numbered, Standing, Start, adoption
 from rcsc.run.signature import REALS
 
 Fields: TypeAlias = list[tuple[str, str]]
@@ -253,6 +253,9 @@ class _Maker:
                 if (greatest := _greatest(level, start)) < NUMBERS - 1:
                     yield when(infix(">", number, Constant(greatest, "uint64_t")), Set(AT, Constant(at)))
                 yield Set(place, Cast(leaf.c_type, number))
+            case Standing(at=at):
+                if standing := _standing(level, at):
+                    yield when(infix("!=", TICKS, FIRST), Set(place, Name(standing)))
             case _:
                 assert_never(start)
 

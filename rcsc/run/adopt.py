@@ -75,8 +75,8 @@ def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = 
     """Return the values with which a level starts safely, whatever its buffers hold.
 
     The order in the command buffer counts as seen, and has failed; each level below gets PAUSE with a number that no order had
-    before: the next after the order that stands, which it may not have echoed yet, or else after what it echoed. Variables
-    that a program lacks, or has with another type, are left alone.
+    before: the next after the order that stands, which it may not have echoed yet, or else after what it echoed. Its report echoes what
+    it echoed. Variables that a program lacks, or has with another type, are left alone.
 
     Args:
         sign: The level's program.
@@ -113,7 +113,14 @@ class Numbered:
     echo: int
 
 
-Start: TypeAlias = Fixed | Copied | Numbered
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """It starts with what stands of it in the level's own buffer, or else as it is initially."""
+
+    at: int
+
+
+Start: TypeAlias = Fixed | Copied | Numbered | Standing
 
 
 def adoption(sign: Signature) -> tuple[Start, ...]:
@@ -129,6 +136,8 @@ def _start(sign: Signature, at: int, adopts: Adopted) -> Start:
             return Copied(at, sign.index[leaf])
         case lang.After(leaf):
             return Numbered(at, sign.index[leaf])
+        case lang.Stands():
+            return Standing(at)
 
 
 def _started(start: Start, now: Sequence[Value], stands: Mapping[int, Value]) -> Value:
@@ -139,5 +148,7 @@ def _started(start: Start, now: Sequence[Value], stands: Mapping[int, Value]) ->
             return now[source]
         case Numbered(at=at, echo=echo):
             return (int(stands.get(at, now[echo])) + 1) % NUMBERS
+        case Standing(at=at):
+            return stands.get(at, now[at])
         case _:
             assert_never(start)

@@ -15,7 +15,7 @@ from typing import TypeAlias
 from rcsc.host.files.names import BadName, identifier, inside, shown
 from rcsc.host.files.read import MIB, CheckedFields, Malformed, json_of, text
 from rcsc.lang.operator_table import single, spell_single
-from rcsc.lang.restart import Adopted, After, Fixed, Part, SameAs, by_names
+from rcsc.lang.restart import Adopted, After, Fixed, Part, SameAs, Stands, by_names
 from rcsc.run.description import BadDescription
 
 Value: TypeAlias = bool | int | float
@@ -519,6 +519,8 @@ def _entry(adopts: Adopted) -> dict[str, object]:
             return {"same_as": other}
         case After(other):
             return {"after": other}
+        case Stands():
+            return {"stands": True}
 
 
 def _adopted(entry: CheckedFields, leaf: Leaf, leaves: Mapping[str, Leaf]) -> Adopted:
@@ -537,6 +539,10 @@ def _adopted(entry: CheckedFields, leaf: Leaf, leaves: Mapping[str, Leaf]) -> Ad
             ):
                 raise Malformed(f"{entry.where}: {shown(leaf.name)} cannot adopt that")
             return form(other.name)
+    if "stands" in entry.value:
+        if not entry.flag("stands") or leaf.kind != "output":
+            raise Malformed(f"{entry.where}: {shown(leaf.name)} stands in no buffer of its own")
+        return Stands()
     value = entry.number("value")
     if (
         value is None

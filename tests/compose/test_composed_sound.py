@@ -27,6 +27,7 @@ from rcsc.compose.proof.system import NoProgramError, loaded_program, transition
 from rcsc.compose.proof.termination import Ending
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Value, VariableName
+from rcsc.lang.restart import Stands
 from rcsc.run.description import BadDescription, description
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
@@ -663,10 +664,13 @@ SHOWS_A_SAFE_VALUE = small_text(
 
 
 def test_a_property_trusts_that_no_input_is_refused_where_an_output_has_a_safe_value(tmp_path: Path) -> None:
-    whole = prove_system(small_system(tmp_path, lower=SHOWS_A_SAFE_VALUE), LITTLE)
+    safe = SHOWS_A_SAFE_VALUE.replace("input there", "input load : int 0 .. 2\ninput there")
+    whole = prove_system(small_system(tmp_path, lower=safe), LITTLE)
     found = whole.of("lower", (Sort.PROPERTY, "", "shut"))
     assert found.proved
-    assert "no input of level `lower` is refused: its outputs would show their safe values" in found.trusts
+    kept = "`station` keeps to the protocol"
+    assert found.trusts == ("`load` of level `lower` is never refused", kept)
+    assert whole.of("lower", (Sort.SOME_LINE, "go", "")).trusts == (kept,)
 
 
 STOPS = small_text(
@@ -689,18 +693,26 @@ def test_a_new_command_is_passed_over_where_a_stopping_assumption_fails(tmp_path
     assert (obligation.table, found.steps[-1].fault) == ("go", Fault.ASSUMPTION)
 
 
-def test_what_is_trusted_of_a_restart_is_named_of_both_levels(tmp_path: Path) -> None:
-    """The cycle after it may not stop: else an older report follows the one that stood."""
+def test_an_echo_never_goes_back_so_that_nothing_is_trusted_of_the_cycle_after_a_restart(
+    tmp_path: Path,
+) -> None:
+    """It may be refused, or stop: the report that the level then gives still echoes what it echoed."""
     path = small_system(tmp_path, lower=STOPS)
     whole = prove_system(path, LITTLE)
-    words = "assumption `loaded` of level `lower` does not fail in the first cycle after a restart"
-    proof = next(one for one in whole.levels if one.level == "lower")
-    claimed = of_level(transition_systems(path)["lower"], proof)
-    assert [key for key, claim in claimed if words in claim.trusts] == [(Sort.ECHOES, "", "report")]
     echoes = whole.of("lower", (Sort.ECHOES, "", "report"))
     assert echoes.accepted
-    assert words in echoes.trusts
-    assert words in whole.of("upper", (Sort.ONE_LINE, "work", "")).trusts
+    assert echoes.trusts == ("`station` keeps to the protocol",)
+    ts = transition_systems(path)["lower"]
+    adopted = {
+        leaf: ts.program.adopted[leaf] for leaf in ("report.inc_command_echo", "report.ref_command_echo")
+    }
+    assert set(adopted.values()) == {Stands()}
+    others = {VariableName(leaf): how for leaf, how in ts.program.adopted.items() if leaf not in adopted}
+    forgets = replace(ts.program, restart=tuple(others.items()))
+    proof = next(one for one in whole.levels if one.level == "lower")
+    words = "assumption `loaded` of level `lower` does not fail in the first cycle after a restart"
+    claimed = of_level(ts.of(forgets), proof)
+    assert [key for key, claim in claimed if words in claim.trusts] == [(Sort.ECHOES, "", "report")]
 
 
 # --- what verdicts rest on -------------------------------------------------------------------------

@@ -218,15 +218,16 @@ def test_what_levels_assume_of_each_other_is_told_word_for_word(
 def test_an_ending_rests_on_those_of_levels_below_and_trusts_those_that_are_none(
     upper: TransitionSystem,
 ) -> None:
-    inside = _of_ending(upper, Ending("work", 0, still=("command",), settled=("lower",)), Verdict.PROVED)
+    inside = _of_ending(upper, Ending("work", 0, still=("command",), settled=("lower",)), admitting=False)
     still = "the values in `command` of level `upper` stand still meanwhile"
+    refused = "`command.input_command` of level `upper` is not refused for ever"
     needs = ("upper", RUNS), ("lower", ENDING), ("lower", STANDS)
-    assert inside == Claim(Verdict.PROVED, needs, (still,))
+    assert inside == Claim(Verdict.PROVED, needs, (still, refused))
     [below] = upper.links.below
     left = replace(upper, links=replace(upper.links, below=(replace(below, outside=True),)))
     answers = "`lower` answers every order that is not replaced, and stays so"
-    assert _of_ending(left, Ending("work", 0), Verdict.PROVED) == Claim(
-        Verdict.PROVED, (("upper", RUNS),), (answers,)
+    assert _of_ending(left, Ending("work", 0), admitting=False) == Claim(
+        Verdict.PROVED, (("upper", RUNS),), (answers, refused)
     )
 
 

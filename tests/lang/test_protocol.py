@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rcsc.lang.interpret import Fault, cycle, holds, initial
 from rcsc.lang.model import AssumptionName, Program, Scalar, Standing, Value, spell, value_of_text
 from rcsc.lang.resolve import compile_text
-from rcsc.lang.restart import After, Fixed, SameAs
+from rcsc.lang.restart import After, Fixed, SameAs, Stands
 
 WORDS = """
 enum job { rest, work, stow }
@@ -267,6 +267,7 @@ def test_what_a_level_adopts_that_starts_anew_is_declared() -> None:
     assert dict(made.restart) == {
         "inc_command_seen": SameAs("boss.inc_command"),
         "to_boss.status_report": Fixed(2),
+        **dict.fromkeys(("to_boss.inc_command_echo", "to_boss.ref_command_echo"), Stands()),
         "to_boss.why": Fixed(3),
         "to_arm.input_command": Fixed(0),
         "to_arm.inc_command": After("from_arm.inc_command_echo"),

@@ -13,7 +13,7 @@ from operator import itemgetter
 
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Enum, Int, Kind, Program, Value, Variable
-from rcsc.lang.restart import Part, by_names
+from rcsc.lang.restart import Part, Stands, by_names
 from rcsc.run.adopt import adopt
 from rcsc.run.signature import Leaf, Signature
 from tests.small_hierarchies.level import EARLY, UNDEFINED, Key, Ran, Role, State, number_type
@@ -36,9 +36,14 @@ def restarts(role: Role) -> Iterator[dict[str, Value]]:
         (0, 1) if role.program.variable(leaf).type == number_type(role) else role.domain(leaf)
         for leaf in remembered
     ]
+    standing = [str(leaf) for leaf, how in role.program.adopted.items() if how == Stands()]
+    choices += [
+        (0, 1) if role.program.variable(leaf).type == number_type(role) else role.domain(leaf)
+        for leaf in standing
+    ]
     for values in product(*choices):
-        now = role.start | dict(zip(remembered, values, strict=True))
-        yield adopted(role, now)
+        now = role.start | dict(zip(remembered, values, strict=False))
+        yield adopted(role, now, dict(zip(standing, values[len(remembered) :], strict=True)))
 
 
 def adopted(

@@ -8,9 +8,23 @@ from typing import Any
 
 import click
 
-from rcsc.compose.contract.claims import AGAIN, ENDING, RUNS, UNREACHED, Key, Need, declared, spelled
+from rcsc.compose.contract.claims import (
+    AGAIN,
+    ENDING,
+    RESTING,
+    RUNS,
+    SAFE,
+    STANDS,
+    UNREACHED,
+    Key,
+    Need,
+    declared,
+    of_refusals,
+    spelled,
+)
 from rcsc.compose.contract.obligations import Sort, pause_of
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.proof.assume_guarantee import not_for_ever
 from rcsc.compose.proof.context import Context
 from rcsc.compose.proof.level import LevelProof, certificate
 from rcsc.compose.proof.ranking import RisingLine
@@ -71,7 +85,8 @@ def in_context(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> I
             if in_time
             else ""
         )
-        yield f"given that every order that is not replaced is answered some time{late}, and stays so,"
+        still = f" and that {not_for_ever(ts)}," if ts.refusable else ""
+        yield f"given that every order that is not replaced is answered some time{late}, and stays so,{still}"
         for ending in proof.endings:
             closed = whole.of(proof.level, (Sort.ENDS, ending.table, ""))
             only = (
@@ -150,6 +165,11 @@ def _lacking(whole: SystemProof) -> Iterator[str]:
     counts = {
         "not looked at": sum(missing.applies for level in whole.levels for missing in level.unstated),
         "resting on what is not known": sum(map(len, _resting(whole).values())),
+        "trusting that inputs are not refused": sum(
+            any(map(of_refusals, closed.trusts))
+            for (_, key), closed in whole.closed.items()
+            if key not in {ENDING, RESTING, RUNS, SAFE, STANDS} and closed.proved
+        ),
         "not shown to end": sum(not ending.proved for level in whole.levels for ending in level.endings),
         "never reached": sum(len(seen.unreached) for seen in contexts),
         "not shown to be reached": sum(len(seen.unsure) for seen in contexts),
@@ -243,7 +263,12 @@ def reaction(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Ite
         lowest = {name: cycles - 1 for name, cycles in reached.items() if name != top}
         if lowest:
             orders = ", ".join(f"of `{name}` in {cycles}" for name, cycles in lowest.items())
-            yield f"a PAUSE of `{top}` is ordered {orders} cycles of levels, besides what buffers take"
+            refused = (
+                " and cycles of which an input is refused"
+                if any(systems[name].refusable for name in reached)
+                else ""
+            )
+            yield f"a PAUSE of `{top}` is ordered {orders} cycles of levels, besides what buffers take{refused}"
 
 
 def pauses(systems: Mapping[str, TransitionSystem]) -> Iterator[str]:

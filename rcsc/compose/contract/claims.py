@@ -164,9 +164,19 @@ DECLARED = ", as it is declared"
 """The suffix of a trusted assumption that a table declares."""
 
 
+NEVER_REFUSED, NOT_FOR_EVER = "never refused", "not refused for ever"
+"""How what is trusted of refusals ends: a claim about each cycle needs the first, one that something ends the second."""
+
+
 def declared(trusts: Iterable[str]) -> tuple[str, ...]:
-    """Select the assumptions of tables from what is trusted, in order."""
-    return tuple(sorted(trust.removesuffix(DECLARED) for trust in set(trusts) if trust.endswith(DECLARED)))
+    """Select the assumptions of tables, and what is assumed of refusals, from what is trusted, in order."""
+    named = (trust for trust in set(trusts) if trust.endswith(DECLARED) or of_refusals(trust))
+    return tuple(sorted(trust.removesuffix(DECLARED) for trust in named))
+
+
+def of_refusals(trust: str) -> bool:
+    """Return whether something is trusted not to be refused, at all or for ever."""
+    return trust.endswith((NEVER_REFUSED, NOT_FOR_EVER))
 
 
 def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> str:

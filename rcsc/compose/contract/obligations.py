@@ -230,12 +230,13 @@ def _waiting(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
 
 
 def _passes_on_a_pause(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
-    """Return the condition that a new PAUSE (the first command) is ordered below by the end of the cycle."""
+    """Return the condition that a new PAUSE (the first command) is ordered below by the end of the cycle that takes it."""
     above = ts.links.above
     assert above is not None
     paused = values.equal(cycle.taken[above.command], values.constant(ts.kinds[above.command], 0))
     passes = values.equal(cycle.after[below.command], values.constant(ts.kinds[below.command], 0))
-    return values.follows(values.both(values.negation(command_stays(ts, cycle)), paused), passes)
+    new = values.negation(values.either(cycle.untaken, command_stays(ts, cycle)))
+    return values.follows(values.both(new, paused), passes)
 
 
 def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
@@ -253,7 +254,8 @@ def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
         if variable.deferred_until is not None:
             untouched = values.equal(cycle.after[variable.name], cycle.prepared[variable.name])
             agreed = values.equal(cycle.after[variable.name], cycle.after[pending(variable.name)])
-            yield Obligation(Sort.DEFERRED, "", str(variable.name), values.either(untouched, agreed))
+            holds = values.any_of((cycle.untaken, untouched, agreed))
+            yield Obligation(Sort.DEFERRED, "", str(variable.name), holds)
 
 
 def has_flag(ts: TransitionSystem) -> bool:
@@ -408,7 +410,7 @@ def _answered(ts: TransitionSystem, cycle: Cycle, at: TableAt, overlooking: tupl
     If it is down when the level sees the same inputs again, no line will answer the command, and the report of this
     line is taken for the answer.
     """
-    again = ts.cycle(cycle.after, " again", taken=cycle.taken).middle[FLAG]
+    again = ts.admitting().cycle(cycle.after, " again", taken=cycle.taken).middle[FLAG]
     missed = values.any_of(overlooking)
     passed = values.all_of((at.chosen, values.negation(at.several()), missed))
     passed = values.either(passed, values.both(at.selected, cycle.interrupted))

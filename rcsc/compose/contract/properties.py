@@ -10,6 +10,7 @@ condition (a division by zero, an index out of range) does not hold.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
 
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.predicates import (
@@ -20,7 +21,7 @@ from rcsc.compose.contract.predicates import (
     looked_back_at,
     predicates,
 )
-from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
+from rcsc.compose.contract.transition import REFUSED, Cycle, Leaves, TransitionSystem
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.leaves import parts, read_by, renamed
 from rcsc.lang.meaning import spelled
@@ -31,6 +32,8 @@ from rcsc.lang.model import (
     Apply,
     Bool,
     Expr,
+    Kind,
+    Literal,
     Op,
     Program,
     Read,
@@ -41,7 +44,7 @@ from rcsc.lang.model import (
 )
 from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
-from rcsc.symbolic.values import Node
+from rcsc.symbolic.values import FALSE, Node
 
 # --- as conditions on a cycle ----------------------------------------------------------------
 
@@ -75,7 +78,53 @@ def properties(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
     """Yield each property's name and its condition on the cycle and the one before."""
     leaves = {**cycle.after, **{str(earlier(name)): node for name, node in cycle.before.items()}}
     for stated in program.properties:
-        yield stated.name, _true(stated.condition, leaves)
+        holds = _true(stated.condition, leaves)
+        if cycle.untaken is not FALSE:
+            holds = _with_refusals(program, cycle, stated.condition, leaves, holds)
+        yield stated.name, holds
+
+
+def _with_refusals(program: Program, cycle: Cycle, condition: Expr, leaves: Leaves, holds: Node) -> Node:
+    """Return the condition that a property holds of the cycle, also where it or the one before took nothing.
+
+    The inputs of such a cycle stand as they came (`Event.INPUT_REFUSED`). One from outside need not be in its range: whatever compares it
+    then may be true or false. The cycle after it may find any inputs in the one before.
+    """
+    came = {**leaves, **cycle.taken}
+    looks_back = frozenset(str(earlier(str(v.name))) for v in program.variables if v.kind is Kind.INPUT)
+    before = cycle.before.get(REFUSED, FALSE)
+    untaken = values.choice(
+        before,
+        _opened(condition, cycle.strange | looks_back, came),
+        _opened(condition, cycle.strange, came),
+    )
+    after_one = values.choice(before, _opened(condition, looks_back, leaves), holds)
+    return values.choice(cycle.untaken, untaken, after_one)
+
+
+def _opened(condition: Expr, names: frozenset[str], leaves: Leaves) -> Node:
+    """Return the condition, with each atomic part that reads one of the leaves true or false; false if one may be undefined."""
+    opened: dict[str, Node] = {}
+    undefined = False
+
+    def part(expr: Expr) -> Expr:
+        nonlocal undefined
+        if not names & set(map(str, read_by(expr))):
+            return expr
+        if isinstance(expr, Apply) and all(isinstance(one.type, Bool) for one in (expr, *expr.args)):
+            return replace(expr, args=tuple(map(part, expr.args)))
+        undefined = undefined or not all(map(_only_compares, parts(expr)))
+        name = f"{REFUSED}: {spelled(expr)}"
+        opened[name] = values.variable(name, Bool())
+        return Read(VariableName(name), Bool())
+
+    open_ = part(condition)
+    return FALSE if undefined else _true(open_, {**leaves, **opened})
+
+
+def _only_compares(part: Expr) -> bool:
+    """Return whether a part of an atomic condition is defined for any value whatever, in its range or not."""
+    return isinstance(part, Read | Literal | Among) or (isinstance(part, Apply) and part.op in COMPARISONS)
 
 
 def _true(condition: Expr, leaves: Leaves) -> Node:

@@ -4,13 +4,16 @@ In: a program, its level, the links. Out: `Cycle`s. A cycle takes the inputs, se
 selected table and postprocess, exactly as `interpret.cycle` does; what the environment may do is a condition on what is taken.
 """
 
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from rcsc.compose.contract.environment import Below, Links
 from rcsc.compose.contract.facts import believed, outside_values
-from rcsc.lang.interpret import Fault, chosen_table
+from rcsc.lang.environment import EARLY as EARLY  # noqa: PLC0414  # of a cycle as nodes, too
+from rcsc.lang.environment import refusable, unadmitted
+from rcsc.lang.interpret import chosen_table
+from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (  # fmt: skip
     Action,
     Assumption,
@@ -28,8 +31,10 @@ from rcsc.lang.model import (  # fmt: skip
     Snapshot,
     Table,
     TableChoice,
+    Variable,
+    earlier,
 )
-from rcsc.lang.restart import After, Fixed, SameAs
+from rcsc.lang.restart import After, Fixed, SameAs, Stands
 from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import ExternResults, State
 from rcsc.symbolic.execution import Run
@@ -37,9 +42,10 @@ from rcsc.symbolic.values import FALSE, TRUE, Node
 
 GHOST = "asked "
 """Prefix of ghosts, which the proof remembers and the level does not: that the database was asked, and for which keys."""
-
-EARLY = frozenset({Fault.EXTERN, Fault.ASSUMPTION})
-"""Faults that no proof excludes: the cycle ends there, and the next one runs."""
+REFUSED = f"{GHOST}and an input was refused"
+"""The ghost of properties that look back at inputs: the cycle before was refused."""
+_REFUSED = "an input is refused:"
+"""Of a cycle: whether the environment ends it by an input. Its variables are no leaves: a leaf has no colon."""
 Leaves = dict[str, Node]
 NUMBERS = 65536
 """How many command numbers there are (16 bits)."""
@@ -109,8 +115,10 @@ class Cycle:
         tables: Each table that may run last; `stages`, each that may run before it, and `every`, all.
         seen: Every leaf as the tables of each stage see it, in order.
         after: Every leaf and ghost after the cycle.
-        refused: The condition that the cycle ends early, by a refused result or a failed stopping assumption;
+        refused: The condition that the cycle ends early, by a refused input or result, or a failed stopping assumption;
             `unmatched`, before the table is matched; `interrupted`, before its line is done.
+        untaken: The condition that an input is refused: then nothing is taken, and inputs before the next cycle are as last taken.
+        strange: Inputs that such a cycle may leave outside their ranges.
         calls: Calls of extern procedures, in the order in which they can be made.
         settled: Every leaf before the preprocess, and `acted`, before the postprocess.
     """
@@ -130,6 +138,8 @@ class Cycle:
     undeclared: Node = TRUE
     stages: tuple[TableAt, ...] = ()
     seen: tuple[Leaves, ...] = ()
+    untaken: Node = FALSE
+    strange: frozenset[str] = frozenset()
 
     @property
     def every(self) -> tuple[TableAt, ...]:
@@ -178,12 +188,14 @@ class TransitionSystem:
         kinds: The type of each leaf and ghost, by name.
         inputs: The leaves that each cycle takes, in declared order.
         trusted: Assumptions about what stands outside that the tables declare: part of the contract.
+        refuses: Whether cycles that an input ends are cycles, too; else nothing is refused, which is then to be trusted.
     """
 
     program: Program
     level: Level
     links: Links
     safety: Safety = Safety()
+    refuses: bool = False
     procedures: dict[str, Procedure] = field(init=False)
     kinds: dict[str, Scalar] = field(init=False)
     inputs: tuple[str, ...] = field(init=False)
@@ -198,7 +210,33 @@ class TransitionSystem:
             self.kinds[f"{GHOST}{asked.into}"] = Bool()
             for key in asked.keys:
                 self.kinds[f"{GHOST}{asked.into} {key}"] = self.kinds[key]
+        if self._looks_back():
+            self.kinds[REFUSED] = Bool()
         self.trusted = self._of_the_environment()
+
+    def _looks_back(self) -> bool:
+        """Return whether a property looks back at an input, which a refused cycle left as it came."""
+        inputs = {str(earlier(leaf)) for leaf in self.inputs}
+        return any(inputs & set(map(str, read_by(stated.condition))) for stated in self.program.properties)
+
+    @property
+    def refusable(self) -> tuple[str, ...]:
+        """The inputs that may be refused, in declared order: what a level writes never is."""
+        return tuple(str(v.name) for v in self._of_outside() if refusable(v))
+
+    def _of_outside(self) -> Iterator[Variable]:
+        """Yield the inputs that no level writes: the operator, the plant, the database, or nobody."""
+        for variable in self.program.variables:
+            if variable.kind is Kind.INPUT and self.links.written_as(variable.name) is None:
+                yield variable
+
+    def refusing(self) -> "TransitionSystem":
+        """Return the same level in an environment in which inputs may be refused."""
+        return replace(self, refuses=bool(self.refusable))
+
+    def admitting(self) -> "TransitionSystem":
+        """Return the same level in an environment in which no input is ever refused."""
+        return replace(self, refuses=False) if self.refuses else self
 
     def _of_the_environment(self) -> frozenset[str]:
         """Find the *assumed* assumptions about what comes from outside; others are proved, here or where what they speak of is written."""
@@ -249,9 +287,12 @@ class TransitionSystem:
         """Return the states before the first cycle after a restart, as `run.adopt` makes them, whatever stood in the buffers.
 
         A state that lacks the member, or has a number of another type, keeps its initial value, as there. An order has a number that
-        no report can echo yet: the one after the order in the buffer, which may be late, or after the echo if there is none.
+        no report can echo yet: the one after the order in the buffer, which may be late, or after the echo if there is none. A report
+        echoes what it echoed.
         """
         start = self.initial()
+        if self.refuses and REFUSED in self.kinds:  # nothing was admitted yet of what it begins with
+            start[REFUSED] = values.variable(f"{REFUSED} before restart", Bool())
         start |= {
             name: values.variable(f"{name} before restart", self.kinds[name]) for name in sorted(self.inputs)
         }
@@ -261,6 +302,8 @@ class TransitionSystem:
                     start[leaf] = values.constant(self.kinds[leaf], value)
                 case SameAs(other):
                     start[leaf] = start[other]
+                case Stands():
+                    start[leaf] = values.variable(f"{leaf} before restart", self.kinds[leaf])
                 case After(echo):
                     late = values.variable(f"{leaf} before restart", self.kinds[leaf])
                     start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
@@ -268,12 +311,8 @@ class TransitionSystem:
 
     def of(self, program: Program) -> "TransitionSystem":
         """Return the same level with another program of the same leaves."""
-        return TransitionSystem(
-            program,
-            next(level for level in program.levels if level.name == self.level.name),
-            self.links,
-            self.safety,
-        )
+        level = next(level for level in program.levels if level.name == self.level.name)
+        return replace(self, program=program, level=level)
 
     def table(self, name: str) -> Table:
         """Return a table of the program.
@@ -299,6 +338,57 @@ class TransitionSystem:
 
         Results of extern procedures are named with it, too: cycles in one query need different suffixes.
         """
+        cycle = self._admitted(before, suffix, taken)
+        return (
+            self._or_refused(cycle, values.variable(f"{_REFUSED}{suffix}", Bool())) if self.refuses else cycle
+        )
+
+    def _or_refused(self, cycle: Cycle, untaken: Node) -> Cycle:
+        """Return the cycle as it is if nothing is refused, and else as one that takes nothing (`Event.INPUT_REFUSED`).
+
+        What tables would have seen stays: none is chosen.
+        """
+        taken = values.negation(untaken)
+
+        def instead(leaves: Leaves, otherwise: Leaves) -> Leaves:
+            return {
+                name: node if node is otherwise[name] else values.choice(untaken, otherwise[name], node)
+                for name, node in leaves.items()
+            }
+
+        def tables(every: tuple[TableAt, ...]) -> tuple[TableAt, ...]:
+            return tuple(replace(at, chosen=values.both(at.chosen, taken)) for at in every)
+
+        contract, undeclared = cycle.contract, cycle.undeclared
+        if self.trusted:  # what is declared of a table holds where it runs
+            contract = values.either(values.both(untaken, undeclared), contract)
+        after = instead(cycle.after, {**cycle.before, **self._safe(cycle.before)})
+        if REFUSED in self.kinds:
+            after[REFUSED] = untaken
+        return replace(
+            cycle,
+            contract=contract,
+            tables=tables(cycle.tables),
+            after=after,
+            refused=values.either(untaken, cycle.refused),
+            unmatched=values.either(untaken, cycle.unmatched),
+            interrupted=values.either(untaken, cycle.interrupted),
+            stages=tables(cycle.stages),
+            untaken=untaken,
+            strange=frozenset(str(v.name) for v in self._of_outside() if unadmitted(v)),
+        )
+
+    def _safe(self, leaves: Leaves) -> Leaves:
+        """Return the outputs that show another value after a fault, with that value."""
+        shown = (
+            (str(v.name), values.constant(v.type, v.safe))
+            for v in self.program.variables
+            if v.safe is not None
+        )
+        return {name: node for name, node in shown if name in leaves}
+
+    def _admitted(self, before: Leaves, suffix: str, taken: Leaves | None) -> Cycle:
+        """Return a cycle in which no input is refused."""
         if taken is None:
             taken = {name: values.variable(f"{name}{suffix}", self.kinds[name]) for name in self.inputs}
         run = Run(self.procedures, self.kinds, dict(before), suffix=suffix, refusals=True)
@@ -321,10 +411,10 @@ class TransitionSystem:
         acted, interrupted = {**before, **run.state.leaves}, run.ended
         run.execute(Call(self.procedures[name].name) for name in self.level.postprocess)
         after = {**before, **run.state.leaves, **ghosts}
-        for variable in self.program.variables:
-            if variable.safe is not None:
-                shown, name = values.constant(variable.type, variable.safe), str(variable.name)
-                after[name] = values.choice(run.ended, shown, after[name])
+        for name, shown in self._safe(after).items():
+            after[name] = values.choice(run.ended, shown, after[name])
+        if REFUSED in self.kinds:
+            after[REFUSED] = FALSE
         calls = tuple(run.answered)
         return Cycle(
             before, taken, contract, middle, tables, after,

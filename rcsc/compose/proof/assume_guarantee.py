@@ -14,6 +14,8 @@ from rcsc.compose.contract.claims import (
     DECLARED,
     ENDING,
     GIVEN,
+    NEVER_REFUSED,
+    NOT_FOR_EVER,
     RESTING,
     RUNS,
     SAFE,
@@ -27,10 +29,11 @@ from rcsc.compose.contract.claims import (
     worst,
 )
 from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER
-from rcsc.compose.contract.obligations import Sort, asks, resting_table
+from rcsc.compose.contract.obligations import Obligation, Sort, asks, resting_table
 from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.termination import Ending
+from rcsc.lang.restart import Stands
 from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
 
@@ -66,37 +69,61 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     runs = ((name, RUNS),)
     yield from _of_runs(ts, proof)
     for obligation, verdict in proof.verdicts:
-        trusts: tuple[str, ...] = ()
-        if obligation.sort is Sort.ECHOES:
-            trusts = tuple(_of_a_restart(ts, proof))
-        elif obligation.sort is Sort.PROPERTY:
-            trusts = tuple(_of_a_refusal(ts, name))
         if obligation.key != SAFE:
-            yield obligation.key, Claim(verdict, runs, trusts)
+            yield obligation.key, Claim(verdict, runs, _trusted(ts, proof, obligation))
     if proof.context is not None:
+        trusts = (never_refused(ts),) if proof.looked_admitting else ()
         for line in proof.context.unreached:
-            yield (UNREACHED, *line), Claim(Verdict.PROVED, runs)
+            yield (UNREACHED, *line), Claim(Verdict.PROVED, runs, trusts)
         if not proof.context.repeated and not proof.context.restless:
-            yield (AGAIN, "", ""), Claim(Verdict.PROVED, runs)
+            yield (AGAIN, "", ""), Claim(Verdict.PROVED, runs, trusts)
     for ending in proof.endings:
-        verdict = Verdict.PROVED if ending.proved else Verdict.NOT_PROVED
-        yield (Sort.ENDS, ending.table, ""), _of_ending(ts, ending, verdict)
+        yield (Sort.ENDS, ending.table, ""), _of_ending(ts, ending, admitting=proof.ends_admitting(ending))
     if proof.stands and ts.links.above is not None:
-        yield STANDS, Claim(Verdict.PROVED, (*runs, (name, (Sort.ECHOES, "", ts.links.above.report))))
+        trusts = (never_refused(ts),) if proof.stands_admitting else ()
+        yield STANDS, Claim(Verdict.PROVED, (*runs, (name, (Sort.ECHOES, "", ts.links.above.report))), trusts)
     if proof.endings:
         every = tuple((name, (Sort.ENDS, ending.table, "")) for ending in proof.endings)
         yield ENDING, Claim(Verdict.PROVED, every)
         yield RESTING, Claim(Verdict.PROVED, ((name, (Sort.ENDS, resting_table(ts), "")),))
 
 
-def _of_a_refusal(ts: TransitionSystem, level: str) -> Iterator[str]:
-    """Yield the assumption that no input is refused: proofs leave out such a cycle, whose safe values may break a property."""
-    if ts.inputs and any(variable.safe is not None for variable in ts.program.variables):
-        yield f"no input of level `{level}` is refused: its outputs would show their safe values"
+def _trusted(ts: TransitionSystem, proof: LevelProof, obligation: Obligation) -> tuple[str, ...]:
+    """List what an obligation trusts that no level is responsible for."""
+    of_a_restart = tuple(_of_a_restart(ts, proof)) if obligation.sort is Sort.ECHOES else ()
+    return (*of_a_restart, never_refused(ts)) if proof.needs_admission(obligation.key) else of_a_restart
+
+
+def never_refused(ts: TransitionSystem) -> str:
+    """Return the assumption of a claim that a cycle without inputs would break."""
+    inputs = _refusable(ts)
+    return f"{', '.join(inputs)} of level `{ts.level.name}` {'is' if len(inputs) == 1 else 'are'} {NEVER_REFUSED}"
+
+
+def not_for_ever(ts: TransitionSystem) -> str:
+    """Return the assumption of a claim that cycles without inputs only put off."""
+    inputs = _refusable(ts)
+    return (
+        f"{', '.join(inputs)} of level `{ts.level.name}` {'is' if len(inputs) == 1 else 'are'} {NOT_FOR_EVER}"
+    )
+
+
+def _refusable(ts: TransitionSystem) -> tuple[str, ...]:
+    """List the inputs that can be refused: a record or an array of which several parts can be once, with its name."""
+    parts: dict[str, list[str]] = {}
+    for leaf in ts.refusable:
+        parts.setdefault(leaf.partition(".")[0].partition("[")[0], []).append(leaf)
+    return tuple(f"`{leaves[0] if len(leaves) == 1 else whole}`" for whole, leaves in parts.items())
 
 
 def _of_a_restart(ts: TransitionSystem, proof: LevelProof) -> Iterator[str]:
-    """Yield assumptions that the first cycle after a restart does not end early; else an older report follows a newer one."""
+    """Yield assumptions that the first cycle after a restart does not end early; else an older report follows a newer one.
+
+    None where the level then still echoes what it echoed before.
+    """
+    above = ts.links.above
+    if above is None or all(ts.program.adopted.get(leaf) == Stands() for leaf in (above.echo, above.echoed)):
+        return
     if asks(ts.program):
         yield "no extern procedure is refused in the first cycle after a restart"
     stops = {str(name) for table in ts.program.tables for name in table.stops}
@@ -131,11 +158,12 @@ def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     within = [verdict for obligation, verdict in proof.verdicts if obligation.key == SAFE]
     invariants = tuple((name, (Sort.INVARIANT, "", invariant)) for invariant in ts.safety.invariants)
     rests = ((name, RUNS), *invariants) if within else invariants
-    yield SAFE, Claim(worst(within), rests)
+    yield SAFE, Claim(worst(within), rests, (never_refused(ts),) if proof.needs_admission(SAFE) else ())
 
 
-def _of_ending(ts: TransitionSystem, ending: Ending, verdict: Verdict) -> Claim:
+def _of_ending(ts: TransitionSystem, ending: Ending, *, admitting: bool) -> Claim:
     """Claim that a command ends, assuming that subordinates answer theirs and that some inputs stand still."""
+    verdict = Verdict.PROVED if ending.proved else Verdict.NOT_PROVED
     name, below = ts.level.name, ts.links.below
     trusts = [
         f"`{other.name}` comes to rest some time where it is told to, and stays so"
@@ -146,7 +174,9 @@ def _of_ending(ts: TransitionSystem, ending: Ending, verdict: Verdict) -> Claim:
     ]
     trusts += [f"the values in `{record}` of level `{name}` stand still meanwhile" for record in ending.still]
     if asks(ts.program):
-        trusts.append(f"extern procedures of level `{name}` are refused only finitely often")
+        trusts.append(f"extern procedures of level `{name}` are {NOT_FOR_EVER}")
+    if ts.refusable:
+        trusts.append(never_refused(ts) if admitting else not_for_ever(ts))
     needs = tuple(
         (other.name, RESTING if other.answers_in_time else ENDING) for other in below if not other.outside
     )

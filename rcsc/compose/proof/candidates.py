@@ -43,11 +43,11 @@ def keep_candidates(
 
 
 def _key(ts: TransitionSystem) -> tuple[str, ...]:
-    return os.path.realpath(ts.level.span.file), ts.level.name
+    return os.path.realpath(ts.level.span.file), ts.level.name, *(["refusing"] if ts.refuses else [])
 
 
 def content(ts: TransitionSystem) -> str:
     """Return the digest of all that a proof of the level depends on, wherever the files are."""
     tables = tuple(replace(table, file="", stops=()) for table in ts.program.tables)  # they follow from it
     program = replace(ts.program, file="", tables=tables)
-    return hashlib.sha256(repr((program, ts.level.name, ts.links)).encode()).hexdigest()
+    return hashlib.sha256(repr((program, ts.level.name, ts.links, ts.refuses)).encode()).hexdigest()

@@ -18,7 +18,7 @@ from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.assume_guarantee import of_level
 from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import Context
-from rcsc.compose.proof.level import LevelProof, Verdict
+from rcsc.compose.proof.level import LevelProof, Verdict, joined
 from rcsc.compose.proof.standing import Verdicts, keep_verdicts
 from rcsc.compose.proof.termination import Ending
 from rcsc.host.cache import Cache
@@ -38,13 +38,30 @@ class _Kept:
     endings: tuple[Ending, ...]
     unstated: tuple[Unstated, ...]
     stands: bool
+    parts: "tuple[_Kept, ...]" = ()
 
 
 def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | None:
     """Return the proof of the level, if it is kept."""
     kept = cache.load(_Kept, *_key(ts, effort))
-    if kept is None:
-        return None
+    proof = None if kept is None else _whole(ts, kept)
+    if proof is not None:
+        keep_verdicts(cache, content(ts), _shortened(ts, proof))  # they may have been pruned
+    return proof
+
+
+def _whole(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
+    """Return the proof with its parts: with refusals, where there are any, and without."""
+    if not kept.parts:
+        return _recalled(ts.refusing(), kept)
+    with_refusals, without = (
+        _recalled(each, part) for each, part in zip((ts.refusing(), ts), kept.parts, strict=True)
+    )
+    return None if with_refusals is None or without is None else joined(with_refusals, without)
+
+
+def _recalled(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
+    """Return the proof of one environment, if it is of the level as it is."""
     cycle = ts.cycle(ts.havoc())
     wanted = obligations(ts, cycle)
     if [obligation.key for obligation in wanted] != [key for key, _ in kept.verdicts]:
@@ -55,26 +72,27 @@ def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | N
             verdicts = tuple(
                 (goal, verdict) for goal, (_, verdict) in zip(wanted, kept.verdicts, strict=True)
             )
-            proof = LevelProof(
+            return LevelProof(
                 ts.level.name, verdicts, chosen, kept.clauses, kept.walked, kept.learnt, kept.seconds, cached=True,
                 context=kept.context, endings=kept.endings, unstated=kept.unstated, stands=kept.stands,
             )  # fmt: skip
-            keep_verdicts(cache, content(ts), _shortened(ts, proof))  # they may have been pruned
-            return proof
     return None
 
 
 def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) -> None:
     """Keep the proof, unless something was left undecided."""
-    if any(verdict is Verdict.UNDECIDED for _, verdict in proof.verdicts):
+    if any(verdict is Verdict.UNDECIDED for part in (proof, *proof.parts) for _, verdict in part.verdicts):
         return
-    kept = _Kept(
+    cache.store(_kept(proof), *_key(ts, effort))
+    keep_verdicts(cache, content(ts), _shortened(ts, proof))
+
+
+def _kept(proof: LevelProof) -> _Kept:
+    return _Kept(
         tuple((obligation.key, verdict) for obligation, verdict in proof.verdicts),
         tuple(predicate.name for predicate in proof.predicates), proof.clauses, proof.walked, proof.learnt, proof.seconds,
-        proof.context, proof.endings, proof.unstated, proof.stands,
+        proof.context, proof.endings, proof.unstated, proof.stands, tuple(map(_kept, proof.parts)),
     )  # fmt: skip
-    cache.store(kept, *_key(ts, effort))
-    keep_verdicts(cache, content(ts), _shortened(ts, proof))
 
 
 def _shortened(ts: TransitionSystem, proof: LevelProof) -> Verdicts:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from rcsc.compose.contract.claims import ACCEPTED
+from rcsc.compose.contract.claims import ACCEPTED, Key
 from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of an obligation, too
 from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations, unstated
 from rcsc.compose.contract.predicates import Predicate
@@ -28,6 +28,7 @@ from rcsc.solvers.sat import GaveUpError
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
+from rcsc.symbolic.values import TRUE
 
 TOGETHER = 50
 """All questions about a level together may take the steps of so many; later ones are not decided."""
@@ -54,6 +55,7 @@ class LevelProof:
         endings: Whether its commands end, table by table.
         unstated: Obligations that could not be stated, because part of the level was not recognised.
         stands: Whether its report stands once it has answered.
+        parts: Where some claims need that no input is refused, the proofs with refusals and without; else none.
     """
 
     level: str
@@ -68,6 +70,29 @@ class LevelProof:
     endings: tuple[Ending, ...] = ()
     unstated: tuple[Unstated, ...] = ()
     stands: bool = False
+    parts: "tuple[LevelProof, ...]" = ()
+
+    def needs_admission(self, key: Key) -> bool:
+        """Return whether an obligation is proved only if no input is refused."""
+        here, refusing = (
+            [verdict for owed, verdict in one.verdicts if owed.key == key]
+            for one in (self, *(self.parts[:1] or (self,)))
+        )
+        return here != refusing and here[0] in ACCEPTED
+
+    @property
+    def stands_admitting(self) -> bool:
+        """Whether the report stands only if no input is refused."""
+        return bool(self.parts) and not self.parts[0].stands
+
+    @property
+    def looked_admitting(self) -> bool:
+        """Whether lines in context were looked at only as if no input were refused."""
+        return bool(self.parts) and self.parts[0].context is None
+
+    def ends_admitting(self, ending: Ending) -> bool:
+        """Return whether an ending is found only if no input is refused."""
+        return bool(self.parts) and ending not in self.parts[0].endings
 
     def verdict(self, sort: Sort, table: str = "", name: str = "") -> Verdict:
         """Return the verdict of an obligation.
@@ -87,13 +112,53 @@ class LevelProof:
 
 
 def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache | None = None) -> LevelProof:
-    """Prove a level: find an invariant, confirm it, decide each obligation, and analyse the lines in context.
+    """Prove a level whose inputs may be refused; what is not proved of it, once more as if none were.
+
+    An invariant with refusals is one without: the second search begins with the first one's.
+    """
+    effort, refusing = effort or Effort(), ts.refusing()
+    if not refusing.refuses:
+        return _proved_of(ts, effort, cache)
+    first = _proved_of(refusing, effort, cache)
+    stands = first.stands or ts.links.above is None
+    looked = first.context is not None and stands and all(ending.proved for ending in first.endings)
+    if looked and not first.open:
+        return first
+    begun = FoundInvariant(first.predicates, first.clauses).named
+    without = replace(effort, looks=effort.looks and not looked)
+    return joined(first, _proved(ts, without, None, Candidates(begun, content(ts))))
+
+
+def joined(refusing: LevelProof, admitting: LevelProof) -> LevelProof:
+    """Return the proof of a level of which some claims need that no input is refused (`LevelProof.parts`)."""
+    proved = {obligation.key: verdict for obligation, verdict in refusing.verdicts if verdict in ACCEPTED}
+    verdicts = tuple((owed, proved.get(owed.key, verdict)) for owed, verdict in admitting.verdicts)
+    others = {ending.table: ending for ending in admitting.endings}
+    endings = tuple(e if e.proved else others.get(e.table, e) for e in refusing.endings) or admitting.endings
+    return replace(
+        admitting,
+        verdicts=verdicts,
+        seconds=refusing.seconds + admitting.seconds,
+        context=refusing.context or admitting.context,
+        endings=endings,
+        stands=refusing.stands or admitting.stands,
+        parts=(without_nodes(refusing), without_nodes(admitting)),
+    )
+
+
+def without_nodes(proof: LevelProof) -> LevelProof:
+    """Return the proof with obligations whose many nodes are left out."""
+    verdicts = tuple((replace(obligation, holds=TRUE), verdict) for obligation, verdict in proof.verdicts)
+    return replace(proof, verdicts=verdicts)
+
+
+def _proved_of(ts: TransitionSystem, effort: Effort, cache: Cache | None) -> LevelProof:
+    """Prove a level in one environment: find an invariant, confirm it, decide each obligation, analyse the lines in context.
 
     The search begins with the clauses that the last one left in the cache. Lines and endings may depend on which invariant it finds: where
     more is missing of them than in the version of the level that the clauses were found of, all is proved once more without those.
     """
-    effort, this = effort or Effort(), content(ts)
-    begun = candidates(cache, ts)
+    this, begun = content(ts), candidates(cache, ts)
     proof = _proved(ts, effort, cache, begun)
     if begun.found_of != this and not set(_lacking(proof)) <= set(begun.lacking):
         proof = _proved(ts, effort, cache, Candidates(found_of=this))
@@ -129,7 +194,8 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
             invariant = search(ts, firsts, cycle, wanted, effort, known.clauses)
             keep_candidates(cache, ts, invariant, known)
             asked = _asked_anew(invariant.predicates, firsts, cycle, effort.limits)
-            looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open)
+            aside = {Sort.NUMBERED, Sort.PROPERTY} if ts.refuses else {Sort.NUMBERED}
+            looks = effort.looks and not any(wanted[at].sort not in aside for at in invariant.open)
             flow = Flow(ts, asked, invariant.clauses)
             if looks and (
                 others := [
@@ -255,7 +321,9 @@ def _believed(
     names = [str(at.table.name) for at in inference.cycle.every]
     if not ts.trusted:
         return dict.fromkeys(names, Verdict.TRUSTED)
-    whole = _of_possible({solver.check() for solver in solvers})
+    cycles = inference.cycle, *inference.firsts
+    taken = [inference.keyed.term(values.negation(each.untaken)) for each in cycles]
+    whole = _of_possible({answer(solver, term) for solver, term in zip(solvers, taken, strict=True)})
     if whole is not Verdict.TRUSTED:
         return dict.fromkeys(names, whole)
     return {name: _can_run(inference, clauses, solvers, at) for at, name in enumerate(names)}
@@ -295,9 +363,22 @@ def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS
     `first` and `restart`: such a cycle leads into the invariant; `step TABLE`: a later cycle in which this table runs keeps
     it; `goals first`, `goals restart`: such cycles fulfil the obligations that are proved; `goals SORT`: every cycle from the
     invariant fulfils those of one sort; `lines N`: the lines in their context; `ends TABLE N`: no step is taken that was not
-    found, counters rise, and there is no other loop; `stands N`: the report stands once it has answered.
+    found, counters rise, and there is no other loop; `stands N`: the report stands once it has answered. What needs that no
+    input is refused has questions of its own, `nothing refused ...`.
     If lines or endings, asked again, differ from the proof, one question has a model.
     """
+    if proof.parts:
+        refusing, admitting = proof.parts
+        aside = {obligation.key for obligation, verdict in refusing.verdicts if verdict in ACCEPTED}
+        left = tuple((owed, verdict) for owed, verdict in admitting.verdicts if owed.key not in aside)
+        scripts = _certificate(ts.refusing(), refusing, limits)
+        others = _certificate(ts, replace(admitting, verdicts=left), limits)
+        return scripts | {f"nothing refused {name}": text for name, text in others.items()}
+    return _certificate(ts.refusing(), proof, limits)
+
+
+def _certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits) -> dict[str, str]:
+    """Write the questions of one environment."""
     cycle, firsts = ts.cycle(ts.havoc()), _firsts(ts)
     asked = _asked_anew(proof.predicates, tuple(firsts.values()), cycle, limits)
     clauses = proof.clauses

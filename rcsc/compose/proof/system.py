@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
-from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, Need, Promise, closed
+from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, Need, Promise, closed, of_refusals
 from rcsc.compose.contract.environment import Links, check_ends, links
 from rcsc.compose.contract.facts import with_facts
 from rcsc.compose.contract.obligations import Obligation, obligations
@@ -18,7 +18,7 @@ from rcsc.compose.contract.transition import Safety, TransitionSystem
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements, claims, other_end
 from rcsc.compose.proof.kept import keep, recall
-from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
+from rcsc.compose.proof.level import LevelProof, Verdict, prove_level, without_nodes
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
@@ -29,7 +29,6 @@ from rcsc.lang.model import AssumptionName, Program
 from rcsc.lang.project import Loaded, load
 from rcsc.run.description import BadDescription, Description, description, places
 from rcsc.run.links import check_links
-from rcsc.symbolic.values import TRUE
 
 SHOWN_HERE = frozenset({Code.ASSUMPTION_NOT_PROVED, Code.INVARIANT_BROKEN, Code.TWO_WRITERS})
 """Codes that are proved of the levels instead, or are no fault of a running cycle."""
@@ -66,6 +65,13 @@ class SystemProof:
             self.proved
             and not any(missing.applies for proof in self.levels for missing in proof.unstated)
             and all(claim.proved for claim in self.closed.values())
+        )
+
+    @property
+    def admitting(self) -> tuple[str, ...]:
+        """What is trusted not to be refused, at all or for ever, by some claim."""
+        return tuple(
+            sorted({trust for claim in self.closed.values() for trust in claim.trusts if of_refusals(trust)})
         )
 
     def of(self, level: str, key: Key) -> Closed:
@@ -197,7 +203,7 @@ def _safety(
 
 def replace_safety(ts: TransitionSystem, safety: Safety) -> TransitionSystem:
     """Return the transition system with this safety of its program."""
-    return TransitionSystem(ts.program, ts.level, ts.links, safety)
+    return replace(ts, safety=safety)
 
 
 def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
@@ -292,10 +298,7 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None) -> LevelP
 def _without_nodes(ts: TransitionSystem, effort: Effort, cache: Cache | None) -> LevelProof:
     """Prove a level in a process of its own; return obligations without their many nodes, which are made anew."""
     proof = _proved(ts, effort, cache)
-    return replace(
-        proof,
-        verdicts=tuple((replace(obligation, holds=TRUE), verdict) for obligation, verdict in proof.verdicts),
-    )
+    return without_nodes(proof)
 
 
 def _again(ts: TransitionSystem, proof: LevelProof) -> tuple[tuple[Obligation, Verdict], ...]:

@@ -30,7 +30,7 @@ from rcsc.lang.model import (
     pending,
     unit_text,
 )
-from rcsc.lang.restart import Adopted, After, Fixed, SameAs
+from rcsc.lang.restart import Adopted, After, Fixed, SameAs, Stands
 
 
 def symbols(plan: Plan, names: Names, digest: Digest) -> str:
@@ -116,6 +116,8 @@ def _adopted(restart: tuple[tuple[VariableName, Adopted], ...]) -> Iterator[dict
                 yield {"leaf": leaf, "same_as": other}
             case After(other):
                 yield {"leaf": leaf, "after": other}
+            case Stands():
+                yield {"leaf": leaf, "stands": True}
 
 
 MOST_DOC = 1000

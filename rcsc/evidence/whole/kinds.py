@@ -17,7 +17,7 @@ from rcsc.host.files import csv_text
 from rcsc.host.tools import Absent, BuildFailed
 from rcsc.lang.model import Bool
 from rcsc.link import Linked
-from rcsc.run.adopt import Fixed, adoption
+from rcsc.run.adopt import Copied, Numbered, adoption
 from rcsc.testing.coverage.case import outside_of
 
 STEPS = 40_000
@@ -108,7 +108,9 @@ def _fresh(whole: Whole, point: Point) -> str:
     for level in whole.system.levels:
         if point.function == f"{whole.system.word}_restart_{level.member}":
             program, leaves = level.program.plan.program, level.program.sign.leaves
-            given = (start.at for start in adoption(level.program.sign) if not isinstance(start, Fixed))
+            given = (
+                start.at for start in adoption(level.program.sign) if isinstance(start, Copied | Numbered)
+            )
             narrow = (
                 at
                 for at in given

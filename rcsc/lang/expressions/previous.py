@@ -46,7 +46,7 @@ from rcsc.lang.model import (
     Variable,
     VariableName,
 )
-from rcsc.lang.restart import Adopted, After, SameAs
+from rcsc.lang.restart import Adopted, After, SameAs, Stands
 
 KEEP = "keep_previous"
 """The procedure that ends a cycle; a digit is added where the program has one of that name."""
@@ -295,7 +295,7 @@ def _alone(keep: Procedure, table: Table) -> Table:
 def adopted_before(scope: Scope, adopted: dict[str, Adopted]) -> dict[str, Adopted]:
     """What hidden states adopt: what their leaves do, of which they come after; others begin as initially."""
     return {
-        hidden: SameAs(name) if isinstance(adopted[name], After) else adopted[name]
+        hidden: SameAs(name) if isinstance(adopted[name], After | Stands) else adopted[name]
         for name, hidden in scope.previous.items()
         if name in adopted
     }

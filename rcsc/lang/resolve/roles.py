@@ -32,7 +32,7 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.protocol import Flags, Parties, Party, Watched, condition, in_step
 from rcsc.lang.resolve.variables import value_given
-from rcsc.lang.restart import Adopted, After, Fixed, SameAs, by_names
+from rcsc.lang.restart import ECHOED, Adopted, After, Fixed, SameAs, Stands, by_names
 from rcsc.lang.syntax import tree
 
 
@@ -174,6 +174,7 @@ def _protocol(scope: Scope, parties: Parties) -> Iterator[tuple[str, Adopted]]:
     if above is not None:
         yield "inc_command_seen", SameAs(f"{above.name}.inc_command")
         yield f"{above.told}.status_report", Fixed(above.failed)
+        yield from ((f"{above.told}.{echo}", Stands()) for echo in ECHOED)
         for part in above.link.report:
             leaf = scope.leaves.get(f"{above.told}.{part.name.text}")
             value = None if leaf is None else value_given(scope, part.restart, leaf.type, "restart")

@@ -1,0 +1,81 @@
+"""Cycles that an input ends are cycles of the proof; what needs that there are none says so."""
+
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.proof.system import SystemProof, transition_systems
+from tests.support.programs.systems import LITTLE, solo_system
+from tests.support.proved import prove_system
+
+SAFE_VALUE = """input x : int 0 .. 9
+output o : int 0 .. 3 safe 3
+assume no_three monitored : o /= 3
+table t assuming no_three {
+  | line | o   | x   || o |
+  |------|-----|-----||---|
+  | up   | 0   | 0   || 1 |
+  | on   | 1   |     || 2 |
+  | back | 2   |     || 0 |
+  | stay | 0   | > 0 || 0 |
+}
+level solo { period 40 [ms] table t }
+"""
+GUARDED = """input guard : bool
+input level : int 0 .. 100
+output speed : int 0 .. 9
+property only_guarded : speed > 0 implies guard
+property bounded : speed <= 5
+table t {
+  | line | guard | level || speed |
+  |------|-------|-------||-------|
+  | go   | true  | < 50  || 5     |
+  | high | true  | >= 50 || 0     |
+  | no   | false |       || 0     |
+}
+level solo { period 40 [ms] table t }
+"""
+
+
+def trusts(whole: SystemProof, sort: Sort, table: str, name: str = "") -> tuple[str, ...]:
+    found = whole.of("solo", (sort, table, name))
+    assert found.proved
+    return found.trusts
+
+
+@pytest.mark.parametrize("more", ["", " clamp"])
+def test_a_line_that_a_safe_value_takes_away_trusts_that_nothing_is_refused(
+    more: str, tmp_path: Path
+) -> None:
+    path = solo_system(tmp_path, SAFE_VALUE.replace("0 .. 9", f"0 .. 9{more}"))
+    whole = prove_system(path, LITTLE)
+    words = () if more else ("`x` of level `solo` is never refused",)
+    assert trusts(whole, Sort.SOME_LINE, "t") == words
+    assert trusts(whole, Sort.ASSUMPTION, "t", "no_three") == words
+    assert whole.admitting == words
+    assert run(["prove", str(path), "--no-cache"]) == 0
+    assert run(["prove", str(path), "--no-cache", "--strict"]) == (0 if more else 1)
+
+
+def test_a_property_about_an_input_trusts_that_no_other_is_refused(tmp_path: Path) -> None:
+    """One that does not look at inputs trusts nothing: a refused cycle changes no output without a safe value."""
+    whole = prove_system(solo_system(tmp_path, GUARDED), LITTLE)
+    assert trusts(whole, Sort.PROPERTY, "", "only_guarded") == ("`level` of level `solo` is never refused",)
+    assert trusts(whole, Sort.PROPERTY, "", "bounded") == ()
+    assert trusts(whole, Sort.SOME_LINE, "t") == ()
+
+
+def test_with_a_safe_value_the_property_holds_in_a_refused_cycle_too(tmp_path: Path) -> None:
+    text = GUARDED.replace("speed : int 0 .. 9", "speed : int 0 .. 9 safe 0")
+    whole = prove_system(solo_system(tmp_path, text), LITTLE)
+    assert trusts(whole, Sort.PROPERTY, "", "only_guarded") == ()
+
+
+def test_a_bool_is_never_refused(tmp_path: Path) -> None:
+    text = GUARDED.replace("input level : int 0 .. 100", "input level : bool")
+    text = text.replace("< 50 ", "false").replace(">= 50", "true ")
+    path = solo_system(tmp_path, text)
+    assert transition_systems(path)["solo"].refusable == ()
+    assert prove_system(path, LITTLE).admitting == ()
