@@ -19,40 +19,36 @@ What a level assumes of its environment is the contract (`transition`):
 
 - of the superior: an order that it takes under the number that it took last is the same order, as far as the superior
   numbers it. Nothing else: any command may come at any moment, whether or not the last one was echoed, done, or seen;
-- of a subordinate, whose report it may see late, twice or never: (1) what is reported under the number of the last
-  order is about the command of that order; (2) the number after the last one is not echoed; (3) once the last order
-  is echoed, it stays so until another is given. Nothing about the status, about how long anything takes, or about
-  reports on older orders;
-- of any level of which it says so in a declared assumption about one buffer: that what is published there is so (`contract.facts`);
+- of a subordinate, whose report it may see late, twice or never: (1) what is reported under the number of the last order is about the
+  command of that order; (2) the number after the last one is not echoed; (3) once the last order is echoed, it stays so until another is
+  given. Nothing about the status, about how long anything takes, or about reports on older orders; - of any level of which it says so in a
+  declared assumption about one buffer: that what is published there is so (`contract.facts`);
 - of the database: the same question has the same answer;
 - of everything else: its declared range. What no level writes may also come as a value that is *refused*: that cycle takes nothing
-  (`rcsc.lang.environment`), as often as the environment likes. Claims are proved of such an environment first. Only what is not proved
-  there is proved once more as if nothing were refused, and then says so, whatever its kind (`proof.level`).
+  (`rcsc.lang.protocol.environment`), as often as the environment likes. Claims are proved of such an environment first. Only what is not
+  proved there is proved once more as if nothing were refused, and then says so, whatever its kind (`proof.level`).
 
-Why the contract may be assumed. Let a superior U publish orders, a subordinate D take them and publish reports,
-through buffers that hold the latest value, whole (`run.buffers`; processes copy under a sequence lock,
-`run.processes.memory`). What D takes was published by U, never older than what it took before; likewise back. Suppose
-that up to some cycle every level has kept its guarantees. U's orders are then numbered one after the other: two
-orders under one number are the same, or 65536 numbers apart. D's report echoes the order that it took: so what is
-reported under number *n* is about order *n* (1); no number is echoed that was not sent (2); as D takes no older
-order, it keeps echoing the last one (3); and an order taken twice under one number is one order. A cycle that is
-refused changes neither orders nor reports: for its neighbours the level is late by a cycle, and what it takes next is
-compared with what it took last. So the contract holds up to the next cycle, in which, by the proofs of the levels,
-every guarantee is kept again; at first it holds because both begin with the same order (checked, `system`). This is
-induction over cycles of all levels at once: a guarantee in a cycle rests on contracts about what was published before
-it. So levels are proved one by one, and the cost grows with their number.
+Why the contract may be assumed. Let a superior U publish orders, a subordinate D take them and publish reports, through buffers that hold
+the latest value, whole (`run.buffers`; processes copy under a sequence lock, `run.processes.memory`). What D takes was published by U,
+never older than what it took before; likewise back. Suppose that up to some cycle every level has kept its guarantees. U's orders are then
+numbered one after the other: two orders under one number are the same, or 65536 numbers apart. D's report echoes the order that it took:
+so what is reported under number *n* is about order *n* (1); no number is echoed that was not sent (2); as D takes no older order, it keeps
+echoing the last one (3); and an order taken twice under one number is one order. A cycle that is refused changes neither orders nor
+reports: for its neighbours the level is late by a cycle, and what it takes next is compared with what it took last. So the contract holds
+up to the next cycle, in which, by the proofs of the levels, every guarantee is kept again; at first it holds because both begin with the
+same order (checked, `system`). This is induction over cycles of all levels at once: a guarantee in a cycle rests on contracts about what
+was published before it. So levels are proved one by one, and the cost grows with their number.
 
 Further assumptions:
 
-- *Numbers.* They are 16 bits and wrap; the proof treats them so. "65536 numbers apart" is excluded by *freshness*: no level
-  is so late that all numbers go round meanwhile, which takes at least 65536 cycles, 43 minutes at 40 ms. A level that
-  waits for echoes before it orders again cannot come near it (`WAITS`).
-- *Restarts.* A level may begin anew at any moment as `run.adopt` does: its order is PAUSE under the number after the
-  order in its buffer, or after the echo if the buffer is empty, what it takes counts as seen, and its report echoes what it echoed,
-  so that no echo goes back even if its first cycles are refused. Such a beginning is proved like the first. To its neighbours
-  it is an order that is superseded, or a report that failed.
-  If the buffer is empty, freshness requires more: no earlier order of the level that is not echoed yet may still
-  be on its way, because its number is now used again.
+- *Numbers.* They are 16 bits and wrap; the proof treats them so. "65536 numbers apart" is excluded by *freshness*: no level is so late
+  that all numbers go round meanwhile, which takes at least 65536 cycles, 43 minutes at 40 ms. A level that waits for echoes before it
+  orders again cannot come near it (`WAITS`).
+- *Restarts.* A level may begin anew at any moment as `run.adopt` does: its order is PAUSE under the number after the order in its buffer,
+  or after the echo if the buffer is empty, what it takes counts as seen, and its report echoes what it echoed, so that no echo goes back
+  even if its first cycles are refused. Such a beginning is proved like the first. To its neighbours it is an order that is superseded, or
+  a report that failed. If the buffer is empty, freshness requires more: no earlier order of the level that is not echoed yet may still be
+  on its way, because its number is now used again.
 - *Reals* and arithmetic are followed as far as `symbolic.keyed` does, and `symbolic.measured` for termination; the rest may take
   any value.
 - *Termination* assumes more than the contract: an order that is not replaced is eventually answered, and stays so. That is

@@ -14,7 +14,7 @@ from rcsc.host.files import csv_text
 from rcsc.host.files.names import shown
 from rcsc.host.files.plain import plain, read
 from rcsc.host.files.read import json_of
-from rcsc.lang.environment import Event
+from rcsc.lang.protocol.environment import Event
 from rcsc.run.system import Kind
 
 Harm = Literal["lost", "late", "doubled", "stale"]

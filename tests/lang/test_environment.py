@@ -9,9 +9,9 @@ from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.properties import properties
 from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
 from rcsc.episodes.episode import FAULTS, MADE
-from rcsc.lang.environment import EARLY, ENVIRONMENT, Event, Kept, refusable
 from rcsc.lang.interpret import Fault, answering, cycle, initial
 from rcsc.lang.model import Kind, Value
+from rcsc.lang.protocol.environment import EARLY, ENVIRONMENT, Event, Kept, refusable
 from rcsc.run.signature import FAULTS as FAULT_NAMES
 from rcsc.symbolic import values
 from tests.support.programs.stages import program_of

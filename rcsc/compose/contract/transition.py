@@ -10,8 +10,6 @@ from functools import partial
 
 from rcsc.compose.contract.environment import Below, Links
 from rcsc.compose.contract.facts import believed, outside_values
-from rcsc.lang.environment import EARLY as EARLY  # noqa: PLC0414  # of a cycle as nodes, too
-from rcsc.lang.environment import refusable, unadmitted
 from rcsc.lang.interpret import chosen_table
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (  # fmt: skip
@@ -34,6 +32,8 @@ from rcsc.lang.model import (  # fmt: skip
     Variable,
     earlier,
 )
+from rcsc.lang.protocol.environment import EARLY as EARLY  # noqa: PLC0414  # of a cycle as nodes, too
+from rcsc.lang.protocol.environment import refusable, unadmitted
 from rcsc.lang.restart import After, Fixed, SameAs, Stands
 from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import ExternResults, State

@@ -20,7 +20,8 @@ Trusted: `written`, for what a program is. `in_step` is not: what it guesses is 
 `in_step`, states times commands.
 
 Modules, in the order the data flows: `roles` (who is whose superior, checked), `written` (the text of what is made), `expand`,
-`in_step` (which state goes with which orders).
+`in_step` (which state goes with which orders). Beside them `environment`: what can happen to a level, and what each event leaves, for
+all rooms that let it happen.
 """
 
 from rcsc.lang.protocol.expand import condition, expanded
