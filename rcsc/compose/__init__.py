@@ -17,8 +17,8 @@ eventually answered, assuming that subordinates answer theirs (`proof.terminatio
 
 What a level assumes of its environment is the contract (`transition`):
 
-- of the superior: an order that it takes under the number that it took last is the same order, as far as the superior
-  numbers it. Nothing else: any command may come at any moment, whether or not the last one was echoed, done, or seen;
+- of the superior: an order that it takes under the number that it took last is the same order, as far as the superior numbers it. Nothing
+  else: any command may come at any moment, whether or not the last one was echoed, done, or seen;
 - of a subordinate, whose report it may see late, twice or never: (1) what is reported under the number of the last order is about the
   command of that order; (2) the number after the last one is not echoed; (3) once the last order is echoed, it stays so until another is
   given. Nothing about the status, about how long anything takes, or about reports on older orders; - of any level of which it says so in a
@@ -49,16 +49,16 @@ Further assumptions:
   even if its first cycles are refused. Such a beginning is proved like the first. To its neighbours it is an order that is superseded, or
   a report that failed. If the buffer is empty, freshness requires more: no earlier order of the level that is not echoed yet may still be
   on its way, because its number is now used again.
-- *Reals* and arithmetic are followed as far as `symbolic.keyed` does, and `symbolic.measured` for termination; the rest may take
-  any value.
-- *Termination* assumes more than the contract: an order that is not replaced is eventually answered, and stays so. That is
-  shown in turn of every subordinate that is a level. No level's inputs are refused for ever; after the last refusal all is as if there
-  had been none, from a state within the invariant. If it is printed, the values in an input stay the same meanwhile, too.
-- *Neighbours outside the levels* (workstation, robot, hand, camera) keep to the same contract by their own means; they are
-  listed, not proved.
+- *Reals* and arithmetic are followed as far as `symbolic.keyed` does, and `symbolic.measured` for termination; the rest may take any
+  value.
+- *Termination* assumes more than the contract: an order that is not replaced is eventually answered, and stays so. That is shown in turn
+  of every subordinate that is a level. No level's inputs are refused for ever; after the last refusal all is as if there had been none,
+  from a state within the invariant. If it is printed, the values in an input stay the same meanwhile, too.
+- *Neighbours outside the levels* (workstation, robot, hand, camera) keep to the same contract by their own means; they are listed, not
+  proved.
 
 Rooms, in the order the data flows: `contract` (a level, its environment, and what it owes in one cycle), `invariant` (PDR, whose clauses
 Z3 confirms), `proof` (of a level, and of the system), `counterexample` (runs that break what is not proved). Trusted are
-`contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here and in `proof.termination`, and
-Z3; not the search.
+`contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here and in `proof.termination`, and Z3;
+not the search.
 """

@@ -11,7 +11,7 @@ from tests.support.programs.systems import LITTLE, solo_system
 from tests.support.proved import prove_system
 
 SAFE_VALUE = """input x : int 0 .. 9
-output o : int 0 .. 3 safe 3
+output o : int 0 .. 3 = 0 safe 3
 assume no_three monitored : o /= 3
 table t assuming no_three {
   | line | o   | x   || o |
