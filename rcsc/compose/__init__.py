@@ -49,16 +49,14 @@ Further assumptions:
   even if its first cycles are refused. Such a beginning is proved like the first. To its neighbours it is an order that is superseded, or
   a report that failed. If the buffer is empty, freshness requires more: no earlier order of the level that is not echoed yet may still be
   on its way, because its number is now used again.
-- *Reals* and arithmetic are followed as far as `symbolic.keyed` does, and `symbolic.measured` for termination; the rest may take any
-  value.
+- *Reals* and arithmetic are followed as far as `symbolic.keyed` does, and `symbolic.measured` for termination; the rest may be anything.
 - *Termination* assumes more than the contract: an order that is not replaced is eventually answered, and stays so. That is shown in turn
   of every subordinate that is a level. No level's inputs are refused for ever; after the last refusal all is as if there had been none,
   from a state within the invariant. If it is printed, the values in an input stay the same meanwhile, too.
-- *Neighbours outside the levels* (workstation, robot, hand, camera) keep to the same contract by their own means; they are listed, not
-  proved.
+- *Neighbours outside the levels* (workstation, robot, hand, camera) keep to the same contract by their own means, which are only listed.
 
 Rooms, in the order the data flows: `contract` (a level, its environment, and what it owes in one cycle), `invariant` (PDR, whose clauses
 Z3 confirms), `proof` (of a level, and of the system), `counterexample` (runs that break what is not proved). Trusted are
-`contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here and in `proof.termination`, and Z3;
+`contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here and in `proof.termination`, Z3;
 not the search.
 """
