@@ -645,6 +645,37 @@ def test_a_reload_that_changes_nothing_says_so_and_one_that_changes_no_meaning_t
     do(commands, "at = end", "at.next = end", "step", "expect walker.line = home")
 
 
+LOOKING_BACK = """input a : bool
+input b : bool
+state s : bool
+table t {
+  | line | when              || s     |
+  | long | (a or b) for 80 [ms] || true  |
+  | else | DEFAULT           ||       |
+}
+level back { period 40 [ms] table t }
+"""
+
+
+def test_a_history_is_carried_on_only_where_it_is_of_the_same_thing(tmp_path: Path) -> None:
+    """`held_a` counts what the text first asks of `a`: another condition begins anew, and a time alone changes nothing."""
+    source = tmp_path / "back.rcs"
+    source.write_text(LOOKING_BACK, encoding="utf-8")
+    buffers = {"outside.a": "back.a", "outside.b": "back.b"}
+    (tmp_path / "system.toml").write_text(system(["back"], buffers), encoding="utf-8")
+    compile_beside(source)
+    commands = alone(tmp_path / "system.toml", "python")
+    do(commands, "b = true", "a = false", "step", "expect held_a = 1")
+    source.write_text(LOOKING_BACK.replace("80 [ms]", "120 [ms]"), encoding="utf-8")
+    do(commands, "reload anyway", "expect held_a = 1", "step 2", "expect held_a = 3", "expect s = false")
+    source.write_text(LOOKING_BACK.replace("80 [ms]", "40 [ms]"), encoding="utf-8")
+    do(commands, "reload anyway", "expect held_a = 1", "undo")
+    source.write_text(LOOKING_BACK.replace("(a or b)", "(a or not b)"), encoding="utf-8")
+    said = do(commands, "reload anyway")
+    assert "new: held_a; gone: held_a" in said[-1]
+    do(commands, "expect held_a = 0", "b = false", "step", "expect s = false", "step 2", "expect s = true")
+
+
 def test_a_change_that_the_present_state_does_not_meet_is_taken_with_what_it_changes(walker: Path) -> None:
     commands = walking(walker)
     write(walker, ON)
