@@ -202,11 +202,16 @@ def table_report(verdict: TableVerdict, program: Program) -> TableReport:
 
 
 def _verdict(verdict: TableVerdict) -> Verdict:
-    if any(isinstance(finding, Undecided | SolversDisagree) for finding in verdict.findings):
+    """What a table is: refuted where anything is wrong with it, though something else was left open."""
+    if any(isinstance(finding, SolversDisagree) for finding in verdict.findings):
         return Verdict.UNDECIDED
     falls = not must_cover(verdict.table)
     wrong = any(
-        not (isinstance(finding, Gap) and falls) and not (isinstance(finding, DeadLine) and finding.assuming)
+        not (isinstance(finding, Gap) and falls)
+        and not (isinstance(finding, DeadLine) and finding.assuming)
+        and not isinstance(finding, Undecided)
         for finding in verdict.findings
     )
-    return Verdict.REFUTED if wrong else Verdict.PROVED
+    if wrong:
+        return Verdict.REFUTED
+    return Verdict.UNDECIDED if verdict.undecided else Verdict.PROVED

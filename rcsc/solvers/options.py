@@ -8,6 +8,10 @@ STEPS = 20_000_000
 TOGETHER = 20
 """All questions about a table, or about a procedure, take at most as many steps as so many of them may."""
 
+WRONG_STEPS = 1_000_000
+"""Steps of Z3 for what is said of a table beside that something is wrong with it, each kind of it for all findings together: the least
+inputs and what else is wrong, whether lines do the same, whether Z3 agrees, what repairs do. Half a second of doubles."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:

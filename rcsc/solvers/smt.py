@@ -92,9 +92,11 @@ class Budget:
 
     Attributes:
         left: Steps; with none left nothing more is asked, and every answer is `UNKNOWN`.
+        of_all: Whether it bounds what is done outside Z3, too, where that is charged.
     """
 
     left: int
+    of_all: bool = False
 
     @property
     def spent(self) -> bool:
@@ -102,7 +104,7 @@ class Budget:
         return self.left <= 0
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True, eq=False, kw_only=True)
 class _Until(Budget):
     """No steps, but something that happens, in place of a budget: for who shows what is known so far, or gives up."""
 
@@ -138,7 +140,7 @@ def until(over: Callable[[], bool], *, breaks_off: bool = False) -> Iterator[Non
         over: Whether it is.
         breaks_off: Whether the question under way is broken off, too; `over` is then asked in another thread as well.
     """
-    ending, left = _Until(sys.maxsize, over), threading.Event()
+    ending, left = _Until(sys.maxsize, over=over), threading.Event()
     watcher = (
         threading.Thread(target=_watch, args=(over, left, threading.get_ident()), daemon=True)
         if breaks_off
@@ -178,11 +180,26 @@ def _absorb() -> None:
 def together(steps: int) -> Iterator[Budget]:
     """Inside, all questions of all solvers take at most so many steps."""
     budget = Budget(steps)
+    with within(budget):
+        yield budget
+
+
+@contextmanager
+def within(budget: Budget) -> Iterator[None]:
+    """Inside, all questions take at most what a budget has left: again for each part of a work that has one in all."""
     _own.budgets.append(budget)
     try:
-        yield budget
+        yield
     finally:
         _own.budgets.remove(budget)
+
+
+def charge(steps: int) -> bool:
+    """Take what a piece of work outside Z3 costs, in its steps, from the budgets that bound both; return whether one is spent."""
+    charged = [budget for budget in _own.budgets if budget.of_all]
+    for budget in charged:
+        budget.left -= steps
+    return any(budget.spent for budget in charged)
 
 
 def spent() -> bool:

@@ -5,6 +5,7 @@ that is defined; that it is defined is proved apart (`obligations`).
 """
 
 from collections.abc import Iterable
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -152,12 +153,14 @@ def least_where(
         return None
 
 
-def least_witness(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[str, Value] | None:
+def least_witness(
+    solver: Solver, variables: Iterable[Variable], frame: Frame, spare: smt.Budget | None = None
+) -> dict[str, Value] | None:
     """The least values, in declared order, for which what is asserted holds; None where none is found.
 
     Any model of Z3's may change with its version; the least one depends on the question alone. Where the
     solver gives up on the way, the values found last stand: a witness still, but not the least. The solver is
-    left with the witness asserted.
+    left with the witness asserted. `spare`: what may be spent once some is known.
     """
     shown = list(variables)
     if solver.check() is not Answer.SATISFIABLE:
@@ -173,7 +176,8 @@ def least_witness(solver: Solver, variables: Iterable[Variable], frame: Frame) -
 
     for variable in shown:
         term, kind = frame.leaves[variable.name], variable.type
-        key = lowest(key_bounds(kind)[0], last[variable.name], partial(up_to, variable))
+        with nullcontext() if spare is None else smt.within(spare):
+            key = lowest(key_bounds(kind)[0], last[variable.name], partial(up_to, variable))
         solver.add(smt.equal(term, smt.literal(kind, value_of_key(kind, key)), kind))
     return {variable.name: value_of_key(variable.type, last[variable.name]) for variable in shown}
 

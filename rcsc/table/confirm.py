@@ -10,7 +10,7 @@ from enum import Enum, auto
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Expr, Program, Snapshot, Table, Variable
 from rcsc.solvers import smt
-from rcsc.solvers.options import Options
+from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic.encode import declared, encode, least_witness
 from rcsc.table.certificate import must_cover
@@ -55,11 +55,14 @@ class TableSolver:
         """State that no line matches."""
         return smt.negation(smt.any_of([self.line(at) for at in range(len(self.table.lines))]))
 
-    def witness(self, *terms: Term) -> Snapshot | None:
-        """The least input for which the terms hold; None where the solver gives up."""
+    def witness(self, *terms: Term, spare: smt.Budget | None = None) -> Snapshot | None:
+        """The least input for which the terms hold; None where the solver gives up.
+
+        `spare`, where there is one, is what may be spent to find the least once some input is known.
+        """
         self.solver.push()
         self.solver.add(*terms)
-        witness = least_witness(self.solver, shown(self.program, self.table), self.frame)
+        witness = least_witness(self.solver, shown(self.program, self.table), self.frame, spare)
         self.solver.pop()
         return witness
 
@@ -102,7 +105,8 @@ def confirm(
     ):  # before anything is put into its words, which takes longer than to ask
         return Agreement.UNKNOWN
     if options.solver == "auto":
-        options = replace(options, steps=min(options.steps, _STEPS))
+        steps = WRONG_STEPS // 3 if any(isinstance(each, Overlap) for each in findings) else _STEPS
+        options = replace(options, steps=min(options.steps, steps))
     asked = TableSolver(program, table, options)
     overlap = _some_overlap(asked)
     gaps = [finding for finding in findings if isinstance(finding, Gap)]

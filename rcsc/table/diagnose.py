@@ -30,7 +30,7 @@ from rcsc.lang.model import (
     spell,
 )
 from rcsc.solvers import smt
-from rcsc.solvers.options import Options
+from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.symbolic.alike import alike
 from rcsc.table import cells as words
 from rcsc.table.certificate import must_cover
@@ -69,10 +69,11 @@ def diagnostics(
 ) -> list[Diagnostic]:
     """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
     table = verdict.table
-    with smt.together(options.together):
+    few = min(WRONG_STEPS, options.together)
+    with smt.together(few):
         verdict = replace(verdict, findings=tuple(likely(program, table, verdict.findings, options)))
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
-    with smt.together(options.together):
+    with smt.together(few):
         shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
         effects = [_effects(program, table, each, options) for each in overlaps[MOST_PAIRS:MOST_COMPARED]]
     shown = grouped(table, overlaps, shown)

@@ -26,7 +26,7 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.written.changes import with_proposal
 from rcsc.solvers import smt
-from rcsc.solvers.options import Options
+from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.table.certificate import must_cover
 from rcsc.table.program import Nothing, ProgramVerdict, prove_program
 from rcsc.table.regions import partition
@@ -73,7 +73,7 @@ def mended(
         smt.leave_open("whether a repair mends")
         return verdict.findings
     trials = _Trials(verdict, root, loaded, replace(options, brief=True, bare=True, jobs=1), known)
-    with smt.together(options.together):
+    with smt.together(min(WRONG_STEPS, options.together)):
         return tuple(_tried(finding, trials) for finding in verdict.findings)
 
 

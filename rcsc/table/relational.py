@@ -7,6 +7,7 @@ one solver that is made when first needed; *unknown* is a finding, never a proof
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -28,7 +29,7 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.questions import located, question
 from rcsc.solvers import smt
-from rcsc.solvers.options import Options
+from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.solvers.search import furthest
 from rcsc.solvers.smt import Answer, Term
 from rcsc.symbolic import trial
@@ -61,8 +62,8 @@ _MOST_GAPS = 64
 """Regions of a gap among which linear arithmetic looks for the least input."""
 _MOST_LINES_TRIED = 200
 """Lines of a table above which no inputs are tried by the interpreter."""
-_STEPS_OF_LEAST = 2_000_000
-"""Budget of a search for the least input, where some is known."""
+_NODES_OF_A_LINE = 500
+"""Nodes in which an input is looked for that a line matches, before the solver is asked."""
 _MOST_REPROVED = 2_000
 """Nodes of a tree above which it is not tried whether an assumption can be spared."""
 
@@ -144,6 +145,10 @@ class _Decision:
         self.assumed = [whole(assumption) for assumption in self.assumptions]
         self._asked: TableSolver | None = None
         self._tried: tuple[Snapshot, ...] | None = None
+        self._matching: list[frozenset[int]] | None = None
+        self.spare = smt.Budget(WRONG_STEPS, of_all=True)
+        self.wrong = False
+        self.models: list[Snapshot] = []
 
     @property
     def tried(self) -> tuple[Snapshot, ...]:
@@ -170,6 +175,13 @@ class _Decision:
             return False
         return True
 
+    def tried_by(self, *lines: int) -> list[Snapshot]:
+        """The sample inputs that all these lines match; without one those that none matches."""
+        if self._matching is None:
+            self._matching = [frozenset(self.matching(snapshot)) for snapshot in self.tried]
+        pairs = zip(self.tried, self._matching, strict=True)
+        return [snapshot for snapshot, found in pairs if (found.issuperset(lines) if lines else not found)]
+
     @property
     def asked(self) -> TableSolver:
         """Z3, made when first asked."""
@@ -188,7 +200,8 @@ class _Decision:
             kept, search = self.spared(search)
         found = [*self.overlaps(search), *self.gap(search)]
         dead = self.dead(search)
-        findings: tuple[TableFinding, ...] = (*(each.grown() for each in found), *dead)
+        with smt.within(self.spare):
+            findings: tuple[TableFinding, ...] = (*(each.grown() for each in found), *dead)
         if search.undecided:
             findings = (*findings, Undecided(f"{search.undecided} regions of the input space"))
         names = tuple(self.table.assumptions[at] for at in kept)
@@ -230,13 +243,13 @@ class _Decision:
         return [each.finding for each in self.gap(Search())]
 
     def search(
-        self, kept: Sequence[int], budget: int = 60_000, *, alone: bool = False, covering: bool = False
+        self, kept: Sequence[int], budget: int | None = None, *, alone: bool = False, covering: bool = False
     ) -> Search:
         """Search under some of the assumptions.
 
         Args:
             kept: Their positions.
-            budget: How many nodes at most.
+            budget: How many nodes at most; by the number of lines, where none is given.
             alone: Without the solver, to the first finding.
             covering: Without the solver, as if there were no DEFAULT: to find what it takes.
         """
@@ -274,10 +287,13 @@ class _Decision:
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
         for snapshot in self.tried:
             if all(fold(condition, snapshot) for condition in conditions):
+                self.wrong = True
                 return snapshot
         z3 = self.asked
-        answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
+        with smt.within(self.spare) if self.wrong else nullcontext():
+            answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
         if answer is Answer.SATISFIABLE:
+            self.wrong = True
             return self.model(z3)
         return NoWitness.NONE if answer is Answer.UNSATISFIABLE else NoWitness.UNKNOWN
 
@@ -308,15 +324,17 @@ class _Decision:
     def overlaps(self, search: Search) -> list[_Found]:
         """Every overlapping pair with its least witness."""
         pairs = set(search.overlaps)
+        self.models += search.witnesses
         for seen in search.witnesses:
             pairs.update(combinations(self.matching(seen), 2))
-        for asked in search.doubtful:
-            pairs.update(self.others(asked, pairs))
+        with smt.within(self.spare):
+            for asked in search.doubtful:
+                pairs.update(self.others(asked, pairs))
         found: list[_Found] = []
         if self.options.brief and len(pairs) > 1:
             smt.leave_open("where else two lines meet")
         for first, second in sorted(pairs):
-            grown = len(found) < (1 if self.options.brief else _MOST_GROWN) and not self.options.bare
+            grown = len(found) < (1 if self.options.brief else _MOST_GROWN)
             found.append(self.overlap(first, second, search.overlaps.get((first, second)), grown=grown))
         return found
 
@@ -332,7 +350,8 @@ class _Decision:
         while left and len(found) < _MOST_DOUBTFUL and not smt.spent():
             if z3.holds(*region, smt.any_of(list(left.values()))) is not Answer.SATISFIABLE:
                 break
-            new = left.keys() & set(combinations(self.matching(self.model(z3)), 2))
+            self.models.append(self.model(z3))
+            new = left.keys() & set(combinations(self.matching(self.models[-1]), 2))
             if not new:
                 break
             found |= new
@@ -363,14 +382,20 @@ class _Decision:
         if known is not None and (self.options.bare or smt.gives_up("the least input")):
             return _Found(Overlap(first, second, self.snapshot(known)))
         both = [self.line(first), self.line(second)]
-        point = least(self.universe, [*both, *self.assumed], self.columns)
+        with smt.within(self.spare):
+            point = least(self.universe, [*both, *self.assumed], self.columns)
         if isinstance(point, NoWitness):
-            seen = [snapshot for snapshot in self.tried if {first, second} <= set(self.matching(snapshot))]
+            models = [each for each in self.models if {first, second} <= set(self.matching(each))]
+            seen = [
+                *self.tried_by(first, second),
+                *models,
+                *([] if known is None else [self.snapshot(known)]),
+            ]
             witness = self.witness(seen, lambda z3: (z3.line(first), z3.line(second)))
             pair = f"lines `{self.table.lines[first].name}` and `{self.table.lines[second].name}`"
             return _Found(Undecided(pair) if witness is None else Overlap(first, second, witness))
         outside = [[some(negated(self.universe, line) for line in both)]]
-        grow = partial(self.around, point, outside) if grown else None
+        grow = partial(self.around, point, outside) if grown and not self.options.bare else None
         return _Found(Overlap(first, second, self.snapshot(point)), grow)
 
     def gap(self, search: Search) -> list[_Found]:
@@ -383,16 +408,17 @@ class _Decision:
         seen = [snapshot for snapshot in search.witnesses if not self.matching(snapshot)]
         covered = self.covered(search)
         if search.gaps and covered and not seen and len(search.gaps) <= _MOST_GAPS:
-            points = [
-                least(self.universe, inside(self.universe, part), self.columns) for part, _ in search.gaps
-            ]
+            with smt.within(self.spare):
+                points = [
+                    least(self.universe, inside(self.universe, part), self.columns) for part, _ in search.gaps
+                ]
             settled = [point for point in points if not isinstance(point, NoWitness)]
             if len(settled) == len(points):
                 point = min(settled, key=lambda candidate: [candidate[column] for column in self.columns])
                 lines = [] if many else [[whole(line)] for line in self.clauses]
                 grow = None if many or self.options.bare else partial(self.around, point, lines)
                 return [_Found(Gap((self.snapshot(point),), (None,)), grow)]
-        seen += [snapshot for snapshot in self.tried if not self.matching(snapshot)]
+        seen += self.tried_by()
         if covered and not search.gaps and not seen:
             return []
         seen += [self.snapshot(point) for _, point in search.gaps]
@@ -421,13 +447,13 @@ class _Decision:
     def meeting(self, at: int, near: Point) -> Point | NoWitness:
         """An input that a line matches under the assumptions, looked for near another."""
         if self.assumed:
-            return find(self.universe, [self.line(at), *self.assumed])
-        return meeting(self.universe, self.clauses[at], near)
+            return find(self.universe, [self.line(at), *self.assumed], _NODES_OF_A_LINE)
+        return meeting(self.universe, self.clauses[at], near, _NODES_OF_A_LINE)
 
     def dead_line(self, at: int, point: NoWitness) -> TableFinding | None:
         """What is wrong with a line of which no input is known."""
         answer = Answer.UNSATISFIABLE
-        if point is NoWitness.UNKNOWN and any(at in self.matching(snapshot) for snapshot in self.tried):
+        if point is NoWitness.UNKNOWN and self.tried_by(at):
             answer = Answer.SATISFIABLE
         elif point is NoWitness.UNKNOWN:
             answer = self.asked.holds(self.asked.line(at))
@@ -463,11 +489,10 @@ class _Decision:
     def _least(
         self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]
     ) -> Snapshot | None:
-        z3 = self.asked
-        if seen:
-            few = replace(self.options, steps=min(self.options.steps, _STEPS_OF_LEAST))
-            z3 = TableSolver(self.program, self.table, few)
-        return z3.witness(*terms(z3))
+        if not seen:
+            return self.asked.witness(*terms(self.asked), spare=self.spare)
+        with smt.within(self.spare):
+            return None if smt.spent() else self.asked.witness(*terms(self.asked))
 
     # --- witnesses ---------------------------------------------------------------------
 

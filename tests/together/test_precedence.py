@@ -21,7 +21,10 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import MARKS
-from tests.support.programs.stages import codes, program_of, refused, reported, verdict_of
+from rcsc.table import relational
+from rcsc.table.regions.region import NoWitness, Question
+from rcsc.table.regions.splitting import FEWEST_NODES, MOST_PAST, NODES_OF_A_LINE
+from tests.support.programs.stages import BOXES, codes, program_of, refused, reported, verdict_of
 from tests.support.programs.texts import edited
 
 HEAD = """
@@ -456,3 +459,25 @@ table t {{
         for a, b, x, y in product(range(4), range(4), (0.0, 1.0, 4.0), (0.0, 1.0, 4.0)):
             now: dict[str, Value] = {"a": a, "b": b, "x": x, "y": y, "o": 0}
             assert matching_lines(other.tables[0], now) == matching_lines(program.tables[0], now), (cell, now)
+
+
+def test_a_long_chain_over_masks_comes_to_an_end_within_its_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Past its nodes the tree asks the solver about a few regions, and leaves the rest undecided: each node and question costs."""
+    random, rows = Random(2), list[str]()  # noqa: S311 - a draw that repeats
+    for at in range(15):
+        mask = "".join(random.choice("xxxxxxxx01") for _ in range(32))
+        rows.append(f"| n{at}{f' above n{at + 1}' if at < 14 else ''} | 0b{mask} || {at} |")
+    text = "input w : int 0 .. 4294967295\noutput o : int 0 .. 99\ntable t {\n| line | w || o |\n"
+    program = program_of(f"{text}{chr(10).join(rows)}\n| r | DEFAULT || 99 |\n}}\n")
+    asked = list[Question]()
+
+    def refuted(question: Question) -> NoWitness:
+        asked.append(question)
+        return NoWitness.NONE
+
+    decision = relational._Decision(program, program.tables[0], BOXES)
+    monkeypatch.setattr(decision, "oracle", refuted)
+    search = decision.search(())
+    nodes = FEWEST_NODES + 15 * NODES_OF_A_LINE
+    assert nodes < len(search.nodes) <= nodes + 200
+    assert 0 < len(asked) <= MOST_PAST

@@ -45,6 +45,13 @@ from rcsc.table.regions.region import (
 
 _ROUNDS = 200
 """Splits in a row, made to round one vertex to integers, before a solver is asked."""
+FEWEST_NODES, NODES_OF_A_LINE, MOST_NODES = 2_000, 100, 60_000
+"""Nodes of a tree, by lines: what a text may cost grows with the text. The shipped tables take 400 at most; a chain of `above` over
+masks can take any number."""
+STEPS_OF_A_NODE = 500
+"""What a node costs, in steps of Z3: both take some tenths of a millisecond."""
+MOST_PAST = 64
+"""Regions past that which the solver is asked about."""
 _PATIENCE = 3
 """Regions left undecided by the solver, after which it is asked no more: each may cost its full time."""
 
@@ -77,7 +84,7 @@ class Tree:
         oracle: Oracle,
         *,
         default: bool,
-        budget: int = 60_000,
+        budget: int | None = None,
         first_only: bool = False,
     ) -> None:
         """Prepare the root.
@@ -88,15 +95,17 @@ class Tree:
             assumptions: The assumptions that may be used, in order.
             oracle: Asked about regions with terms that are not linear, and past the budget.
             default: Whether inputs that no line matches are allowed (a reachable DEFAULT).
-            budget: How many nodes at most before the rest is left to the oracle.
+            budget: How many nodes at most before the rest is left to the oracle; by the number of lines, where none is given.
             first_only: Stop at the first finding.
         """
         self.universe = universe
         self.default = default
         self.oracle = oracle
-        self.budget = budget
+        by_lines = min(MOST_NODES, FEWEST_NODES + NODES_OF_A_LINE * len(lines))
+        self.budget = by_lines if budget is None else budget
         self.first_only = first_only
         self.search = Search()
+        self.past = 0
         self._singles = frozenset(universe.single)
         self._lines = lines
         possible = [(i, c) for i, c in enumerate(lines) if not c.impossible]
@@ -117,7 +126,7 @@ class Tree:
         """Decide every region, in preorder; what was found stands where the rest is given up."""
         stack = [self.root]
         while stack:
-            if smt.gives_up("how the lines share the inputs"):
+            if smt.gives_up("how the lines share the inputs") or smt.charge(STEPS_OF_A_NODE):
                 self.search.undecided += 1
                 break
             region = stack.pop()
@@ -141,7 +150,7 @@ class Tree:
         if many == 1 and len(survey.holding) == 1:
             return Only(survey.holding[0]), []
         if len(self.search.nodes) > self.budget:
-            return self._ask(region), []
+            return self._past(region), []
         fresh = [pair for pair in combinations(survey.holding, 2) if pair not in self.search.overlaps]
         if fresh or not many:
             return self._probe(region, survey, fresh)
@@ -178,6 +187,14 @@ class Tree:
             self.search.gaps.append((region.bounds, point))
         settled = region.many == len(survey.holding)
         return (Open(), []) if settled else self._narrow(region, survey)
+
+    def _past(self, region: Region) -> Node:
+        """Leave a region past the budget to the solver, as long as these are few: the rest is undecided."""
+        self.past += 1
+        if self.past <= MOST_PAST:
+            return self._ask(region)
+        self.search.undecided += 1
+        return Open()
 
     def _ask(self, region: Region) -> Node:
         """Leave the region to the solver."""
