@@ -87,6 +87,19 @@ def test_every_field_of_an_order_is_numbered_but_a_declared_stream(tmp_path: Pat
             edit_file(dock.parent / "words.rcs", ("    target_mm : ", "    stream target_mm : "))
 
 
+@pytest.mark.parametrize(("restart", "left"), [(" restart bad", []), ("", [Sort.KEPT])])
+def test_an_order_that_stands_at_a_restart_has_failed(restart: str, left: list[Sort], tmp_path: Path) -> None:
+    """A level that writes the protocol by hand owes it, too: campaigns watch it as `failed stays failed`."""
+    shutil.copytree(
+        DOCK.parent / "dock", tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache")
+    )
+    if not restart:
+        edit_file(tmp_path / "drive.rcs", ("stage restart bad", f"stage{restart}"))
+    proof = prove_level(transition_systems(tmp_path / "system.toml")["drive"], Effort(walks=6, cycles=40))
+    assert not proof.open
+    assert [one.sort for one in proof.unstated if one.applies] == left
+
+
 FORGETS = """
 table goto {
   | line  | now    | bumper | travelled_mm            || procedures          | speed | status_out |

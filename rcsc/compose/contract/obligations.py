@@ -49,6 +49,7 @@ class Sort(StrEnum):
     PROPERTY = "property"
     ENDS = "the command ends"  # not a condition on one cycle: `termination`, `lasso`
     PROTOCOL = "orders and reports"  # all of its sorts at once
+    KEPT = "failed stays failed"  # likewise; levels that declare whom they serve state it as a property
     SAFE = SAFE[0]
 
 

@@ -293,6 +293,7 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool
             | Sort.DEFERRED
             | Sort.OWED
             | Sort.ENDS
+            | Sort.KEPT
             | Sort.PROTOCOL
         ):
             return _broken_between(ts, obligation, step)

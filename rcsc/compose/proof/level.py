@@ -32,6 +32,9 @@ from rcsc.symbolic.values import TRUE
 
 TOGETHER = 50
 """All questions about a level together may take the steps of so many; later ones are not decided."""
+ANEW = (
+    "an order that stands when the level starts anew has failed, and the first cycle may report it otherwise"
+)
 TRIES = (64, 64, 16, 16, 4, 1)
 """What part of its steps a question of the confirmation gets, try after try: what one search gives up another often refutes at once."""
 
@@ -188,7 +191,7 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
     wanted = obligations(ts, cycle)
     seen: Context | None = None
     ends: tuple[Ending, ...] = ()
-    stands = False
+    stands, fails = False, True
     try:
         with smt.together(TOGETHER * effort.limits.steps):
             invariant = search(ts, firsts, cycle, wanted, effort, known.clauses)
@@ -213,7 +216,7 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
             verdicts = list(_verdicts(ts, asked, invariant, wanted))
             if looks:
                 seen, ends = context(ts, asked, invariant.clauses, invariant.ran), tuple(flow.endings())
-                stands = flow.report_stands()
+                stands, fails = flow.report_stands(), flow.failed_stays()
             _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
         invariant, seen, ends, stands = FoundInvariant(), None, (), False
@@ -228,7 +231,11 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
         time.perf_counter() - begun,
         context=seen,
         endings=ends,
-        unstated=(*unstated(ts), *(Unstated(Sort.ENDS, "", why) for why in no_answers(ts))),
+        unstated=(
+            *unstated(ts),
+            *([] if fails else [Unstated(Sort.KEPT, "", ANEW)]),
+            *(Unstated(Sort.ENDS, "", why) for why in no_answers(ts)),
+        ),
         stands=stands,
     )
 
@@ -408,7 +415,7 @@ def _looked_again(ts: TransitionSystem, proof: LevelProof, asked: Confirmation) 
     for ending in flow.endings():
         ends.append(ending)
         scripts |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
-    stands = flow.report_stands()
+    stands, _ = flow.report_stands(), flow.failed_stays()
     scripts |= {f"stands {number}": text for number, text in enumerate(_refuted(asked), 1)}
     if (seen, tuple(ends), stands) != (proof.context, proof.endings, proof.stands):
         scripts["lines and endings as before"] = "(set-logic ALL)\n(check-sat)\n"
