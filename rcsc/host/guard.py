@@ -12,8 +12,10 @@ that the user has open; these rules keep them out:
   user of the machine reads, and no referrer tells it.
 """
 
+import asyncio
 import hmac
-from collections.abc import Iterator, Mapping
+import logging
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -34,6 +36,47 @@ _DOOR = """<!doctype html>
 <meta http-equiv="refresh" content="0; url={address}">
 <title>rcsc</title><a href="{address}">to the page</a>
 """
+
+
+MOST_CONNECTIONS = 64
+"""At once, whoever makes them: a page and its parts need some ten."""
+
+
+class _Entrance(asyncio.Protocol):
+    """Has a connection answered while there are not too many; else says so, and ends it."""
+
+    def __init__(self, make: Callable[[], asyncio.Protocol], now: Callable[[], int]) -> None:
+        self._make, self._now = make, now
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        if self._now() < MOST_CONNECTIONS:
+            protocol = self._make()
+            transport.set_protocol(protocol)
+            protocol.connection_made(transport)
+        else:
+            transport.write(
+                b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+            )
+            transport.close()
+
+
+def bounded(make: Callable[[], asyncio.Protocol], now: Callable[[], int]) -> Callable[[], asyncio.Protocol]:
+    """Return what answers a connection while there are not too many, and refuses it else.
+
+    Args:
+        make: Answers one.
+        now: How many there are; asked when one is there, for several are accepted before the first is.
+    """
+    return lambda: _Entrance(make, now)
+
+
+def silent(name: str) -> logging.Logger:
+    """Return a log that nobody sees: what anybody on this machine sends that is no request is nothing to the user."""
+    log = logging.getLogger(name)
+    log.propagate = False
+    log.addHandler(logging.NullHandler())
+    return log
 
 
 @contextmanager

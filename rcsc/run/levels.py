@@ -46,6 +46,15 @@ class Fill:
     form: str
 
 
+def misfit(form: str, values: Values) -> str:
+    """Say why these are no values of leaves of a form; empty where they are. Whoever gives them may give anything."""
+    try:
+        struct.pack(form, *values)
+    except (struct.error, OverflowError, TypeError, ValueError) as error:
+        return str(error)
+    return ""
+
+
 class StateTableError(CodedError):
     """A level met a fault that the proofs exclude, or was refused an input or a state; says which, where and when."""
 
@@ -123,10 +132,8 @@ class RunningLevel:
                 self._put("the answer of the database", fill.form, fill.first, fill.query(*keys))
 
     def _put(self, what: str, form: str, first: int, values: Values) -> None:
-        try:
-            struct.pack(form, *values)
-        except struct.error as error:
-            raise StateTableError(f"level `{self.name}` cannot take {what}: {error}") from error
+        if wrong := misfit(form, values):
+            raise StateTableError(f"level `{self.name}` cannot take {what}: {wrong}")
         self.executor.put(first, values)
 
     def run(self) -> int:
@@ -253,7 +260,10 @@ def _fill(spec: LevelSpec, sign: Signature, feed: Feed, queries: Mapping[str, Qu
     run = _positions(sign, feed.into, where)
     keys = tuple(_positions(sign, key, where).start for key in feed.keys)
     query = queries[feed.query]
-    answer = query(*(0 for _ in keys))
-    if len(answer) != len(run):
-        raise BadDescription(f"{where}: {len(answer)} values for {len(run)} leaves")
+    answer: object = query(*(0 for _ in keys))
+    if not isinstance(answer, tuple | list) or len(answer) != len(run):
+        given = (
+            f"{len(answer)} values" if isinstance(answer, tuple | list) else f"a `{type(answer).__name__}`"
+        )
+        raise BadDescription(f"{where}: {given} for {len(run)} leaves")
     return Fill(query, run.start, keys, sign.form(run))

@@ -4,7 +4,6 @@ In each tick every level that is due takes the buffers as the tick before left t
 level sees does not depend on the order of the levels, and is the same with every executor.
 """
 
-import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
@@ -14,7 +13,7 @@ from rcsc.run.adopt import Restarted, restart
 from rcsc.run.buffers import Buffers, CommonMemory
 from rcsc.run.description import BadDescription, Description
 from rcsc.run.executors import CExecutor, Executor, PythonExecutor, build
-from rcsc.run.levels import Query, RunningLevel, running_level
+from rcsc.run.levels import Query, RunningLevel, misfit, running_level
 from rcsc.run.levels import StateTableError as StateTableError  # noqa: PLC0414  # callers look for it here
 from rcsc.run.signature import Signature, Values, generated_files, signature
 from rcsc.run.unproved import refuse_unproved
@@ -77,6 +76,10 @@ class System:
         for level in due:
             level.give(self.buffers)
         for published in given:
+            if not isinstance(published, Mapping):
+                raise StateTableError(
+                    f"what stands outside published a `{type(published).__name__}`, and no buffers"
+                )
             for name, values in published.items():
                 self._publish(name, values)
         self.tick += 1
@@ -88,11 +91,8 @@ class System:
 
     def _publish(self, name: str, values: Values) -> None:
         """Raises: StateTableError: What stands outside published what the buffer cannot hold."""
-        try:
-            if name in self.forms:
-                struct.pack(self.forms[name], *values)
-        except struct.error as error:
-            raise StateTableError(f"buffer `{name}` cannot hold what was published: {error}") from error
+        if name in self.forms and (wrong := misfit(self.forms[name], values)):
+            raise StateTableError(f"buffer `{name}` cannot hold what was published: {wrong}")
         self.buffers.publish(name, values)
 
     def restart(self, name: str, checkpoint: Values | None = None, written: Buffers | None = None) -> None:

@@ -6,7 +6,6 @@ the folder `page` and nothing else, and talks over one socket: questions and ans
 
 import asyncio
 import contextlib
-import logging
 import os
 import secrets
 import signal
@@ -22,7 +21,7 @@ from aiohttp import WSMsgType, web
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files.read import MIB, Malformed, json_of
-from rcsc.host.guard import HEADERS, policy, refusal
+from rcsc.host.guard import HEADERS, policy, refusal, silent
 from rcsc.studio.hub import DEEPEST_MESSAGE, Client, Concern, Hub
 
 ADDRESS = "127.0.0.1"
@@ -119,7 +118,9 @@ class Server:
         app.on_response_prepare.append(self._headed)
         app.router.add_get("/{token}/socket", self._socket)
         app.router.add_get("/{token}/{name:.*}", self._file)
-        runner = web.AppRunner(app, access_log=None, logger=_silent(), shutdown_timeout=GOODBYE_S)
+        runner = web.AppRunner(
+            app, access_log=None, logger=silent("rcsc.studio.server"), shutdown_timeout=GOODBYE_S
+        )
         await runner.setup()
         try:
             await self._listen_on(web.TCPSite(runner, ADDRESS, self._wanted))
@@ -203,14 +204,6 @@ class Server:
                 self.hub.ask(client, json_of(said.data, DEEPEST_MESSAGE, plain=False))
             except Malformed:
                 return
-
-
-def _silent() -> logging.Logger:
-    """What anybody on this machine sends that is no request is nothing to the user, who would have it printed."""
-    silent = logging.getLogger("rcsc.studio.server")
-    silent.propagate = False
-    silent.addHandler(logging.NullHandler())
-    return silent
 
 
 def _end_in_order(loop: asyncio.AbstractEventLoop, over: asyncio.Event) -> None:

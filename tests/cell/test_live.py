@@ -1,8 +1,10 @@
 """The live page: what a run publishes is seen in a browser, and no other page, name or machine gets at it."""
 
 import asyncio
+import contextlib
 import http.client
 import json
+import logging
 import socket
 import threading
 from collections.abc import Iterator, Sequence
@@ -18,12 +20,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.host.guard import refusal
+from rcsc.host.guard import MOST_CONNECTIONS, refusal
 from rcsc_cell.cell.arm import plate
 from rcsc_cell.database.pose import nine
 from rcsc_cell.live import Live
 from rcsc_cell.live.board import MOST_MOMENTS, Board, Display, History, display_names, problems
-from rcsc_cell.live.server import MOST_BYTES, MOST_WATCHED, watched
+from rcsc_cell.live.server import MOST_BYTES, MOST_PAGES, MOST_WATCHED, watched
 from rcsc_cell.pictures.stick import stick
 from tests.support.browser import Browser
 
@@ -236,6 +238,57 @@ def test_it_listens_on_the_loopback_interface_alone(live: Live) -> None:
             with socket.socket() as knock:
                 knock.settimeout(10)
                 assert knock.connect_ex((other, live.address[1])) != 0
+
+
+JUNK = (
+    b"\x16\x03\x01\x02\x00", b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"\0" * 100, b"GET /" + b"a" * 20_000,
+    b"GET / HTTP/1.1\r\nHost : x\r\n\r\n", b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\nContent-Length: 3\r\n\r\nzz",
+)  # fmt: skip
+
+
+def answered(live: Live, said: bytes) -> bytes:
+    with socket.create_connection(live.address, timeout=60) as one:
+        one.sendall(said)
+        return one.recv(65_536)
+
+
+def test_junk_is_answered_plainly_and_printed_nowhere(
+    live: Live, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    for said in JUNK:
+        assert answered(live, said).split()[1] == b"400"
+    assert capfd.readouterr().err == ""
+    assert {record.name for record in caplog.records} <= {
+        "rcsc_cell.live"
+    }  # pytest sees what is told to nobody
+    assert not logging.getLogger("rcsc_cell.live").propagate
+
+
+def test_connections_are_bounded(live: Live) -> None:
+    """Whoever makes them; those that go make room."""
+    with contextlib.ExitStack() as held:
+        for _ in range(MOST_CONNECTIONS):
+            held.enter_context(socket.create_connection(live.address, timeout=60))
+        assert answered(live, b"").split()[1] == b"503"
+    for _ in range(1000):
+        with contextlib.suppress(http.client.HTTPException, ConnectionError):
+            if ask(live, "/token/")[0] == 200:
+                return
+    pytest.fail("no room was made")
+
+
+def test_pages_are_bounded(live: Live) -> None:
+    async def inside() -> list[int]:
+        own = f"http://127.0.0.1:{live.address[1]}"
+        async with contextlib.AsyncExitStack() as held:
+            session = await held.enter_async_context(aiohttp.ClientSession())
+            for _ in range(MOST_PAGES):
+                await held.enter_async_context(session.ws_connect(f"{url(live)}socket", origin=own))
+            with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+                await session.ws_connect(f"{url(live)}socket", origin=own)
+            return [refused.value.status]
+
+    assert asyncio.run(inside()) == [503]
 
 
 def test_two_pages_have_two_tokens() -> None:

@@ -7,18 +7,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from rcsc.diagnostics.codes import Code
 from rcsc.run.description import BadDescription, description
+from rcsc.run.levels import misfit
 from rcsc.run.plant import Range, fields
 from rcsc.run.plant.bind import BadPlant, BoundPlant, PlantFailed, bind
+from rcsc.run.plant.load import _query as plant_query
 from rcsc.run.plant.load import load
 from rcsc.run.plant.units import factor
 from rcsc.run.plant.values import BadValue, Misfit, link, shape
 from rcsc.run.signature import Leaf, Values, signature
-from rcsc.run.system import signatures
+from rcsc.run.system import StateTableError, assemble, signatures
 from tests.support.programs.texts import edited
 
 
@@ -333,6 +336,21 @@ def test_the_keys_of_a_plant_are_checked_with_their_lines(what: str, dock: Path)
             "the plant's `travelled` is nan, and `travelled_mm` is a whole number",
         ),
         ("del self.contact", "the plant's `contact`"),
+        ("self.lateral = 10**400", "the plant's `lateral` is "),
+        ("self.travelled = 10**5000", "the plant's `travelled` "),
+        ("raise GeneratorExit", "the plant failed in cycle 3: GeneratorExit"),
+        (
+            "self.lateral = type('Odd', (), {'__repr__': lambda _: 1 / 0})()",
+            "is `Odd, raising ZeroDivisionError`",
+        ),
+        (
+            "type(self).bumper = property(lambda _: 1 / 0)",
+            "the plant's `bumper` cannot be read: ZeroDivisionError",
+        ),
+        (
+            "type(self).__setattr__ = lambda *_: 1 / 0; self.lateral = 1",
+            "the plant failed in cycle 3: ZeroDivisionError",
+        ),
     ],
 )
 def test_a_plant_that_fails_names_the_field_and_the_cycle(line: str, message: str, dock: Path) -> None:
@@ -343,6 +361,46 @@ def test_a_plant_that_fails_names_the_field_and_the_cycle(line: str, message: st
     with pytest.raises(PlantFailed) as caught:
         bound(dock).step(2, nothing)
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    ["5", "None", "'ab'", "[]", "[1, 2]", "[None]", "[10**400]", "['x']", "{}", "1 / 0", "sys.exit(3)"],
+)
+def test_an_answer_of_another_shape_than_was_asked_for_is_the_plant_s_failure(answer: str) -> None:
+    """Of a feed's query, whenever it is asked."""
+
+    class Plant:
+        asked = 0
+
+        def place(self, _: int) -> object:
+            self.asked += 1
+            return (1,) if self.asked == 1 else eval(answer)  # noqa: S307  # of this test
+
+    query = plant_query(Plant(), "place")
+    assert misfit("<i", query(0)) == ""
+    failed = ""
+    try:
+        failed = misfit("<i", query(0))
+    except PlantFailed as error:
+        failed = str(error)
+    assert failed
+
+
+@pytest.mark.parametrize(
+    "published",
+    [5, None, [("a", (1,))], {"base.travelled": 5}, {"base.travelled": ("x",)}, {"base.lateral": (10**400,)}],
+)
+def test_what_stands_outside_publishes_buffers_and_values_or_is_told_apart(
+    published: object, dock: Path
+) -> None:
+    class Outside:
+        def step(self, _tick: int, _latest: object) -> Any:
+            return published
+
+    system = assemble(description(dock / "system.toml"), "python", {}, (Outside(),))
+    with pytest.raises(StateTableError, match=r"outside published|cannot hold what was published"):
+        system.step()
 
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"/>'

@@ -86,7 +86,7 @@ class BoundPlant:
         Raises:
             PlantFailed: It cannot be copied.
         """
-        with _told("the plant cannot be copied"):
+        with told("the plant cannot be copied"):
             return BoundPlant(copy.deepcopy(self.plant, memo), self.takes, self.gives, self.seconds)
 
     @property
@@ -96,7 +96,7 @@ class BoundPlant:
         Raises:
             PlantFailed: It raised.
         """
-        with _told("the plant's `over` failed"):
+        with told("the plant's `over` failed"):
             return bool(getattr(self.plant, "over", False))
 
     @property
@@ -113,7 +113,7 @@ class BoundPlant:
         offered = getattr(self.plant, "space", None)
         if not callable(offered):
             return None
-        with _told("the plant's `space` failed"):
+        with told("the plant's `space` failed"):
             space: Space = offered()
             return space
 
@@ -123,7 +123,7 @@ class BoundPlant:
         Raises:
             PlantFailed: `picture` raised, or gave something else.
         """
-        with _told("the plant's `picture` failed"):
+        with told("the plant's `picture` failed"):
             text = self.plant.picture()
             if not isinstance(text, str):
                 raise TypeError(f"it gave a {type(text).__name__}, which is no text")
@@ -181,11 +181,11 @@ class BoundPlant:
         Raises:
             PlantFailed: The plant raised, or a field has a value that its buffer cannot hold.
         """
-        for buffer, to_field in self.takes:
-            values = latest(buffer.name)
-            if values is not None:
-                self._put(buffer.field, to_field.taken(iter(values)))
-        with _told(f"the plant failed in cycle {tick + 1}"):
+        with told(f"the plant failed in cycle {tick + 1}"):
+            for buffer, to_field in self.takes:
+                values = latest(buffer.name)
+                if values is not None:
+                    self._put(buffer.field, to_field.taken(iter(values)))
             self.plant.step(self.seconds)
         return {buffer.name: self._given(tick, buffer, to_leaves) for buffer, to_leaves in self.gives}
 
@@ -201,14 +201,23 @@ class BoundPlant:
             for part in buffer.field:
                 value = getattr(value, part)
             return tuple(to_leaves.given(value))
-        except (BadValue, AttributeError) as error:
-            where, what = error.args if isinstance(error, BadValue) else ("", f"is missing: {error}")
+        except BadValue as error:
+            where, what = error.args
             field = f"{'.'.join(buffer.field)}{where}"
             raise PlantFailed(f"the plant's `{field}` {what}, in cycle {tick + 1}") from error
+        except (Exception, SystemExit) as error:  # a field may be any code of the user's
+            what = (
+                f"is missing: {error}"
+                if isinstance(error, AttributeError)
+                else f"cannot be read: {raised(error)}"
+            )
+            raise PlantFailed(
+                f"the plant's `{'.'.join(buffer.field)}` {what}, in cycle {tick + 1}"
+            ) from error
 
 
 @contextmanager
-def _told(what: str) -> Iterator[None]:
+def told(what: str) -> Iterator[None]:
     """Whatever a user's code raises, told as what the plant did.
 
     Raises:
@@ -216,7 +225,7 @@ def _told(what: str) -> Iterator[None]:
     """
     try:
         yield
-    except (Exception, SystemExit) as error:
+    except (Exception, SystemExit, GeneratorExit) as error:
         raise PlantFailed(f"{what}: {raised(error)}") from error
 
 
@@ -474,7 +483,7 @@ def _prepare(page: Document, plant: Any, buffer: Buffer, to_field: Link) -> None
     try:
         first = to_field.taken(iter(leaf.initial for leaf in buffer.leaves))
         _put_first(plant, buffer, first)
-    except Exception as error:  # noqa: BLE001  # of the user's classes
+    except (Exception, SystemExit) as error:  # noqa: BLE001  # of the user's classes
         helps = "a class of fields is made of them, by name: all others need a default"
         page.wrong(buffer.path, f"`{'.'.join(buffer.field)}` cannot be made: {raised(error)}", helps)
 

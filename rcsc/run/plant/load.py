@@ -8,7 +8,7 @@ import importlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -23,8 +23,8 @@ from rcsc.run.description import Description
 from rcsc.run.levels import Query
 from rcsc.run.orders.operator import Operator, ScriptedRun
 from rcsc.run.orders.stopped import StoppedRuns
-from rcsc.run.plant.bind import BadPlant, BoundPlant, bind, plant_page, raised
-from rcsc.run.signature import Signature
+from rcsc.run.plant.bind import BadPlant, BoundPlant, bind, plant_page, raised, told
+from rcsc.run.signature import Signature, Value, Values
 from rcsc.run.system import Outside
 
 MODELS = "rcsc_cell.bound.model_plant:staged"
@@ -158,7 +158,18 @@ def load(
 def _queries(system: Description, bound: BoundPlant) -> dict[str, Query]:
     """The plant's methods that are named as what feeds ask; what it does not answer is told when a level needs it."""
     asked = {feed.query for spec in system.levels for feed in spec.feeds}
-    return {name: getattr(bound.plant, name) for name in asked if callable(getattr(bound.plant, name, None))}
+    return {name: _query(bound.plant, name) for name in asked if callable(getattr(bound.plant, name, None))}
+
+
+def _query(plant: Any, name: str) -> Query:
+    """Return the answers of a plant's method; what is wrong with one is told as the plant's failure."""
+
+    def query(*keys: Value) -> Values:
+        with told(f"the plant failed, asked for `{name}`"):
+            answer = getattr(plant, name)(*keys)
+            return tuple(answer) if isinstance(answer, Iterable) and not isinstance(answer, str) else answer
+
+    return query
 
 
 def _factory(system: Description, spec: PlantSpec, *, given: bool) -> Any:

@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import islice
 from typing import Any, Protocol
 
 from rcsc.host.described import nearest
@@ -143,8 +144,11 @@ class NumberLink:
                 yield number
                 return
             raise BadValue("", f"is {number}, and `{self.leaf.name}` is a whole number")
-        exact = number if self.factor.is_one else _times(self.factor, number)
-        yield self.leaf.held(float(exact)) if real else self._held(round(exact))
+        try:
+            exact = number if self.factor.is_one else _times(self.factor, number)
+            yield self.leaf.held(float(exact)) if real else self._held(round(exact))
+        except OverflowError:
+            raise BadValue("", f"is {_shown(value)}, which no float holds") from None
 
     def _held(self, number: int) -> int:
         """A whole number that the variable's C type holds."""
@@ -191,11 +195,12 @@ class ElementsLink:
     def given(self, value: Any) -> Iterator[Value]:
         """The values of the elements."""
         try:
-            elements = list(value)
+            elements = list(islice(value, len(self.parts) + 1))  # there may be no end of them
         except TypeError:
             raise BadValue("", f"is {_shown(value)}, which has no elements") from None
         if len(elements) != len(self.parts):
-            raise BadValue("", f"has {len(elements)} elements, and its buffer {len(self.parts)}")
+            many = "more" if len(elements) > len(self.parts) and not hasattr(value, "__len__") else len(value)
+            raise BadValue("", f"has {many} elements, and its buffer {len(self.parts)}")
         for at, (part, element) in enumerate(zip(self.parts, elements, strict=True)):
             yield from _at(f"[{at}]", part, element)
 
@@ -361,7 +366,10 @@ def _times(by: Factor, number: float) -> Fraction | float:
 
 
 def _shown(value: object) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except Exception as error:  # noqa: BLE001  # of the user's classes
+        text = f"{type(value).__name__}, raising {type(error).__name__}"
     return f"`{text[:40]}{'...' if len(text) > 40 else ''}`"
 
 

@@ -19,7 +19,7 @@ from typing import Any, Self
 from aiohttp import WSMsgType, web
 
 from rcsc.host.files.read import Malformed, json_of
-from rcsc.host.guard import HEADERS, policy, refusal
+from rcsc.host.guard import HEADERS, bounded, policy, refusal, silent
 from rcsc_cell.live.board import Board, Latest, Moment, Value, problems
 
 ADDRESS = "127.0.0.1"
@@ -27,6 +27,8 @@ PUSH_S = 0.1
 """The page is told what is new so often."""
 GOODBYE_S = 0.4
 """A page that does not answer is waited for no longer when the run ends."""
+MOST_PAGES = 16
+"""Pages at once."""
 MOST_WATCHED = 256
 DEEPEST_MESSAGE = 4
 """Variables that one page may ask for."""
@@ -173,22 +175,33 @@ class Live:
         app.on_response_prepare.append(self._headed)
         app.router.add_get("/{token}/socket", self._socket)
         app.router.add_get("/{token}/{name:[a-z.]*}", self._file)
-        runner = web.AppRunner(app, access_log=None, shutdown_timeout=GOODBYE_S)
+        runner = web.AppRunner(
+            app, access_log=None, logger=silent("rcsc_cell.live"), shutdown_timeout=GOODBYE_S
+        )
         await runner.setup()
+        made = runner.server
+        assert made is not None
+        listens: asyncio.Server | None = None
         try:
-            await web.TCPSite(runner, ADDRESS, self._port).start()
-            self.address = runner.addresses[0][:2]
+            listens = await self._loop.create_server(
+                bounded(made, lambda: len(made.connections)), ADDRESS, self._port
+            )
+            self.address = listens.sockets[0].getsockname()[:2]
             ready.set_result(self.address[1])
             await self._over.wait()
             if self._talks:  # what is being cleaned up no longer hears a page say good-bye
                 await asyncio.wait(self._talks, timeout=GOODBYE_S)
         finally:
+            if listens is not None:
+                listens.close()
             await runner.cleanup()
 
     @web.middleware
     async def _guarded(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
         reason = refusal(request.headers, request.path, self.address[1], self._token)
-        return web.Response(status=403, text=f"{reason}\n") if reason else await handler(request)
+        if not reason:
+            return await handler(request)
+        return web.Response(status=403, text=f"{reason}\n")
 
     async def _headed(self, _: web.Request, response: web.StreamResponse) -> None:
         """Every answer has the headers, a refusal, too."""
@@ -203,7 +216,9 @@ class Live:
         return web.Response(text=text, content_type=kind)
 
     async def _socket(self, request: web.Request) -> web.WebSocketResponse:
-        socket = web.WebSocketResponse(max_msg_size=MOST_BYTES, heartbeat=30.0)
+        if len(self._talks) >= MOST_PAGES:
+            raise web.HTTPServiceUnavailable(text=f"{MOST_PAGES} pages are open\n")
+        socket = web.WebSocketResponse(max_msg_size=MOST_BYTES, heartbeat=30.0, compress=False)
         await socket.prepare(request)
         told, talk = _Told(), asyncio.get_running_loop().create_future()
         self._talks.add(talk)
