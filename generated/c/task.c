@@ -211,10 +211,11 @@ static void task_do_remove_from_buffer_db(task_t *s)
     }
 }
 
-/* task/common.rcs procedure pickup: Takes one part off the count of the buffer, or gives up: nothing to
-   pick up. */
-static void task_do_pickup(task_t *s)
+/* task/common.rcs procedure pickup: Takes one part off the count of the buffer and goes to that state, or
+   gives up: nothing to pick up. */
+static void task_do_pickup(task_t *s, task_common_task_state_t v_then)
 {
+    task_do_nextstate(s, v_then);
     s->to_emove.obj_ptr = s->workstation.obj;
     s->to_emove.input_command = VCBLRY_EMOVE_CMND_PICKUP;
     s->obj_acquired = true;
@@ -1163,8 +1164,7 @@ static int32_t task_run_acquire(task_t *s)
     /* task/acquire.rcs line 5: new_command false; emove.command move_to_obj; emove.status done; cur_state
        state_4 */
     case TASK_LINE_ACQUIRE_5:
-        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
-        task_do_pickup(s);
+        task_do_pickup(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_executing(s);
         break;
     /* task/acquire.rcs line 6: new_command false; emove.command move_to; emove.status done; cur_state
@@ -1177,8 +1177,7 @@ static int32_t task_run_acquire(task_t *s)
     /* task/acquire.rcs line 7: new_command false; emove.command locate; emove.status done; cur_state
        state_3 */
     case TASK_LINE_ACQUIRE_7:
-        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
-        task_do_pickup(s);
+        task_do_pickup(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_executing(s);
         break;
     /* task/acquire.rcs line 8: new_command false; emove.command pickup; emove.status done; cur_state
@@ -1451,15 +1450,13 @@ static int32_t task_run_move(task_t *s)
         break;
     /* task/move.rcs line 10: new_command false; emove.command locate; emove.status done; cur_state state_3 */
     case TASK_LINE_MOVE_10:
-        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
-        task_do_pickup(s);
+        task_do_pickup(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_executing(s);
         break;
     /* task/move.rcs line 11: new_command false; emove.command move_to_obj; emove.status done; cur_state
        state_4 */
     case TASK_LINE_MOVE_11:
-        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
-        task_do_pickup(s);
+        task_do_pickup(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_executing(s);
         break;
     /* task/move.rcs line 12: new_command false; emove.command pickup; emove.status done; cur_state state_5 */
@@ -1735,15 +1732,13 @@ static int32_t task_run_transfer(task_t *s)
     /* task/transfer.rcs line 9: new_command false; emove.command locate; emove.status done; cur_state
        state_3 */
     case TASK_LINE_TRANSFER_9:
-        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
-        task_do_pickup(s);
+        task_do_pickup(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_executing(s);
         break;
     /* task/transfer.rcs line 10: new_command false; emove.command move_to_obj; emove.status done;
        cur_state state_4 */
     case TASK_LINE_TRANSFER_10:
-        task_do_nextstate(s, TASK_COMMON_TASK_STATE_STATE_5);
-        task_do_pickup(s);
+        task_do_pickup(s, TASK_COMMON_TASK_STATE_STATE_5);
         task_do_executing(s);
         break;
     /* task/transfer.rcs line 11: new_command false; emove.command pickup; emove.status done; cur_state

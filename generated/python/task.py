@@ -126,7 +126,7 @@ class locating(IntEnum):
     known = 1
 
 
-DIGEST = 0x09c4e0ee
+DIGEST = 0xecdde457
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 80
 """What `check` gives of a state that other tables made."""
@@ -475,8 +475,9 @@ def _do_move_to_obj(s):
     s.to_emove_input_command = 2
 
 
-def _do_pickup(s):
-    """task/common.rcs procedure pickup: Takes one part off the count of the buffer, or gives up: nothing to pick up."""
+def _do_pickup(s, v_then):
+    """task/common.rcs procedure pickup: Takes one part off the count of the buffer and goes to that state, or gives up: nothing to pick up."""
+    _do_nextstate(s, v_then)
     s.to_emove_obj_ptr = s.workstation_obj
     s.to_emove_input_command = 4
     s.obj_acquired = True
@@ -1201,8 +1202,7 @@ def _acquire_4(s):
 
 def _acquire_5(s):
     """task/acquire.rcs line 5"""
-    _do_nextstate(s, 5)
-    _do_pickup(s)
+    _do_pickup(s, 5)
     _do_executing(s)
 
 
@@ -1215,8 +1215,7 @@ def _acquire_6(s):
 
 def _acquire_7(s):
     """task/acquire.rcs line 7"""
-    _do_nextstate(s, 5)
-    _do_pickup(s)
+    _do_pickup(s, 5)
     _do_executing(s)
 
 
@@ -1858,15 +1857,13 @@ def _move_9(s):
 
 def _move_10(s):
     """task/move.rcs line 10"""
-    _do_nextstate(s, 5)
-    _do_pickup(s)
+    _do_pickup(s, 5)
     _do_executing(s)
 
 
 def _move_11(s):
     """task/move.rcs line 11"""
-    _do_nextstate(s, 5)
-    _do_pickup(s)
+    _do_pickup(s, 5)
     _do_executing(s)
 
 
@@ -2502,15 +2499,13 @@ def _transfer_8(s):
 
 def _transfer_9(s):
     """task/transfer.rcs line 9"""
-    _do_nextstate(s, 5)
-    _do_pickup(s)
+    _do_pickup(s, 5)
     _do_executing(s)
 
 
 def _transfer_10(s):
     """task/transfer.rcs line 10"""
-    _do_nextstate(s, 5)
-    _do_pickup(s)
+    _do_pickup(s, 5)
     _do_executing(s)
 
 

@@ -12,7 +12,7 @@ line's actions and then postprocess; it may also end wherever an extern procedur
 - an assumption that is declared `proved` follows from ranges and invariants;
 - nothing overflows, leaves a range or an array, divides by zero or reads what is not assigned: in each line (with its conditions), in
   what levels run before and after their tables, and in procedures that nothing calls (for all parameters);
-- no two actions of a line write different values to one output;
+- no two actions of a line write different values to one variable;
 - two lines that are said to do the same leave every variable the same, wherever both come through.
 
 The steps are those of `rcsc/lang/interpret.py`; the argument is induction over them.
@@ -328,8 +328,7 @@ class Debts:
         return [self.start.condition(test.condition) for test in line.tests if test is not None]
 
     def _actions(self, run: _Running, actions: Iterable[Action]) -> None:
-        """Left to right; an output that two of them write gets one value."""
-        outputs = {str(variable.name) for variable in self.program.variables if variable.kind is Kind.OUTPUT}
+        """Left to right; what two of them write gets one value."""
         wrote: dict[str, Term] = {}
         for action in actions:
             before, run.state.wrote = dict(run.state.leaves), {}
@@ -337,7 +336,7 @@ class Debts:
             run.cell = action.statement.span
             run.execute((action.statement,))
             for name, now in run.state.wrote.items():
-                if name in wrote and name in outputs:
+                if name in wrote:
                     twice = self.terms.every((wrote[name], now))
                     same = self.terms.make("=", before[name], run.state.leaves[name])
                     run.owe(f"two actions write one value to `{name}`", self.terms.follows(twice, same))

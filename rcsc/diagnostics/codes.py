@@ -1190,9 +1190,10 @@ class Code(StrEnum):
         state n : int 0 .. 9
         procedure go { local k : int 0 .. 9 := 0 if a { k := 1 } n := k }
     """
-    TWO_WRITERS = """RCS415: one output written twice in a line
+    TWO_WRITERS = """RCS415: one variable written twice in a line
 
-    Two actions of one line write the same output: which of them counts would hang on the order of columns.
+    Two actions of one line, or what they call, write the same output or state: which of them counts would hang on their order, and
+    what the first decided would be gone. A procedure that does both says which goes first.
 
         input ready : bool
         output go : bool

@@ -22,7 +22,9 @@ _HELP: dict[Code, tuple[str, ...]] = {
         "guard the assignment with `if`, use `min` or `max`, or widen the variable's range",
     ),
     Code.USE_BEFORE_ASSIGNMENT: ("give the local a first value where it is declared",),
-    Code.TWO_WRITERS: ("let one action of the line write the output",),
+    Code.TWO_WRITERS: (
+        "let one action of the line write it: a procedure that does both in the order that is meant",
+    ),
     Code.ASSUMPTION_NOT_PROVED: ("declare it `assumed` or `monitored`",),
     Code.INVARIANT_BROKEN: ("mend what runs there, or strengthen the invariant if that state cannot occur",),
 }

@@ -1,4 +1,4 @@
-"""Nothing can overflow, divide by zero, leave an array or a declared range, or write an output twice.
+"""Nothing can overflow, divide by zero, leave an array or a declared range, or be written twice by one line.
 
 In: a program. Out: diagnostics with least witnesses, and the assumptions that stop a cycle. Each line's actions are
 shown right where they run: under the invariants and the line's conditions; procedures of levels under the
@@ -34,7 +34,6 @@ from rcsc.lang.model import (
     Default,
     Expr,
     Invariant,
-    Kind,
     Line,
     Literal,
     Procedure,
@@ -121,7 +120,6 @@ class Obligations:
     _too_long: list[Diagnostic] = field(default_factory=list)
     _asker: Asker = field(init=False)
     _procedures: dict[str, Procedure] = field(init=False)
-    _outputs: set[str] = field(init=False)
     _kinds: dict[str, Scalar] = field(init=False)
     _kept: list[tuple[Invariant, set[str]]] = field(init=False)
 
@@ -130,7 +128,6 @@ class Obligations:
         self._asker = Asker(self.options, {v.name: at for at, v in enumerate(leaves)}, self.tally)
         self._procedures = {procedure.name: procedure for procedure in self.program.procedures}
         self._kinds = {v.name: v.type for v in leaves}
-        self._outputs = {v.name for v in leaves if v.kind is Kind.OUTPUT}
         self._kept = [(invariant, set(read_by(invariant.condition))) for invariant in self.program.invariants]
 
     def prove(self, tables: Iterable[Table]) -> list[Diagnostic]:
@@ -364,7 +361,7 @@ class Obligations:
         written: set[str] = set()
         for action in actions:
             names = self._plainly_written(action.statement)
-            if names is None or names & written & self._outputs:
+            if names is None or names & written:
                 return False
             written |= names
         return not any(written & reads for _, reads in self._kept)
@@ -411,7 +408,7 @@ class Obligations:
         )
 
     def _actions(self, run: Run, actions: tuple[Action, ...]) -> None:
-        """Runs them left to right; an output that two of them write gets one value."""
+        """Runs them left to right; what two of them write gets one value."""
         written: dict[str, tuple[Node, str]] = {}
         for action in actions:
             before = run.state
@@ -419,8 +416,6 @@ class Obligations:
             run.cell = action.statement.span
             run.execute((action.statement,))
             for name, now in run.state.wrote.items():
-                if name not in self._outputs:
-                    continue
                 if name in written:
                     self._one_writer(
                         run, name, values.both(written[name][0], now), before, (written[name][1], action)

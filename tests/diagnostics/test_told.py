@@ -139,7 +139,7 @@ RCS411 error `b`: the divisor can be zero
     t: b = 0, n = 0, r = 1.0000000000000002, late = 0, shown = 0
 RCS415 error `both(a)`: `1` and `both(a)` can write different values to `out`
     in line `one` of table `t`
-    help: let one action of the line write the output
+    help: let one action of the line write it: a procedure that does both in the order that is meant
     t: a = 2, b = 1, yes = true, n = 0, r = 1.0000000000000002, late = 0, shown = 0
 RCS417 error `two`: line `two` of table `t` can break invariant `apart`
     in line `two` of table `t`
@@ -151,7 +151,7 @@ RCS417 error `two`: line `two` of table `t` can break invariant `small`
     t: a = 6, yes = false, n = 0, r = 1.0000000000000002, late = 0, shown = 0
 RCS415 error `both(a)`: `both(1)` and `both(a)` can write different values to `out`
     in line `d` of table `t`
-    help: let one action of the line write the output
+    help: let one action of the line write it: a procedure that does both in the order that is meant
     t: a = 0, b = -5, yes = true, n = 0, r = 1.0000000000000002, late = 0, shown = 0
 RCS417 error `l`: what runs in `postprocess` of level `l` can break invariant `small`
     in `postprocess` of level `l`

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.lang.syntax.expected import ELSEWHERE, operator_meant, word_meant
-from tests.support.programs.stages import refused
+from tests.support.programs.stages import program_of, refused
 from tests.support.programs.texts import table
 
 WHEN = "a whole condition stands in a column headed `when`"
@@ -159,3 +159,23 @@ def test_an_action_in_a_column_of_values_is_told_where_it_stands(cell: str) -> N
 def test_a_comparison_says_which_side_is_what(condition: str, sides: str) -> None:
     found, _ = shown(f"{HEAD}assume one : {condition}\n")
     assert found.message == sides
+
+
+@pytest.mark.parametrize(
+    ("member", "help_"),
+    [
+        ("moving", "hides the type of that name: write `moving` alone, or call the variable otherwise"),
+        ("movin", "hides the type of that name: call the variable otherwise"),
+    ],
+)
+def test_a_variable_that_hides_its_type_is_told(member: str, help_: str) -> None:
+    text = f"enum stage {{ idle, moving }}\nstate stage : stage\ninvariant i : stage = stage.{member}\n"
+    (found,) = refused(text)
+    assert found.message == "`stage` has no fields"
+    assert [each.endswith(help_) for each in found.help] == [True]
+    program_of(text.replace(f"stage.{member}", "moving"))
+    program_of(
+        text.replace(f"stage.{member}", "stage.moving")
+        .replace("state stage", "state now")
+        .replace(": stage =", ": now =")
+    )

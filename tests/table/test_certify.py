@@ -357,6 +357,8 @@ EDITS = [  # what is edited, and what then does not hold
     ("extern procedure ask reads a writes o", "extern procedure ask reads a writes left, o", "where `ask` fails"),
     ("extern procedure ask reads a writes o", "extern procedure ask reads a writes taken", "`nothing_lost` is kept"),
     ("move_one; pick |      |", "move_one; alone; alone | blue |", "two actions write one value to `seen`"),
+    ("share; later ", "share; later; next now := 3 ", "two actions write one value to `now.next`"),
+    ("move_one; pick |", "move_one; pick; k[1] := 2 |", "two actions write one value to `k[1]`"),
     ("a - 9 ||", "a / now ||", "the divisor is not zero"),
     ("deferred until take", "deferred until take and a / now > 0", "`deferred until` of `now`: the divisor is not zero"),
     ("  postprocess ask", "  postprocess move_one", "`postprocess` of level `top`: `left` stays in 0 .. 9"),

@@ -182,9 +182,10 @@ def test_a_line_runs_under_its_conditions() -> None:
 
 
 def test_the_state_carries_over_from_action_to_action() -> None:
-    [found] = table(low="grow; grow")
+    [found, twice] = table(low="grow; grow")
+    assert twice.code is Code.TWO_WRITERS
     assert dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True)) == {"n": "8"}
-    assert codes(table(high="n := 0; grow; grow")) == []
+    assert codes(table(high="n := 0; grow; grow")) == ["RCS415", "RCS415"]
 
 
 def test_a_default_line_runs_where_no_line_matches() -> None:
@@ -231,6 +232,48 @@ def test_the_solver_reads_an_array_at_a_changing_place(second: str, wrong: list[
         f"table t {{\n| line | when ||\n| one | xs[a] * b > 3 ||\n| two | {second} ||\n}}\n"
     )
     assert codes(verdict_of(program, Options()).findings) == wrong
+
+
+STATES = """
+record pair { a : int 0 .. 9  b : int 0 .. 9 }
+input i : int 0 .. 2
+input one : bool
+input two : bool
+state n : int 0 .. 9
+state p : pair
+state xs : array[3] of int 0 .. 9
+state x : int 0 .. 9 deferred until true
+procedure set_n(v : int 0 .. 9) { n := v }
+procedure deep(v : int 0 .. 9) { set_n(v) }
+procedure if_one { if one { n := 1 } }
+procedure if_two { if two { n := 2 } }
+procedure later(v : int 0 .. 9) { next x := v }
+procedure some(v : int 0 .. 9) { xs[i] := v }
+"""
+
+
+@pytest.mark.parametrize(
+    ("actions", "wrong"),
+    [
+        ("if_one; if_two", "n"),
+        ("n := 1; n := 2", "n"),
+        ("n := 1; deep(2)", "n"),
+        ("deep(i); set_n(i)", ""),
+        ("n := i; deep(i + 1)", "n"),
+        ("xs[0] := 1; xs[i] := 2", "xs[0]"),
+        ("some(1); xs[2] := 3", "xs[2]"),
+        ("xs[0] := 1; xs[1] := 2", ""),
+        ("p.a := 1; p.a := i", "p.a"),
+        ("p.a := 1; p.b := 2", ""),
+        ("next x := 1; later(2)", "x.next"),
+        ("next x := i; later(i)", ""),
+        ("x := 1; next x := 2", ""),
+    ],
+)
+def test_two_actions_of_a_line_give_a_state_one_value(actions: str, wrong: str) -> None:
+    text = f"{STATES}table t {{\n| line | when || procedures |\n| all | true || {actions} |\n}}\n"
+    found = [each for each in verdict_of(text).findings if each.code is Code.TWO_WRITERS]
+    assert [each.message.rpartition(" ")[2] for each in found] == ([f"`{wrong}`"] if wrong else [])
 
 
 def test_actions_that_never_write_together_are_no_two_writers() -> None:

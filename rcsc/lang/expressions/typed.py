@@ -227,7 +227,9 @@ def _field(scope: Scope, base: Path | None, name: tree.Name) -> Path | None:
     if base is None:
         return None
     if not isinstance(base.type, Record):
-        scope.report(Code.KIND, f"`{base.names[0]}` has no fields", name.span)
+        hidden = scope.types.get(base.names[0])
+        own = [_hides(hidden, name)] if isinstance(hidden, Enum) else []
+        scope.report(Code.KIND, f"`{base.names[0]}` has no fields", name.span, *own)
         return None
     for part in base.type.fields:
         if part.name == name.text:
@@ -247,6 +249,12 @@ def _field(scope: Scope, base: Path | None, name: tree.Name) -> Path | None:
         return None
     scope.unknown("field", name, [part.name for part in base.type.fields])
     return None
+
+
+def _hides(enum: Enum, member: tree.Name) -> str:
+    """Say that a variable has the name of an enumeration, and how to mean a member all the same."""
+    said = f"write `{member.text}` alone, or " if member.text in enum.members else ""
+    return f"the variable `{enum.name}` hides the type of that name: {said}call the variable otherwise"
 
 
 def _element(scope: Scope, body: Body, base: Path | None, written: tree.Expr) -> Path | None:

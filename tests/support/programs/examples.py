@@ -78,10 +78,11 @@ state pull : real -1.0 .. 1.0
 extern procedure look_up(times : int 0 .. 5) reads part, force writes height, kind, pull
   python "parts.database:height" c "parts_height"
 procedure twice { look_up(2); if kind < 0 { look_up(1) }; height := 0 }
+procedure often { twice; look_up(0); height := 7 }
 table t {
-  | line | part  || procedures        | height |
-  | 1    | < 50  || look_up(3)        |        |
-  | 2    | >= 50 || twice; look_up(0) | 7      |
+  | line | part  || procedures |
+  | 1    | < 50  || look_up(3) |
+  | 2    | >= 50 || often      |
 }
 level top {
   period 10 [ms]
