@@ -152,12 +152,13 @@ class Elements:
 
 @dataclass(frozen=True)
 class NamedSet:
-    """A declared set: whether a value is of it, and some that are."""
+    """A declared set: whether a value is of it, some that are, and whether masks are among its members: of words of eight bits."""
 
     name: str
     kind: Kind
     has: Callable[[Any], bool]
     some: tuple[Value, ...]
+    masks: bool = False
 
 
 @dataclass(frozen=True)
@@ -533,6 +534,7 @@ class Maker:
         rng = self.rng
         one = rng.choice(self.made.sets)
         subject = self.integer(depth) if one.kind.sort == "int" and rng.randrange(2) else self.read(one.kind)
+        subject = self.byte() if one.masks else subject
         if one.kind.sort == "int" and not fits((subject.low, subject.high), (one.kind.low, one.kind.high)):
             return self.read(BOOL)
         turned = rng.randrange(3) == 0
@@ -931,7 +933,13 @@ class Maker:
     def set_cell(self, leaf: Leaf) -> tuple[str, Expr | None] | None:
         """`in NAME`, or `not in NAME`, where some value of the leaf satisfies it; None where no set is of its type."""
         rng, kind = self.rng, leaf.kind
-        fitting = [one for one in self.made.sets if alike(one.kind, kind) and fits_kind(one.kind, kind)]
+        fitting = [
+            one
+            for one in self.made.sets
+            if alike(one.kind, kind)
+            and fits_kind(one.kind, kind)
+            and (not one.masks or (kind.low, kind.high) == (0, 255))
+        ]
         if not fitting or rng.randrange(3):
             return None
         one, turned = rng.choice(fitting), rng.randrange(3) == 0
@@ -1149,7 +1157,12 @@ class Maker:
                 tests.append(partial(is_same, value))
                 some.append(value)
         self.made.text.append(f"set {name} : {kind.text} = {{{', '.join(texts)}}}")
-        self.made.sets.append(NamedSet(name, kind, lambda x: any(test(x) for test in tests), tuple(some)))
+        masks = any(text.startswith("0b") for text in texts) or any(
+            each.masks for each in self.made.sets if each.name in texts
+        )
+        self.made.sets.append(
+            NamedSet(name, kind, lambda x: any(test(x) for test in tests), tuple(some), masks)
+        )
 
     def only_lines(self, count: int) -> list[Leaf]:
         """Outputs that only lines write."""

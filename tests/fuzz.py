@@ -2,7 +2,7 @@
 
 `python -m tests.fuzz --runs 100000 --seed 1` for a long run; `tests/emit/test_fuzz.py` makes a short one in the suite. With
 `--names` programs of adversarial names, types and docs are emitted, compiled by gcc and clang under the strict flags, imported and run: C,
-Python, interpreter and the evaluator of `tests.differential` agree.
+Python, interpreter and the evaluator of `tests.differential` agree; and so are the manual's programs that declare links.
 """
 
 import argparse
@@ -14,16 +14,17 @@ import subprocess
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.emit.c.c99 import emit_c
 from rcsc.emit.lower import lower
 from rcsc.emit.python import emit_python
 from rcsc.lang import reserved
-from rcsc.lang.model import Program
+from rcsc.lang.model import Program, ProvedProgram, seal_of_proof
 from rcsc.lang.resolve import compile_text
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
@@ -254,13 +255,86 @@ def named(number: int, seed: int, taken: set[str]) -> differential.Built | tuple
     return differential.built(drawn, own)
 
 
+OF_LINKS = OURS | frozenset(
+    """silent within cycles report reason deferred status command done failed executing resting late settle pause to from last ms s
+    period answered""".split()
+)
+"""Words of the language where levels are linked, and what the protocol makes."""
+MADE_BY_LINKS = (
+    "done",
+    "failed",
+    "to_a",
+    "last_a",
+    "a_late",
+    "new_command",
+    "answered",
+    "inc_command",
+    "settle",
+    "value",
+    "order",
+    "x",
+)
+WORD = re.compile(r"\b[a-z_][a-z_0-9]*\b")
+
+
+def linked(number: int, seed: int) -> str:
+    """A program of the manual that declares links, with some names (of links, members, levels, lines) that are adversarial."""
+    rng = random.Random(f"{seed} {number} links")
+    manual = (REPO / "grammar/manual.md").read_text(encoding="utf-8").split("```")
+    texts = [part.removeprefix("rcs\n") for part in manual if part.startswith("rcs\n") and "serves" in part]
+    text = rng.choice([each for each in texts if "# error" not in each])
+    names = sorted({*WORD.findall(re.sub(r"#.*", "", text))} - OF_LINKS)
+    word = hostile_words(rng)
+    new = {
+        name: rng.choice(MADE_BY_LINKS) if rng.randrange(5) == 0 else word()
+        for name in rng.sample(names, min(len(names), rng.randint(1, 8)))
+    }
+    return WORD.sub(lambda found: new.get(found[0], found[0]), text)
+
+
+def links_campaign(runs: int, seed: int, compilers: Sequence[str]) -> Counter[str]:
+    """Emits, compiles, imports and runs programs with links of adversarial names; how many were refused with which code."""
+    told: Counter[str] = Counter()
+    for number in range(runs):
+        text = linked(number, seed)
+        try:
+            program = compile_text(text, "linked.rcs")
+            if not isinstance(program, Program):
+                told.update(f"links refused {code}" for code in set(_codes(program, text)))
+                continue
+            plan = lower(ProvedProgram(program, seal_of_proof()))
+            files = emit_c(plan) | emit_python(plan)
+            with tempfile.TemporaryDirectory(prefix="rcsc-links-") as place:
+                for cc in compilers:
+                    compiled(files, Path(place), cc)
+            module = ModuleType("linked")
+            [python] = [source for path, source in files.items() if path.endswith(".py")]
+            exec(compile(python, "linked.py", "exec"), module.__dict__)  # noqa: S102  # it is what is tested
+            state = module.State()
+            for cycle in [name for name in vars(module) if name.endswith("_cycle")]:
+                getattr(module, cycle)(state)
+        except Exception as bug:
+            raise AssertionError(f"links {number} of seed {seed}: {bug}\n{text}") from bug
+        told["programs with links"] += 1
+    return told
+
+
+def compiled(files: Mapping[str, str], folder: Path, cc: str) -> None:
+    """Compiles the C without a warning; AssertionError where there is one."""
+    for path, text in files.items():
+        (folder / Path(path).name).write_text(text, encoding="utf-8")
+    sources = [Path(path).name for path in files if path.endswith(".c")]
+    command = [cc, *STRICT, "-c", *sources, "-o", "strict.o"]
+    ran = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, "\n".join(ran.stderr.splitlines()[:12])
+
+
 def strictly(built: differential.Built, folder: Path, cc: str) -> None:
     """Compiles the C of one program without a warning."""
-    for path, text in built.files.items():
-        (folder / Path(path).name).write_text(text, encoding="utf-8")
-    command = [cc, *STRICT, "-c", built.symbols["source"], "-o", "strict.o"]
-    ran = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert ran.returncode == 0, "\n".join([*ran.stderr.splitlines()[:12], *built.drawn.text])
+    try:
+        compiled(built.files, folder, cc)
+    except AssertionError as bug:
+        raise AssertionError("\n".join([str(bug), *built.drawn.text])) from bug
 
 
 def names_campaign(runs: int, seed: int, compilers: Sequence[str]) -> Counter[str]:
@@ -303,7 +377,9 @@ def main() -> None:
     )
     given = arguments.parse_args()
     if given.names:
-        told = names_campaign(given.runs, given.seed, [cc for cc in ("gcc", "clang") if shutil.which(cc)])
+        compilers = [cc for cc in ("gcc", "clang") if shutil.which(cc)]
+        told = names_campaign(given.runs, given.seed, compilers)
+        told += links_campaign(given.runs // 4, given.seed, compilers)
         for name, number in sorted(told.items()):
             print(f"{name:24} {number:9}")
         return

@@ -14,7 +14,7 @@ import pytest
 from rcsc.lang.model import Program
 from rcsc.lang.resolve import compile_text
 from tests import differential
-from tests.fuzz import campaign, names_campaign, strictly
+from tests.fuzz import campaign, links_campaign, names_campaign, strictly
 
 
 def test_mutated_tables_and_garbage_give_only_coded_errors() -> None:
@@ -65,6 +65,7 @@ def test_programs_of_adversarial_names_compile_load_and_agree(cc: str) -> None:
     told = names_campaign(runs=12, seed=20261122 + len(cc), compilers=[cc])
     assert told["programs"] > 8
     assert told["fault 0"] > 20
+    assert links_campaign(runs=8, seed=20261122 + len(cc), compilers=[cc])["programs with links"] > 2
 
 
 def test_a_bound_beyond_all_doubles_is_no_bug() -> None:
