@@ -1025,7 +1025,7 @@ class Code(StrEnum):
     CONTRADICTORY_ASSUMPTIONS = """RCS405: assumptions that contradict each other
 
     No values satisfy all the assumptions of the table and the invariants. Everything would be proved of it, and nothing would be worth
-    anything.
+    anything. The same is told of two tables that a level runs in one cycle, where what they assume of its inputs cannot hold together.
 
         input n : int 0 .. 9
         output go : bool

@@ -25,6 +25,7 @@ from rcsc.procedures.discharge import Tally
 from rcsc.procedures.invariants import assumptions_satisfiable, at_first, properties_elsewhere
 from rcsc.procedures.meetings import met
 from rcsc.procedures.obligations import Obligations, defined_alone
+from rcsc.procedures.together import assumed_together
 from rcsc.solvers import smt
 from rcsc.solvers.options import TOGETHER, Options
 from rcsc.solvers.smt import Answer
@@ -106,6 +107,7 @@ def prove_program(
     """
     before = known or Nothing()
     findings = [*at_first(program), *properties_elsewhere(program), *declared_badly(program)]
+    findings += assumed_together(program, options)
     owed = Obligations(program, options)
     wanted = [table for table in program.tables if only is None or table.name in only]
     findings += owed.prove(wanted)

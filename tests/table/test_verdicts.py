@@ -21,7 +21,7 @@ from rcsc.lang.model import Program, Value
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
-from tests.support.programs.stages import drawn_program, program_of, verdict_of
+from tests.support.programs.stages import drawn_program, program_of, reported, verdict_of
 from tests.support.programs.texts import table
 
 HERE = {
@@ -292,3 +292,38 @@ def test_what_inputs_show_of_products_of_doubles_is_told_though_z3_gives_up(
             witness = found.witness if isinstance(found, Overlap) else found.witnesses[0]
             assert not assumed or holds(program.assumptions[0].condition, witness)
             assert len(matching_lines(program.tables[0], witness)) == (2 if isinstance(found, Overlap) else 0)
+
+
+def test_tables_of_one_cycle_that_assume_what_cannot_hold_together_are_told() -> None:
+    """Each is proved under its own; of what a stage before writes nothing follows, nor of tables of which one or the other runs."""
+
+    def text(low: str, high: str, level: str) -> str:
+        return f"""input n : int 0 .. 9
+state m : int 0 .. 9
+output a : bool
+output b : bool
+assume low : {low}
+assume high : {high}
+table first assuming low {{
+  | line | n    || a    | m |
+  | x    | <= 2 || true | 7 |
+}}
+table second assuming high {{
+  | line | n    || b    |
+  | y    | >= 7 || true |
+  | z    | < 7  || true |
+}}
+level l {{ period 40 [ms] {level} }}
+"""
+
+    both = "table first table second"
+    found = reported(text("n <= 2", "n >= 7", both))
+    told = [each for each in found if each.code is Code.CONTRADICTORY_ASSUMPTIONS]
+    assert [each.message for each in told] == [
+        "tables `first` and `second` of level `l` run in one cycle, and assume what cannot hold together"
+    ]
+    assert [label.message for label in told[0].related] == ["assumed", "assumed"]
+    for low, high in (("n <= 2", "n <= 1"), ("n <= 2", "m >= 7")):
+        assert Code.CONTRADICTORY_ASSUMPTIONS not in [each.code for each in reported(text(low, high, both))]
+    alone = reported(text("n < 1 and n > 2", "n >= 7", both))
+    assert len([each for each in alone if each.code is Code.CONTRADICTORY_ASSUMPTIONS]) == 1
