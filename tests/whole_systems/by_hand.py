@@ -167,7 +167,7 @@ def upper_by_hand(plan: Plan, random: Random, slips: list[str]) -> str:  # noqa:
         {"sign": ("false", "true")} if plan.takes else {}
     )
     text += fact_text(plan, random, assumes, [f"{name}.flow" for name, one in plan.below if one.flow])
-    text += properties_text(domains, random, plan.parts)
+    text += "" if plan.calm else properties_text(domains, random, plan.parts)
     text += table_text("go", assumes, columns, ["status_out"], rows)
     calm = "begin; halt; ph(idle)" if random.random() < 0.85 else "begin; halt"
     rests = [["r", "true", calm, "done"]]

@@ -111,7 +111,7 @@ def upper(plan: Plan, random: Random, slips: list[str]) -> str:  # noqa: PLR0915
         [f"from_{name}.flow" for name, one in plan.below if one.flow]
         + [f"from_{name}.status_report /= failed" for name in subs[:1]],
     )
-    text += properties_text(domains, random, parts)
+    text += "" if plan.calm else properties_text(domains, random, parts)
     text += table_text("go", assumes, columns, [*subs, "status_out"], rows)
     wait = [["w", "false", "ph(idle)", *rests, "executing"], ["r", "true", "ph(idle)", *rests, "done"]]
     if random.random() < 0.15:

@@ -46,12 +46,15 @@ def _several(shape: str, random: Random) -> Drawn:
     links = {name: _link(at, random, small=small) for at, name in enumerate(names[1:], 1)}
     by_hand = {name: random.random() < 0.3 for name in names}
     plans: dict[str, Plan] = {}
+    calm = random.random() < 0.6
     for at, name in enumerate(names):
         fork = shape == "two subordinates"
         peer = "op" if at == 0 else "u" if fork else names[at - 1]
         under = (names[1:] if at == 0 else []) if fork else names[at + 1 : at + 2]
         below = tuple((one, links[one]) for one in under)
-        plans[name] = Plan(name, station if at == 0 else links[name], peer, below, declared=not by_hand[name])
+        plans[name] = Plan(
+            name, station if at == 0 else links[name], peer, below, declared=not by_hand[name], calm=calm
+        )
     kinds |= {"by hand" if hand else "declared" for hand in by_hand.values()}
     kinds |= {"mixed"} if len(set(by_hand.values())) == 2 else set()
     wires = []

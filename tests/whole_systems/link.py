@@ -71,6 +71,7 @@ class Plan:
     Attributes:
         link: To its superior; None where it takes no orders, and `peer`, the superior's name.
         below: Its subordinates, each with its link.
+        calm: Whether it states nothing that is likely to break: else endings are not looked at.
         gives: Plain outputs that lead to other levels; `takes`, plain inputs from them.
         parts: What it has, in words: the kinds that a system shows.
     """
@@ -80,6 +81,7 @@ class Plan:
     peer: str
     below: tuple[tuple[str, Link], ...]
     declared: bool
+    calm: bool = False
     gives: list[str] = field(default_factory=list)
     takes: list[str] = field(default_factory=list)
     parts: set[str] = field(default_factory=set)

@@ -122,10 +122,14 @@ def lower(plan: Plan, random: Random, slips: list[str]) -> str:  # noqa: C901, P
     assumes: list[str] = []
     fields = [*([f"{order}.k"] if link.field_ else []), *([f"{order}.sp"] if link.stream else [])]
     text += fact_text(plan, random, assumes, fields)
-    text += properties_text(
-        domains | {f"{report}.status_report": ("done", "executing", "failed")}, random, parts
+    text += (
+        ""
+        if plan.calm
+        else properties_text(
+            domains | {f"{report}.status_report": ("done", "executing", "failed")}, random, parts
+        )
     )
-    if random.random() < 0.12:
+    if random.random() < 0.12 and not plan.calm:
         stated = [
             "now /= bad",
             "n /= 2" if waits else "now /= works",

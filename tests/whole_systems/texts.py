@@ -114,7 +114,7 @@ def sign_modules(plan: Plan) -> list[str]:
 def fact_text(plan: Plan, random: Random, assumes: list[str], fields: Sequence[str]) -> str:
     """A fact about what another level writes."""
     every = [*fields, *(["sign"] if plan.takes else [])]
-    if not every or random.random() > 0.25:
+    if plan.calm or not every or random.random() > 0.25:
         return ""
     plan.parts.add("fact of another level")
     word = random.choice(every)
