@@ -67,7 +67,7 @@ def test_every_sort_of_claim_is_compared_or_left_out_for_a_reason() -> None:
     assert all(LEFT_OUT.values())
     others = {text for name, text in vars(of_claims).items() if name.isupper() and isinstance(text, str)}
     keys = {one[0] for one in vars(of_claims).values() if isinstance(one, tuple) and len(one) == 3}  # a key
-    assert (others | keys) - {of_claims.DECLARED} - set(
+    assert (others | keys) - {of_claims.DECLARED, of_claims.NEVER_REFUSED, of_claims.NOT_FOR_EVER} - set(
         map(str, Sort)
     ) == COMPARED_BESIDES | LEFT_OUT_BESIDES.keys()
 
@@ -94,7 +94,7 @@ def test_a_sort_that_nobody_compares_is_told(monkeypatch: pytest.MonkeyPatch) ->
 ALONE = 'name = "w"\ngenerated = "g"\ntick_ms = 40\n[[level]]\nname = "a"\n[buffers]\n"pl.x" = "a.x"\n"pl.g" = "a.g"\n'
 SHOWN = """input x : int 0 .. 2
 input g : bool
-output o : int 0 .. 3 safe 3
+output o : int 0 .. 3 = 0 safe 3
 assume kept monitored : o /= 3
 property guarded : o > 0 implies g or x = x
 table t assuming kept {
@@ -137,10 +137,8 @@ def test_what_a_claim_trusts_is_left_out_and_nothing_else() -> None:
         speaks_of(("no extern procedure is refused in the first cycle after a restart",))
         == Event.REFUSED.rank
     )
-    assert (
-        speaks_of(("no input of level `a` is refused: its outputs would show their safe values",))
-        == Event.ANEW.rank
-    )
+    assert speaks_of((f"`x` of level `a` is {of_claims.NEVER_REFUSED}",)) == Event.ANEW.rank
+    assert speaks_of((f"`x` of level `a` is {of_claims.NOT_FOR_EVER}",)) == Event.EARLY_ANEW.rank
 
 
 def test_links_that_differ_are_drawn_with_both_declarations() -> None:

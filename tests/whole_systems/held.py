@@ -15,8 +15,10 @@ from rcsc.compose.contract.claims import (
     CONTRACT,
     ENDING,
     GIVEN,
+    NOT_FOR_EVER,
     RESTING,
     RUNS,
+    STANDS,
     UNREACHED,
     Closed,
     Key,
@@ -35,7 +37,7 @@ from tests.small_hierarchies.level import Role
 from tests.whole_systems.link import Drawn
 from tests.whole_systems.part import Owed, Part
 from tests.whole_systems.rounds import goes_on
-from tests.whole_systems.whole import Whole, Wire, searched
+from tests.whole_systems.whole import Ends, Whole, Wire, searched
 
 LITTLE = Effort(walks=6, cycles=20)
 MOST = 400
@@ -54,13 +56,15 @@ LEFT_OUT: Mapping[str, str] = {
     Sort.PROTOCOL: "names all sorts of the protocol at once where they cannot be stated",
 }
 """Sorts that are no claims of their own, with the reason."""
-COMPARED_BESIDES = frozenset({CONTRACT, GIVEN, UNREACHED})
+COMPARED_BESIDES = frozenset({CONTRACT, GIVEN, UNREACHED, STANDS[0]})
 LEFT_OUT_BESIDES: Mapping[str, str] = {
     RUNS[0]: "says that lines, safety and the contract are proved; each of these is compared",
     ENDING[0]: "says that the commands of all tables end; each of these is compared",
     RESTING[0]: "says that the first command ends, which is compared",
     AGAIN: "what a line does once more is told, and nothing rests on it",
 }
+FOR_EVER = (NOT_FOR_EVER, "refused only finitely often")
+"""How what is trusted ends of refusals that may be, but not for ever."""
 NO_REFUSAL, NOT_AT_FIRST, ANY = 1, 2, 3
 """Ranks of events of which a claim speaks."""
 
@@ -123,9 +127,9 @@ def _compared(
         if rank <= whole.claimed[level].get(key, -1):
             yield "proved, but breaks in a run of the whole", names[level], " ".join(key), str(rank)
     for level, ends in enumerate(whole.ends):
-        for table, (still, rank) in ends.items():
+        for table, (still, *ranks) in ends.items():
             counts["endings of whole systems"] += 1
-            if goes_on(whole, found, level, table, still, rank):
+            if goes_on(whole, found, level, table, still, *ranks):
                 yield "shown to end, but goes on in the whole", names[level], table, ", ".join(sorted(still))
 
 
@@ -204,16 +208,14 @@ def _claimed(follows: Mapping[Need, Closed], level: str) -> dict[Key, int]:
 
 def speaks_of(trusts: Sequence[str]) -> int:
     """The greatest rank of the events of which a claim speaks that trusts this."""
-    refused = [one for one in trusts if "refused" in one and "only finitely often" not in one]
+    refused = [one for one in trusts if "refused" in one and not one.endswith(FOR_EVER)]
     if any("first cycle after a restart" not in one for one in refused):
         return NO_REFUSAL
     first = [one for one in trusts if "first cycle after a restart" in one]
     return NOT_AT_FIRST if first else ANY
 
 
-def _ends(
-    follows: Mapping[Need, Closed], proof: LevelProof, fed: frozenset[str]
-) -> dict[str, tuple[frozenset[str], int]]:
+def _ends(follows: Mapping[Need, Closed], proof: LevelProof, fed: frozenset[str]) -> dict[str, Ends]:
     """Tables whose commands end; values that another level gives do not stand still because somebody says so."""
     found = {}
     for ending in proof.endings:
@@ -222,6 +224,7 @@ def _ends(
             outside = frozenset(
                 still for still in ending.still if not any(leaf.partition(".")[0] == still for leaf in fed)
             )
-            finitely = any("refused only finitely often" in trust for trust in one.trusts)
-            found[ending.table] = outside, NO_REFUSAL if finitely else speaks_of(one.trusts)
+            rank = speaks_of(one.trusts)
+            finitely = any(trust.endswith(FOR_EVER) for trust in one.trusts)
+            found[ending.table] = outside, rank, NO_REFUSAL if finitely else rank
     return found

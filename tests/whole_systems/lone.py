@@ -15,7 +15,8 @@ def alone(random: Random) -> Drawn:  # noqa: PLR0915  # one text, from top to bo
     asks = random.random() < 0.3
     text = "input g : bool\ninput x : int 0 .. 2\n"
     own = "o" if held else "s"
-    text += f"output o : int 0 .. {most}{f' safe {random.randint(0, most)}' if safe else ''}\n"
+    shown = random.choice(("", " = 0", f" = {most}")) + (f" safe {random.randint(0, most)}" if safe else "")
+    text += f"output o : int 0 .. {most}{shown}\n"
     text += "" if held else f"state s : int 0 .. {most}{random.choice(('', f' = 0 restart {most}'))}\n"
     kinds |= {"safe"} if safe else set()
     if random.random() < 0.3:

@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import product
 from operator import itemgetter
 
-from rcsc.compose.contract.claims import CONTRACT, GIVEN, UNREACHED
+from rcsc.compose.contract.claims import CONTRACT, GIVEN, STANDS, UNREACHED
 from rcsc.compose.contract.obligations import Sort
 from rcsc.lang.interpret import Fault, cycle, holds
 from rcsc.lang.leaves import read_by
@@ -355,6 +355,17 @@ class Part:
         said = kind.members[int(after[f"{above.report}.status_report"])]
         return not (said == above.done or (said == above.failed and not rests))
 
+    def _stands(self, before: Mapping[str, Value], after: Mapping[str, Value]) -> bool:
+        """Whether a report that has answered the order taken last is as it was, while it is about that order."""
+        above = self.role.links.above
+        assert above is not None
+        echo, number = f"{above.report}.inc_command_echo", f"{above.order}.inc_command"
+        about = before[echo] == before[number] == after[echo]
+        about = about and before[f"{above.report}.ref_command_echo"] == before[f"{above.order}.input_command"]
+        if not about or self._unanswered(before):
+            return True
+        return all(before[leaf] == after[leaf] for leaf in self.role.report)
+
     def _broken(
         self, now: Mapping[str, Value], before: Mapping[str, Value], taken: Mapping[str, Value], ran: Ran
     ) -> Iterator[Claimed]:
@@ -368,6 +379,8 @@ class Part:
             yield CONTRACT, "", above.order
         if ran.line:
             yield UNREACHED, ran.table, ran.line
+        if above is not None and not self._stands(before, ran.after):
+            yield STANDS
         for fact, condition in self.facts.items():
             if not holds(condition, taken):
                 yield GIVEN, "", fact

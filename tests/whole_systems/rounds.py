@@ -12,10 +12,13 @@ ROUNDS, ROUND = 4, 160
 """From so many states it is looked for what may go on for ever, each time among so many."""
 
 
-def goes_on(whole: Whole, found: Searched, level: int, table: str, still: frozenset[str], rank: int) -> bool:
+def goes_on(
+    whole: Whole, found: Searched, level: int, table: str, still: frozenset[str], rank: int, again: int
+) -> bool:
     """Whether a command that runs the table may go on for ever: round through states in which every level runs and everything is seen.
 
-    The order of the level is the same all the while, nobody begins anew, and what stands still does.
+    The order of the level is the same all the while, nobody begins anew, and what stands still does. States
+    are reached by events of a rank of at most `rank`, and gone round by those of at most `again`.
     """
     begun = [
         step.end
@@ -27,7 +30,7 @@ def goes_on(whole: Whole, found: Searched, level: int, table: str, still: frozen
         and found.ranks[step.end] <= rank
     ]
     for at in range(0, len(begun), max(1, len(begun) // ROUNDS)):
-        within = _quiet(whole, found.states[begun[at]], level, rank)
+        within = _quiet(whole, found.states[begun[at]], level, again)
         for mine, others in _apart(within.steps, level, still):
             if any(_fair(whole, within, some, level, table) for some in _rounds([*others, *mine])):
                 return True

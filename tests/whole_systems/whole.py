@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from random import Random
+from typing import TypeAlias
 
 from rcsc.compose.contract.claims import SAFE
 from tests.small_hierarchies.world import NUMBERS
@@ -53,19 +54,23 @@ class Now:
         return self.levels, self.stands, self.seen
 
 
+Ends: TypeAlias = tuple[frozenset[str], int, int]
+"""Inputs that stand still; the greatest rank of events before it is looked, and of those that may come again and again."""
+
+
 @dataclass
 class Whole:
     """A system.
 
     Attributes:
         claimed: What is claimed of each level, with the greatest rank of the events of which it speaks.
-        ends: Tables whose commands are claimed to end, with the inputs that stand still meanwhile and that rank.
+        ends: Tables whose commands are claimed to end, each with the `Ends` that it speaks of.
     """
 
     parts: Sequence[Part]
     wires: Sequence[Wire]
     claimed: Sequence[Mapping[Claimed, int]]
-    ends: Sequence[Mapping[str, tuple[frozenset[str], int]]]
+    ends: Sequence[Mapping[str, Ends]]
 
     @cached_property
     def into(self) -> list[list[int]]:
