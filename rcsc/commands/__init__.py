@@ -41,7 +41,8 @@ def main() -> None:
     """Run `rcsc` with the process's arguments and end the process."""
     status = run(sys.argv[1:])
     try:
-        sys.stdout.flush()
+        if sys.stdout is not None:  # None where the process began without
+            sys.stdout.flush()
     except OSError as error:
         status = status or _unwritable("standard output", error.strerror)
         _forget_stdout()

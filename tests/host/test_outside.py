@@ -930,6 +930,14 @@ def test_a_full_standard_output_is_said(project: Path) -> None:
     assert "RCS502" in ended.stderr
 
 
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-", "<&- | head -c 1"])
+def test_streams_that_are_closed_are_no_bug(closed: str, project: Path) -> None:
+    command = f"{sys.executable} -c 'from rcsc.commands import main; main()' explain RCS401 {closed}"
+    ended = subprocess.run(["sh", "-c", command], cwd=project, capture_output=True, text=True, check=False,
+                           env=os.environ | {"PYTHONPATH": str(REPO)})  # fmt: skip
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
 # --- what other programs make of what is written -------------------------------------------------
 
 FORMULAS = [
