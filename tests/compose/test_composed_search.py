@@ -408,8 +408,8 @@ def test_lines_of_the_small_levels_are_all_reached_and_say_the_same_again(tmp_pa
     # `go` of the lower level waits for its input: nothing there makes that come
     assert endings["lower"] == {"pause": (1, ()), "go": (1, ("2",))}
     changes = {table: many for table, (many, _) in endings["upper"].items()}
-    assert changes["rest"] == 2
-    assert changes["work"] in {3, 4}  # it is a bound: how close depends on which invariant was found
+    assert changes["rest"] in {2, 3}
+    assert changes["work"] in {3, 4}  # they are bounds: how close depends on which invariant was found
 
 
 def test_a_line_that_is_dead_in_its_context_is_named(tmp_path: Path) -> None:
