@@ -3,13 +3,14 @@
 `python -m tests.claims --count 1000 --jobs 2` prints a table at the end and every claim that broke, with its seed; `--show SEED` prints
 one system with what breaks it, made small. Exit status 1 where a claim breaks.
 
-Systems are those that `tests.hierarchies` judges by enumeration; those that the compiler refuses are counted, and others taken in their
-place. Episodes have what any system's have (`rcsc.episodes.sampling`): values from outside that move and are refused, orders at any
-moment, buffers that lose, delay and double, levels that start anew; restarts oftener than there.
+Systems are those that `tests.hierarchies` judges by enumeration, small ones and whole ones; those that the compiler refuses are counted,
+and others taken in their place. Episodes have what any system's have (`rcsc.episodes.sampling`): values from outside that move and are
+refused, orders at any moment, buffers that lose, delay and double, levels that start anew; restarts oftener than there.
 """
 
 import argparse
 import gc
+import re
 import sys
 import tempfile
 import time
@@ -24,7 +25,8 @@ from types import ModuleType
 
 from rcsc.campaign.shrink import shrink
 from rcsc.compose.invariant.search import Effort
-from rcsc.compose.proof.system import NoProgramError, prove_transition_systems, read_systems
+from rcsc.compose.proof.system import prove_transition_systems, read_systems
+from rcsc.diagnostics.coded import CodedError
 from rcsc.driver.compile import compile_system
 from rcsc.driver.watched import proved_claims
 from rcsc.episodes.episode import Episode, Restart
@@ -36,6 +38,7 @@ from rcsc.episodes.sampling import draw_on
 from rcsc.episodes.stand import Stand, stand
 from tests.small_hierarchies.more import furnished
 from tests.small_hierarchies.text import files
+from tests.whole_systems.drawn import drawn
 
 LITTLE = Effort(walks=6, cycles=20)
 WITHIN = "[campaign]\nwithin = 60\n"
@@ -80,8 +83,8 @@ NOWHERE = _Nowhere("nowhere")
 
 
 def texts(seed: int) -> dict[str, str]:
-    """The files of the system of a seed, by name."""
-    made = files(furnished(seed))
+    """The files of the system of a seed, by name: of the small hierarchies, and every other time of whole systems."""
+    made = dict(drawn(seed).files) if seed % 2 else files(furnished(seed))
     return {**made, "system.toml": f"{made['system.toml']}{WITHIN}"}
 
 
@@ -94,7 +97,7 @@ def proved(folder: Path, seed: int) -> "tuple[Stand, Claims] | None":
         if compile_system(path).report.failed:
             return None
         return stand(path), proved_claims_of(path)
-    except NoProgramError:
+    except CodedError:  # two ends of a link that differ, a program that is not in order
         return None
 
 
@@ -102,7 +105,7 @@ def proved_claims_of(path: Path) -> Claims:
     """What is proved of a system, with little effort.
 
     Raises:
-        NoProgramError: A program of it is not in order.
+        CodedError: It is not in order.
     """
     systems = read_systems(path)[0]
     return proved_claims(path, systems, prove_transition_systems(systems, LITTLE, 1, tuple(systems)))
@@ -146,6 +149,7 @@ def played(seed: int, episodes: int = EPISODES) -> Played:
             kinds.update(claim.kind for claim in holds.watched)
             counts["claims watched"] += len(holds.watched)
             counts["claims not watched"] += len(holds.unwatched)
+            kinds.update(f"not watched: {re.sub('`[^`]*`', '...', why)}" for _, why in holds.unwatched)
             for number in range(episodes):
                 episode = drawn_episode(its, one, number)
                 loop, found = broken_in(episode, its, claims)

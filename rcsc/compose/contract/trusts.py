@@ -8,13 +8,14 @@ from enum import Enum
 
 
 class Trust(Enum):
-    """A kind of trust, with its sentence; LEVEL and NAME stand for whom and what it is about."""
+    """A kind of trust, with its sentence; LEVEL, NAME, INPUTS and ARE stand for whom and what it is about."""
 
     DECLARED = "assumption `NAME` of level `LEVEL`, as it is declared"
     STATES = "level `LEVEL` can be as its tables declare in every state that it comes to"
     DATABASE = "the same question has the same answer in `NAME` of level `LEVEL`"
     PROTOCOL = "`LEVEL` keeps to the protocol"
-    REFUSED = "no input of level `LEVEL` is refused: its outputs would show their safe values"
+    REFUSED = "INPUTS of level `LEVEL` ARE never refused"
+    NOT_FOR_EVER = "INPUTS of level `LEVEL` ARE not refused for ever"
     EXTERN_AT_RESTART = "no extern procedure is refused in the first cycle after a restart"
     ASSUMPTION_AT_RESTART = (
         "assumption `NAME` of level `LEVEL` does not fail in the first cycle after a restart"
@@ -22,13 +23,17 @@ class Trust(Enum):
     RESTS = "`LEVEL` comes to rest some time where it is told to, and stays so"
     ANSWERS = "`LEVEL` answers every order that is not replaced, and stays so"
     STILL = "the values in `NAME` of level `LEVEL` stand still meanwhile"
-    EXTERNS_FINITE = "extern procedures of level `LEVEL` are refused only finitely often"
+    EXTERNS_FINITE = "extern procedures of level `LEVEL` are not refused for ever"
 
 
+_PLACES = {
+    "LEVEL": "(?P<level>[^`]+)",
+    "NAME": "(?P<name>[^`]+)",
+    "INPUTS": "`[^`]+`(?:, `[^`]+`)*",
+    "ARE": "(?:is|are)",
+}
 _PATTERNS = {
-    trust: re.compile(
-        re.escape(trust.value).replace("LEVEL", r"(?P<level>[^`]+)").replace("NAME", r"(?P<name>[^`]+)")
-    )
+    trust: re.compile(re.sub("|".join(_PLACES), lambda found: _PLACES[found[0]], re.escape(trust.value)))
     for trust in Trust
 }
 

@@ -14,7 +14,7 @@ from rcsc.episodes.stand import Stand
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.run.signature import STOPPED, Values
 
-MEANWHILE = frozenset({"ANSWERS", "RESTS", "STILL", "EXTERNS_FINITE", "STATES"})
+MEANWHILE = frozenset({"ANSWERS", "RESTS", "STILL", "EXTERNS_FINITE", "NOT_FOR_EVER", "STATES"})
 """Kinds that no cycle alone can break."""
 
 
