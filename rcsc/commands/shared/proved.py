@@ -11,10 +11,7 @@ import click
 from rcsc.compose.contract.claims import (
     AGAIN,
     ENDING,
-    RESTING,
     RUNS,
-    SAFE,
-    STANDS,
     UNREACHED,
     Key,
     Need,
@@ -124,29 +121,33 @@ class Summary:
 
     Attributes:
         claims: How many there are, agreements between levels counted; `proved`, how many of them are, and `open`, how many are not.
-        lacks: What else is not shown, kind by kind: it ends with status 1 under `--strict` alone.
+        trusting: How many of those proved trust that inputs are not refused.
+        lacks: What else is not shown, kind by kind. This, and what trusts, ends with status 1 under `--strict` alone.
     """
 
     claims: int
     proved: int
     open: int
+    trusting: int
     lacks: tuple[str, ...]
 
     def status(self, *, strict: bool) -> int:
         """The exit status."""
-        return 1 if self.open or (strict and self.lacks) else 0
+        return 1 if self.open or (strict and (self.lacks or self.trusting)) else 0
 
     def line(self, *, strict: bool) -> str:
         """The verdict, with its colour."""
         many = counted(self.proved, "claim")
+        if self.trusting:
+            many += f", {self.trusting} of them trusting that inputs are not refused"
         rest = ", ".join(self.lacks)
         if self.open:
             text = f"not proved: {self.open} of {counted(self.claims, 'claim')}"
             return click.style(text, fg="red", bold=True) + (f"; also {rest}" if rest else "")
-        if not self.lacks:
-            return click.style(f"proved: {many}", fg="green", bold=True)
-        text = click.style(f"proved in part: {many}", fg="yellow", bold=True)
-        return f"{text}, but {rest}: status {'1' if strict else '0, and 1 with --strict'}"
+        status = f": status {'1' if strict else '0, and 1 with --strict'}" if rest or self.trusting else ""
+        if not rest:
+            return click.style(f"proved: {many}", fg="green", bold=True) + status
+        return click.style(f"proved in part: {many}", fg="yellow", bold=True) + f"; but {rest}{status}"
 
 
 def summary(whole: SystemProof) -> Summary:
@@ -155,8 +156,17 @@ def summary(whole: SystemProof) -> Summary:
     still_open = sum(len(level.open) for level in whole.levels)
     not_agreed = sum(not agreement.holds for agreement in whole.agreements)
     proved = sum(whole.of(*need).proved for need in claims) + len(whole.agreements) - not_agreed
+    trusting_ = sum(
+        closed.proved and any(map(of_refusals, closed.trusts))
+        for need, closed in whole.closed.items()
+        if need in claims
+    )
     return Summary(
-        len(claims) + len(whole.agreements), proved, still_open + not_agreed, tuple(_lacking(whole))
+        len(claims) + len(whole.agreements),
+        proved,
+        still_open + not_agreed,
+        trusting_,
+        tuple(_lacking(whole)),
     )
 
 
@@ -165,16 +175,10 @@ def _lacking(whole: SystemProof) -> Iterator[str]:
     counts = {
         "not looked at": sum(missing.applies for level in whole.levels for missing in level.unstated),
         "resting on what is not known": sum(map(len, _resting(whole).values())),
-        "trusting that inputs are not refused": sum(
-            any(map(of_refusals, closed.trusts))
-            for (_, key), closed in whole.closed.items()
-            if key not in {ENDING, RESTING, RUNS, SAFE, STANDS} and closed.proved
-        ),
         "not shown to end": sum(not ending.proved for level in whole.levels for ending in level.endings),
         "never reached": sum(len(seen.unreached) for seen in contexts),
-        "not shown to be reached": sum(len(seen.unsure) for seen in contexts),
     }
-    nouns = {"not shown to end": "command", "never reached": "line", "not shown to be reached": "line"}
+    nouns = {"not shown to end": "command", "never reached": "line"}
     return (f"{counted(many, nouns.get(what, 'claim'))} {what}" for what, many in counts.items() if many)
 
 
