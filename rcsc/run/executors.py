@@ -74,6 +74,8 @@ def _module(name: str, path: Path) -> ModuleType:
         loader.exec_module(module)
     except Malformed as error:
         raise NotBuilt(f"`{path}` {error}") from error
+    except (Exception, SystemExit, GeneratorExit) as error:  # modules of extern procedures are the user's
+        raise NotBuilt(f"`{path}` cannot be imported: {type(error).__name__}: {error}") from error
     return module
 
 

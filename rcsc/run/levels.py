@@ -137,8 +137,16 @@ class RunningLevel:
         self.executor.put(first, values)
 
     def run(self) -> int:
-        """Run one cycle; return the fault, 0 for none."""
-        fault = self.executor.cycle()
+        """Run one cycle; return the fault, 0 for none.
+
+        Raises:
+            StateTableError: An extern procedure, which is the user's code, raised, or asked to end the process.
+        """
+        try:
+            fault = self.executor.cycle()
+        except (Exception, SystemExit, GeneratorExit) as error:
+            said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+            raise StateTableError(f"level `{self.name}`: an extern procedure failed: {said}") from error
         self.values = self.executor.values()
         return fault
 

@@ -3,6 +3,7 @@
 import copy
 import math
 import shutil
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
 from rcsc.run.description import BadDescription, description
 from rcsc.run.levels import misfit
@@ -401,6 +403,34 @@ def test_what_stands_outside_publishes_buffers_and_values_or_is_told_apart(
     system = assemble(description(dock / "system.toml"), "python", {}, (Outside(),))
     with pytest.raises(StateTableError, match=r"outside published|cannot hold what was published"):
         system.step()
+
+
+@pytest.mark.parametrize(
+    "does",
+    ["raise ValueError('boom')", "raise SystemExit(3)", "raise GeneratorExit", "return of()", "", "1 / 0"],
+)
+def test_an_extern_procedure_that_fails_is_told_as_such(
+    does: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a cycle, or as its module is imported; with no status that is a bug's."""
+    (tmp_path / "t.rcs").write_text(
+        'input n : int 0 .. 5\nstate s : int 0 .. 9\nextern procedure look reads n writes s python "failing_part:of" c "part_of"\n'
+        "table t {\n| line | n || procedures |\n| a | 0 .. 5 || look |\n}\nlevel l { period 40 [ms]  table t }\n",
+        encoding="utf-8",
+    )
+    text = 'name = "ext"\ntick_ms = 40\ngenerated = "generated"\n[[level]]\nname = "l"\nprogram = "t"\n[buffers]\n"outside.n" = "l.n"\n'
+    (tmp_path / "system.toml").write_text(text, encoding="utf-8")
+    inside = does.startswith(("raise", "return"))
+    code = f"def of(*_):\n    {does}\n" if inside else does or "import no_such_module_here"
+    (tmp_path / "failing_part.py").write_text(f"{code}\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "failing_part", raising=False)
+    assert run(["run", str(tmp_path), "-q", "--executor", "python", "--cycles", "3"]) == 1
+    said = capsys.readouterr().err
+    assert (
+        "error[RCS725]: level `l`: an extern procedure failed" if inside else "cannot be imported"
+    ) in said
+    assert "RCS9" not in said
 
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"/>'
