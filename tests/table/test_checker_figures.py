@@ -384,6 +384,10 @@ under 0
     1 at first: invariant `apart` holds
     2 at first: invariant `begins` holds
 under 0
+    0 after a restart: invariant `small` holds
+    1 after a restart: invariant `apart` holds
+    2 after a restart: invariant `begins` holds
+under 0
     0 invariant `apart`: the result of `+` stays in its 64 bits at `n + late`
     1 invariant `apart`: an operand stays in its 64 bits at `n + late`
 under 3
