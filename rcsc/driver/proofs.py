@@ -22,10 +22,9 @@ from rcsc.lang.project import Loaded
 from rcsc.procedures.invariants import properties_elsewhere
 from rcsc.procedures.obligations import called_by_lines
 from rcsc.solvers.options import Options
-from rcsc.table.certificate import must_cover
 from rcsc.table.mending import mended
 from rcsc.table.program import prove_program
-from rcsc.table.verdict import DeadLine, Gap, SolversDisagree, TableVerdict, Undecided
+from rcsc.table.verdict import SolversDisagree, TableVerdict
 
 WORTH_A_PROCESS = 20_000
 """Cells of a program's tables from which several processes are quicker than one."""
@@ -205,13 +204,6 @@ def _verdict(verdict: TableVerdict) -> Verdict:
     """What a table is: refuted where anything is wrong with it, though something else was left open."""
     if any(isinstance(finding, SolversDisagree) for finding in verdict.findings):
         return Verdict.UNDECIDED
-    falls = not must_cover(verdict.table)
-    wrong = any(
-        not (isinstance(finding, Gap) and falls)
-        and not (isinstance(finding, DeadLine) and finding.assuming)
-        and not isinstance(finding, Undecided)
-        for finding in verdict.findings
-    )
-    if wrong:
+    if verdict.refuted:
         return Verdict.REFUTED
     return Verdict.UNDECIDED if verdict.undecided else Verdict.PROVED

@@ -121,7 +121,11 @@ def _others(
                 message = f"the assumptions of table `{table.name}` contradict each other, an invariant or the declared ranges"
                 yield Diagnostic(Code.CONTRADICTORY_ASSUMPTIONS, message, Label(table.span))
             case Undecided(what):
-                helps = ("give each query more steps with `--steps`, or simplify the conditions",)
+                helps = (
+                    "mend what is wrong first: then this is asked with more steps"
+                    if verdict.refuted
+                    else "give each query more steps with `--steps`, or simplify the conditions",
+                )
                 message = f"table `{table.name}` could not be decided: {what}"
                 yield Diagnostic(Code.UNDECIDED, message, Label(table.span), help=helps)
             case SolversDisagree(what):

@@ -64,6 +64,8 @@ _MOST_LINES_TRIED = 200
 """Lines of a table above which no inputs are tried by the interpreter."""
 _NODES_OF_A_LINE = 500
 """Nodes in which an input is looked for that a line matches, before the solver is asked."""
+_NODES_OF_A_GLANCE = 500
+"""Nodes in which arithmetic alone looks for something wrong, before the solver is first asked."""
 _MOST_REPROVED = 2_000
 """Nodes of a tree above which it is not tried whether an assumption can be spared."""
 
@@ -133,6 +135,9 @@ class _Decision:
     Attributes:
         universe: Columns and forms of the lines and assumptions; every variable of a witness is a column.
         clauses, assumed: The lines, and the assumptions as formulas.
+        wrong: Whether something is known to be wrong, so that the verdict stands.
+        spare: What may then be spent on the least inputs, the regions around them and more of the same kind.
+        rest: What may then be spent on what else there is, gaps and dead lines; what has no answer is told as undecided.
     """
 
     def __init__(self, program: Program, table: Table, options: Options) -> None:
@@ -147,7 +152,8 @@ class _Decision:
         self._tried: tuple[Snapshot, ...] | None = None
         self._matching: list[frozenset[int]] | None = None
         self.spare = smt.Budget(WRONG_STEPS, of_all=True)
-        self.wrong = False
+        self.rest = smt.Budget(WRONG_STEPS)
+        self.wrong = self.glanced = False
         self.models: list[Snapshot] = []
 
     @property
@@ -198,6 +204,7 @@ class _Decision:
         search = self.search(kept)
         if search.proved:
             kept, search = self.spared(search)
+        self.wrong |= bool(search.overlaps) or (must_cover(self.table) and bool(search.gaps))
         found = [*self.overlaps(search), *self.gap(search)]
         dead = self.dead(search)
         with smt.within(self.spare):
@@ -283,6 +290,8 @@ class _Decision:
         """Z3's answer about a region, as the tree asks it."""
         if len(asked.candidates) > _MOST_CANDIDATES or smt.spent():
             return NoWitness.UNKNOWN
+        if not self.glanced:
+            self.glance()
         bounds = self.spelled(asked)
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
         for snapshot in self.tried:
@@ -296,6 +305,17 @@ class _Decision:
             self.wrong = True
             return self.model(z3)
         return NoWitness.NONE if answer is Answer.UNSATISFIABLE else NoWitness.UNKNOWN
+
+    def glance(self) -> None:
+        """Look, before Z3 is first asked, whether arithmetic alone soon finds that something is wrong."""
+        self.glanced = True
+        soon = self.search(range(len(self.assumptions)), _NODES_OF_A_GLANCE, alone=True)
+        self.wrong |= soon.refuted
+
+    def holds(self, *terms: Term) -> Answer:
+        """Z3's answer to what else may be wrong: with all steps, as long as nothing is."""
+        with smt.within(self.rest) if self.wrong else nullcontext():
+            return self.asked.holds(*terms)
 
     def model(self, z3: TableSolver) -> dict[str, Value]:
         """The input that the solver gives, of what the table and its assumptions read."""
@@ -363,14 +383,14 @@ class _Decision:
         if smt.gives_up("what no line matches"):
             return False
         if not must_cover(self.table) and (search.undecided or len(self.clauses) <= _MOST_LINES_GROWN):
-            return self.asked.holds(self.asked.none()) is Answer.UNSATISFIABLE
+            return self.holds(self.asked.none()) is Answer.UNSATISFIABLE
         return all(self.missed(asked) is Answer.UNSATISFIABLE for asked in search.doubtful)
 
     def missed(self, asked: Question) -> Answer:
         """Whether the solver finds an input in a region that no line matches."""
         z3 = self.asked
         region = [encode(condition, z3.frame) for condition in located(self.spelled(asked))]
-        return z3.holds(*region, smt.negation(smt.any_of(list(map(z3.line, asked.candidates)))))
+        return self.holds(*region, smt.negation(smt.any_of(list(map(z3.line, asked.candidates)))))
 
     def matching(self, snapshot: Snapshot) -> list[int]:
         """Positions of the lines that match."""
@@ -432,17 +452,33 @@ class _Decision:
         """
         seen = () if search is None else (node.line for node in search.nodes if isinstance(node, Only))
         order = dict.fromkeys([*(at for at in seen if at >= 0), *range(len(self.clauses))])
-        findings: dict[int, TableFinding] = {}
+        open_: list[tuple[int, NoWitness]] = []
         near: Point = {}
         for at in order:
             if smt.gives_up("which lines never match"):
                 break
             point = self.meeting(at, near)
-            if not isinstance(point, NoWitness):
+            if isinstance(point, NoWitness):
+                open_.append((at, point))
+            else:
                 near = point
-            elif (finding := self.dead_line(at, point)) is not None:
-                findings[at] = finding
-        return [findings[at] for at in sorted(findings)]
+        dead = {at: self.excluded_only(at) for at, point in open_ if point is not NoWitness.UNKNOWN}
+        self.wrong |= not all(dead.values())
+        doubtful: list[int] = []
+        for at in sorted(at for at, _ in open_ if at not in dead):
+            answer = Answer.SATISFIABLE if self.tried_by(at) else self.holds(self.asked.line(at))
+            if answer is Answer.UNSATISFIABLE:
+                dead[at] = self.excluded_only(at)
+                self.wrong |= not dead[at]
+            elif answer is Answer.UNKNOWN:
+                doubtful.append(at)
+        findings: list[TableFinding] = [DeadLine(at, dead[at]) for at in sorted(dead)]
+        return [*findings, Undecided(self.doubt(doubtful))] if doubtful else findings
+
+    def doubt(self, lines: Sequence[int]) -> str:
+        """Say of which lines it is not known whether they match."""
+        names = ", ".join(f"`{self.table.lines[at].name}`" for at in lines)
+        return f"whether line{'s' if len(lines) > 1 else ''} {names} can match"
 
     def meeting(self, at: int, near: Point) -> Point | NoWitness:
         """An input that a line matches under the assumptions, looked for near another."""
@@ -450,19 +486,10 @@ class _Decision:
             return find(self.universe, [self.line(at), *self.assumed], _NODES_OF_A_LINE)
         return meeting(self.universe, self.clauses[at], near, _NODES_OF_A_LINE)
 
-    def dead_line(self, at: int, point: NoWitness) -> TableFinding | None:
-        """What is wrong with a line of which no input is known."""
-        answer = Answer.UNSATISFIABLE
-        if point is NoWitness.UNKNOWN and self.tried_by(at):
-            answer = Answer.SATISFIABLE
-        elif point is NoWitness.UNKNOWN:
-            answer = self.asked.holds(self.asked.line(at))
-        if answer is Answer.UNSATISFIABLE:
-            assuming = len(self.sure) < len(self.assumed)
-            assuming = assuming and find(self.universe, [self.line(at), *self.sure]) is not NoWitness.NONE
-            return DeadLine(at, assuming)
-        unknown = answer is Answer.UNKNOWN
-        return Undecided(f"whether line `{self.table.lines[at].name}` can match") if unknown else None
+    def excluded_only(self, at: int) -> bool:
+        """Whether a line never matches only because of an assumption that is not proved."""
+        assuming = len(self.sure) < len(self.assumed)
+        return assuming and find(self.universe, [self.line(at), *self.sure]) is not NoWitness.NONE
 
     @property
     def sure(self) -> list[Formula]:
@@ -490,7 +517,8 @@ class _Decision:
         self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]
     ) -> Snapshot | None:
         if not seen:
-            return self.asked.witness(*terms(self.asked), spare=self.spare)
+            with smt.within(self.rest) if self.wrong else nullcontext():
+                return self.asked.witness(*terms(self.asked), spare=self.spare)
         with smt.within(self.spare):
             return None if smt.spent() else self.asked.witness(*terms(self.asked))
 

@@ -98,3 +98,14 @@ class TableVerdict:
     def undecided(self) -> bool:
         """Whether something was left open."""
         return any(isinstance(finding, Undecided) for finding in self.findings)
+
+    @property
+    def refuted(self) -> bool:
+        """Whether something is wrong, whatever was left open; a gap that DEFAULT takes is not, nor a line that an assumption excludes."""
+        falls = self.table.default is not None and not self.table.default.unreachable
+        return any(
+            not (isinstance(finding, Gap) and falls)
+            and not (isinstance(finding, DeadLine) and finding.assuming)
+            and not isinstance(finding, Undecided | SolversDisagree)
+            for finding in self.findings
+        )

@@ -17,6 +17,7 @@ from rcsc.table import relational
 from rcsc.table.confirm import Agreement, confirm
 from rcsc.table.decide import prove_table
 from rcsc.table.program import prove_program
+from rcsc.table.regions import splitting
 from rcsc.table.regions.splitting import Tree
 from rcsc.table.verdict import Overlap, TableVerdict, Undecided
 from tests.support.programs.stages import program_of, reported
@@ -285,14 +286,15 @@ def test_the_first_twenty_overlaps_are_told_with_their_regions(many: int) -> Non
 def test_a_tree_has_a_budget_of_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
     budgets: list[int] = []
 
-    def tree(*given: Any, budget: int, **more: Any) -> Tree:
-        budgets.append(budget)
-        return Tree(*given, budget=budget, **more)
+    def tree(*given: Any, **more: Any) -> Tree:
+        made = Tree(*given, **more)
+        budgets.append(made.budget)
+        return made
 
     monkeypatch.setattr(relational, "Tree", tree)
     text = "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n| a | x < y ||\n| b | x >= y ||\n}\n"
     assert prove_program(program_of(text), Options()).proved is not None
-    assert budgets == [60_000]
+    assert budgets == [splitting.FEWEST_NODES + 2 * splitting.NODES_OF_A_LINE]
 
 
 def test_what_the_solver_does_not_answer_is_left_open() -> None:

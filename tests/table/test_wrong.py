@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.solvers import smt
 from tests import wrong
 from tests.support.programs.stages import reported
 from tests.support.steps import counted
@@ -37,6 +38,21 @@ def test_a_help_past_the_budget_is_said_to_be_not_proved(monkeypatch: pytest.Mon
     )
     assert found.help[0].startswith("in line `q` write `3` under `a`: not proved to part the two lines")
     assert not any(each.certain for each in found.proposals)
+
+
+def test_what_is_not_known_beside_an_overlap_is_left_open_within_its_steps() -> None:
+    """Whether the last two lines can match takes Z3 millions of steps; the verdict does not wait for it."""
+    term = "single(c) * 2e38 - single(c) * 2e38"
+    rows = "| p | <= 3 | || 1 |\n| q | 3 | || 2 |\n| x | > 3 | in {0.0 .. 0.0, 0.0} || 3 |\n| y | > 3 | > 0.0 || 4 |\n"
+    declared = "input a : int 0 .. 9\ninput c : int 0 .. 65535\noutput o : int 0 .. 9\n"
+    text = f"{declared}table t {{\n| line | a | {term} || o |\n{rows}}}\n"
+    with smt.together(100_000_000) as budget:
+        found = reported(text)
+    assert budget.left > 95_000_000
+    assert "RCS402" in {each.code for each in found}
+    left = [each for each in found if each.code == "RCS409"]
+    assert any("whether lines `x`, `y` can match" in each.message for each in left)
+    assert {each.help for each in left} == {("mend what is wrong first: then this is asked with more steps",)}
 
 
 @pytest.mark.parametrize("number", range(200, 206))
