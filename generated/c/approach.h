@@ -54,9 +54,9 @@ enum {
     APPROACH_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
-/* Digests of what the tables mean, b49362a2a7727c23, and of how the state is laid out, 1fa9c56db3e288dc:
+/* Digests of what the tables mean, 1017409575002425, and of how the state is laid out, 1fa9c56db3e288dc:
    comments, and names of files, change neither. The number is made of both. */
-#define APPROACH_DIGEST 0xb3660506u
+#define APPROACH_DIGEST 0x46c1dc27u
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.
@@ -76,8 +76,8 @@ typedef struct {
     /* 3: input; 0.0 .. 500.0 N; Force on the wrist; a reading outside this range is refused. */
     double force_n;
     double limit_n; /* 4: input; 10.0 .. 400.0 N; Force at which the move is given up. */
-    double smooth_n; /* 5: state; 0.0 .. 500.0 N; Smoothed force. */
-    uint8_t settled; /* 6: state; 0 .. 25; Cycles spent near the goal. */
+    double smooth_n; /* 5: output; 0.0 .. 500.0 N; Smoothed force. */
+    uint8_t settled; /* 6: output; 0 .. 25; Cycles spent near the goal. */
     uint16_t speed_mm_s; /* 7: output; 0 .. 1000 mm/s; Commanded speed. */
     exmpls_words_1984_level_status_t status_report; /* 8: output */
     int32_t line; /* trace: position of the line that ran; -1 for none */

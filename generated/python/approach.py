@@ -91,7 +91,7 @@ class reason(IntEnum):
     buf = 6
 
 
-DIGEST = 0xb3660506
+DIGEST = 0x46c1dc27
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 9
 """What `check` gives of a state that other tables made."""

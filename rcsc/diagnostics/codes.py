@@ -924,6 +924,84 @@ class Code(StrEnum):
         state speed : int 1 .. 9 = 3
         state gain : gains
     """
+    UNREAD = """RCS319: nobody reads a variable
+
+    Nothing asks for any part of this state or input: no line, selector, procedure, assumption, invariant or property. Assignments of a
+    state to itself do not count. A warning: it may be left over, or the line that was to ask for it is missing. What somebody is to see
+    is an output. Judged are variables of the file that was checked, if no other file of the project uses it; those that the
+    system's description names are read.
+
+        input pressed : bool
+        input held : bool
+        output lamp : bool
+        table light {
+          | line | pressed || lamp  |
+          | on   | true    || true  |
+          | off  | false   || false |
+        }
+
+    warning: nothing reads input `held`
+
+        input pressed : bool
+        output lamp : bool
+        table light {
+          | line | pressed || lamp  |
+          | on   | true    || true  |
+          | off  | false   || false |
+        }
+    """
+    UNUSED_CONSTANT = """RCS320: nobody uses a constant
+
+    The number stands nowhere else, so that to change it changes nothing: where it is meant another number may be written. A warning.
+
+        const most = 40
+        input width : int 0 .. 110
+        output held : bool
+        table grip {
+          | line | width || held  |
+          | held | <= 40 || true  |
+          | wide | > 40  || false |
+        }
+
+    warning: nothing uses constant `most`
+
+        const most = 40
+        input width : int 0 .. 110
+        output held : bool
+        table grip {
+          | line | width   || held  |
+          | held | <= most || true  |
+          | wide | > most  || false |
+        }
+    """
+    UNUSED_MEMBER = """RCS321: nothing gives or asks for a member
+
+    No variable ever has this member: it is neither assigned nor asked for, it is not the first, with which variables start, and no
+    variable of its type comes from outside: no input, link or extern procedure has it. Members of outputs are not judged: the
+    level that takes them has the same. A warning.
+
+        enum step { rest, work, broken }
+        input go : bool
+        state now : step
+        table steps {
+          | line  | go    | now     || now  |
+          | start | true  |         || work |
+          | stay  | false | /= work || rest |
+          | end   | false | work    || rest |
+        }
+
+    warning: nothing gives or asks for member `broken` of `step`
+
+        enum step { rest, work }
+        input go : bool
+        state now : step
+        table steps {
+          | line  | go    | now  || now  |
+          | start | true  |      || work |
+          | stay  | false | rest || rest |
+          | end   | false | work || rest |
+        }
+    """
     GAP = """RCS401: an input that no line matches
 
     Exactly one line matches in every cycle; here is an input that none matches: on the robot this is a STATE-TABLE error. The least

@@ -1,19 +1,29 @@
 """`rcsc check`: every table proved, and what is known of the levels together; an unchanged project is recognised without being parsed."""
 
 import os
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.report import Report
 from rcsc.driver.settings import Settings
 from rcsc.driver.unchanged import recall, remember
 from rcsc.host.cache import Cache, open_cache
-from rcsc.lang.project import project_root, systems_above
+from rcsc.host.files.read import Malformed, content
+from rcsc.lang.project import project_root, systems_above, used_elsewhere
+
+_UNREAD = frozenset((Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER))
+_WORD = re.compile(r"\w+")
 
 
 def check(settings: Settings) -> Report:
     """Prove every table; of those that a system's levels run, say what is known of the levels together."""
     cache = _cache(settings)
-    report = _checked(settings, cache)
+    report = _unread_elsewhere(_checked(settings, cache))
     if cache is None or not any(systems_above(table.file) for table in report.tables):
         return report
     from rcsc.driver.together import with_levels  # keep lazy: most files belong to no system
@@ -32,10 +42,44 @@ def _checked(settings: Settings, cache: Cache | None) -> Report:
     )
 
     project = proved(settings, cache)
-    report = project.report()
+    report = project.report(tuple(project.unread()))
     if whole is not None:
         remember(whole, settings.paths, settings.options, project.loaded, report)
     return report
+
+
+def _unread_elsewhere(report: Report) -> Report:
+    """The report without warnings of what the project's other files, or its systems, may read."""
+    told = {each.primary.span.file for each in report.diagnostics if each.code in _UNREAD}
+    shared = {file for file in told if used_elsewhere(file)}
+    named = {file: _words(_descriptions(file)) for file in told - shared}
+
+    def kept(each: Diagnostic) -> bool:
+        span = each.primary.span
+        return each.code not in _UNREAD or (
+            span.file in named and report.sources[span.file].slice(span) not in named[span.file]
+        )
+
+    return replace(report, diagnostics=tuple(filter(kept, report.diagnostics))) if told else report
+
+
+def _descriptions(file: str) -> Iterator[Path]:
+    """What may describe a system of which the file is a part: TOML beside it and above, as far as its project goes."""
+    here, top = Path(os.path.dirname(file) or ".").resolve(), Path(project_root(file)).resolve()
+    for folder in (here, *here.parents):
+        yield from sorted(folder.glob("*.toml"))
+        if folder == top:
+            break
+    yield from systems_above(file)
+
+
+def _words(files: Iterable[Path]) -> set[str]:
+    """All words of the texts."""
+    words: set[str] = set()
+    for file in files:
+        with suppress(OSError, Malformed):  # it is none then that anybody runs
+            words |= set(_WORD.findall(content(file).decode("utf-8", "replace")))
+    return words
 
 
 def _cache(settings: Settings) -> Cache | None:

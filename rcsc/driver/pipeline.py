@@ -11,7 +11,7 @@ from rcsc.host.cache import Cache
 from rcsc.host.memory import uncollected
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import Loaded, load
-from rcsc.lang.resolve import resolve
+from rcsc.lang.resolve import closure, resolve
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +30,15 @@ class Proved:
         }
         tables = merged(table for proof in self.proofs for table in proof.tables)
         return Report(tuple(sorted(every, key=sort_key)), tables, self.loaded.sources)
+
+    def unread(self) -> Iterator[Diagnostic]:
+        """Warn of what the programs declare and do not read."""
+        from rcsc.table.findings.unread import unread  # keep lazy: `rcsc check` alone asks
+
+        for proof in self.proofs:
+            if proof.program is not None:
+                files = {name: self.loaded.files[name] for name in closure(proof.root, self.loaded)}
+                yield from unread(proof.program, files)
 
     @property
     def executable(self) -> tuple[tuple[str, ProvedProgram], ...]:

@@ -126,6 +126,18 @@ def systems_above(file: str) -> list[Path]:
     return [folder / SYSTEM_FILE for folder in folders[: root + 1] if (folder / SYSTEM_FILE).is_file()]
 
 
+def used_elsewhere(file: str) -> bool:
+    """Whether another file of its project may use a file, by the last word of a `use` in its text."""
+    stem, real = os.path.basename(file).removesuffix(".rcs"), os.path.realpath(file)
+    for other in listed((project_root(file),))[:_MOST_FILES]:
+        raw = b"" if os.path.realpath(other) == real else _bytes(other)
+        text = raw.decode("utf-8-sig", "replace") if isinstance(raw, bytes) else ""
+        words = _WORD.finditer(_ASIDE.sub("", text))
+        if any((word["path"] or "").rpartition("/")[2] == stem for word in words):
+            return True
+    return False
+
+
 def prefix(root: str) -> str:
     """What the C names of a project begin with, as its file says; empty where it says nothing, or nothing that is right.
 

@@ -110,7 +110,7 @@ def test_1_findings_with_the_witness_its_region_and_a_repair(rcsc: Rcsc) -> None
 
 @pytest.mark.parametrize("cached", [(), ("--no-cache",)])
 def test_a_table_whose_line_can_go_wrong_is_not_called_proved(rcsc: Rcsc, cached: tuple[str, ...]) -> None:
-    over = "input x : int 0 .. 9\nstate n : int 0 .. 9\nprocedure p { n := n + x }\n"
+    over = "input x : int 0 .. 9\noutput n : int 0 .. 9\nprocedure p { n := n + x }\n"
     write(
         "over.rcs",
         over

@@ -16,6 +16,7 @@ from rcsc.lang.model import Program, ProvedProgram, seal_of_proof
 from rcsc.lang.project import load
 from rcsc.lang.resolve import compile_text, resolve
 from rcsc.solvers.options import Options
+from rcsc.table.findings.unread import unread
 from rcsc.table.mending import mended
 from rcsc.table.program import ProgramVerdict, prove_program
 
@@ -69,6 +70,12 @@ def reported(text: str, options: Options = BOXES) -> tuple[Diagnostic, ...]:
     if not isinstance(program, Program):
         return tuple(program)
     return mended(prove_program(program, options), loaded.roots[0], loaded, options)
+
+
+def unread_in(text: str) -> tuple[Diagnostic, ...]:
+    """Return what `rcsc check` says besides of what nobody reads in a text."""
+    loaded = load(["-"], stdin=text, stdin_name="case.rcs")
+    return tuple(unread(program_of(text), loaded.files))
 
 
 def proved_of(text: str) -> Program:
