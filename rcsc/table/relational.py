@@ -62,6 +62,8 @@ _MOST_GAPS = 64
 """Regions of a gap among which linear arithmetic looks for the least input."""
 _MOST_LINES_TRIED = 200
 """Lines of a table above which no inputs are tried by the interpreter."""
+_STEPS_OF_A_SAMPLE = 10
+"""What it costs to have the interpreter look whether a line matches, in steps of Z3."""
 _NODES_OF_A_LINE = 500
 """Nodes in which an input is looked for that a line matches, before the solver is asked."""
 _NODES_OF_A_GLANCE = 500
@@ -149,44 +151,47 @@ class _Decision:
         self.assumptions = assumptions_of(self.universe, program, table)
         self.assumed = [whole(assumption) for assumption in self.assumptions]
         self._asked: TableSolver | None = None
-        self._tried: tuple[Snapshot, ...] | None = None
-        self._matching: list[frozenset[int]] | None = None
+        self._tried: tuple[tuple[Snapshot, frozenset[int]], ...] | None = None
         self.spare = smt.Budget(WRONG_STEPS, of_all=True)
         self.rest = smt.Budget(WRONG_STEPS)
         self.wrong = self.glanced = False
         self.models: list[Snapshot] = []
 
     @property
-    def tried(self) -> tuple[Snapshot, ...]:
-        """Sample inputs that the assumptions allow, tried before Z3, which is slow on doubles; none without doubles."""
+    def tried(self) -> tuple[tuple[Snapshot, frozenset[int]], ...]:
+        """Sample inputs that the assumptions allow, and the lines that match each: tried before Z3, which is slow on doubles.
+
+        None without doubles, and none where nothing is left to be spent.
+        """
         if self._tried is None:
             few = len(self.table.lines) <= _MOST_LINES_TRIED
             reals = few and any(isinstance(v.type, Real) for v in self.variables)
-            every = trial.points(self.program.variables) if reals else ()
-            self._tried = tuple(snapshot for snapshot in every if self.allowed(snapshot))
+            cost = trial.SAMPLES * max(1, len(self.table.lines)) * _STEPS_OF_A_SAMPLE
+            every = trial.points(self.program.variables) if reals and not smt.charge(cost) else ()
+            self._tried = tuple(
+                (each, matching) for each in every if (matching := self.allowed(each)) is not None
+            )
         return self._tried
 
-    def allowed(self, snapshot: Snapshot) -> bool:
-        """Whether the table's assumptions hold, and every condition of its lines is defined."""
+    def allowed(self, snapshot: Snapshot) -> frozenset[int] | None:
+        """The lines that match; None where an assumption does not hold, or a condition of a line is not defined."""
         names = self.table.assumptions
         if not all(
             fold(assumption.condition, snapshot)
             for assumption in self.program.assumptions
             if assumption.name in names
         ):
-            return False
+            return None
         try:
-            self.matching(snapshot)
+            return frozenset(self.matching(snapshot))
         except UNDEFINED:
-            return False
-        return True
+            return None
 
     def tried_by(self, *lines: int) -> list[Snapshot]:
         """The sample inputs that all these lines match; without one those that none matches."""
-        if self._matching is None:
-            self._matching = [frozenset(self.matching(snapshot)) for snapshot in self.tried]
-        pairs = zip(self.tried, self._matching, strict=True)
-        return [snapshot for snapshot, found in pairs if (found.issuperset(lines) if lines else not found)]
+        return [
+            snapshot for snapshot, found in self.tried if (found.issuperset(lines) if lines else not found)
+        ]
 
     @property
     def asked(self) -> TableSolver:
@@ -294,7 +299,7 @@ class _Decision:
             self.glance()
         bounds = self.spelled(asked)
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
-        for snapshot in self.tried:
+        for snapshot, _ in self.tried:
             if all(fold(condition, snapshot) for condition in conditions):
                 self.wrong = True
                 return snapshot

@@ -55,6 +55,17 @@ def test_what_is_not_known_beside_an_overlap_is_left_open_within_its_steps() -> 
     assert {each.help for each in left} == {("mend what is wrong first: then this is asked with more steps",)}
 
 
+def test_trials_of_helps_are_bounded_outside_the_solver_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The trial needs no solver: its tree of regions counts, a node as so many steps."""
+    rows = "| p | <= 3 | a + b < 10 || 1 |\n| q | >= 3 | a + b < 10 || 2 |\n| r | | a + b >= 10 || 2 |\n"
+    declared = "input a : int 0 .. 9\ninput b : int 0 .. 9\noutput o : int 0 .. 9\n"
+    text = f"{declared}table t {{\n| line | a | when || o |\n{rows}}}\n"
+    begins = "in line `q` write `>= 4` under `a`: "
+    assert reported(text)[0].help[0].startswith(f"{begins}proved")
+    monkeypatch.setattr("rcsc.table.mending.WRONG_STEPS", 100)
+    assert reported(text)[0].help[0].startswith(f"{begins}not proved")
+
+
 @pytest.mark.parametrize("number", range(200, 206))
 def test_what_is_called_proved_holds_when_it_is_written(number: int, tmp_path: Path) -> None:
     """`python -m tests.wrong --helps --count 1000` writes a thousand."""
