@@ -154,7 +154,7 @@ def prefix(root: str) -> str:
 def starts_at_zero(root: str) -> bool:
     """Whether the file of the project in the folder `root` says that its tables were written since numbers start at 0."""
     try:
-        return toml_of(Path(root, PROJECT_FILE).read_text(encoding="utf-8")).get("starts_at_zero") is True
+        return toml_of(content(Path(root, PROJECT_FILE), MOST_TOML_BYTES)).get("starts_at_zero") is True
     except (OSError, ValueError, Malformed):
         return False
 

@@ -175,7 +175,7 @@ def after(first: str, second: str, where: str, here: dict[str, Value]) -> list[d
 
 def test_the_report_says_it_in_text_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "t.rcs").write_text(
-        "input x : int 0 .. 9\nstate y : int 0 .. 20\nstate z : bool\ntable t {\n| line | x || y | z |\n"
+        "input x : int 0 .. 9\noutput y : int 0 .. 20\noutput z : bool\ntable t {\n| line | x || y | z |\n"
         "| low | <= 4 || x + x | true |\n| mid | 4 .. 6 || 2 * x | x > 2 |\n| top | >= 6 || 12 | false |\n}\n"
     )
     assert run(["check", "--no-cache", str(tmp_path / "t.rcs")]) == 1
