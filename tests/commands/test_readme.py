@@ -43,6 +43,7 @@ TINY = {
     "--level task --without-deferral tables/system.toml": "--without-deferral --trace 0 tests/data/composed/system.toml",
     "tests.differential --count 100000": "tests.differential --count 2",
     "--count 10000": "--count 1",
+    "tests.claims --count 1000": "tests.claims --count 1",
     "--runs 10000": "--runs 3",
     "tests.editor.random_edits --count 1000": "tests.editor.random_edits --count 3",
     "tests.prover_mutants --count 1000": "tests.prover_mutants --help",
