@@ -626,7 +626,9 @@ def test_what_is_compiled_together_can_be_linked_together(rcsc: Rcsc) -> None:
     same = F.format("writes n")
     more = "enum k { p, q }\nrecord r { f : bool }\n"
     write("a.rcs", told("b", more + same, "f"))
-    write("a_c.rcs", told("b_c", more + same + same.replace(" f ", " g "), "f; g"))
+    write(
+        "a_c.rcs", told("b_c", f"{more}{same}{same.replace(' f ', ' g ')}procedure both {{ f; g }}\n", "both")
+    )
     write("b_c.rcs", told("a", more))
     assert rcsc("compile").status == 0
     everything = "".join(f'#include "{path.name}"\n' for path in sorted(Path("generated/c").glob("*.h")))

@@ -226,7 +226,7 @@ def test_the_core_proves_levels_certifies_and_says_what_the_rest_needs(tmp_path:
 
 def test_live_is_refused_before_anything_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "aiohttp", None)
-    monkeypatch.setattr("rcsc.commands.systems.run.compiled", lambda *_: pytest.fail("it compiled"))
+    monkeypatch.setattr("rcsc.commands.systems.run.made", lambda *_, **__: pytest.fail("it compiled"))
     ran = CliRunner().invoke(
         commands, ["run", "make_boxt", "--live", "--system", str(REPO / "tables/system.toml")]
     )

@@ -750,7 +750,7 @@ def test_a_proof_goes_on_where_another_was_ended(monkeypatch: pytest.MonkeyPatch
         patched.setattr(level_proof, "_confirm", ended)
         with counted() as first, pytest.raises(KeyboardInterrupt):
             prove_level(ts, LITTLE, cache)
-    known = candidates(cache, ts).clauses
+    known = candidates(cache, ts.refusing()).clauses
     with counted() as again, monkeypatch.context() as patched:
         patched.setattr(level_proof, "_confirm", ended)
         with pytest.raises(KeyboardInterrupt):

@@ -657,7 +657,7 @@ SHOWS_A_SAFE_VALUE = small_text(
     "lower",
     (
         "output report : lower_report",
-        "output report : lower_report\noutput open : bool safe true\nproperty shut : not open",
+        "output report : lower_report\noutput open : bool = false safe true\nproperty shut : not open",
     ),
 )
 """A cycle that refuses an input leaves `open`; no cycle that takes its inputs does."""
@@ -758,8 +758,9 @@ def test_what_a_restart_breaks_is_not_proved_anywhere(
     said = capsys.readouterr().out
     assert re.search(r"small +monitored: rests on invariant `never_failed`", said)
     assert re.search(r"never_ten +rests on invariant `never_failed`", said)
-    assert run(["check", str(tmp_path / "solo.rcs")]) == 0
+    assert run(["check", str(tmp_path / "solo.rcs")]) == 1
     assert "level `solo` is not proved" in (checked := capsys.readouterr().out)
+    assert "error[RCS416]: the values after a restart do not satisfy invariant `never_failed`" in checked
     assert "kept by the levels together" not in checked
 
 
@@ -1188,7 +1189,7 @@ STOPPED = """input at : int 0 .. 3
 input go : bool
 state seen : array[2] of bool
 state was_asked : bool
-output hold : bool safe true
+output hold : bool = false safe true
 assume room monitored : at < 2
 property answered : go implies was_asked
 property moves : not hold

@@ -21,7 +21,7 @@ from tests import hierarchies
 from tests.bench.growth import chain, costs
 from tests.hierarchies import Judged, forget, judged
 from tests.small_hierarchies import together, world
-from tests.small_hierarchies.explored import TooManyError, explored
+from tests.small_hierarchies.explored import TooManyError, adopted, explored
 from tests.small_hierarchies.level import Role
 from tests.small_hierarchies.made import ODD, RIGHT, WRONG, Hierarchy, hierarchy
 from tests.small_hierarchies.more import EVERY, furnished
@@ -295,15 +295,14 @@ def test_levels_that_do_not_keep_their_guarantees_break_something_together(
 def test_two_levels_see_a_cycle_that_stops_behind_a_restart(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is trusted is needed: else the report that stood is followed by an older one."""
-    monkeypatch.setattr(together, "TRUSTED", frozenset())
+    """That a report goes on echoing is needed: else the one that stood is followed by an older one."""
     upper, lower = saying("slow", "load", "assume loaded monitored : load /= 0").levels
     tables = tuple(replace(table, assuming=("loaded",)) for table in lower.tables)
     both = pair(Hierarchy((upper, replace(lower, tables=tables))), tmp_path)
-    found, _ = broken_together(
-        replace(both, claimed_upper=frozenset(), claimed_lower=frozenset()), most=20_000
-    )
-    assert found == ["the contract about the subordinate"]
+    both = replace(both, claimed_upper=frozenset(), claimed_lower=frozenset())
+    assert broken_together(both, most=20_000)[0] == []
+    monkeypatch.setattr(together, "adopted", lambda role, start, *_: adopted(role, start))
+    assert broken_together(both, most=20_000)[0] == ["the contract about the subordinate"]
 
 
 # --- growth ---------------------------------------------------------------------------------
@@ -314,8 +313,10 @@ def test_the_questions_of_a_system_are_those_of_its_levels() -> None:
     every = [costs(chain((2,) * many)) for many in (2, 3)]
     assert {cost.open for found in every for cost in found} == {0}
     two, three = ([cost.questions for cost in found] for found in every)
-    assert three == [two[0], *two]
-    assert two[0] > two[1] > 0
+    assert (three[0], three[2]) == (two[0], two[1])
+    assert (
+        two[0] > three[1] > two[1] > 0
+    )  # of the one between nothing comes from outside that could be refused
 
 
 def test_enumerations_of_many_members_are_followed() -> None:
@@ -323,7 +324,8 @@ def test_enumerations_of_many_members_are_followed() -> None:
     few, many = costs(chain((3, 5))), costs(chain((3, 20)))
     assert [cost.open for cost in (*few, *many)] == [0] * 4
     assert many[0].questions < 1.3 * few[0].questions  # as a solver's models have it
-    assert many[0].questions < 350  # 285; 417 where clauses are pushed one by one, and models forgotten
+    # 587, with refusals and without; a third more where clauses are pushed one by one, and models forgotten
+    assert many[0].questions < 700
     assert many[1].questions < 1.1 * 20 / 5 * few[1].questions  # in proportion, about
 
 

@@ -56,6 +56,8 @@ def _cell(value: object) -> object:
 def written_whole(path: Path, mode: int = 0o666, *, durable: bool = True) -> Iterator[Path]:
     """Give the place of an empty file beside `path`; it takes the name of `path` when the block ends well.
 
+    A device or a pipe is not replaced: its own place is given.
+
     Args:
         path: The place; a symbolic link is followed.
         mode: Permissions of a new file, before the user's mask; a file that is there keeps its own.
@@ -65,6 +67,9 @@ def written_whole(path: Path, mode: int = 0o666, *, durable: bool = True) -> Ite
         OSError: It could not be written; nothing is left behind, and what was there before is kept.
     """
     target = path.resolve()
+    if target.exists() and not target.is_file():
+        yield target
+        return
     beside = target.with_name(
         f".{target.name[:100]}.{os.getpid()}.{secrets.token_hex(4)}{target.suffix[:20]}"
     )

@@ -113,16 +113,19 @@ class Recorder:
         """
         self._tick_ns = system.description.tick_ms * _NS_PER_MS
         self._ticks_a_chunk = max(1, CHUNK_MS // system.description.tick_ms)
-        beside = path.with_name(f".{path.name}.part")
+        # a device or a pipe is not replaced
+        beside = path if path.exists() and not path.is_file() else path.with_name(f".{path.name}.part")
         self._path, self._tick, self._kept = path, system.tick, system.tick
         self._file = _Chained(beside.open("wb", buffering=1 << 20))
         self._writer = Writer(self._file, chunk_size=_MOST_OPEN, compression=CompressionType.ZSTD)  # type: ignore[arg-type]  # all that it calls
         try:
             self._begin(system, finding)
-            beside.replace(path)
+            if beside != path:
+                beside.replace(path)
         except OSError:
             self._file.close()
-            beside.unlink(missing_ok=True)
+            if beside != path:
+                beside.unlink(missing_ok=True)
             raise
 
     def _begin(self, system: System, finding: LoggedFinding | None) -> None:
