@@ -96,7 +96,7 @@ def drawn_system(folder: Path, random: Random, *, most: int = 0) -> Path:
         kind = RANGES[at] if refusing else random.choice(RANGES)
         text = level_text(random, name, period, kind, most, last=last)
         if refusing:
-            text = text.replace(" clamp", "").replace("invariant never : status_report /= failed", "")
+            text = text.replace(" clamp", "").replace("invariant never : mine.first <= 12", "")
         (folder / f"{name}.rcs").write_text(text, encoding="utf-8")
         if not last:
             buffers |= {
@@ -118,7 +118,7 @@ def drawn_system(folder: Path, random: Random, *, most: int = 0) -> Path:
 
 def level_text(random: Random, name: str, period: int, kind: str, most: int, *, last: bool) -> str:
     """The program of a level."""
-    invariant = random.choice(("", "", "invariant never : status_report /= failed"))
+    invariant = random.choice(("", "", "invariant never : mine.first <= 12"))
     numeric = kind.startswith(("int", "real"))
     return LEVEL.format(
         name=name,
