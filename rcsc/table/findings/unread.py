@@ -20,6 +20,9 @@ from rcsc.lang.model import BEFORE, Array, Declared, Enum, Expr, Kind, Program, 
 from rcsc.lang.restart import After, SameAs
 from rcsc.lang.syntax import tree
 
+TOLD = frozenset({Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER})
+"""The codes of these warnings: `rcsc check` tells them, and no editor, while a text is being written."""
+
 
 def unread(program: Program, files: Mapping[str, tree.File]) -> Iterator[Diagnostic]:
     """Yield the warnings; none of a file that only declares words.
