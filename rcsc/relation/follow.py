@@ -8,7 +8,7 @@ nothing is under way: deferred values are the present ones (see `steps`). Arithm
 within its bounds: there it may say "can" too often, never too seldom. Of the levels around nothing is known.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 
@@ -109,6 +109,16 @@ def loosened(nodes: Sequence[Node], numbers: Iterator[int]) -> Iterator[Term]:
                 yield within(node.term, ends)
 
 
+def _needed(tests: Mapping[int, Node], solver: Solver) -> tuple[int, ...]:
+    """The columns of a line whose tests neither its others nor what the solver knows imply."""
+    terms = {at: values.term_of(node) for at, node in tests.items()}
+    for at in list(terms):
+        others = [term for column, term in terms.items() if column != at]
+        if not answered(solver, *others, smt.negation(terms[at])):
+            del terms[at]
+    return tuple(terms)
+
+
 class _Cycles:
     """Two cycles of the level one after the other, from any state."""
 
@@ -131,7 +141,7 @@ class _Cycles:
             if variable.deferred_until is not None:
                 first.state.leaves[pending(variable.name)] = first.leaf(variable.name)
         facts = self._facts(first)
-        lines = self._lines(first)
+        lines = self._lines(self._tests(first))
         for at, actions in enumerate(self._actions()):
             run = self._run()
             run.state = first.state.copy()
@@ -140,7 +150,8 @@ class _Cycles:
             self._procedures(run, () if self.level is None else self.level[0].postprocess)
             self._before_table(run)
             known = [*facts, lines[at], *self._facts(run)]
-            nexts = self._lines(run)
+            tests = self._tests(run)
+            nexts = self._lines(tests)
             solver = Solver(self.options.limits)
             solver.add(
                 *values.domain(values.variables([*known, *nexts]).values()),
@@ -149,22 +160,7 @@ class _Cycles:
             solver.add(*map(values.term_of, known))
             for to, node in enumerate(nexts):
                 if answered(solver, values.term_of(node)):
-                    yield Follow(at, to, self._needed(run, solver, to))
-
-    def _needed(self, run: Run, solver: Solver, line: int) -> tuple[int, ...]:
-        if line == len(self.table.lines):
-            return ()
-        tests = {
-            at: run.evaluate(t.condition)
-            for at, t in enumerate(self.table.lines[line].tests)
-            if t is not None
-        }
-        terms = {at: values.term_of(node) for at, node in tests.items()}
-        for at in list(terms):
-            others = [term for column, term in terms.items() if column != at]
-            if not answered(solver, *others, smt.negation(terms[at])):
-                del terms[at]
-        return tuple(terms)
+                    yield Follow(at, to, _needed(tests[to], solver) if to < len(tests) else ())
 
     def _run(self) -> Run:
         return Run(self.procedures, self.kinds, self.start)
@@ -209,10 +205,19 @@ class _Cycles:
             facts.append(values.equal(run.evaluate(selector), values.constant(selector.type, self.level[1])))
         return facts
 
-    def _lines(self, run: Run) -> list[Node]:
-        """State for each line that it matches then; DEFAULT comes last."""
-        lines = [
-            values.all_of(run.evaluate(t.condition) for t in line.tests if t) for line in self.table.lines
+    def _tests(self, run: Run) -> list[Mapping[int, Node]]:
+        """The tests of each line, by column, as they are then; one that several lines state is evaluated once."""
+        known: dict[int, Node] = {}
+        for test in (test for line in self.table.lines for test in line.tests if test is not None):
+            if id(test) not in known:
+                known[id(test)] = run.evaluate(test.condition)
+        return [
+            {at: known[id(test)] for at, test in enumerate(line.tests) if test is not None}
+            for line in self.table.lines
         ]
+
+    def _lines(self, tests: Sequence[Mapping[int, Node]]) -> list[Node]:
+        """State for each line that it matches then; DEFAULT comes last."""
+        lines = [values.all_of(each.values()) for each in tests]
         none = values.negation(values.any_of(lines))
         return [*lines, none] if self.table.default is not None else lines

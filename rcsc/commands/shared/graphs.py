@@ -17,7 +17,7 @@ from rcsc.host.files import write_atomically
 from rcsc.run.description import BadDescription
 
 ENDINGS = {"svg": ".svg", "dot": ".dot", "mermaid": ".mmd", "scxml": ".scxml"}
-STEPS = steps_option(20)
+STEPS = steps_option(1.5)
 OUT = click.option("-o", "--output", "out", type=click.Path(path_type=Path), default=None, metavar="FILE",
                     help="Write to FILE instead of standard output.")  # fmt: skip
 
