@@ -120,9 +120,10 @@ class Space:
         """
         return self._least(self.solver(*nodes))
 
-    def _least(self, solver: Solver) -> dict[str, Value]:
+    def _least(self, solver: Solver, spare: smt.Budget | None = None) -> dict[str, Value]:
+        """The least input; any one where `spare` is spent."""
         before = solver.queries
-        least = least_witness(solver, self.variables, self.frame)
+        least = least_witness(solver, self.variables, self.frame, spare)
         self.queries += solver.queries - before
         if least is None:
             raise UndecidedError
@@ -137,8 +138,8 @@ class Space:
 
     # --- boxes ---
 
-    def cover(self, wanted: Node, allowed: Node, most: int) -> Cover:
-        """Cover `wanted` with at most `most` boxes within `allowed`.
+    def cover(self, wanted: Node, allowed: Node, most: int, spare: smt.Budget) -> Cover:
+        """Cover `wanted` with at most `most` boxes within `allowed`; with one that need not be wide where `spare` is spent.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -151,12 +152,12 @@ class Space:
         seeds = self.solver(wanted)
         boxes: list[dict[str, Box]] = []
         while self.answered(seeds):
-            if len(boxes) == most:
+            if len(boxes) == most or (boxes and spare.spent):
                 return self._covered(boxes, exact=False)
             seeds.push()
-            seed = self._least(seeds)
+            seed = self._least(seeds, spare)
             seeds.pop()
-            boxes.append(self._grown(seed, bad, (cuts, hull), boxes))
+            boxes.append(self._grown(seed, bad, (cuts, hull), boxes, spare))
             seeds.add(smt.negation(smt.all_of(self._inside(boxes[-1]))))
         return self._covered(boxes, exact=True)
 
@@ -198,6 +199,7 @@ class Space:
         bad: Solver,
         limits: tuple[Mapping[str, list[int]], Mapping[str, Box]],
         others: list[dict[str, Box]],
+        spare: smt.Budget,
     ) -> dict[str, Box]:
         """Grow a box around the seed within the hull, several variables at once where that fits."""
         cuts, hull = limits
@@ -206,9 +208,11 @@ class Space:
 
         def fits(parts: Mapping[str, Box]) -> bool:
             trial_ = {**box, **parts}
-            if any(_meet(trial_, other) for other in others):
+            if spare.spent or any(_meet(trial_, other) for other in others):
                 return False
-            return not self.answered(bad, *self._inside(trial_))
+            with smt.within(spare):
+                self.queries += 1
+                return bad.check(*self._inside(trial_)) is Answer.UNSATISFIABLE
 
         def fills(names: Sequence[str]) -> bool:
             whole = {name: hull[name] for name in names}

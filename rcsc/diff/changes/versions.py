@@ -27,6 +27,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.model import Value as Scalars
+from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.symbolic import trial, values
 from rcsc.symbolic.effect import Effect, Meaning, Shared
@@ -39,6 +40,8 @@ MOST_BOXES = 16
 """Boxes of one region; past them it is said what holds in it besides."""
 MOST_BOXES_ACROSS = 4
 """The same where values of two variables are compared: such a region is seldom made of boxes."""
+COVER_STEPS = 1_000_000
+"""Steps of Z3 for the boxes of all regions together; past them a region is told by one box of it, and by what holds in it."""
 
 Runner = Callable[[Program, dict[str, Scalars]], None]
 """Runs a version's part on a snapshot, in place."""
@@ -76,6 +79,7 @@ class Versions:
         leaves: Those that are compared: both have them.
         stated: For a region that two lines have in common, the conditions of the two: what it is where boxes do not end.
         queries: How often a solver was asked.
+        spare: What is left for the boxes of regions.
     """
 
     def __init__(self, aligned: Aligned, options: Options) -> None:
@@ -92,6 +96,7 @@ class Versions:
             self.shared.start[before] = self.shared.canonical(values.variable(before, kind))
         self.order = {name: at for at, name in enumerate(self.kinds)}
         self.queries = 0
+        self.spare = smt.Budget(COVER_STEPS)
         self.stated: dict[Node, Node] = {}
         self.seen: dict[str, Node] = {}
         self._hits: dict[Node, Hit | None] = {}
@@ -214,7 +219,7 @@ class Versions:
 
     def _cover(self, wanted: Node, allowed: Node, most: int) -> tuple[Cover, int | None]:
         space = self.space(wanted, allowed)
-        cover = space.cover(wanted, allowed, most)
+        cover = space.cover(wanted, allowed, most, self.spare)
         self.queries += space.queries
         return cover, space.volume(space.nodes)
 
