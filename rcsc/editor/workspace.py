@@ -32,7 +32,7 @@ from rcsc.lang.resolve import resolve
 from rcsc.lang.written.changes import with_proposal, with_spelling
 from rcsc.lang.written.tables import WrittenTable, tables_of
 from rcsc.solvers import smt
-from rcsc.solvers.options import Options
+from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.symbolic.remembered import remembering
 from rcsc.table.mending import COUNTED, key, mended, serious
 from rcsc.table.program import prove_program
@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 BOM = "\ufeff"
 GLANCE_STEPS = 200_000
 """Steps of Z3 a question while somebody types: some hundredths of a second."""
+MOST_OF_A_REPAIR = 2 * WRONG_STEPS
+"""Steps in which the text that a repair makes is checked; one that takes more is not offered."""
 GLANCE_S = 0.06
 """How long who has typed waits for a glance, in seconds: what is not found by then is left open, and the answer is put together."""
 LEAST_S = 0.02
@@ -379,7 +381,8 @@ class Workspace:
     def _outcome(self, checked: Checked, source: Source, told: Diagnostic, text: str) -> bool | None:
         """Whether nothing is wrong with the table in a text; None where the finding is still there, or another has come."""
         trial = self.trial({source.name: text})
-        after = trial.checked(checked.reading.path)
+        with smt.within(smt.Budget(MOST_OF_A_REPAIR, of_all=True)):
+            after = trial.checked(checked.reading.path)
         before = {key(each) for each in serious(checked.diagnostics)}
         now = {key(each) for each in serious(after.diagnostics)}
         gone = key(told) not in now or (told.code in COUNTED and told.message not in _messages(after))

@@ -24,7 +24,7 @@ def assumed_together(program: Program, options: Options) -> Iterator[Diagnostic]
     inputs = {variable.name for variable in program.variables if variable.kind is Kind.INPUT}
     plain = {each.name for each in program.assumptions if inputs.issuperset(read_by(each.condition))}
     tables = {table.name: table for table in program.tables}
-    with smt.together(options.together):
+    with smt.together(options.few.steps):
         for level in program.levels:
             for one, other in combinations(level.choices, 2):
                 for first, second in product(one.names, other.names):

@@ -1,6 +1,6 @@
 """How a proof is to be made."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 STEPS = 20_000_000
@@ -8,9 +8,9 @@ STEPS = 20_000_000
 TOGETHER = 20
 """All questions about a table, or about a procedure, take at most as many steps as so many of them may."""
 
-WRONG_STEPS = 1_000_000
+WRONG_STEPS = 200_000
 """Steps of Z3 for what is said of a table beside that something is wrong with it, each kind of it for all findings together: the least
-inputs and what else is wrong, whether lines do the same, whether Z3 agrees, what repairs do. Half a second of doubles."""
+inputs and what else is wrong, whether lines do the same, whether Z3 agrees, what repairs do. Some tenths of a second of doubles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,3 +66,8 @@ class Options:
     def together(self) -> int:
         """What all questions about one table, or one procedure, may cost."""
         return TOGETHER * self.steps
+
+    @property
+    def few(self) -> "Options":
+        """For what is asked beside something that is wrong: a question may take so much as all of them together (`WRONG_STEPS`)."""
+        return replace(self, steps=min(self.steps, WRONG_STEPS))

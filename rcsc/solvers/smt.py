@@ -339,6 +339,12 @@ def integer_operation(op: str, left: Term, right: Term) -> Term:
     return Term(quotient if op == "/" else a - quotient * b)
 
 
+def part(op: str, left: Term, right: int) -> Term:
+    """`/` and `mod` of an integer that is not below zero by one above: of bits of words, which are many, in few terms."""
+    a: Any = left
+    return Term(a / right if op == "/" else a % right)
+
+
 def quotient(left: Term, right: float) -> Term:
     """A real number divided by one that is not zero."""
     a: Any = left

@@ -63,8 +63,15 @@ def encode(expr: Expr, frame: Frame) -> Term:
             term = encode(subject, frame)
             kind = subject.type
             return smt.any_of([smt.equal(term, smt.literal(kind, value), kind) for value in values])
+        case Apply(op=Op.DIV | Op.MOD as op, args=(number, Literal(value=by))) if _splits(number, by):
+            return smt.part(op.value, encode(number, frame), int(by))
         case Apply(op=op, args=args):
             return operation(op, args[0].type, [encode(arg, frame) for arg in args])
+
+
+def _splits(number: Expr, by: Value) -> bool:
+    """Whether an integer is divided that is not below zero, by one above."""
+    return isinstance(number.type, Int) and number.type.low >= 0 and by > 0
 
 
 def operation(op: Operator, kind: Scalar, terms: list[Term]) -> Term:

@@ -7,13 +7,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from random import Random
 
+from rcsc.lang.expressions.words import mask_of
 from rcsc.lang.interpret import operated
+from rcsc.lang.leaves import conjuncts
 from rcsc.lang.model import (
     Bool,
     Op,
+    Read,
     Real,
     Scalar,
     Single,
+    Test,
     Value,
     Variable,
     key_bounds,
@@ -31,6 +35,8 @@ MOST_NODES = 1_500
 """Larger questions go to Z3 at once."""
 EVALUATIONS = 100_000
 """Nodes of all points together at which `met` looks: about a tenth of a second."""
+_NODES_OF_A_STEP = 3
+"""Nodes at a point that cost a step of Z3."""
 
 Point = dict[str, Value]
 
@@ -59,6 +65,22 @@ def points(variables: Sequence[Variable]) -> Iterator[Point]:
         yield {node.name: _pick(node, number, random) for node in nodes}
 
 
+def towards(point: Point, tests: Sequence[Test], kinds: Mapping[str, Scalar], random: Random) -> Point:
+    """The point changed so that tests of one variable, and masks of words, hold, each by itself; the last that changes a variable wins."""
+    moved = dict(point)
+    for test in tests:
+        name = str(test.variables[0]) if test.variables else ""
+        if test.box:
+            first, last = random.choice(test.box)
+            moved[name] = value_of_key(kinds[name], random.choice((first, last, random.randint(first, last))))
+        else:
+            for mask in filter(None, map(mask_of, conjuncts(test.condition))):
+                if isinstance(mask.word, Read):
+                    word = str(mask.word.name)
+                    moved[word] = int(moved[word]) & ~mask.care | mask.value
+    return moved
+
+
 def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:
     """Whether a condition holds at a point that has a value for each of its variables; not where it is undefined."""
     return _all_hold(list(parts_first(condition)), [condition], point)
@@ -78,6 +100,8 @@ def met(conditions: Sequence[Node], goals: Sequence[Node], near: Mapping[str, Va
     tries = min(SAMPLES, EVALUATIONS // max(1, len(order)))
     for number in range(tries):
         if len(found) == len(goals) or smt.gives_up("what trial finds"):
+            break
+        if smt.charge(len(order) // _NODES_OF_A_STEP):
             break
         kept = near if number < tries // 2 else {}
         point = {

@@ -14,7 +14,7 @@ from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic.encode import declared, encode, least_witness
 from rcsc.table.certificate import must_cover
-from rcsc.table.verdict import Gap, Overlap, TableFinding, Undecided
+from rcsc.table.verdict import Gap, Overlap, TableFinding, Undecided, refutes
 
 
 def shown(program: Program, table: Table) -> list[Variable]:
@@ -105,7 +105,7 @@ def confirm(
     ):  # before anything is put into its words, which takes longer than to ask
         return Agreement.UNKNOWN
     if options.solver == "auto":
-        steps = WRONG_STEPS // 3 if any(isinstance(each, Overlap) for each in findings) else _STEPS
+        steps = WRONG_STEPS // 3 if refutes(table, findings) else _STEPS
         options = replace(options, steps=min(options.steps, steps))
     asked = TableSolver(program, table, options)
     overlap = _some_overlap(asked)

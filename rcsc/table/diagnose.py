@@ -54,7 +54,7 @@ MOST_PAIRS = 20
 """Overlapping pairs shown of one table; then how many more."""
 MOST_COMPARED = 200
 """Overlapping pairs of one table of which it is told whether the two lines do the same."""
-COMPARED_STEPS = 500_000
+COMPARED_STEPS = 200_000
 """Steps of Z3 a question whether two such lines leave a variable different: a tenth of a second or some; published tables need 20,000."""
 FAR = 80
 """Characters between a line's name and a cell of it from which on an excerpt points at both."""
@@ -70,10 +70,10 @@ def diagnostics(
     """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
     table = verdict.table
     few = min(WRONG_STEPS, options.together)
-    with smt.together(few):
+    with smt.within(smt.Budget(few, of_all=True)):
         verdict = replace(verdict, findings=tuple(likely(program, table, verdict.findings, options)))
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
-    with smt.together(few):
+    with smt.within(smt.Budget(few, of_all=True)):
         shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
         effects = [_effects(program, table, each, options) for each in overlaps[MOST_PAIRS:MOST_COMPARED]]
     shown = grouped(table, overlaps, shown)
@@ -104,7 +104,9 @@ def diagnostics(
                 Code.OVERLAP, message, Label(table.span), notes=notes, witnesses=others, only_listed=True
             )
         )
-    return shown + list(_others(program, verdict, options, unproved)) + _lower(table)
+    with smt.within(smt.Budget(few, of_all=True)):
+        rest = list(_others(program, verdict, options, unproved))
+    return shown + rest + _lower(table)
 
 
 def _others(

@@ -36,6 +36,8 @@ MOST_TRIED = 60
 """Proposals of one program that are tried."""
 MOST_CELLS = 60_000
 """Cells of the tables that are proved anew for them, all together."""
+STEPS_OF_A_CELL = 200
+"""What a cell of a table costs that is read and decided anew, in steps of Z3."""
 
 
 class Outcome(Enum):
@@ -181,8 +183,11 @@ class _Trials:
         if table is None:
             return Outcome.OPEN
         self.tried += 1
-        self.cells += len(table.lines) * (len(table.columns) + 1)
+        cells = len(table.lines) * (len(table.columns) + 1)
+        self.cells += cells
         if self.tried > MOST_TRIED or self.cells > MOST_CELLS or smt.gives_up("whether a repair mends"):
+            return Outcome.OPEN
+        if smt.charge(STEPS_OF_A_CELL * cells):
             return Outcome.OPEN
         make = partial(self._trial, finding, proposal)
         if self.known is None:

@@ -23,7 +23,7 @@ from rcsc.lang.model import (
 )
 from rcsc.procedures.discharge import Tally
 from rcsc.procedures.invariants import assumptions_satisfiable, at_first, properties_elsewhere
-from rcsc.procedures.meetings import met
+from rcsc.procedures.meetings import Met, met
 from rcsc.procedures.obligations import Obligations, defined_alone
 from rcsc.procedures.together import assumed_together
 from rcsc.solvers import smt
@@ -118,9 +118,9 @@ def prove_program(
     tables = [table for table in assuming.tables if table.name in names]
     decided = _verdicts(assuming, tables, options, owed.undefined, before)
     meetings = {
-        table.name: met(assuming, table, options)
-        for table in tables
-        if table.meetings and table.name not in owed.undefined
+        verdict.table.name: _met(assuming, verdict, options)
+        for verdict in decided
+        if verdict.table.meetings and verdict.table.name not in owed.undefined
     }
     relied = {name: each.relied for name, each in meetings.items()}
     verdicts = tuple(
@@ -157,6 +157,13 @@ def _unproved(program: Program, findings: Iterable[Diagnostic]) -> frozenset[str
             *(str(assumption.name) for assumption in claimed if broken or assumption.span in spans),
         )
     )
+
+
+def _met(program: Program, verdict: TableVerdict, options: Options) -> Met:
+    """Prove what a table says of pairs of its lines; soon, where something else is wrong with it."""
+    soon = options.few if verdict.refuted else options
+    with smt.within(smt.Budget(soon.steps if verdict.refuted else soon.together, of_all=verdict.refuted)):
+        return met(program, verdict.table, soon)
 
 
 def _with_invariants(program: Program, verdict: TableVerdict) -> TableVerdict:
@@ -224,7 +231,7 @@ def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVer
             isinstance(finding, ContradictoryAssumptions) for finding in verdict.findings
         ):
             return verdict
-        possible = assumptions_satisfiable(program, table, options)
+        possible = assumptions_satisfiable(program, table, options.few if verdict.refuted else options)
     except smt.troubles() as trouble:
         return _left_open(table, Undecided(f"{type(trouble).__name__}: {trouble}"))
     if not isinstance(possible, Answer):

@@ -5,12 +5,13 @@ of a table in order. Linear arithmetic settles what it can; terms that are not l
 one solver that is made when first needed; *unknown* is a finding, never a proof.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import combinations
+from itertools import combinations, islice
+from random import Random
 
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interpret import UNDEFINED, matching_lines
@@ -19,7 +20,6 @@ from rcsc.lang.model import (
     Expr,
     Program,
     Read,
-    Real,
     Snapshot,
     Standing,
     Table,
@@ -48,6 +48,7 @@ from rcsc.table.verdict import (
     Region,
     TableFinding,
     Undecided,
+    settles,
 )
 
 _MOST_CANDIDATES = 64
@@ -62,12 +63,14 @@ _MOST_GAPS = 64
 """Regions of a gap among which linear arithmetic looks for the least input."""
 _MOST_LINES_TRIED = 200
 """Lines of a table above which no inputs are tried by the interpreter."""
+_AIMED, _MOST_PAIRS_AIMED = 8, 200
+"""Inputs that are tried for each line, and pairs of lines for which one is."""
 _STEPS_OF_A_SAMPLE = 10
 """What it costs to have the interpreter look whether a line matches, in steps of Z3."""
+_STEPS_OF_A_QUESTION = 4_000
+"""What it costs to put a question about a region into Z3's words."""
 _NODES_OF_A_LINE = 500
 """Nodes in which an input is looked for that a line matches, before the solver is asked."""
-_NODES_OF_A_GLANCE = 500
-"""Nodes in which arithmetic alone looks for something wrong, before the solver is first asked."""
 _MOST_REPROVED = 2_000
 """Nodes of a tree above which it is not tried whether an assumption can be spared."""
 
@@ -104,8 +107,12 @@ class _Found:
 
 
 def decide(program: Program, table: Table, options: Options) -> Decided:
-    """Decide the table under its assumptions."""
-    return _Decision(program, table, options).decided()
+    """Decide the table under its assumptions: at first with few steps, which tell most of what is wrong with one that is.
+
+    Only where they tell nothing, and leave something open, it is decided anew, with all of them.
+    """
+    soon = _Decision(program, table, options, few=True).decided()
+    return soon if settles(table, soon.findings) else _Decision(program, table, options).decided()
 
 
 def certificate_alone(program: Program, table: Table, options: Options) -> Mapping[str, object] | None:
@@ -128,7 +135,8 @@ def under_assumptions(
         options: Limits.
         settled: That gap, where there is one.
     """
-    return _Decision(program, table, options).under_assumptions(settled)
+    soon = _Decision(program, table, options, few=True).under_assumptions(settled)
+    return soon if settles(table, soon) else _Decision(program, table, options).under_assumptions(settled)
 
 
 class _Decision:
@@ -137,12 +145,12 @@ class _Decision:
     Attributes:
         universe: Columns and forms of the lines and assumptions; every variable of a witness is a column.
         clauses, assumed: The lines, and the assumptions as formulas.
-        wrong: Whether something is known to be wrong, so that the verdict stands.
+        few: Whether it is to be answered soon, or something is known to be wrong, so that the verdict stands.
         spare: What may then be spent on the least inputs, the regions around them and more of the same kind.
         rest: What may then be spent on what else there is, gaps and dead lines; what has no answer is told as undecided.
     """
 
-    def __init__(self, program: Program, table: Table, options: Options) -> None:
+    def __init__(self, program: Program, table: Table, options: Options, *, few: bool = False) -> None:
         self.program, self.table, self.options = program, table, options
         self.universe = Universe()
         self.variables = shown(program, table)
@@ -154,24 +162,36 @@ class _Decision:
         self._tried: tuple[tuple[Snapshot, frozenset[int]], ...] | None = None
         self.spare = smt.Budget(WRONG_STEPS, of_all=True)
         self.rest = smt.Budget(WRONG_STEPS)
-        self.wrong = self.glanced = False
-        self.models: list[Snapshot] = []
+        self.few = few
+        self.models: list[tuple[Snapshot, frozenset[int]]] = []
 
     @property
     def tried(self) -> tuple[tuple[Snapshot, frozenset[int]], ...]:
-        """Sample inputs that the assumptions allow, and the lines that match each: tried before Z3, which is slow on doubles.
+        """Sample inputs that the assumptions allow, and the lines that match each: tried before Z3, which is slow on doubles and bits.
 
-        None without doubles, and none where nothing is left to be spent.
+        None where nothing is left to be spent.
         """
         if self._tried is None:
-            few = len(self.table.lines) <= _MOST_LINES_TRIED
-            reals = few and any(isinstance(v.type, Real) for v in self.variables)
-            cost = trial.SAMPLES * max(1, len(self.table.lines)) * _STEPS_OF_A_SAMPLE
-            every = trial.points(self.program.variables) if reals and not smt.charge(cost) else ()
+            lines = self.table.lines
+            samples = trial.SAMPLES + _AIMED * len(lines) + min(_MOST_PAIRS_AIMED, len(lines) ** 2)
+            cost = samples * max(1, len(lines)) * _STEPS_OF_A_SAMPLE
+            every = self.samples() if len(lines) <= _MOST_LINES_TRIED and not smt.charge(cost) else ()
             self._tried = tuple(
                 (each, matching) for each in every if (matching := self.allowed(each)) is not None
             )
         return self._tried
+
+    def samples(self) -> Iterator[Snapshot]:
+        """Yield inputs, then some that lines, and pairs of them, are likely to match: a mask of a word matches few others."""
+        random = Random(0)  # noqa: S311  # a sample, not a secret
+        points = list(trial.points(self.program.variables))
+        yield from points
+        kinds = {str(v.name): v.type for v in self.program.variables}
+        tests = [[test for test in line.tests if test is not None] for line in self.table.lines]
+        for one in tests * _AIMED:
+            yield trial.towards(random.choice(points), one, kinds, random)
+        for one, other in islice(combinations(tests, 2), _MOST_PAIRS_AIMED):
+            yield trial.towards(random.choice(points), [*one, *other], kinds, random)
 
     def allowed(self, snapshot: Snapshot) -> frozenset[int] | None:
         """The lines that match; None where an assumption does not hold, or a condition of a line is not defined."""
@@ -209,9 +229,10 @@ class _Decision:
         search = self.search(kept)
         if search.proved:
             kept, search = self.spared(search)
-        self.wrong |= bool(search.overlaps) or (must_cover(self.table) and bool(search.gaps))
-        found = [*self.overlaps(search), *self.gap(search)]
-        dead = self.dead(search)
+        self.few |= bool(search.overlaps) or (must_cover(self.table) and bool(search.gaps))
+        found = self.overlaps(search)
+        dead = self.dead(search)  # which may be wrong; what DEFAULT takes is not, and is looked for after it
+        found += self.gap(search)
         with smt.within(self.spare):
             findings: tuple[TableFinding, ...] = (*(each.grown() for each in found), *dead)
         if search.undecided:
@@ -293,33 +314,28 @@ class _Decision:
 
     def oracle(self, asked: Question) -> Snapshot | NoWitness:
         """Z3's answer about a region, as the tree asks it."""
-        if len(asked.candidates) > _MOST_CANDIDATES or smt.spent():
+        if len(asked.candidates) > _MOST_CANDIDATES or smt.spent() or (self.few and self.rest.spent):
             return NoWitness.UNKNOWN
-        if not self.glanced:
-            self.glance()
+        self.rest.left -= _STEPS_OF_A_QUESTION * self.few
         bounds = self.spelled(asked)
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
-        for snapshot, _ in self.tried:
-            if all(fold(condition, snapshot) for condition in conditions):
-                self.wrong = True
+        for snapshot, found in self.tried:
+            if len(found.intersection(asked.candidates)) != 1 and all(
+                fold(condition, snapshot) for condition in conditions
+            ):
+                self.few = True
                 return snapshot
         z3 = self.asked
-        with smt.within(self.spare) if self.wrong else nullcontext():
+        with smt.within(self.rest) if self.few else nullcontext():
             answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
         if answer is Answer.SATISFIABLE:
-            self.wrong = True
+            self.few = True
             return self.model(z3)
         return NoWitness.NONE if answer is Answer.UNSATISFIABLE else NoWitness.UNKNOWN
 
-    def glance(self) -> None:
-        """Look, before Z3 is first asked, whether arithmetic alone soon finds that something is wrong."""
-        self.glanced = True
-        soon = self.search(range(len(self.assumptions)), _NODES_OF_A_GLANCE, alone=True)
-        self.wrong |= soon.refuted
-
     def holds(self, *terms: Term) -> Answer:
         """Z3's answer to what else may be wrong: with all steps, as long as nothing is."""
-        with smt.within(self.rest) if self.wrong else nullcontext():
+        with smt.within(self.rest) if self.few else nullcontext():
             return self.asked.holds(*terms)
 
     def model(self, z3: TableSolver) -> dict[str, Value]:
@@ -349,9 +365,12 @@ class _Decision:
     def overlaps(self, search: Search) -> list[_Found]:
         """Every overlapping pair with its least witness."""
         pairs = set(search.overlaps)
-        self.models += search.witnesses
         for seen in search.witnesses:
-            pairs.update(combinations(self.matching(seen), 2))
+            pairs.update(combinations(self.seen(seen), 2))
+        if search.undecided:  # in regions of which Z3 was perhaps not asked
+            for _, found_there in self.tried:
+                pairs.update(combinations(sorted(found_there), 2))
+            self.few |= bool(pairs)
         with smt.within(self.spare):
             for asked in search.doubtful:
                 pairs.update(self.others(asked, pairs))
@@ -375,8 +394,7 @@ class _Decision:
         while left and len(found) < _MOST_DOUBTFUL and not smt.spent():
             if z3.holds(*region, smt.any_of(list(left.values()))) is not Answer.SATISFIABLE:
                 break
-            self.models.append(self.model(z3))
-            new = left.keys() & set(combinations(self.matching(self.models[-1]), 2))
+            new = left.keys() & set(combinations(self.seen(self.model(z3)), 2))
             if not new:
                 break
             found |= new
@@ -402,6 +420,12 @@ class _Decision:
         names = set(matching_lines(self.table, snapshot))
         return [at for at, line in enumerate(self.table.lines) if line.name in names]
 
+    def seen(self, snapshot: Snapshot) -> list[int]:
+        """Keep an input that the solver gave; return positions of the lines that match."""
+        found = self.matching(snapshot)
+        self.models.append((snapshot, frozenset(found)))
+        return found
+
     def overlap(self, first: int, second: int, known: Point | None, *, grown: bool) -> _Found:
         """A pair of lines that overlaps, at its least input; at the one that is known where nobody waits for the least."""
         if known is not None and (self.options.bare or smt.gives_up("the least input")):
@@ -410,7 +434,7 @@ class _Decision:
         with smt.within(self.spare):
             point = least(self.universe, [*both, *self.assumed], self.columns)
         if isinstance(point, NoWitness):
-            models = [each for each in self.models if {first, second} <= set(self.matching(each))]
+            models = [each for each, found in self.models if found.issuperset((first, second))]
             seen = [
                 *self.tried_by(first, second),
                 *models,
@@ -468,13 +492,13 @@ class _Decision:
             else:
                 near = point
         dead = {at: self.excluded_only(at) for at, point in open_ if point is not NoWitness.UNKNOWN}
-        self.wrong |= not all(dead.values())
+        self.few |= not all(dead.values())
         doubtful: list[int] = []
         for at in sorted(at for at, _ in open_ if at not in dead):
             answer = Answer.SATISFIABLE if self.tried_by(at) else self.holds(self.asked.line(at))
             if answer is Answer.UNSATISFIABLE:
                 dead[at] = self.excluded_only(at)
-                self.wrong |= not dead[at]
+                self.few |= not dead[at]
             elif answer is Answer.UNKNOWN:
                 doubtful.append(at)
         findings: list[TableFinding] = [DeadLine(at, dead[at]) for at in sorted(dead)]
@@ -522,7 +546,7 @@ class _Decision:
         self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]
     ) -> Snapshot | None:
         if not seen:
-            with smt.within(self.rest) if self.wrong else nullcontext():
+            with smt.within(self.rest) if self.few else nullcontext():
                 return self.asked.witness(*terms(self.asked), spare=self.spare)
         with smt.within(self.spare):
             return None if smt.spent() else self.asked.witness(*terms(self.asked))

@@ -3,7 +3,7 @@
 Keys are those of `rcsc.lang.model`: order-preserving integers for every kind of value.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -101,11 +101,21 @@ class TableVerdict:
 
     @property
     def refuted(self) -> bool:
-        """Whether something is wrong, whatever was left open; a gap that DEFAULT takes is not, nor a line that an assumption excludes."""
-        falls = self.table.default is not None and not self.table.default.unreachable
-        return any(
-            not (isinstance(finding, Gap) and falls)
-            and not (isinstance(finding, DeadLine) and finding.assuming)
-            and not isinstance(finding, Undecided | SolversDisagree)
-            for finding in self.findings
-        )
+        """Whether something is wrong, whatever was left open."""
+        return refutes(self.table, self.findings)
+
+
+def refutes(table: Table, findings: Iterable[TableFinding]) -> bool:
+    """Whether something is wrong; a gap that DEFAULT takes is not, nor a line that an assumption excludes, nor what is left open."""
+    falls = table.default is not None and not table.default.unreachable
+    return any(
+        not (isinstance(finding, Gap) and falls)
+        and not (isinstance(finding, DeadLine) and finding.assuming)
+        and not isinstance(finding, Undecided | SolversDisagree)
+        for finding in findings
+    )
+
+
+def settles(table: Table, findings: Collection[TableFinding]) -> bool:
+    """Whether more steps would change nothing of the verdict: nothing is left open, or something is wrong."""
+    return not any(isinstance(each, Undecided) for each in findings) or refutes(table, findings)

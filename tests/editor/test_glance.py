@@ -277,7 +277,7 @@ def test_an_outdated_check_ends_and_leaves_nothing_wrong(tmp_path: Path) -> None
     workspace, file = Workspace(), str(tmp_path / "hard.rcs")
     Path(file).write_text(HARD)
     workspace.open(file, HARD.replace("| true  |", "|       |"))
-    end_s = time.thread_time() + 0.3
+    end_s = time.thread_time() + 0.03
     with pytest.raises(OutdatedError):
         workspace.check(file, lambda: time.thread_time() < end_s)
     workspace.open(file, HARD)

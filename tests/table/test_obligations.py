@@ -536,8 +536,8 @@ OWED = {  # each owes what bounds alone do not settle
     "an assumption": f"assume odd monitored : {ODD}\ntable t assuming odd {{\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}}\n",
     "a preprocess": "module q reads x, y writes m {\n  if x <= y { m := y - x }\n}\n"
     "table t {\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}\nlevel l {\n  period 40 [ms]\n  preprocess q\n  table t\n}\n",
-    "a table": "table t {\n| line | when ||\n| a | x * y > 50 and x * m > 7 ||\n| b | x * y <= 50 and x * m > 7 ||\n"
-    "| c | x * m <= 7 and m * y > 9 ||\n| d | x * m <= 7 and m * y <= 9 ||\n}\n",
+    "a table": "table t {\n| line | when ||\n| a | x * y > 0 and x * m > 0 ||\n| b | (x = 0 or y = 0) and x * m > 0 ||\n"
+    "| c | x = 0 or m = 0 ||\n}\n",
 }
 
 

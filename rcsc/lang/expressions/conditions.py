@@ -1,6 +1,7 @@
 """Condition cells to tests; where a test looks at one leaf only, to its set of keys."""
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -202,14 +203,16 @@ def box_of(condition: Expr, leaf: Variable) -> Box | None:
     low, high = key_bounds(leaf.type)
     box = _box(condition, leaf.type, low, high)
     if box is None and high - low < _SMALL and not isinstance(leaf.type, Real):
-        return _tried(condition, leaf.name, leaf.type, range(low, high + 1))
+        return _tried(condition, leaf.name, leaf.type)
     return box
 
 
-def _tried(condition: Expr, name: VariableName, kind: Scalar, keys: range) -> Box | None:
+@lru_cache(maxsize=1024)  # the cells of a text that is resolved again and again are nearly all the same
+def _tried(condition: Expr, name: VariableName, kind: Scalar) -> Box | None:
     """Try every key; None where the condition is undefined for some."""
     holding = []
-    for key in keys:
+    low, high = key_bounds(kind)
+    for key in range(low, high + 1):
         value = fold(condition, {name: value_of_key(kind, key)})
         if value is None:
             return None
