@@ -46,6 +46,8 @@ MOST_OF_PAIRS_CPU_S = 15.0
 """Of the graph of lines, which asks about each pair of them, whether the table is wrong or not."""
 HANGS_S = 20
 """Past so much it is broken off."""
+MOST_LINES_OF_MASKS = 8
+"""Lines of a table that looks at more than 16 bits of a word: thirty with two such masks each have 3,600 tests, and take some 6 s."""
 NAMES = "abcdefgh"
 Rng = random.Random
 
@@ -132,6 +134,7 @@ class Draw:
     whole: list[str]
     real: list[str]
     conditions: list[str]
+    masks: bool = False
 
     def variable(self, name: str) -> None:
         """Declare an input of some type, and a column about it."""
@@ -181,6 +184,7 @@ class Draw:
     def _word(self, name: str, word: str) -> None:
         rng = self.rng
         width = rng.choice((4, 8, 16, 32, 63, 64))
+        self.masks |= width > 16
         self.declared.append(f"{word} {name} : int 0 .. {2**width - 1}")
         ways = [
             Heading(name, of_bits(width)),
@@ -268,10 +272,11 @@ def _drawn(rng: Rng, small: bool) -> str:
         if draw.conditions
     ]
     named = [each.split()[1] for each in assumed if "for 300" not in each]
-    lines = (2, 3, 4, 5) if small else (2, 3, 3, 4, 5, 6, 8, 14, 30)
-    tables = [_table("t", draw, named, rng, rng.choice(lines))]
+    lines = (2, 3, 4, 5) if small else (2, 2, 3, 3, 3, 4, 4, 5, 6, 8, 14, 30)
+    most = MOST_LINES_OF_MASKS if draw.masks else max(lines)
+    tables = [_table("t", draw, named, rng, min(most, rng.choice(lines)))]
     if not rng.randrange(8):
-        tables.append(_table("u", draw, named, rng, rng.choice(lines)))
+        tables.append(_table("u", draw, named, rng, min(most, rng.choice(lines))))
     shown = [
         f"level l {{ period 100 [ms] {' '.join(f'table {name}' for name in ('t', 'u')[: len(tables)])} }}"
     ]

@@ -23,6 +23,9 @@ from rcsc.solvers.options import Options
 from rcsc.symbolic.evaluation import TooLongError
 from rcsc.table.cover import UndecidedError
 
+MOST_OF_A_PART = 2
+"""Questions' worth of steps that a table, all procedures or all levels may take."""
+
 
 def compare(
     name: str, before: Program, after: Program, options: Options, *, follow: bool = False
@@ -40,7 +43,8 @@ def compare(
     compared: list[ComparedPart] = []
     for what, steps in _steps(versions):
         try:
-            compared += steps()
+            with smt.together(MOST_OF_A_PART * options.steps):
+                compared += steps()
         except given_up:
             undecided.append(what)
     reported = [
