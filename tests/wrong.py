@@ -44,7 +44,7 @@ MOST_CPU_S = 2.0
 """Of one command, on one table."""
 MOST_OF_PAIRS_CPU_S = 15.0
 """Of the graph of lines, which asks about each pair of them, whether the table is wrong or not."""
-HANGS_S = 20
+HANGS_S = 40
 """Past so much it is broken off."""
 MOST_LINES_OF_MASKS = 8
 """Lines of a table that looks at more than 16 bits of a word: thirty with two such masks each have 3,600 tests, and take some 6 s."""
@@ -398,7 +398,7 @@ class Seen:
     """What a campaign came to.
 
     Attributes:
-        slowest: By command, seconds of the processor, and the number of the table.
+        slowest: By command, seconds of the processor on a wrong table, and its number.
         late: Tables that are wrong, with a command that took longer than it may.
         right: How often a command took so long on one that is not: that was a proof.
         failed: What ended otherwise.
@@ -514,8 +514,35 @@ def helps_campaign(count: int, seed: int, first: int = 0) -> tuple[int, int, dic
 
 
 def _one(place: Path, text: str, rng: Rng, number: int, seen: Seen) -> None:
+    """Run the commands; what is late counts if it is so three times: other processes slow down what the processor's time counts."""
     (place / "rcsc.toml").touch()
-    told, late = "", list[str]()
+    state = rng.getstate()
+    took_s, errors = _timed(place, text, rng)
+    for _ in range(2):
+        if any(_is_late(*each) for each in took_s.items()):
+            rng.setstate(state)
+            again_s, _ = _timed(place, text, rng)
+            took_s = {name: min(once_s, again_s[name]) for name, once_s in took_s.items()}
+    late = [f"{name} {once_s:.1f} s" for name, once_s in took_s.items() if _is_late(name, once_s)]
+    if errors and late:
+        seen.late[number] = late
+    else:
+        seen.right += len(late)
+    for name, once_s in took_s.items():
+        if errors:
+            seen.slowest[name] = max(seen.slowest.get(name, (0.0, -1)), (once_s, number))
+    seen.codes.update(set(errors))
+    seen.codes["two and more"] += len(errors) > 1
+
+
+def _is_late(name: str, took_s: float) -> bool:
+    return took_s > (MOST_OF_PAIRS_CPU_S if name == "graph --lines" else MOST_CPU_S)
+
+
+def _timed(place: Path, text: str, rng: Rng) -> tuple[dict[str, float], list[str]]:
+    """Run the commands; what each took of the processor, and the errors that `check` tells."""
+    took_s: dict[str, float] = {}
+    errors: list[str] = []
     for name, does in commands(place, text, rng, every=False):
         begun = time.process_time()
         try:
@@ -523,18 +550,9 @@ def _one(place: Path, text: str, rng: Rng, number: int, seen: Seen) -> None:
                 answer = does()
         except Exception as bug:
             raise AssertionError(f"{name}: {type(bug).__name__}: {bug}") from bug
-        told = str(answer) if name == "check" else told
-        took_s = time.process_time() - begun
-        seen.slowest[name] = max(seen.slowest.get(name, (0.0, -1)), (took_s, number))
-        if took_s > (MOST_OF_PAIRS_CPU_S if name == "graph --lines" else MOST_CPU_S):
-            late.append(f"{name} {took_s:.1f} s")
-    errors = re.findall(r"error\[(RCS\d+)\]", told)
-    if errors and late:
-        seen.late[number] = late
-    else:
-        seen.right += len(late)
-    seen.codes.update(set(errors))
-    seen.codes["two and more"] += len(errors) > 1
+        took_s[name] = max(took_s.get(name, 0.0), time.process_time() - begun)
+        errors = re.findall(r"error\[(RCS\d+)\]", str(answer)) if name == "check" else errors
+    return took_s, errors
 
 
 def main() -> None:

@@ -84,20 +84,28 @@ class Steps:
 
     def steps(self, states: Sequence[Value]) -> list[Step]:
         """Every step from these states; by line, then in the states' order."""
-        steps = []
+        steps: list[Step] = []
         for at, actions in enumerate(self._actions()):
             after = self._after(actions)
+            self._declare([self._lines[at], *(node for pair in after for node in pair)])
+            self._solver.push()  # a line is stated once, for all states
+            self._solver.add(values.term_of(self._lines[at]))
             for source in states:
-                here = [self._lines[at], self._is(self._before(), source)]
-                if not self._possible(*here):
-                    continue
-                targets = [
-                    value
-                    for value in self._values()
-                    if any(self._possible(*here, when, self._is(node, value)) for when, node in after)
-                ]
-                steps += [Step(at, source, target, len(targets) > 1) for target in targets]
+                here = self._is(self._before(), source)
+                if self._possible(here):
+                    targets = [value for value in self._values() if self._leads(here, source, value, after)]
+                    steps += [Step(at, source, target, len(targets) > 1) for target in targets]
+            self._solver.pop()
         return steps
+
+    def _leads(self, here: Node, source: Value, target: Value, after: Sequence[tuple[Node, Node]]) -> bool:
+        """Whether the line that is stated can lead from a state to another; where it leaves the state as it is nothing is asked."""
+        return any(
+            source == target
+            if when is values.TRUE and node is self._before()
+            else self._possible(here, when, self._is(node, target))
+            for when, node in after
+        )
 
     def sets(self, action: Action) -> Value | None:
         """The state that the action alone, whatever the input, leads to; None where it does anything else too."""
