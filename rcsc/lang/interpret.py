@@ -13,6 +13,7 @@ from enum import IntEnum
 from functools import partial
 from typing import Any, TypeAlias, assert_never
 
+from rcsc.diagnostics.coded import USERS_FAILURES, raised
 from rcsc.lang.model import (
     Action,
     Admit,
@@ -90,6 +91,10 @@ class Outcome:
 
 class ExternError(Exception):
     """An extern procedure gave a value outside its declared range, for the leaf named."""
+
+
+class ExternFailedError(Exception):
+    """The user's function of an extern procedure raised, asked to end the process, or cannot be imported; says what was raised."""
 
 
 UNDEFINED = (ArithmeticError, IndexError, ValueError)
@@ -238,7 +243,10 @@ def _call_extern(
 def _of_user(procedure: Procedure, args: list[Value]) -> tuple[Value, ...]:
     assert procedure.extern is not None
     module, _, function = procedure.extern.python.partition(":")
-    results = getattr(importlib.import_module(module), function)(*args)
+    try:
+        results = getattr(importlib.import_module(module), function)(*args)
+    except USERS_FAILURES as error:
+        raise ExternFailedError(raised(error)) from error
     if not procedure.writes:
         return ()
     return results if isinstance(results, tuple) else (results,)

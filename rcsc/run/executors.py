@@ -19,7 +19,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Protocol
 
-from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.coded import USERS_FAILURES, CodedError, raised
 from rcsc.host import children
 from rcsc.host.files.names import BadName
 from rcsc.host.files.read import Malformed, content
@@ -74,8 +74,8 @@ def _module(name: str, path: Path) -> ModuleType:
         loader.exec_module(module)
     except Malformed as error:
         raise NotBuilt(f"`{path}` {error}") from error
-    except (Exception, SystemExit, GeneratorExit) as error:  # modules of extern procedures are the user's
-        raise NotBuilt(f"`{path}` cannot be imported: {type(error).__name__}: {error}") from error
+    except USERS_FAILURES as error:  # modules of extern procedures are the user's
+        raise NotBuilt(f"`{path}` cannot be imported: {raised(error)}") from error
     return module
 
 

@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.coded import USERS_FAILURES, CodedError, raised
 from rcsc.diagnostics.codes import Code
 from rcsc.run.buffers import Buffers
 from rcsc.run.description import BadDescription, Description, Feed, LevelSpec
@@ -85,6 +85,18 @@ def put_checked(name: str, sign: Signature, executor: Executor, values: Values) 
         raise BadState(f"level `{name}` cannot go on from this state: {wrong}")
 
 
+def cycled(name: str, executor: Executor) -> int:
+    """Run one cycle of a level's executor, whoever asks; return the fault, 0 for none.
+
+    Raises:
+        StateTableError: An extern procedure, which is the user's code, raised, or asked to end the process.
+    """
+    try:
+        return executor.cycle()
+    except USERS_FAILURES as error:
+        raise StateTableError(f"level `{name}`: an extern procedure failed: {raised(error)}") from error
+
+
 @dataclass(slots=True)
 class RunningLevel:
     """One level with its state.
@@ -140,13 +152,9 @@ class RunningLevel:
         """Run one cycle; return the fault, 0 for none.
 
         Raises:
-            StateTableError: An extern procedure, which is the user's code, raised, or asked to end the process.
+            StateTableError: An extern procedure failed.
         """
-        try:
-            fault = self.executor.cycle()
-        except (Exception, SystemExit, GeneratorExit) as error:
-            said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-            raise StateTableError(f"level `{self.name}`: an extern procedure failed: {said}") from error
+        fault = cycled(self.name, self.executor)
         self.values = self.executor.values()
         return fault
 

@@ -13,6 +13,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.lang.interpret import (
     UNDEFINED,
     ExternError,
+    ExternFailedError,
     admit,
     call,
     chosen_table,
@@ -111,6 +112,10 @@ def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[
     except ExternError as error:
         raise Refused(
             Code.SHELL_PART, f"an extern procedure in `{meant}` gave no value for `{error}`"
+        ) from error
+    except ExternFailedError as error:
+        raise Refused(
+            Code.STATE_TABLE_ERROR, f"an extern procedure in `{meant}` failed: {error}: nothing was changed"
         ) from error
     except (*UNDEFINED, KeyError) as error:
         raise Refused(

@@ -134,12 +134,15 @@ class Session:
         """One cycle of one level: it takes its buffers as they are, runs, and gives.
 
         Raises:
-            Refused: It was refused an input, or no line or several matched.
+            Refused: It was refused an input, no line or several matched, or an extern procedure failed.
         """
         _fit(level)
         self._keep()
-        level.take(self.memory)
-        fault = level.run()
+        try:
+            level.take(self.memory)
+            fault = level.run()
+        except StateTableError as error:
+            raise Refused(Code.STATE_TABLE_ERROR, str(error), "`undo` takes the cycle back") from error
         level.give(self.memory)
         if fault:
             raise Refused(Code.STATE_TABLE_ERROR, _fault(level), "`undo` takes the cycle back")

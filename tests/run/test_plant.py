@@ -413,23 +413,59 @@ def test_an_extern_procedure_that_fails_is_told_as_such(
     does: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """In a cycle, or as its module is imported; with no status that is a bug's."""
-    (tmp_path / "t.rcs").write_text(
-        'input n : int 0 .. 5\nstate s : int 0 .. 9\nextern procedure look reads n writes s python "failing_part:of" c "part_of"\n'
-        "table t {\n| line | n || procedures |\n| a | 0 .. 5 || look |\n}\nlevel l { period 40 [ms]  table t }\n",
-        encoding="utf-8",
-    )
-    text = 'name = "ext"\ntick_ms = 40\ngenerated = "generated"\n[[level]]\nname = "l"\nprogram = "t"\n[buffers]\n"outside.n" = "l.n"\n'
-    (tmp_path / "system.toml").write_text(text, encoding="utf-8")
     inside = does.startswith(("raise", "return"))
     code = f"def of(*_):\n    {does}\n" if inside else does or "import no_such_module_here"
-    (tmp_path / "failing_part.py").write_text(f"{code}\n", encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.delitem(sys.modules, "failing_part", raising=False)
+    with_extern(tmp_path, code, monkeypatch)
     assert run(["run", str(tmp_path), "-q", "--executor", "python", "--cycles", "3"]) == 1
     said = capsys.readouterr().err
     assert (
         "error[RCS725]: level `l`: an extern procedure failed" if inside else "cannot be imported"
     ) in said
+    assert "RCS9" not in said
+
+
+def with_extern(folder: Path, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write a system of one level whose extern procedure is `of` of a module with this code."""
+    (folder / "t.rcs").write_text(
+        'input n : int 0 .. 5\nstate s : int 0 .. 9\nextern procedure look reads n writes s python "failing_part:of" c "part_of"\n'
+        "table t {\n| line | n || procedures |\n| a | 0 .. 5 || look |\n}\nlevel l { period 40 [ms]  table t }\n",
+        encoding="utf-8",
+    )
+    text = 'name = "ext"\ntick_ms = 40\ngenerated = "generated"\n[[level]]\nname = "l"\nprogram = "t"\n[buffers]\n"outside.n" = "l.n"\n'
+    (folder / "system.toml").write_text(text, encoding="utf-8")
+    (folder / "failing_part.py").write_text(f"{code}\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.delitem(sys.modules, "failing_part", raising=False)
+
+
+@pytest.mark.parametrize(
+    "does", ["raise ValueError('boom')", "raise KeyError('boom')", "raise SystemExit(3)", "return of()"]
+)
+@pytest.mark.parametrize("command", ["replay", "step", "l-level", "look", "t"])
+def test_an_extern_procedure_that_fails_fails_alike_whoever_calls_it(
+    command: str,
+    does: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A log that is replayed, a shell that steps a level, runs it alone or a part of it: as a run does."""
+    with_extern(tmp_path, "def of(*_): return 3", monkeypatch)
+    log = tmp_path / "run.mcap"
+    quick = [str(tmp_path), "--executor", "python"]
+    assert run(["run", *quick, "-q", "--cycles", "3", "--log", str(log)]) == 0
+    with_extern(tmp_path, f"def of(*_):\n    {does}", monkeypatch)
+    (tmp_path / "script").write_text(f"{command}\n", encoding="utf-8")
+    ask = (
+        ["replay", str(log), "--system"]
+        if command == "replay"
+        else ["shell", "--script", str(tmp_path / "script")]
+    )
+    assert run([*ask, *quick]) == 1
+    said = capsys.readouterr().err
+    assert "error[RCS725]: " in said
+    assert "an extern procedure" in said
+    assert "failed: " in said
     assert "RCS9" not in said
 
 

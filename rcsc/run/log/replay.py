@@ -16,7 +16,7 @@ from rcsc.run.adopt import Begun
 from rcsc.run.answers import Answers, told
 from rcsc.run.description import BadDescription
 from rcsc.run.executors import Executor
-from rcsc.run.levels import put_checked
+from rcsc.run.levels import cycled, put_checked
 from rcsc.run.log.queries import Predicate
 from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.log.schema import fingerprints
@@ -98,7 +98,11 @@ class _Again:
         self.lacking = dict.fromkeys(f"{self.logged.name}.{name}" for name in gone)
 
     def cycle(self, at: int, answers: Answers) -> ReplayedCycle | None:
-        """Run the cycle whose record has this place; None for the state that recording started from."""
+        """Run the cycle whose record has this place; None for the state that recording started from.
+
+        Raises:
+            StateTableError: The tables are not proved for the recorded state, or an extern procedure failed.
+        """
         if at < 1:
             return None
         track = self.logged.track
@@ -106,7 +110,7 @@ class _Again:
         restart = self.logged.restarted(at)
         self._put(track.layout.unpack(track.packed[at - 1]) if restart is None else restart.values, recorded)
         told(self.executor, answers)
-        self.executor.cycle()
+        cycled(self.logged.name, self.executor)
         now = self.executor.values()
         equal = self.same and self.packed.pack(*now) == track.packed[at]
         return ReplayedCycle(
