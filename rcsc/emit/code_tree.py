@@ -238,18 +238,19 @@ def when(condition: Code, *body: Stmt) -> Branch:
 
 def read(node: object) -> Iterator[Code]:
     """Every expression in a tree, but for variables that are only set."""
-    if isinstance(node, tuple):
-        for child in node:
-            yield from read(child)
-    elif isinstance(node, Set) and isinstance(node.place, Name):
-        yield from read(node.value)
-    elif isinstance(node, Code | Stmt | Function):
-        if isinstance(node, Code):
-            yield node
-        if isinstance(node, Loop):
-            yield Name(node.name)
-        for part in node.__slots__:
-            yield from read(getattr(node, part))
+    waiting = [node]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, tuple):
+            waiting += reversed(node)
+        elif isinstance(node, Set) and isinstance(node.place, Name):
+            waiting.append(node.value)
+        elif isinstance(node, Code | Stmt | Function):
+            if isinstance(node, Code):
+                yield node
+            if isinstance(node, Loop):
+                yield Name(node.name)
+            waiting += (getattr(node, part) for part in reversed(node.__slots__))
 
 
 # --- spelling ------------------------------------------------------------------------
