@@ -281,6 +281,15 @@ def test_inputs_are_those_that_the_cycle_took() -> None:
     assert (restarted.restarted, len(restarted.steps), restarted.steps[0].before["i"]) == (True, 1, True)
 
 
+def test_a_table_may_have_its_default_line_alone() -> None:
+    text = (
+        "input x : int 0 .. 3\nstate y : int 0 .. 3\n"
+        "table t {\n | line | x || y |\n | rest | DEFAULT || x |\n}\n"
+        "level l { period 40 [ms] table t }\nproperty same : y = x\nproperty late : was y = x\n"
+    )
+    assert verdicts(prove_level(alone(text), LITTLE)) == {"same": True, "late": False}
+
+
 COUNTING = """
 state n : int 0 .. 3 = 3
 state kept : array[3] of int 0 .. 1

@@ -236,10 +236,8 @@ def _cells(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
     """Make predicates of cells that compare numbers."""
     kinds, seen = ts.kinds, set()
     for table in ts.program.tables:
-        for column, tests in zip(
-            table.columns, zip(*(line.tests for line in table.lines), strict=True), strict=True
-        ):
-            for test in tests:
+        for at, column in enumerate(table.columns):
+            for test in (line.tests[at] for line in table.lines):
                 if test is None or all(listed(kinds[leaf]) for leaf in test.variables):
                     continue
                 name = spelled(test.condition)
