@@ -1612,6 +1612,10 @@ class Code(StrEnum):
     random numbers for instance, is kept if its class has `state` and `restore`. In the paper's cell an interlock may refuse a row before
     it begins, for it would machine a loose part, put a second part into the fixture, or let go of a part; and what has been done of
     a row is not done again.
+
+    Ctrl-C or SIGTERM interrupt a run (status 130), in a plant, a database or an extern procedure that does not come back, too: `rcsc run`
+    waits for these as long as they take, as how long is right differs by machine. The log holds all whole cycles. What holds on even
+    then is ended, and `rcsc` with it, by a second one.
     """
     STATE_TABLE_ERROR = """RCS725: STATE-TABLE error
 

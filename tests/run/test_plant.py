@@ -3,6 +3,7 @@
 import copy
 import math
 import shutil
+import signal
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -467,6 +468,51 @@ def test_an_extern_procedure_that_fails_fails_alike_whoever_calls_it(
     assert "an extern procedure" in said
     assert "failed: " in said
     assert "RCS9" not in said
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize(
+    ("place", "catches"), [("extern", False), ("plant", False), ("extern", True), ("plant", True)]
+)
+def test_who_ends_a_run_has_a_code_and_every_cycle_before(
+    name: str,
+    place: str,
+    catches: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """In an extern procedure or a plant that is waited for; where that catches it, with the cycle that came to its end so."""
+    does = (
+        "import signal\nclass Ends:\n    times = 0\n    def now(self):\n        self.times += 1\n        if self.times == 30:\n"
+        f"            try: signal.raise_signal(signal.{name})\n            except BaseException:\n                if not {catches}: raise\n"
+        "ends = Ends()\n"
+    )
+    with_extern(
+        tmp_path,
+        f"{does}def of(*_):\n    {'ends.now()' if place == 'extern' else ''}\n    return 3",
+        monkeypatch,
+    )
+    step = "ends.now()" if place == "plant" else "pass"
+    plant = (
+        f"{does}class Cell:\n    n: int = 0\n    def step(self, seconds: float) -> None:\n        {step}\n"
+    )
+    (tmp_path / "cell.py").write_text(plant, encoding="utf-8")
+    system = (tmp_path / "system.toml").read_text(encoding="utf-8").replace("outside.n", "cell.n")
+    (tmp_path / "system.toml").write_text(
+        f'{system}[plant.cell]\npython = "cell.py:Cell"\n', encoding="utf-8"
+    )
+    log = tmp_path / "run.mcap"
+    before = signal.getsignal(signal.SIGTERM)
+    assert (
+        run(["run", str(tmp_path), "--executor", "python", "--cycles", "99", "-q", "--log", str(log)]) == 130
+    )
+    assert signal.getsignal(signal.SIGTERM) is before
+    whole = 30 if catches else 29
+    said = capsys.readouterr().err
+    assert f"error[RCS724]: interrupted in cycle {whole + 1}; the log holds the {whole} before it" in said
+    assert run(["replay", str(log), "--system", str(tmp_path), "--executor", "python"]) == 0
+    assert f"{whole} ticks replayed: nothing differs; sealed" in capsys.readouterr().out
 
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"/>'

@@ -13,7 +13,7 @@ import click
 
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.played import with_ticks
-from rcsc.commands.shared.stopped import Stopped
+from rcsc.commands.shared.stopped import Ending, Interrupted, Stopped
 from rcsc.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLANT, SYSTEM, made, meant
 from rcsc.diagnostics.codes import Code
 from rcsc.host.children import scratch
@@ -176,6 +176,7 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
     Raises:
         CodedError: Something is not in order, and nothing has moved; or a row was not done.
         StateTableError: A level met a fault that the proofs exclude.
+        Interrupted: The user, or the system, ended it.
     """
     system = description(asked.path)
     signs = signatures(system)
@@ -185,9 +186,14 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
     _place(run, stage.resume, from_row, resumes)
     witness = stage.witness(run) if stage.witness else RunWitness(run, stage.pictures)
     witness.film = asked.report is not None
-    with _recorded(run, asked) as log, _followed(witness, asked):
+    ending = Ending()
+    with _recorded(run, asked, ending) as log, _followed(witness, asked):
         running.watch.append(witness)
-        seconds = _watch(run, asked)
+        try:
+            with ending.inside():
+                seconds = _watch(run, asked)
+        except KeyboardInterrupt as error:
+            raise _interrupted(run, log) from error
     if asked.report is not None:
         _write_report(asked.report, witness, log, asked, seconds)
     return _closing(witness, stage.resume, asked, seconds, log)
@@ -226,8 +232,8 @@ def _check_row(run: ScriptedRun, from_row: int | None) -> None:
 
 
 @contextlib.contextmanager
-def _recorded(run: ScriptedRun, asked: RunOptions) -> Iterator[Path]:
-    """Writes the log; its path."""
+def _recorded(run: ScriptedRun, asked: RunOptions, ending: Ending) -> Iterator[Path]:
+    """Writes the log, cycle by whole cycle; its path."""
     from rcsc.run.log.recorder import (
         Recorder,  # of an extra; a plant that needs a larger one has said so by now
     )
@@ -239,7 +245,7 @@ def _recorded(run: ScriptedRun, asked: RunOptions) -> Iterator[Path]:
         recorder = Recorder(run.system, path)
     except OSError as error:
         raise BadDescription(f"the log {path} cannot be written: {error.strerror}") from error
-    run.system.watch.append(recorder)
+    run.system.watch.append(ending.whole(recorder))
     try:
         yield path
     finally:
@@ -295,6 +301,13 @@ def _watch(run: ScriptedRun, asked: RunOptions) -> float:
         if not asked.quiet:
             _say(result.row.number, result.row.text, result.state, result.reason, result.ticks)
     return time.perf_counter() - begun
+
+
+def _interrupted(run: ScriptedRun, log: Path) -> Interrupted:
+    """The end of a run whose plant, extern procedure or script the user waited for no longer, or that was long enough."""
+    done = run.system.tick
+    message = f"interrupted in cycle {done + 1}; the log holds the {done - run.first_tick} before it"
+    return Interrupted(Code.SCRIPT_STOPPED, message, f"`rcsc log {shlex.quote(str(log))}` shows them")
 
 
 def _say(number: int, text: str, state: str, reason: str, ticks: int) -> None:
