@@ -120,7 +120,7 @@ class Unproved:
         run: The run, a row a cycle and level, as the interpreter and the executors did it; empty where none was found.
         cycle: The cycle, from 1, that breaks it; 0 without a run.
         restarted: Whether the run begins where a restart does; then its first row, of tick 0, says where.
-        helps: What would mend the tables, each proved.
+        helps: What would mend the tables, each with whether it is proved of the text that it makes.
         together: What the first helps of all findings of its table do together, at the last of them.
         follows: What comes of it, each with its run.
     """

@@ -114,7 +114,7 @@ def key(finding: Diagnostic) -> tuple[str, str]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Wrong:
+class Wrong:
     """What is wrong with a table, by names, that one version of it can be compared with another.
 
     Attributes:
@@ -133,7 +133,7 @@ class _Wrong:
     whole: bool
 
     @classmethod
-    def of(cls, verdict: TableVerdict) -> "_Wrong":
+    def of(cls, verdict: TableVerdict) -> "Wrong":
         """Return what a verdict says."""
         lines, pairs, dead, gaps = verdict.table.lines, set[frozenset[str]](), set[str](), list[Gap]()
         whole = True
@@ -151,11 +151,34 @@ class _Wrong:
         whole = whole and len(pairs) < partition.MOST_PAIRS
         return cls(frozenset(pairs), frozenset(dead), bool(gaps), left, not must_cover(verdict.table), whole)
 
-    def within(self, other: "_Wrong") -> bool:
+    def within(self, other: "Wrong") -> bool:
         """Whether nothing is wrong that is not so in another, no more inputs are left, and a DEFAULT is still reached."""
         fewer = self.left is None or other.left is None or self.left <= other.left
         gap = self.gap <= other.gap and (not self.falls or self.gap == other.gap)
         return self.pairs <= other.pairs and self.dead <= other.dead and gap and fewer
+
+
+def written(root: str, loaded: Loaded, file: str, proposal: Proposal) -> Program | None:
+    """Return the program of the texts once a proposal stands in one of them; None where there is none.
+
+    Args:
+        root: The file that is resolved.
+        loaded: All texts.
+        file: Where the table stands.
+        proposal: What is written.
+    """
+    source = loaded.sources.get(file)
+    text = None if source is None else with_proposal(source, proposal)
+    if source is None or text is None:
+        return None
+    new = Source(source.name, text)
+    parsed = parse(new)
+    if not isinstance(parsed, tree.File):
+        return None
+    files = {**loaded.files, source.name: parsed}
+    sources = {**loaded.sources, source.name: new}
+    program = resolve(root, replace(loaded, files=files, sources=sources))
+    return program if isinstance(program, Program) else None
 
 
 @dataclass(slots=True)
@@ -170,12 +193,12 @@ class _Trials:
     tried: int = 0
     cells: int = 0
     told: set[tuple[str, str]] = field(init=False)
-    before: dict[str, _Wrong] = field(init=False)
+    before: dict[str, Wrong] = field(init=False)
 
     def __post_init__(self) -> None:
         """Note what was wrong before."""
         self.told = {key(each) for each in serious(self.verdict.findings)}
-        self.before = {str(each.table.name): _Wrong.of(each) for each in self.verdict.tables}
+        self.before = {str(each.table.name): Wrong.of(each) for each in self.verdict.tables}
 
     def outcome(self, finding: Diagnostic, proposal: Proposal) -> Outcome:
         """Say what comes of a proposal; nothing is tried past the budget."""
@@ -195,36 +218,21 @@ class _Trials:
         return self.known.outcome(self.verdict.program, table, proposal, make)
 
     def _trial(self, finding: Diagnostic, proposal: Proposal) -> Outcome:
-        program = self._changed(finding, proposal)
+        program = written(self.root, self.loaded, finding.primary.span.file, proposal)
         names = () if program is None else [each for each in program.tables if each.name == proposal.table]
         if program is None or len(names) != 1:
             return Outcome.FAILS
         [table] = names
         try:
-            after = prove_program(program, self.options, only=[table.name], known=_Silent())
+            after = prove_program(program, self.options, only=[table.name], known=Silent())
         except smt.troubles():
             return Outcome.OPEN
         return self._compared(finding, proposal, after)
 
-    def _changed(self, finding: Diagnostic, proposal: Proposal) -> Program | None:
-        """The program of the text with the proposal; None where there is none."""
-        source = self.loaded.sources.get(finding.primary.span.file)
-        text = None if source is None else with_proposal(source, proposal)
-        if source is None or text is None:
-            return None
-        new = Source(source.name, text)
-        parsed = parse(new)
-        if not isinstance(parsed, tree.File):
-            return None
-        files = {**self.loaded.files, source.name: parsed}
-        sources = {**self.loaded.sources, source.name: new}
-        program = resolve(self.root, replace(self.loaded, files=files, sources=sources))
-        return program if isinstance(program, Program) else None
-
     def _compared(self, finding: Diagnostic, proposal: Proposal, after: ProgramVerdict) -> Outcome:
         """Whether the finding is gone, and no other has come."""
         [table] = [each for each in after.tables if each.table.name == proposal.table]
-        was, now = self.before.get(proposal.table), _Wrong.of(table)
+        was, now = self.before.get(proposal.table), Wrong.of(table)
         elsewhere = {key(each) for each in serious(after.findings)} - self.told
         if was is None or not was.whole or not now.whole or any(Code.UNDECIDED in each for each in elsewhere):
             return Outcome.OPEN
@@ -248,7 +256,7 @@ class _Trials:
         return Outcome.HOLDS if gone else Outcome.FAILS
 
 
-class _Silent(Nothing):
+class Silent(Nothing):
     """Nothing is known, and nobody is told: what is wrong with a table is taken from its verdict."""
 
     def told(self, _verdict: TableVerdict, _unproved: frozenset[str], _make: object) -> list[Diagnostic]:

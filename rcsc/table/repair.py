@@ -1,4 +1,4 @@
-"""Repairs worth proposing: each is proved before it is shown, or not shown.
+"""Repairs worth proposing: what is right of the table as resolved. Whether it is of the text is tried elsewhere (`mending`).
 
 In: a finding of a table. Out: a cell or a line to write, and the sentence that proposes it; or nothing.
 """
@@ -80,12 +80,8 @@ class PartingCell:
     lost: int
     falls: bool
 
-    def shown(self, table: Table) -> str:
-        """Say what to write and that it is proved, which line then runs, and what it does otherwise than the line that does not."""
-        return "proved".join(self.told(table))
-
     def told(self, table: Table) -> tuple[str, str]:
-        """Say it in two pieces, between which stands whether it is proved."""
+        """Say what to write, which line then runs, and what it does otherwise: in two pieces, between which stands whether it is proved."""
         line, other = table.lines[self.line], table.lines[self.other]
         does, did = ({action.heading: action.text for action in of.actions} for of in (other, line))
         headings = [heading for heading in dict.fromkeys((*did, *does)) if heading != "procedures"]
@@ -107,12 +103,6 @@ class PartingCell:
     def change(self, table: Table) -> Change:
         """The change of the table's text."""
         return Change(Place.CELL, str(table.lines[self.line].name), self.column, (self.text,))
-
-
-def parting_cell(program: Program, table: Table, overlap: Overlap) -> str | None:
-    """Return the smallest change of one cell that parts the two lines and leaves every input matched, in words; of box tables."""
-    cell = next(iter(parting_cells(program, table, overlap)), None)
-    return None if cell is None or cell.falls else cell.shown(table)
 
 
 def parting(program: Program, table: Table, overlap: Overlap) -> PartingCell | None:
@@ -276,15 +266,6 @@ class NewLine:
         """Say what it is and does."""
         what = "closes the gap" if self.closes else "closes this part of the gap"
         return f"a line `| {' | '.join(('new', *self.cells))} || ... |` {what} and overlaps no other"
-
-    def __str__(self) -> str:
-        return f"{self.told}: proved"
-
-
-def closing_line(program: Program, table: Table, gap: Gap) -> str | None:
-    """Propose a line for the gap's first region, in words."""
-    row = new_line(program, table, gap)
-    return None if row is None else str(row)
 
 
 def new_line(program: Program, table: Table, gap: Gap) -> NewLine | None:

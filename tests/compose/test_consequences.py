@@ -16,6 +16,7 @@ from rcsc.commands import run
 from rcsc.compose.contract.beginning import BadStartError, starts
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.applied import Texts
 from rcsc.compose.counterexample.consequence import MOST, Consequence, How, consequences, spelled_report, told
 from rcsc.compose.counterexample.cycle_run import one_cycle
 from rcsc.compose.counterexample.finding import Finding, of_trace
@@ -260,7 +261,10 @@ def test_the_smallest_repairs_together_report_executing_after_failed(task: Trans
     [table] = task.program.tables
     smallest = cells_of(task, *((line, "14") for line in LATER), ("14", "15"))
     assert left_by(task.program, table, smallest) == ""
-    trial = tried(task, table, smallest, [], 4)
+    after = Texts().of(task, "acquire").together(smallest)
+    assert after is not None
+    assert after.ts is not None
+    trial = tried(after.ts, table, smallest, [], 4)
     assert trial.rank[:2] == (1, 0)
     [breaks] = trial.breaks
     assert re.search(r"line `15` changes .* from `failed` .* to `executing`", breaks)
@@ -298,7 +302,10 @@ def test_what_was_proved_and_is_broken_by_a_repair_is_told_first(task: Transitio
     """As if it had been proved that no order is replaced before its echo."""
     [table] = task.program.tables
     kept = [obligation_of(task, Sort.WAITS, "", "to_emove")]
-    trial = tried(task, table, cells_of(task, ("10", "14")), kept, 4)
+    [cell] = cells_of(task, ("10", "14"))
+    after = Texts().of(task, "acquire").parted(cell)
+    assert after.ts is not None
+    trial = tried(after.ts, table, (cell,), kept, 4)
     assert trial.rank[0] == 1
     assert trial.breaks[0] == f"in cycle 2 this is no longer so: {kept[0].shown}"
 

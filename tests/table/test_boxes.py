@@ -23,7 +23,7 @@ from rcsc.table.decide import prove_table
 from rcsc.table.diagnose import diagnostics
 from rcsc.table.program import prove_program
 from rcsc.table.regions import holes, partition
-from rcsc.table.repair import closing_line, parting_cell
+from rcsc.table.repair import new_line, parting
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench.made import families
 from tests.support.programs.stages import BOXES, drawn_program, program_of, reported
@@ -268,16 +268,16 @@ def test_a_repair_that_is_shown_repairs(text: str) -> None:
     program = program_of(text)
     table, right = program.tables[0], matched(program)
     for found in prove_table(program, table, Options()).findings:
-        if isinstance(found, Overlap) and (help_ := parting_cell(program, table, found)):
-            said = re.fullmatch(r"in line `(l\d)` write `(.*)` under `(.)`: proved .*", help_)
-            assert said is not None, help_
+        if isinstance(found, Overlap) and (cell := parting(program, table, found)):
+            said = re.fullmatch(r"in line `(l\d)` write `(.*)` under `(.)`", cell.write(table))
+            assert said is not None, cell
             after = matched(program_of(changed(text, said[1], said[3], said[2])))
             assert not any({found.first, found.second} <= set(lines) for lines in after.values())
             assert not any(right[p] and not lines for p, lines in after.items()), "it opened a gap"
             assert all(set(lines) <= set(right[p]) for p, lines in after.items()), "it made an overlap"
-        if isinstance(found, Gap) and (help_ := closing_line(program, table, found)):
-            row = re.search(r"`(\|.*\|\|) \.\.\. \|`", help_)
-            assert row is not None, help_
+        if isinstance(found, Gap) and (line := new_line(program, table, found)):
+            row = re.search(r"`(\|.*\|\|) \.\.\. \|`", line.told)
+            assert row is not None, line
             after = matched(program_of(with_row(text, row[1])))
             new = [p for p in right if len(after[p]) > len(right[p])]
             assert new, "it closed nothing"
@@ -309,10 +309,10 @@ def test_a_line_across_variables_that_is_shown_closes_what_it_says(
     program = drawn_program(head + table_text("t", heading, *texts, assuming=assuming), "RCS301", "RCS306")
     verdict = prove_table(program, program.tables[0], Options())
     gaps = [finding for finding in verdict.findings if isinstance(finding, Gap)]
-    if not gaps or (help_ := closing_line(program, program.tables[0], gaps[0])) is None:
+    if not gaps or (line := new_line(program, program.tables[0], gaps[0])) is None:
         return
-    row = re.search(r"`\| (.*\|\|) \.\.\. \|`", help_)
-    assert row is not None, help_
+    row = re.search(r"`\| (.*\|\|) \.\.\. \|`", line.told)
+    assert row is not None, line
     mended = program_of(head + table_text("t", heading, *texts, row[1], assuming=assuming))
     filled = False
     for a, n, m in product((False, True), range(-1, 4), range(4)):
@@ -320,8 +320,8 @@ def test_a_line_across_variables_that_is_shown_closes_what_it_says(
         if any(not fold(one.condition, at) for one in mended.assumptions):
             continue
         lines = matching_lines(mended.tables[0], at)
-        assert not ("new" in lines and len(lines) > 1), (at, help_)
-        assert lines or "closes this part" in help_, (at, help_)
+        assert not ("new" in lines and len(lines) > 1), (at, line)
+        assert lines or not line.closes, (at, line)
         filled |= "new" in lines
     assert filled
 
@@ -331,11 +331,11 @@ def test_a_table_with_as_many_pairs_as_nobody_looks_at_gets_no_line(monkeypatch:
     program = program_of(text)
     [gap] = prove_table(program, program.tables[0], Options()).findings
     assert isinstance(gap, Gap)
-    assert closing_line(program, program.tables[0], gap) == (
-        "a line `| new | >= m || ... |` closes the gap and overlaps no other: proved"
-    )
+    line = new_line(program, program.tables[0], gap)
+    assert line is not None
+    assert line.told == "a line `| new | >= m || ... |` closes the gap and overlaps no other"
     monkeypatch.setattr("rcsc.table.repair.MOST_ASKED", 0)
-    assert closing_line(program, program.tables[0], gap) is None
+    assert new_line(program, program.tables[0], gap) is None
 
 
 def changed(text: str, line: str, column: str, cell: str) -> str:

@@ -17,7 +17,7 @@ from rcsc.table import boxes
 from rcsc.table.decide import prove_table
 from rcsc.table.program import prove_program
 from rcsc.table.regions.word_bits import Part, words_of
-from rcsc.table.repair import closing_line, parting_cells, with_cells
+from rcsc.table.repair import new_line, parting_cells, with_cells
 from rcsc.table.verdict import DeadLine, Gap, Overlap, Region
 from tests.support.programs.stages import program_of
 
@@ -130,7 +130,8 @@ def test_what_is_proposed_repairs(program: Program) -> None:
     before = matched(program)
     for finding in verdict.findings:
         if isinstance(finding, Gap) and table.default is None:
-            row = re.search(r"`\| (.*?) \|\| \.\.\. \|`", closing_line(program, table, finding) or "")
+            line = new_line(program, table, finding)
+            row = None if line is None else re.search(r"`\| (.*?) \|\| \.\.\. \|`", line.told)
             if row is not None:
                 after = matched(program_of(with_row(program, row[1])))
                 assert sum(map(bool, after.values())) > sum(map(bool, before.values()))

@@ -16,6 +16,6 @@ Cost: a SAT question for each obligation and cycle (at most `--trace` cycles), m
 for each level that has a finding.
 
 Modules, in the order the data flows: `simplest` (bounded runs, simplest models), `cycle_run` (one cycle by the interpreter, and what it
-breaks), `trace`, `lasso`, `pair`, `finding` (time lines), `consequence`, `rerun` (executors, log), `frozen`, `repair` (of the table, tried
-in runs), `explain` (all that is open).
+breaks), `trace`, `lasso`, `pair`, `finding` (time lines), `consequence`, `rerun` (executors, log), `frozen`, `applied` (a repair, proved
+of the text that it makes), `repair` (of the table, tried in runs of that text), `explain` (all that is open).
 """

@@ -12,6 +12,7 @@ from rcsc.compose.contract.beginning import Starts
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, pairs
 from rcsc.compose.contract.properties import invariant_kept
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.applied import Texts
 from rcsc.compose.counterexample.consequence import Consequence, consequences
 from rcsc.compose.counterexample.finding import Finding, of_trace, supposed
 from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
@@ -37,7 +38,7 @@ class Explanation:
         finding: The run that breaks it; None if none was found.
         beside: If the run is not reproduced, where the two differ, a line each.
         guessed: Whether that is no bug, because arithmetic was left open (`keyed`).
-        helps: Suggested repairs of the table.
+        helps: Suggested repairs of the table, each with whether it is proved of the text that it makes.
         log: Where the run is kept.
         others: Pairs of lines of the same table that no run shows.
         in_c: Whether the C executor ran it, too; it cannot if an extern procedure has to give what no C function can.
@@ -118,10 +119,11 @@ def explain(
         OSError: A log cannot be written.
     """
     with scratch("findings") as kept:
-        rerun = _Rerun(systems, settings, settings.log or kept)
+        texts = Texts()
+        rerun = _Rerun(systems, settings, settings.log or kept, texts)
         for level in proof.levels:
             for explanation in (
-                *_level(systems, level, settings),
+                *_level(systems, level, settings, texts),
                 *_together(systems, level.level, level.open, settings),
                 *_endless(systems[level.level], level, settings),
             ):
@@ -129,7 +131,7 @@ def explain(
 
 
 def _level(
-    systems: Mapping[str, TransitionSystem], proof: LevelProof, settings: TraceSettings
+    systems: Mapping[str, TransitionSystem], proof: LevelProof, settings: TraceSettings, texts: Texts
 ) -> Iterator[Explanation]:
     wanted = proof.open
     if not settings.most:
@@ -147,7 +149,7 @@ def _level(
     for obligation in wanted:
         if obligation.key in parted:
             every_pair = list(_pairs(ts, obligation, parted[obligation.key], results))
-            yield from _with_repairs(ts, every_pair, proof, settings)
+            yield from _with_repairs(ts, every_pair, proof, settings, texts)
         else:
             explanation = _explanation(ts, obligation, results.get(obligation.key))
             explanation = replace(explanation, notes=_as_it_begins(ts, obligation))
@@ -215,7 +217,11 @@ def _pairs(
 
 
 def _with_repairs(
-    ts: TransitionSystem, every: list[Explanation], proof: LevelProof, settings: TraceSettings
+    ts: TransitionSystem,
+    every: list[Explanation],
+    proof: LevelProof,
+    settings: TraceSettings,
+    texts: Texts,
 ) -> Iterator[Explanation]:
     """Add what would part the lines, tried; the last says what the repairs of all do together."""
     findings = [explanation.finding for explanation in every if explanation.finding is not None]
@@ -223,7 +229,7 @@ def _with_repairs(
         yield from every
         return
     kept = [obligation for obligation, verdict in proof.verdicts if verdict is Verdict.PROVED]
-    tries = repairs(ts, findings, kept, min(settings.most, TRIED_CYCLES))
+    tries = repairs(ts, findings, kept, min(settings.most, TRIED_CYCLES), texts)
     left = iter(tries.helps)
     for at, explanation in enumerate(every):
         shown = next(left) if explanation.finding is not None else ()
@@ -306,6 +312,7 @@ class _Rerun:
     systems: Mapping[str, TransitionSystem]
     settings: TraceSettings
     folder: Path
+    texts: Texts
     _ready: set[str] = field(default_factory=set)
     _names: set[str] = field(default_factory=set)
 
@@ -331,7 +338,7 @@ class _Rerun:
         except ExecutorsDifferError as error:
             return replace(explanation, beside=error.beside)
         in_c = not only_in_python(finding, self.systems)
-        suggested = explanation.helps or helps(self.systems[explanation.level], finding)
+        suggested = explanation.helps or helps(self.systems[explanation.level], finding, self.texts)
         return replace(explanation, helps=suggested, log=path, in_c=in_c, follows=follows)
 
     def _follows(self, finding: Finding) -> tuple[Consequence, ...] | None:

@@ -1,18 +1,20 @@
 """Suggests repairs of a table that a run breaks: a cell, a line, or the weakest condition under which exactly one line matches.
 
-In: a transition system and a finding. Out: sentences in table words, each proved of the table as it stands; none if no small repair is
-known. A cell that parts two lines is also tried: on the changed table runs are searched in which another line runs than before and the
-answer to a command changes, or DEFAULT runs, and runs that break an obligation that was proved. What is found of each stands beside it, and
-those that break less come first. Nothing found is no proof: the runs are bounded.
+In: a transition system and a finding. Out: sentences in table words, each with whether it is proved of the text that it makes (`applied`);
+none if no small repair is known, or the text with it is worse. A cell that parts two lines is also tried: on the table of that text runs
+are searched in which another line runs than before and the answer to a command changes, or DEFAULT runs, and runs that break an obligation
+that was proved. What is found of each stands beside it, and those that break less come first. Nothing found is no proof: the runs are
+bounded.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations, pause_of
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.counterexample.applied import After, Texts
 from rcsc.compose.counterexample.consequence import answered, reported, spelled_report, told_by
 from rcsc.compose.counterexample.cycle_run import CycleRun, ran_on, seen_by_table
 from rcsc.compose.counterexample.finding import Finding
@@ -23,15 +25,9 @@ from rcsc.solvers.sat import GaveUpError
 from rcsc.symbolic import values
 from rcsc.symbolic.values import Node
 from rcsc.table import boxes, cells
+from rcsc.table.mending import Outcome
 from rcsc.table.regions.partition import BudgetError, Gaps
-from rcsc.table.repair import (
-    PartingCell,
-    closing_line,
-    left_by,
-    parting_cell,
-    parting_cells,
-    with_cells,
-)
+from rcsc.table.repair import NewLine, PartingCell, left_by, new_line, parting_cells
 from rcsc.table.verdict import Gap, Overlap, Region
 
 MOST_REGIONS = 3
@@ -42,8 +38,8 @@ TRIED_CYCLES = 4
 """Cycles of the runs in which repairs are tried."""
 
 
-def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
-    """Suggest changes to the table that the last cycle ran."""
+def helps(ts: TransitionSystem, finding: Finding, texts: Texts | None = None) -> tuple[str, ...]:
+    """Suggest changes to the table that the last cycle ran, each tried in its text."""
     step = finding.broken
     if finding.obligation.sort is Sort.PAUSES:
         return tuple(_pauses(ts, finding.obligation.name))
@@ -54,9 +50,8 @@ def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
     if finding.obligation.table not in {"", step.table}:
         return ()  # a table that others followed: the last one is not to be mended
     table = ts.table(step.table)
-    if not boxes.applies(table):
-        return tuple(_line(ts, replace(table, assumptions=()), step))
-    return tuple(dict.fromkeys(_suggested(ts, table, step)))
+    suggested = (_suggested if boxes.applies(table) else _line)(ts, table, step, texts or Texts())
+    return tuple(dict.fromkeys(suggested))
 
 
 def _pauses(ts: TransitionSystem, order: str) -> Iterator[str]:
@@ -71,32 +66,47 @@ def _pauses(ts: TransitionSystem, order: str) -> Iterator[str]:
         )
 
 
-def _line(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[str]:
+def _line(ts: TransitionSystem, table: Table, step: CycleRun, texts: Texts) -> Iterator[str]:
     """Suggest a line for a table with conditions across variables that no line of it matched."""
     seen = seen_by_table(ts, step)
     if seen is not None and not matching_lines(table, seen):
-        row = closing_line(ts.program, table, Gap((seen,), (None,)))
-        if row:
-            yield row
+        yield from _row(ts, table, Gap((seen,), (None,)), texts)
 
 
-def _suggested(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[str]:
+def _row(ts: TransitionSystem, table: Table, gap: Gap, texts: Texts) -> Iterator[str]:
+    """Suggest a line for the input of a gap, tried in the text."""
+    row = new_line(ts.program, replace(table, assumptions=()), gap)
+    if isinstance(row, NewLine):
+        after = texts.of(ts, str(table.name)).joined(row, gap.witnesses[0])
+        if after.outcome is not Outcome.FAILS:
+            yield after.told((f"{row.told}: ", ""))
+
+
+def _suggested(ts: TransitionSystem, table: Table, step: CycleRun, texts: Texts) -> Iterator[str]:
     seen = seen_by_table(ts, step)
     if seen is None:
         return
     matching = [at for at, line in enumerate(table.lines) if line.name in matching_lines(table, seen)]
     if len(matching) > 1:
-        cell = parting_cell(ts.program, table, Overlap(matching[0], matching[1], {}))
-        yield cell or f"lines {_names(table, matching)} both match {_while(ts.program, table, matching)}"
+        every = parting_cells(ts.program, table, Overlap(matching[0], matching[1], {}))
+        best = next(_told(ts, table, [cell for cell in every if not cell.falls], texts), "")
+        yield best or f"lines {_names(table, matching)} both match {_while(ts.program, table, matching)}"
     elif not matching:
         region = around(ts.program, table, seen)
         yield f"no line matches while {_conditions(ts.program, region)}"
-        if row := closing_line(ts.program, replace(table, assumptions=()), Gap((seen,), (region,))):
-            yield row
+        yield from _row(ts, table, Gap((seen,), (region,)), texts)
     else:
         yield f"line `{table.lines[matching[0]].name}` matches all the same, and no other"
     if (weakest := weakest_condition(ts.program, table)) and step.failed:
-        yield f"exactly one line matches under no more than this: {weakest}: proved"
+        yield f"exactly one line matches under no more than this: {weakest}"
+
+
+def _told(ts: TransitionSystem, table: Table, cells_: Sequence[PartingCell], texts: Texts) -> Iterator[str]:
+    """Say of each cell what it does in the text; those that fail there are left out, and those that are proved come first."""
+    text = texts.of(ts, str(table.name))
+    every = [(cell, text.parted(cell)) for cell in cells_[: 2 * MOST_TRIED]]
+    for outcome in (Outcome.HOLDS, Outcome.OPEN):
+        yield from (after.told(cell.told(table)) for cell, after in every if after.outcome is outcome)
 
 
 # --- repairs that are tried --------------------------------------------------------------------
@@ -104,24 +114,18 @@ def _suggested(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[s
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """Cells that part lines, and what else they do in runs.
+    """What cells that part lines do else in runs.
 
     Attributes:
-        cells: The cells, of one table.
         breaks: What they break, in words.
         rank: The less, the better: obligations broken and answers revoked; reasons changed and inputs that fall to DEFAULT; keys lost.
     """
 
-    cells: tuple[PartingCell, ...]
     breaks: tuple[str, ...]
     rank: tuple[int, int, int]
 
-    def shown(self, table: Table, most: int) -> str:
-        """Say the one cell, and what it breaks in runs of up to `most` cycles."""
-        return f"{self.cells[0].shown(table)}; {self.outcome(most)}"
-
     def outcome(self, most: int) -> str:
-        """Say what they break."""
+        """Say what they break in runs of up to `most` cycles."""
         return (
             f"but {'; '.join(self.breaks)}"
             if self.breaks
@@ -143,7 +147,11 @@ class Repairs:
 
 
 def repairs(
-    ts: TransitionSystem, findings: Sequence[Finding], kept: Sequence[Obligation], most: int
+    ts: TransitionSystem,
+    findings: Sequence[Finding],
+    kept: Sequence[Obligation],
+    most: int,
+    texts: Texts | None = None,
 ) -> Repairs:
     """Try what parts the two lines of each finding of one table, alone and together.
 
@@ -152,73 +160,109 @@ def repairs(
         findings: Runs in which two lines of the table match.
         kept: Obligations that are proved, and should stay so.
         most: The most cycles of a run.
+        texts: What was read of the tables' texts; None for nothing yet.
     """
-    table = ts.table(findings[0].broken.table)
-    shown: list[tuple[str, ...]] = []
-    best: list[PartingCell] = []
+    texts, shown, best = texts or Texts(), list[tuple[str, ...]](), list[PartingCell]()
+    trials = _Trials(ts, ts.table(findings[0].broken.table), kept, most, texts)
     for finding in findings:
-        cells_ = _parting(ts, table, finding)
-        if len(shown) >= MOST_FINDINGS or not cells_:
-            shown.append(helps(ts, finding))
+        every = trials.ranked(finding) if len(shown) < MOST_FINDINGS else []
+        if not every:
+            shown.append(helps(ts, finding, texts))
             continue
-        every = _ranked(tried(ts, table, (cell,), kept, most) for cell in cells_)
         worth = every[: 1 if not every[0].breaks else MOST_SHOWN]
-        shown.append(tuple(one.shown(table, most) for one in worth))
-        best.append(every[0].cells[0])
-    return Repairs(tuple(shown), _together(ts, table, best, kept, most))
+        shown.append(tuple(one.said for one in worth))
+        best.append(every[0].cell)
+    return Repairs(tuple(shown), trials.together(best))
 
 
-def _ranked(every: Iterable[Tried]) -> list[Tried]:
-    """Try one after the other, until one breaks nothing; return them, the best first."""
-    so_far: list[Tried] = []
-    for trial in every:
-        so_far.append(trial)
-        if not trial.breaks:
-            break
-    return sorted(so_far, key=lambda trial: trial.rank)
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    """One cell, what is said of it, and what it breaks."""
+
+    cell: PartingCell
+    said: str
+    breaks: tuple[str, ...]
+    rank: tuple[int, ...]
 
 
-def _parting(ts: TransitionSystem, table: Table, finding: Finding) -> tuple[PartingCell, ...]:
-    """Return the smallest cells that part the lines of a finding: of each line one or two."""
-    places = [at for at, line in enumerate(table.lines) if line.name in finding.obligation.lines]
-    if len(places) != 2:
-        return ()
-    every = parting_cells(ts.program, table, Overlap(places[0], places[1], {}))
-    tries = [cell for line in places for cell in [one for one in every if one.line == line][:MOST_TRIED]]
-    return tuple(cell for cell in every if cell in tries)
+@dataclass(frozen=True, slots=True)
+class _Trials:
+    """Cells of one table, each tried in its text.
 
+    Attributes:
+        kept: Obligations that are proved, and should stay so.
+        most: The most cycles of a run.
+    """
 
-def _together(
-    ts: TransitionSystem, table: Table, best: Sequence[PartingCell], kept: Sequence[Obligation], most: int
-) -> str:
-    if len(best) < 2:
-        return ""
-    left = left_by(ts.program, table, best) or "proved that no two lines match any more"
-    begins = f"the first help of each of these {len(best)} findings, all together: {left}"
-    if with_cells(ts.program, table, best) is None:
-        return begins
-    return f"{begins}; {tried(ts, table, tuple(best), kept, most).outcome(most)}"
+    ts: TransitionSystem
+    table: Table
+    kept: Sequence[Obligation]
+    most: int
+    texts: Texts
+
+    def ranked(self, finding: Finding) -> list[_Trial]:
+        """Try what parts the lines of a finding, until one is proved and breaks nothing; return those that may be right, the best first."""
+        text, so_far = self.texts.of(self.ts, str(self.table.name)), list[_Trial]()
+        for cell in self._parting(finding):
+            after = text.parted(cell)
+            if after.outcome is Outcome.FAILS:
+                continue
+            trial = self._tried(cell, after)
+            so_far.append(trial)
+            if after.outcome is Outcome.HOLDS and not trial.breaks:
+                break
+        return sorted(so_far, key=lambda trial: trial.rank)
+
+    def _parting(self, finding: Finding) -> tuple[PartingCell, ...]:
+        """Return the smallest cells that part the lines of a finding: of each line one or two."""
+        places = [at for at, line in enumerate(self.table.lines) if line.name in finding.obligation.lines]
+        if len(places) != 2:
+            return ()
+        every = parting_cells(self.ts.program, self.table, Overlap(places[0], places[1], {}))
+        tries = [cell for line in places for cell in [one for one in every if one.line == line][:MOST_TRIED]]
+        return tuple(cell for cell in every if cell in tries)
+
+    def _tried(self, cell: PartingCell, after: After) -> _Trial:
+        """Say what comes of a cell; what cannot be run is only said to be proved, or not."""
+        said, unproved = after.told(cell.told(self.table)), int(after.outcome is not Outcome.HOLDS)
+        if after.ts is None:
+            return _Trial(cell, said, (), (unproved, 1, 0, cell.lost))
+        trial = tried(after.ts, self.table, (cell,), self.kept, self.most)
+        return _Trial(cell, f"{said}; {trial.outcome(self.most)}", trial.breaks, (unproved, *trial.rank))
+
+    def together(self, best: Sequence[PartingCell]) -> str:
+        """Say what the best of all findings do together; empty for fewer than two, and where no text says that."""
+        if len(best) < 2:
+            return ""
+        after = self.texts.of(self.ts, str(self.table.name)).together(best)
+        begins = f"the first help of each of these {len(best)} findings, all together: "
+        if after is None:
+            left = left_by(self.ts.program, self.table, best)
+            return f"{begins}{left}" if left else ""
+        said = after.told((begins, " that no two lines match any more"))
+        if after.pairs:
+            said = f"{begins}lines {' and '.join(f'`{name}`' for name in after.pairs[0])} still both match some input"
+        if after.ts is None:
+            return said
+        trial = tried(after.ts, self.table, best, self.kept, self.most)
+        return f"{said}; {trial.outcome(self.most)}"
 
 
 def tried(
-    ts: TransitionSystem,
+    new: TransitionSystem,
     table: Table,
-    changed: tuple[PartingCell, ...],
+    changed: Sequence[PartingCell],
     kept: Sequence[Obligation],
     most: int,
 ) -> Tried:
-    """Search runs of the level with these cells in which they do harm."""
-    after = with_cells(ts.program, table, changed)
-    assert after is not None
-    tables = tuple(after if each is table else each for each in ts.program.tables)
-    new = ts.of(replace(ts.program, tables=tables))
-    trial = _Trial(new, table, after, changed, Unrolled(new, TraceSearch(most, legal=True)))
-    harms = trial.search(most)
+    """Search runs in which cells of a table do harm, of the level as the text with them means it (`new`)."""
+    search = TraceSearch(most, legal=True)
+    harms = _Harms(new, table, new.table(table.name), tuple(changed), Unrolled(new, search)).search(most)
     owed = {obligation.key for obligation in obligations(new, new.cycle(new.havoc()))}
     still = [
         obligation for obligation in kept if obligation.key in owed
     ]  # what no line can break is not owed
-    broken = traces(new, still, TraceSearch(most, legal=True))
+    broken = traces(new, still, search)
     words = [
         f"in cycle {len(trace.steps)} this is no longer so: {obligation.shown}"
         for obligation in still
@@ -226,7 +270,7 @@ def tried(
     ]
     grave = len(words) + (Harm.REVOKED in harms)
     slight = len(harms) - (Harm.REVOKED in harms)
-    return Tried(changed, (*words, *harms.values()), (grave, slight, sum(cell.lost for cell in changed)))
+    return Tried((*words, *harms.values()), (grave, slight, sum(cell.lost for cell in changed)))
 
 
 class Harm(StrEnum):
@@ -238,7 +282,7 @@ class Harm(StrEnum):
 
 
 @dataclass(slots=True)
-class _Trial:
+class _Harms:
     """The runs of a level whose table has changed cells.
 
     Attributes:

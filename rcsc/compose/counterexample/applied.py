@@ -1,0 +1,246 @@
+"""Repairs in the text: whether what is said of one is proved once it stands there, and the level that the text then means.
+
+In: a level, a table that a run breaks, changes of it. Out: an `After` of each. The change is written into the text of the table, and that
+is parsed, resolved and proved anew, with the whole program: a cell of a line that stands above another changes what that one matches, too,
+and a condition may bring a counter with it. What is proved of the table as it was resolved is proved of nothing that anybody can write.
+
+Trusted: nothing but the pipeline itself. Where the text on disk does not mean the table that ran, because it was saved since, or the
+table is a variant under another rule, nobody can tell.
+
+Cost: a proof of one table a change, at most `MOST_TRIED` of one table, and of all tables together so many steps as `MOST_STEPS`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Change, Place, Proposal
+from rcsc.lang.interpret import UNDEFINED, matching_lines
+from rcsc.lang.model import Program, Scalar, Snapshot, Table
+from rcsc.lang.project import Loaded, load
+from rcsc.lang.resolve import resolve
+from rcsc.solvers import smt
+from rcsc.solvers.options import WRONG_STEPS, Options
+from rcsc.table.mending import STEPS_OF_A_CELL, Outcome, Silent, Wrong, key, serious, written
+from rcsc.table.program import ProgramVerdict, prove_program
+from rcsc.table.repair import NewLine, PartingCell, changes_of
+
+MOST_STEPS = 20 * WRONG_STEPS
+"""Steps of Z3 for all changes of all tables that runs break, together."""
+MOST_TRIED = 40
+"""Changes of one table that are tried."""
+
+
+@dataclass(frozen=True, slots=True)
+class After:
+    """What comes of a change in the text.
+
+    Attributes:
+        outcome: Whether what is said of it is proved of the text.
+        ts: The level with the text's table, for runs; None where there is none with the same leaves.
+        pairs: Lines that overlap then, by names.
+    """
+
+    outcome: Outcome
+    ts: TransitionSystem | None = None
+    pairs: tuple[tuple[str, str], ...] = ()
+
+    def told(self, pieces: Sequence[str]) -> str:
+        """Put whether it is proved between the pieces of what is said of it."""
+        return ("proved" if self.outcome is Outcome.HOLDS else "not proved").join(pieces)
+
+
+@dataclass(slots=True)
+class Texts:
+    """The texts of the tables that runs break, each read once."""
+
+    budget: smt.Budget = field(default_factory=lambda: smt.Budget(MOST_STEPS, of_all=True))
+    known: dict[tuple[str, str], "Text"] = field(default_factory=dict)
+
+    def of(self, ts: TransitionSystem, name: str) -> "Text":
+        """Return the text of a table of a level."""
+        place = str(ts.level.name), name
+        kept = self.known.get(place)
+        if kept is None or kept.ts is not ts:
+            kept = self.known[place] = Text(ts, ts.table(name), self.budget)
+        return kept
+
+
+@dataclass(slots=True)
+class Text:
+    """The text of one table.
+
+    Attributes:
+        loaded: All files of its program; None where they do not say this table.
+        before: What is wrong with the table as it is, and `told`, with the program; None where that was not decided.
+        tried: How many changes were tried.
+    """
+
+    ts: TransitionSystem
+    table: Table
+    budget: smt.Budget
+    loaded: Loaded | None = field(init=False)
+    before: Wrong | None = field(init=False, default=None)
+    told: set[tuple[str, str]] = field(init=False, default_factory=set)
+    tried: int = 0
+
+    def __post_init__(self) -> None:
+        """Read the files, and prove the table as it is."""
+        self.loaded = load([self.ts.program.file])
+        program = resolve(self.loaded.roots[0], self.loaded) if self.loaded.roots else None
+        if not isinstance(program, Program) or not self._says(program):
+            self.loaded = None
+        elif (verdict := self._verdict(program)) is not None:
+            self.before = Wrong.of(verdict.tables[0])
+            self.told = {key(each) for each in serious(verdict.findings)}
+
+    def _says(self, program: Program) -> bool:
+        """Return whether a program has the table, of variables of these types."""
+        tables = [table for table in program.tables if table.name == self.table.name]
+        return tables == [replace(self.table, stops=())] and _kinds(program) == _kinds(self.ts.program)
+
+    # --- changes ---
+
+    def parted(self, cell: PartingCell) -> After:
+        """Write a cell that parts two lines; proved: they never both match, the other runs, and nothing new is wrong.
+
+        If all that the line loses is the other's, nothing falls to no line, or to DEFAULT, that did not before.
+        """
+        made = self._made((cell.change(self.table),))
+        if not isinstance(made, _Made):
+            return After(made)
+        name, other = (self.table.lines[at].name for at in (cell.line, cell.other))
+        if made.wrong.pairs - made.before.pairs or frozenset((name, other)) in made.wrong.pairs:
+            return made.after(Outcome.FAILS)
+        counted = not made.wrong.gap or None not in (made.wrong.left, made.before.left)
+        if cell.falls or made.wrong.within(made.before):
+            same = made.names == _names(self.table) and made.tests[other] == _tests(self.table)[other]
+            return made.after(Outcome.HOLDS if same and (cell.falls or counted) else Outcome.OPEN)
+        return made.after(Outcome.FAILS)
+
+    def together(self, cells: Sequence[PartingCell]) -> After | None:
+        """Write several cells; proved: no two lines both match. None where no text says that."""
+        changes = changes_of(self.ts.program, self.table, cells)
+        if not changes:
+            return None
+        made = self._made(changes)
+        if not isinstance(made, _Made):
+            return After(made)
+        return made.after(Outcome.FAILS if made.wrong.pairs else Outcome.HOLDS)
+
+    def joined(self, row: NewLine, seen: Snapshot) -> After:
+        """Write a line for an input that no line matches; proved: it alone matches that, it overlaps no other, and closes what it says."""
+        made = self._made((Change(Place.LINE, texts=row.cells),))
+        if not isinstance(made, _Made):
+            return After(made)
+        new = [name for name in made.names if name not in _names(self.table)]
+        others = {name: tests for name, tests in made.tests.items() if name not in new}
+        try:
+            matches = matching_lines(made.table, seen)
+        except (KeyError, *UNDEFINED):
+            return made.after(Outcome.OPEN)
+        overlaps = any(name in pair for name in new for pair in made.wrong.pairs)
+        closes = not (row.closes and made.wrong.gap)
+        right = len(new) == 1 and matches == new and not overlaps and closes and others == _tests(self.table)
+        return made.after(Outcome.HOLDS if right else Outcome.FAILS)
+
+    def _made(self, changes: tuple[Change, ...]) -> "_Made | Outcome":
+        """Write changes and prove what is then wrong; an outcome if that is not known, or if it is worse than before."""
+        self.tried += 1
+        if self.loaded is None or self.before is None or self.tried > MOST_TRIED:
+            return Outcome.OPEN
+        proposal = Proposal("", str(self.table.name), "", changes)
+        program = written(self.loaded.roots[0], self.loaded, self.table.span.file, proposal)
+        if program is None or not any(table.name == self.table.name for table in program.tables):
+            return Outcome.FAILS
+        verdict = self._verdict(program)
+        if verdict is None:
+            return Outcome.OPEN
+        wrong = Wrong.of(verdict.tables[0])
+        more = {key(each) for each in serious(verdict.findings)} - self.told
+        if not (self.before.whole and wrong.whole) or any(Code.UNDECIDED in each for each in more):
+            return Outcome.OPEN
+        if more or wrong.dead - self.before.dead:
+            return Outcome.FAILS
+        return _Made(self._level(verdict), verdict.tables[0].table, self.before, wrong)
+
+    def _verdict(self, program: Program) -> ProgramVerdict | None:
+        """Prove the program of the table; what is wrong with that is told as if nothing were assumed, as runs need not keep to it.
+
+        None where the budget ends first.
+        """
+        cells = len(self.table.lines) * (len(self.table.columns) + 1)
+        with smt.within(self.budget):
+            if smt.charge(STEPS_OF_A_CELL * cells):
+                return None
+            try:
+                whole = prove_program(program, _QUICK, only=[self.table.name], known=Silent())
+                free = _free(program, self.table.name)
+                if free == program:
+                    return whole
+                alone = prove_program(free, _QUICK, only=[self.table.name], known=Silent())
+            except smt.troubles():
+                return None
+        return replace(whole, tables=alone.tables)
+
+    def _level(self, verdict: ProgramVerdict) -> TransitionSystem | None:
+        """Return the level with the program that was proved; None if that has other leaves."""
+        if _kinds(verdict.program) != _kinds(self.ts.program):
+            return None
+        stops = {table.name: table.stops for table in self.ts.program.tables}
+        tables = (
+            table if table.name == self.table.name else replace(table, stops=stops.get(table.name, ()))
+            for table in verdict.program.tables
+        )
+        return self.ts.of(replace(verdict.program, tables=tuple(tables)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """What a change made: the level, the table, what was wrong before, and what is."""
+
+    ts: TransitionSystem | None
+    table: Table
+    before: Wrong
+    wrong: Wrong
+
+    @property
+    def names(self) -> list[str]:
+        """The lines, in order."""
+        return _names(self.table)
+
+    @property
+    def tests(self) -> Mapping[str, object]:
+        """What each line asks, by its name."""
+        return _tests(self.table)
+
+    def after(self, outcome: Outcome) -> After:
+        """Return it with what comes of it."""
+        order = self.names
+        pairs = sorted(tuple(sorted(pair, key=order.index)) for pair in self.wrong.pairs)
+        return After(outcome, self.ts, tuple((first, second) for first, second in pairs))
+
+
+_QUICK = Options(brief=True, bare=True, jobs=1)
+
+
+def _names(table: Table) -> list[str]:
+    return [str(line.name) for line in table.lines]
+
+
+def _tests(table: Table) -> Mapping[str, object]:
+    """What each line asks; columns where it asks nothing are left out, as `above` adds and takes such."""
+    return {
+        str(line.name): [test.condition for test in line.tests if test is not None] for line in table.lines
+    }
+
+
+def _free(program: Program, name: str) -> Program:
+    """A program whose table rests on no assumption and no invariant."""
+    tables = (replace(table, assumptions=()) if table.name == name else table for table in program.tables)
+    return replace(program, invariants=(), tables=tuple(tables))
+
+
+def _kinds(program: Program) -> Mapping[str, Scalar]:
+    return {str(variable.name): variable.type for variable in program.variables}
