@@ -95,7 +95,7 @@ class Repair:
 
     Attributes:
         title: What it does, in the imperative.
-        proved: What is known of the text with it, in words.
+        proved: What is proved of the text with it, in words; empty where it is only checked.
         edits: To be made together.
         clears: Whether nothing is then wrong with the table.
         certain: Whether it was proved, not only checked that the finding goes: a likely spelling is not.

@@ -371,7 +371,8 @@ class Workspace:
             outcome = None if text is None else self._outcome(checked, source, told, text)
             if text is not None and outcome is not None:
                 edits = difference(source.name, Lines(source.text), text)
-                yield Repair(proposal.title, proposal.proved, edits, outcome, certain=proposal.certain)
+                known = proposal.proved if proposal.certain else ""
+                yield Repair(proposal.title, known, edits, outcome, certain=proposal.certain)
         spelt = with_spelling(source, told)
         if spelt is not None:
             text, meant = spelt

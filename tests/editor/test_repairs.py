@@ -209,3 +209,16 @@ def test_a_repair_is_of_the_text_as_it_is_not_of_an_older_one(what: str, tmp_pat
         assert all(of_known == of_new for of_known, of_new in now)
         offered += sum(len(each) for each, _ in now)
     assert offered
+
+
+def test_what_is_only_checked_says_nothing_that_was_to_be_proved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Past the budget of trials the finding goes with a repair; that its own words are so is not proved."""
+    written = text_of(WRONG["an overlap of lines that do the same"])
+    known = [repair for _, repair, _ in mended(Workspace(), str(tmp_path / "a.rcs"), written)]
+    assert all(repair.certain and repair.proved for repair in known)
+    monkeypatch.setattr("rcsc.table.mending.MOST_TRIED", 0)
+    checked = [repair for _, repair, _ in mended(Workspace(), str(tmp_path / "a.rcs"), written)]
+    assert [repair.title for repair in checked] == [repair.title for repair in known]
+    assert not any(repair.certain or repair.proved for repair in checked)

@@ -158,7 +158,7 @@ export class TextView {
     else if (this.#coloured === key) this.#coloured = "";
   }
 
-  /** A finding in words, with the input that shows it and the repairs that are proved. */
+  /** A finding in words, with the input that shows it and the repairs that are proved, or checked. */
   #words(one) {
     const box = make("div", { class: "told" }, ...spoken(one.message), " ", make("span", { class: "soft" }, `[${one.code}]`));
     const [witness] = one.witnesses;
