@@ -169,14 +169,16 @@ def written(root: str, loaded: Loaded, file: str, proposal: Proposal) -> Program
     """
     source = loaded.sources.get(file)
     text = None if source is None else with_proposal(source, proposal)
-    if source is None or text is None:
-        return None
-    new = Source(source.name, text)
+    return None if text is None else of_text(root, loaded, Source(file, text))
+
+
+def of_text(root: str, loaded: Loaded, new: Source) -> Program | None:
+    """Return the program of the texts with a new one in place of its file's; None where there is none."""
     parsed = parse(new)
     if not isinstance(parsed, tree.File):
         return None
-    files = {**loaded.files, source.name: parsed}
-    sources = {**loaded.sources, source.name: new}
+    files = {**loaded.files, new.name: parsed}
+    sources = {**loaded.sources, new.name: new}
     program = resolve(root, replace(loaded, files=files, sources=sources))
     return program if isinstance(program, Program) else None
 

@@ -13,6 +13,7 @@ from rcsc.compose.counterexample.repair import helps, repairs
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
 from rcsc.solvers import smt
+from rcsc.table.mending import Outcome
 from tests.support.programs.systems import solo_system
 from tests.support.programs.texts import edit_file
 from tests.support.proved import obligation_of
@@ -88,3 +89,44 @@ def test_a_line_is_proved_of_the_text_that_has_it(saved: bool, tmp_path: Path) -
     *_, row = helps(ts, found)
     standing = "not proved" if saved else "proved"
     assert row == f"a line `| new | 1 || ... |` closes the gap and overlaps no other: {standing}"
+
+
+WEAKEST = """state n : int 0 .. 3
+{stated}
+table t assuming few {{
+  | line | n    || n     |
+  |------|------||-------|
+  | up   | <= 1 || n + 1 |
+  | top  | 2    || 3     |
+}}
+level solo {{ period 40 [ms] table t }}
+"""
+
+
+@pytest.mark.parametrize("saved", [False, True])
+def test_the_weakest_condition_is_proved_of_the_text_that_assumes_it(saved: bool, tmp_path: Path) -> None:
+    ts = level(tmp_path, WEAKEST.format(stated="assume few monitored : n <= 2"))
+    obligation = obligation_of(ts, Sort.ASSUMPTION, "t", "few")
+    [trace] = traces(ts, [obligation], TraceSearch(most=4, legal=True)).values()
+    assert isinstance(trace, Trace)
+    if saved:
+        edit_file(tmp_path / "solo.rcs", ("| <= 1 |", "| <= 2 |"))
+    *_, said = helps(ts, of_trace(ts, obligation, trace))
+    standing = "not proved" if saved else "proved"
+    assert said == f"exactly one line matches under no more than this: not (n = 3): {standing}"
+
+
+@pytest.mark.parametrize(
+    ("condition", "outcome"),
+    [
+        ("n /= 3", Outcome.HOLDS),
+        ("n <= 1", Outcome.FAILS),  # and n = 2
+        ("n < 9", Outcome.FAILS),  # and not n = 3
+        ("m <= 2", Outcome.FAILS),
+    ],
+)
+def test_a_condition_that_is_not_the_weakest_is_not_proved(
+    condition: str, outcome: Outcome, tmp_path: Path
+) -> None:
+    ts = level(tmp_path, WEAKEST.format(stated="assume few monitored : n <= 2"))
+    assert Texts().of(ts, "t").under(condition) is outcome

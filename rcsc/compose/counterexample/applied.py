@@ -10,20 +10,27 @@ table is a variant under another rule, nobody can tell.
 Cost: a proof of one table a change, at most `MOST_TRIED` of one table, and of all tables together so many steps as `MOST_STEPS`.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Change, Place, Proposal
+from rcsc.diagnostics.source import Source
 from rcsc.lang.interpret import UNDEFINED, matching_lines
-from rcsc.lang.model import Program, Scalar, Snapshot, Table
+from rcsc.lang.model import AssumptionName, Program, Scalar, Snapshot, Table
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import resolve
+from rcsc.lang.written.changes import spliced
+from rcsc.lang.written.tables import table_of
 from rcsc.solvers import smt
 from rcsc.solvers.options import WRONG_STEPS, Options
-from rcsc.table.mending import STEPS_OF_A_CELL, Outcome, Silent, Wrong, key, serious, written
+from rcsc.table.mending import STEPS_OF_A_CELL, Outcome, Silent, Wrong, key, of_text, serious, written
 from rcsc.table.program import ProgramVerdict, prove_program
+from rcsc.table.regions.atoms import Every, Universe, assumptions_of, lines_of
+from rcsc.table.regions.least import find, negated, whole
+from rcsc.table.regions.region import NoWitness
 from rcsc.table.repair import NewLine, PartingCell, changes_of
 
 MOST_STEPS = 20 * WRONG_STEPS
@@ -145,6 +152,24 @@ class Text:
         right = len(new) == 1 and matches == new and not overlaps and closes and others == _tests(self.table)
         return made.after(Outcome.HOLDS if right else Outcome.FAILS)
 
+    def under(self, condition: str) -> Outcome:
+        """Have the table assume a condition in its text; proved: exactly one line matches under it, and under no weaker one."""
+        source = None if self.loaded is None else self.loaded.sources.get(self.table.span.file)
+        text = None if source is None else assuming(source.text, str(self.table.name), condition)
+        if self.loaded is None or source is None or text is None:
+            return Outcome.OPEN
+        program = of_text(self.loaded.roots[0], self.loaded, Source(source.name, text))
+        tables = [] if program is None else [each for each in program.tables if each.name == self.table.name]
+        if program is None or len(tables) != 1:
+            return Outcome.FAILS
+        table = replace(tables[0], assumptions=(AssumptionName(_NEW),))
+        verdict = self._proved(_free(program, table))
+        wrong = None if verdict is None else Wrong.of(verdict.tables[0])
+        if wrong is None or not wrong.whole:
+            return Outcome.OPEN
+        holds = not wrong.pairs and not wrong.gap and _no_weaker(program, table)
+        return Outcome.HOLDS if holds else Outcome.FAILS
+
     def _made(self, changes: tuple[Change, ...]) -> "_Made | Outcome":
         """Write changes and prove what is then wrong; an outcome if that is not known, or if it is worse than before."""
         self.tried += 1
@@ -170,19 +195,23 @@ class Text:
 
         None where the budget ends first.
         """
+        full = self._proved(program)
+        table = next(table for table in program.tables if table.name == self.table.name)
+        free = _free(program, replace(table, assumptions=()))
+        if full is None or free == program:
+            return full
+        alone = self._proved(free)
+        return None if alone is None else replace(full, tables=alone.tables)
+
+    def _proved(self, program: Program) -> ProgramVerdict | None:
         cells = len(self.table.lines) * (len(self.table.columns) + 1)
         with smt.within(self.budget):
             if smt.charge(STEPS_OF_A_CELL * cells):
                 return None
             try:
-                whole = prove_program(program, _QUICK, only=[self.table.name], known=Silent())
-                free = _free(program, self.table.name)
-                if free == program:
-                    return whole
-                alone = prove_program(free, _QUICK, only=[self.table.name], known=Silent())
+                return prove_program(program, _QUICK, only=[self.table.name], known=Silent())
             except smt.troubles():
                 return None
-        return replace(whole, tables=alone.tables)
 
     def _level(self, verdict: ProgramVerdict) -> TransitionSystem | None:
         """Return the level with the program that was proved; None if that has other leaves."""
@@ -236,10 +265,41 @@ def _tests(table: Table) -> Mapping[str, object]:
     }
 
 
-def _free(program: Program, name: str) -> Program:
-    """A program whose table rests on no assumption and no invariant."""
-    tables = (replace(table, assumptions=()) if table.name == name else table for table in program.tables)
+def _free(program: Program, table: Table) -> Program:
+    """A program with this table, which rests on no invariant."""
+    tables = (table if each.name == table.name else each for each in program.tables)
     return replace(program, invariants=(), tables=tuple(tables))
+
+
+# --- a condition that is assumed ---------------------------------------------------------------
+
+_NEW = "assumed_for_one_line"
+"""What the condition is called in the text that is tried."""
+_ASSUMING = re.compile(r"\s+assuming\s+")
+
+
+def assuming(text: str, name: str, condition: str) -> str | None:
+    """Return a text in which a table assumes a condition, too; None where the table is not found, or the name is taken."""
+    table = table_of(text, name)
+    if table is None or _NEW in text:
+        return None
+    past = table.named + len(name)
+    more = _ASSUMING.match(text, past)
+    listed = (past, past, f" assuming {_NEW}") if more is None else (more.end(), more.end(), f"{_NEW}, ")
+    stated = (table.start, table.start, f"assume {_NEW} monitored : {condition}\n")
+    return spliced(text, [stated, listed])
+
+
+def _no_weaker(program: Program, table: Table) -> bool:
+    """Return whether no input that exactly one line matches is excluded by what the table assumes."""
+    universe = Universe()
+    lines = lines_of(universe, table)
+    assumed = Every(tuple(map(whole, assumptions_of(universe, program, table))))
+    alone = (
+        [whole(line), *(negated(universe, whole(other)) for other in lines if other is not line)]
+        for line in lines
+    )
+    return all(find(universe, [*one, negated(universe, assumed)]) is NoWitness.NONE for one in alone)
 
 
 def _kinds(program: Program) -> Mapping[str, Scalar]:

@@ -98,7 +98,9 @@ def _suggested(ts: TransitionSystem, table: Table, step: CycleRun, texts: Texts)
     else:
         yield f"line `{table.lines[matching[0]].name}` matches all the same, and no other"
     if (weakest := weakest_condition(ts.program, table)) and step.failed:
-        yield f"exactly one line matches under no more than this: {weakest}"
+        outcome = texts.of(ts, str(table.name)).under(weakest)
+        if outcome is not Outcome.FAILS:
+            yield After(outcome).told((f"exactly one line matches under no more than this: {weakest}: ", ""))
 
 
 def _told(ts: TransitionSystem, table: Table, cells_: Sequence[PartingCell], texts: Texts) -> Iterator[str]:
