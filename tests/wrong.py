@@ -369,6 +369,8 @@ def _run(given: Sequence[str]) -> str:
     out, wrong = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(wrong):
         status = run(given)
+    if "HangsError" in wrong.getvalue():
+        raise HangsError(wrong.getvalue()[-300:])
     assert status in (0, 1, 2), f"status {status}: {wrong.getvalue()[-3000:]}"
     return out.getvalue() + wrong.getvalue()
 
@@ -421,6 +423,11 @@ def campaign(count: int, seed: int, first: int = 0) -> Seen:
         with tempfile.TemporaryDirectory(prefix="rcsc-wrong-") as place:
             try:
                 _one(Path(place), text, rng, number, seen)
+            except HangsError as bug:
+                if _wrong_soon(Path(place)):
+                    seen.failed[number] = f"HangsError: {bug}"
+                else:
+                    seen.right += 1
             except Exception as bug:  # noqa: BLE001  # whatever it is, it is told with its number
                 seen.failed[number] = f"{type(bug).__name__}: {str(bug)[-1500:]}"
         told = seen.late.get(number) or seen.failed.get(number)
@@ -524,15 +531,22 @@ def _one(place: Path, text: str, rng: Rng, number: int, seen: Seen) -> None:
             again_s, _ = _timed(place, text, rng)
             took_s = {name: min(once_s, again_s[name]) for name, once_s in took_s.items()}
     late = [f"{name} {once_s:.1f} s" for name, once_s in took_s.items() if _is_late(name, once_s)]
-    if errors and late:
+    wrong = set(errors) - {Code.UNDECIDED.value}  # what is only left open is a proof that is not finished
+    if wrong and late:
         seen.late[number] = late
     else:
         seen.right += len(late)
     for name, once_s in took_s.items():
-        if errors:
+        if wrong:
             seen.slowest[name] = max(seen.slowest.get(name, (0.0, -1)), (once_s, number))
     seen.codes.update(set(errors))
     seen.codes["two and more"] += len(errors) > 1
+
+
+def _wrong_soon(place: Path) -> bool:
+    """Whether something is known to be wrong with few steps."""
+    told = _run(("check", "--no-cache", "--steps", "0.2", str(place / "wrong.rcs")))
+    return bool(set(re.findall(r"error\[(RCS\d+)\]", told)) - {Code.UNDECIDED.value})
 
 
 def _is_late(name: str, took_s: float) -> bool:
@@ -548,6 +562,8 @@ def _timed(place: Path, text: str, rng: Rng) -> tuple[dict[str, float], list[str
         try:
             with ending():
                 answer = does()
+        except HangsError:
+            raise
         except Exception as bug:
             raise AssertionError(f"{name}: {type(bug).__name__}: {bug}") from bug
         took_s[name] = max(took_s.get(name, 0.0), time.process_time() - begun)
