@@ -13,7 +13,7 @@ from rcsc.compose.contract.trusts import Trust, trust_of
 from rcsc.episodes.episode import BufferFault, Episode, OrderSpec, Reading, Restart
 from rcsc.episodes.loop import Loop
 from rcsc.episodes.proved.checks import WATCHED
-from rcsc.episodes.proved.claims import Claim, Claims, ProvedLevel, Trusted
+from rcsc.episodes.proved.claims import Claim, Claims, Neighbour, ProvedLevel, Trusted
 from rcsc.episodes.proved.watch import PROVED
 from rcsc.episodes.sampling import draw_on
 from rcsc.episodes.stand import Stand, stand
@@ -54,6 +54,46 @@ level lv { period 40 [ms] table t }
 """,
     "system.toml": 'name = "sn"\ngenerated = "generated"\ntick_ms = 40\n[[level]]\nname = "lv"\n'
     '[buffers]\n"out.x" = "lv.x"\n"out.y" = "lv.y"\n' + WITHIN,
+}
+
+
+TIMELY = {
+    "lv.rcs": """
+enum job { rest, sort }
+enum feed { halt, feed }
+enum status { done, executing, failed }
+enum why { none, silent, begun_anew }
+link jobs {
+  command : job rest rest
+  status : status done done failed failed executing executing
+  report { reason why : why restart begun_anew }
+}
+link feeding {
+  command : feed rest halt
+  status : status done done failed failed executing executing
+  report { reason why : why restart begun_anew }
+}
+serves user : jobs
+commands a : feeding within 2 cycles else silent
+table sort {
+  | line | new_command | answered | a.status || a    | status_out |
+  |------|-------------|----------|----------||------|------------|
+  | go   | true        | false    |          || feed | executing  |
+  | wait | true        | true     |          ||      |            |
+  | lost | false       |          | failed   || halt | failed     |
+  | on   | false       |          | /= failed||      | executing  |
+}
+table rest {
+  | line | a.resting || a    | status_out |
+  |------|-----------||------|------------|
+  | soon | false     || halt | executing  |
+  | now  | true      || halt | done       |
+}
+level lv { period 40 [ms] table by user.input_command { rest : rest  sort : sort } }
+""",
+    "system.toml": 'name = "sn"\ngenerated = "generated"\ntick_ms = 40\n[[level]]\nname = "lv"\n'
+    '[buffers]\n"user.to_lv" = "lv.user"\n"lv.to_user" = "user.lv"\n"lv.to_a" = "a.lv"\n"a.to_lv" = "lv.from_a"\n'
+    + WITHIN,
 }
 
 
@@ -188,6 +228,23 @@ class TestFalseClaims:
         episode = Episode(readings=(Reading("out.y", "nan", 3, 3, refused=True),), ticks=12)
         assert Episode.from_json(episode.to_json()) == episode
         assert broken(safe, only(never), iter((episode,))) == {"UNREACHED"}
+
+    def test_that_an_order_waits_for_its_echo_but_where_it_is_late(self, tmp_path: Path) -> None:
+        """What is ordered instead is late no more where the cycle ends."""
+        its = stand(written(tmp_path, TIMELY))
+        above = Neighbour("user", "user", "to_user", True, "done", "failed")
+        below = Neighbour("a", "to_a", "from_a", True, "done", "failed")
+        claim = Claim("lv", "WAITS", "", "to_a", "no other command replaces its order")
+        silent = Episode(
+            orders=(OrderSpec("lv", "sort"),), harms=(BufferFault("a.to_lv", "lost", 0, 60),), ticks=60
+        )
+
+        def found(late: str) -> set[str]:
+            level = ProvedLevel("lv", "0" * 64, above, (replace(below, late=late),), (claim,))
+            return broken(its, Claims((level,)), iter((silent,)))
+
+        assert found("a.late") == set()
+        assert found("") == {"WAITS"}
 
     def test_that_a_command_ends(self, tmp_path: Path) -> None:
         """Without it the level takes every cycle's order as a new one, and begins again and again."""

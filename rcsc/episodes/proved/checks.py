@@ -182,11 +182,14 @@ def _waits(claim: Claim, reader: Reader, level: ProvedLevel) -> Check:
     assert above is not None
     stays, command = _stays(above, reader), reader.at(below.command)
     echo, number = reader.at(below.echo), reader.at(below.number)
-    late = reader.at(below.late) if below.late else -1
+    if below.late:  # as the table saw it: an order that takes a number is late no more where the cycle ends
+        _replayed(reader)
 
     def check(now: Now) -> str:
         waiting = now.took and stays(now) and now.values[echo] != now.stood[number]
-        if not waiting or (late >= 0 and now.values[late]) or now.values[command] == now.stood[command]:
+        if not waiting or now.values[command] == now.stood[command]:
+            return ""
+        if below.late and reader.prepared(now)[below.late]:
             return ""
         return (
             f"was {reader.shown(below.command, now.stood)}, and is {reader.shown(below.command, now.values)}"
