@@ -130,3 +130,11 @@ def test_a_condition_that_is_not_the_weakest_is_not_proved(
 ) -> None:
     ts = level(tmp_path, WEAKEST.format(stated="assume few monitored : n <= 2"))
     assert Texts().of(ts, "t").under(condition) is outcome
+
+
+def test_a_cell_of_a_used_file_is_written_there(tmp_path: Path) -> None:
+    """The level stands in one file, and its table in another that it uses."""
+    (tmp_path / "part.rcs").write_text(PLAIN.replace(LEVEL, ""), encoding="utf-8")
+    ts = level(tmp_path, f"use part\n{LEVEL}")
+    (help_,) = helps(ts, finding(ts, Sort.ONE_LINE, "p and r"))
+    assert help_.startswith("in line `p` write `<= 1` under `a`: proved to part")

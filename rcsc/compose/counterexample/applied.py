@@ -35,7 +35,7 @@ from rcsc.table.repair import NewLine, PartingCell, changes_of
 
 MOST_STEPS = 20 * WRONG_STEPS
 """Steps of Z3 for all changes of all tables that runs break, together."""
-MOST_TRIED = 40
+MOST_TRIED = 100
 """Changes of one table that are tried."""
 
 

@@ -89,7 +89,7 @@ def _suggested(ts: TransitionSystem, table: Table, step: CycleRun, texts: Texts)
     matching = [at for at, line in enumerate(table.lines) if line.name in matching_lines(table, seen)]
     if len(matching) > 1:
         every = parting_cells(ts.program, table, Overlap(matching[0], matching[1], {}))
-        best = next(_told(ts, table, [cell for cell in every if not cell.falls], texts), "")
+        best = _told(ts, table, [cell for cell in every if not cell.falls], texts)
         yield best or f"lines {_names(table, matching)} both match {_while(ts.program, table, matching)}"
     elif not matching:
         region = around(ts.program, table, seen)
@@ -103,12 +103,16 @@ def _suggested(ts: TransitionSystem, table: Table, step: CycleRun, texts: Texts)
             yield After(outcome).told((f"exactly one line matches under no more than this: {weakest}: ", ""))
 
 
-def _told(ts: TransitionSystem, table: Table, cells_: Sequence[PartingCell], texts: Texts) -> Iterator[str]:
-    """Say of each cell what it does in the text; those that fail there are left out, and those that are proved come first."""
-    text = texts.of(ts, str(table.name))
-    every = [(cell, text.parted(cell)) for cell in cells_[: 2 * MOST_TRIED]]
-    for outcome in (Outcome.HOLDS, Outcome.OPEN):
-        yield from (after.told(cell.told(table)) for cell, after in every if after.outcome is outcome)
+def _told(ts: TransitionSystem, table: Table, cells_: Sequence[PartingCell], texts: Texts) -> str:
+    """Say what the first cell does that is proved in the text, else the first that may be right; empty where all fail."""
+    text, open_ = texts.of(ts, str(table.name)), ""
+    for cell in cells_[: 2 * MOST_TRIED]:
+        after = text.parted(cell)
+        if after.outcome is Outcome.HOLDS:
+            return after.told(cell.told(table))
+        if after.outcome is Outcome.OPEN:
+            open_ = open_ or after.told(cell.told(table))
+    return open_
 
 
 # --- repairs that are tried --------------------------------------------------------------------
