@@ -15,6 +15,7 @@ that the user has open; these rules keep them out:
 import asyncio
 import hmac
 import logging
+import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -40,35 +41,82 @@ _DOOR = """<!doctype html>
 
 MOST_CONNECTIONS = 64
 """At once, whoever makes them: a page and its parts need some ten."""
+MOST_ACCEPTED = 8
+"""Between two looks at what the others say: the user has shown the token long before `MOST_CONNECTIONS` more have come."""
+
+MOST_WAITING = 128
+"""Until they are accepted."""
 
 
-class _Entrance(asyncio.Protocol):
-    """Has a connection answered while there are not too many; else says so, and ends it."""
+class Entrance:
+    """Has `MOST_CONNECTIONS` at once answered: strangers, who have not shown the token, give way to who comes, the oldest first.
 
-    def __init__(self, make: Callable[[], asyncio.Protocol], now: Callable[[], int]) -> None:
-        self._make, self._now = make, now
+    Who says nothing, or half a request, or a header a minute, therefore takes nobody's place.
+    """
+
+    def __init__(self, make: Callable[[], asyncio.Protocol]) -> None:
+        """Args: make: Answers a connection."""
+        self._make = make
+        self._strangers: dict[asyncio.Transport, None] = {}
+        self._users: dict[asyncio.Transport, None] = {}
+
+    async def listen(self, address: str, port: int) -> asyncio.Server:
+        """Let connections come.
+
+        Raises:
+            OSError: The port cannot be listened at.
+        """
+        place = socket.create_server((address, port))
+        try:
+            loop = asyncio.get_running_loop()
+            server = await loop.create_server(lambda: _Arrival(self), sock=place, backlog=MOST_ACCEPTED)
+        except BaseException:
+            place.close()
+            raise
+        place.listen(MOST_WAITING)  # the loop would have no more wait than it accepts
+        return server
+
+    def knows(self, transport: asyncio.BaseTransport | None) -> None:
+        """Note that whoever is at the other end has shown the token."""
+        if isinstance(transport, asyncio.Transport):
+            self._strangers.pop(transport, None)
+            self._users[transport] = None
+
+    def arrived(self, transport: asyncio.Transport) -> None:
+        """Have a new connection answered, in the place of a stranger's where there are too many; or refuse it."""
+        for there in (self._strangers, self._users):
+            for gone in [one for one in there if one.is_closing()]:
+                del there[gone]
+        if len(self._strangers) + len(self._users) >= MOST_CONNECTIONS:
+            if not self._strangers:
+                _dismiss(transport, "503 Service Unavailable")
+                return
+            _dismiss(first := next(iter(self._strangers)), "408 Request Timeout")
+            del self._strangers[first]
+        self._strangers[transport] = None
+        protocol = self._make()
+        transport.set_protocol(protocol)
+        protocol.connection_made(transport)
+
+
+class _Arrival(asyncio.Protocol):
+    """A connection of which nothing is known."""
+
+    def __init__(self, entrance: Entrance) -> None:
+        self._entrance = entrance
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
-        if self._now() < MOST_CONNECTIONS:
-            protocol = self._make()
-            transport.set_protocol(protocol)
-            protocol.connection_made(transport)
-        else:
-            transport.write(
-                b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
-            )
-            transport.close()
+        self._entrance.arrived(transport)
 
 
-def bounded(make: Callable[[], asyncio.Protocol], now: Callable[[], int]) -> Callable[[], asyncio.Protocol]:
-    """Return what answers a connection while there are not too many, and refuses it else.
-
-    Args:
-        make: Answers one.
-        now: How many there are; asked when one is there, for several are accepted before the first is.
-    """
-    return lambda: _Entrance(make, now)
+def _dismiss(transport: asyncio.Transport, why: str) -> None:
+    """End a connection with a plain answer; at once where the other end takes none."""
+    transport.write(f"HTTP/1.1 {why}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n".encode())
+    if transport.get_write_buffer_size():
+        transport.abort()
+    else:
+        transport.close()
 
 
 def silent(name: str) -> logging.Logger:

@@ -21,7 +21,7 @@ from aiohttp import WSMsgType, web
 from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files.read import MIB, Malformed, json_of
-from rcsc.host.guard import HEADERS, policy, refusal, silent
+from rcsc.host.guard import HEADERS, Entrance, policy, refusal, silent
 from rcsc.studio.hub import DEEPEST_MESSAGE, Client, Concern, Hub
 
 ADDRESS = "127.0.0.1"
@@ -81,6 +81,7 @@ class Server:
         self._files = page_files()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._over: asyncio.Event | None = None
+        self._entrance: Entrance | None = None
         self._talks: set[asyncio.Task[None]] = set()
 
     def serve(self, concerns: Sequence[Concern], opened: Callable[[str], None]) -> None:
@@ -122,9 +123,11 @@ class Server:
             app, access_log=None, logger=silent("rcsc.studio.server"), shutdown_timeout=GOODBYE_S
         )
         await runner.setup()
+        assert runner.server is not None
+        self._entrance, listens = Entrance(runner.server), None
         try:
-            await self._listen_on(web.TCPSite(runner, ADDRESS, self._wanted))
-            self._port = runner.addresses[0][1]
+            listens = await self._listens()
+            self._port = listens.sockets[0].getsockname()[1]
             self.address = f"http://{ADDRESS}:{self._port}/{self._token}/"
             opened(self.address)
             self.hub.begin()
@@ -133,15 +136,18 @@ class Server:
             self.hub.close()
             for talk in self._talks:
                 talk.cancel()
+            if listens is not None:
+                listens.close()
             await runner.cleanup()
             await asyncio.to_thread(
                 self.hub.ended, LAST_S
             )  # who ends while a process begins leaves that without a parent
 
-    async def _listen_on(self, site: web.TCPSite) -> None:
+    async def _listens(self) -> asyncio.Server:
         """Raises: NoPort: It cannot."""
+        assert self._entrance is not None
         try:
-            await site.start()
+            return await self._entrance.listen(ADDRESS, self._wanted)
         except OSError as error:
             why = os.strerror(error.errno) if error.errno else str(error)
             raise NoPort(f"port {self._wanted} cannot be listened at: {why}") from error
@@ -152,7 +158,11 @@ class Server:
     async def _guarded(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
         reason = refusal(request.headers, request.path, self._port, self._token)
         if reason:
-            return web.Response(status=403, text=f"{reason}\n")
+            answer = web.Response(status=403, text=f"{reason}\n")
+            answer.force_close()
+            return answer
+        assert self._entrance is not None
+        self._entrance.knows(request.transport)
         try:
             return await handler(request)
         except (web.HTTPException, ConnectionError):  # a refusal, or who asked has gone

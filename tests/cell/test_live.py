@@ -28,6 +28,7 @@ from rcsc_cell.live.board import MOST_MOMENTS, Board, Display, History, display_
 from rcsc_cell.live.server import MOST_BYTES, MOST_PAGES, MOST_WATCHED, watched
 from rcsc_cell.pictures.stick import stick
 from tests.support.browser import Browser
+from tests.support.strangers import STRANGERS, held_beside
 
 X, Z, OPENING = "primitive.to_robot.plate[0]", "primitive.to_robot.plate[2]", "gripper.opening_mm"
 STATE, CHOOSER = "task.cur_state", "task.to_user.display"
@@ -264,11 +265,23 @@ def test_junk_is_answered_plainly_and_printed_nowhere(
     assert not logging.getLogger("rcsc_cell.live").propagate
 
 
+@pytest.mark.parametrize("said", STRANGERS)
+def test_strangers_take_nobodys_place(live: Live, said: bytes, capfd: pytest.CaptureFixture[str]) -> None:
+    """Who says nothing, or never all of it: the user is answered, and few of them are held."""
+    where, port, path = live.address[0], live.address[1], urlsplit(url(live)).path
+    assert held_beside(where, port, path, said) <= MOST_CONNECTIONS
+    assert capfd.readouterr().err == ""
+
+
 def test_connections_are_bounded(live: Live) -> None:
-    """Whoever makes them; those that go make room."""
+    """Those of whoever knows the token, too; those that go make room."""
     with contextlib.ExitStack() as held:
         for _ in range(MOST_CONNECTIONS):
-            held.enter_context(socket.create_connection(live.address, timeout=60))
+            one = held.enter_context(socket.create_connection(live.address, timeout=60))
+            one.sendall(
+                f"GET {urlsplit(url(live)).path} HTTP/1.1\r\nHost: 127.0.0.1:{live.address[1]}\r\n\r\n".encode()
+            )
+            assert one.recv(65_536).split()[1] == b"200"
         assert answered(live, b"").split()[1] == b"503"
     for _ in range(1000):
         with contextlib.suppress(http.client.HTTPException, ConnectionError):

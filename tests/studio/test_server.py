@@ -17,12 +17,13 @@ import pytest
 
 from rcsc.commands import run as rcsc
 from rcsc.diagnostics.codes import Code
-from rcsc.host.guard import door
+from rcsc.host.guard import MOST_CONNECTIONS, door
 from rcsc.shell.reload.refusal import Refused as Refusal
 from rcsc.studio.hub import MOST_OPEN, Ask, Client, Hub, message
 from rcsc.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
 from tests.studio.driven import DOCK, Seat
 from tests.studio.served import PATIENCE_S, Page, Refused, page, page_at, serving, until
+from tests.support.strangers import STRANGERS, held_beside
 
 
 class Echo:
@@ -386,6 +387,17 @@ class Pages:
     async def __aexit__(self, *_: object) -> None:
         for one in self._open:
             await one.__aexit__(None, None, None)
+
+
+@pytest.mark.parametrize("said", STRANGERS)
+def test_strangers_take_nobodys_place(said: bytes, capfd: pytest.CaptureFixture[str]) -> None:
+    """Who says nothing, or never all of it: the user is answered, and few of them are held."""
+    with serving(others=[Echo()]) as server:
+        parts = urlsplit(server.address)
+        assert parts.hostname is not None
+        assert parts.port is not None
+        assert held_beside(parts.hostname, parts.port, parts.path, said) <= MOST_CONNECTIONS
+    assert capfd.readouterr().err == ""
 
 
 def test_two_concerns_do_not_answer_one_kind() -> None:

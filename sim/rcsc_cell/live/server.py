@@ -19,7 +19,7 @@ from typing import Any, Self
 from aiohttp import WSMsgType, web
 
 from rcsc.host.files.read import Malformed, json_of
-from rcsc.host.guard import HEADERS, bounded, policy, refusal, silent
+from rcsc.host.guard import HEADERS, Entrance, policy, refusal, silent
 from rcsc_cell.live.board import Board, Latest, Moment, Value, problems
 
 ADDRESS = "127.0.0.1"
@@ -109,6 +109,7 @@ class Live:
         self._thread: threading.Thread | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._over = asyncio.Event()
+        self._entrance: Entrance | None = None
         self._talks: set[asyncio.Future[None]] = set()
         self._drawn: dict[str, float] = {}
 
@@ -179,13 +180,10 @@ class Live:
             app, access_log=None, logger=silent("rcsc_cell.live"), shutdown_timeout=GOODBYE_S
         )
         await runner.setup()
-        made = runner.server
-        assert made is not None
-        listens: asyncio.Server | None = None
+        assert runner.server is not None
+        self._entrance, listens = Entrance(runner.server), None
         try:
-            listens = await self._loop.create_server(
-                bounded(made, lambda: len(made.connections)), ADDRESS, self._port
-            )
+            listens = await self._entrance.listen(ADDRESS, self._port)
             self.address = listens.sockets[0].getsockname()[:2]
             ready.set_result(self.address[1])
             await self._over.wait()
@@ -199,9 +197,13 @@ class Live:
     @web.middleware
     async def _guarded(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
         reason = refusal(request.headers, request.path, self.address[1], self._token)
-        if not reason:
-            return await handler(request)
-        return web.Response(status=403, text=f"{reason}\n")
+        if reason:
+            answer = web.Response(status=403, text=f"{reason}\n")
+            answer.force_close()
+            return answer
+        assert self._entrance is not None
+        self._entrance.knows(request.transport)
+        return await handler(request)
 
     async def _headed(self, _: web.Request, response: web.StreamResponse) -> None:
         """Every answer has the headers, a refusal, too."""
