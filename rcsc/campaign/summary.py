@@ -42,6 +42,8 @@ _KINDS = {
     "PAUSES": "PAUSE passed on",
     "ONCE": "taken up once",
     "ANSWERED": "no command passed over",
+    "DONE_STAYS": "done stays",
+    "FAILED_STAYS": "failed stays",
 }
 """What a kind of claim is called where its claims are counted."""
 _WIDEST_SHOWN = 12

@@ -10,7 +10,8 @@ What is proved of each level, alone in its environment (`proof.level`):
 - its program's invariants, and its properties over a cycle and the one before (`properties`);
 - its guarantees for neighbours: its report echoes the number and the command of the order that it took in that
   very cycle (so no order is lost, and none is echoed that was not run); its orders change only together with their
-  numbers, and numbers come one after the other.
+  numbers, and numbers come one after the other;
+- of a level by hand, that *done* and *failed* stay (others state it as properties): no proof of a neighbour takes it for granted.
 
 Context: which lines are never reached, and what a line does when it matches again (`proof.context`). Termination: every command is
 eventually answered, assuming that subordinates answer theirs (`proof.termination`, `proof.ranking`).

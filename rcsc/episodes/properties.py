@@ -199,32 +199,37 @@ def numbered(stand: Stand, link: Served) -> tuple[int, ...]:
 class AnswerStays:
     """What was answered of an order stays until the next, but of the order to rest; where the program does not say so itself.
 
-    An order that stands when the level starts anew has failed.
+    An order that stands when the level starts anew has failed. What `rcsc prove` asks of such a level in every cycle, this asks of each
+    that runs, whether or not it was proved; a cycle that a fault ends publishes, too.
 
     Attributes:
         at: Where the level's report begins among its leaves; `order` is where the order does.
+        told: The command of the order taken last; `last`, what was reported of it, or of an older one.
         anew: In which cycle the level started anew last.
     """
 
     link: Served
     at: int
     order: int
-    last: tuple[int, str] | None = None
+    told: int
+    last: tuple[int, str]
     anew: int = 0
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
         """What it was, and what it became."""
         link, level = self.link, cycle.levels[self.link.level]
         if level.name in cycle.restarted:
-            self.last = int(cycle.before[level.name][self.order + link.number]), link.failed
+            stood = cycle.before[level.name][self.order : self.order + len(link.order_leaves)]
+            self.last, self.told = (int(stood[link.number]), link.failed), int(stood[link.command])
             self.anew = cycle.tick
-        if level not in cycle.ran or level.fault:
+        if level not in cycle.ran:
             return
         echo = int(level.values[self.at + link.echo])
         status = link.report_leaves[link.status].shown(level.values[self.at + link.status])
-        was, self.last = self.last, (echo, status)
-        resting = level.values[self.order + link.command] == link.rest
-        if was is None or was[0] != echo or was[1] == status or resting:
+        was, told = self.last, self.told
+        if level.fault != REFUSED:
+            self.last, self.told = (echo, status), int(level.values[self.order + link.command])
+        if was[0] != echo or was[1] == status or told == link.rest or told != self.told:
             return
         if was[1] in (link.done, link.failed):
             text = f"order {echo} of `{link.order}` was {was[1]}, and is {status}"
@@ -309,6 +314,8 @@ def properties(stand: Stand, within: int, claims: Claims = NOTHING) -> list[Prop
         if link.party in stand.programs:
             watching.append(NumbersOrders(link, numbered(stand, link)))
         if stand.programs[link.level].roles is None:  # else its standard properties say it
-            watching.append(AnswerStays(link, at, sign.index[link.order_leaves[0].name]))
+            told = int(link.order_leaves[link.command].initial)
+            said = echo, link.report_leaves[link.status].shown(link.report_leaves[link.status].initial)
+            watching.append(AnswerStays(link, at, sign.index[link.order_leaves[0].name], told, said))
     proved = [ProvedHolds(claims, stand)] if claims.levels else []
     return [*watching, Ends(within), PlantHolds(), *proved]

@@ -72,6 +72,8 @@ _FAILED = {
     "cur_state.next": "f_state",
 }
 """A member, by its name, for a state; the failure stands until the next command."""
+_REPORTED = ("status_report", "failure")
+"""Likewise of a report, which is published even if the first cycle takes nothing."""
 
 
 def by_names(parts: Mapping[str, Part]) -> dict[str, Adopted]:
@@ -95,8 +97,16 @@ def _seen(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
 
 def _reports(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
     for name, part in parts.items():
-        if part.output and name.rpartition(".")[2] in ECHOED:
+        record, _, field = name.rpartition(".")
+        if part.output and field in ECHOED:
             yield name, Stands()
+        elif (
+            part.output
+            and field in _REPORTED
+            and f"{record}.{ECHOED[0]}" in parts
+            and _FAILED[field] in part.members
+        ):
+            yield name, Fixed(part.members.index(_FAILED[field]))
 
 
 def _orders(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:

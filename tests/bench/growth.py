@@ -85,7 +85,8 @@ def _lowest(at: int, commands: tuple[str, ...]) -> MadeLevel:
         Line("1", (new,), ("state(s1)",), "", "executing"),
         Line("2", (*going, ("there", "false")), (), "", "executing"),
         Line("3", (*going, ("there", "true")), ("state(d_state)",), "", "done"),
-        Line("4", (old, ("cur_state", "/= s1")), (), "", "done"),
+        Line("4", (old, ("cur_state", "d_state")), (), "", "done"),
+        Line("5", (old, ("cur_state", "f_state")), (), "", "failed"),
     )
     rest = MadeTable("rest", (Line("1", (("when", "true"),), ("state(d_state)",), "", "done"),))
     tables = (rest, *(MadeTable(f"{command}_table", lines) for command in commands[1:]))

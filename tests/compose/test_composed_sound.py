@@ -511,7 +511,7 @@ def test_what_goes_round_while_the_command_is_answered_does_no_harm(tmp_path: Pa
 
     def flips(status: str) -> str:
         ends = going("2", does="state(d_state)", status="done")
-        idle = f"4 | false | /= going | | || work | {status}"
+        idle = f"4 | false | d_state | | || work | {status}"
         return lower_level(ends, declared="state flip : bool", work="flip := not flip", idle=idle)
 
     _, proof = proved_level(tmp_path / "done", "lower", lower=flips("done"))
@@ -645,7 +645,7 @@ def test_a_cell_that_lets_both_values_of_the_flag_pass_looks_for_no_command(
         "lower",
         ("| 1    | true        |           |", "| 1 | true | /= d_state |"),
         (
-            "| 4    | false       | /= going  |       ||                | done       |",
+            "| 4    | false       | d_state   |       ||                | done       |",
             f"| 4 | {cell} | d_state | || | done |\n| 5 | false | f_state | || | done |",
         ),
     )
@@ -713,6 +713,19 @@ def test_an_echo_never_goes_back_so_that_nothing_is_trusted_of_the_cycle_after_a
     words = "assumption `loaded` of level `lower` does not fail in the first cycle after a restart"
     claimed = of_level(ts.of(forgets), proof)
     assert [key for key, claim in claimed if words in claim.trusts] == [(Sort.ECHOES, "", "report")]
+
+
+def test_a_level_that_begins_anew_says_failed_though_it_takes_nothing_yet(tmp_path: Path) -> None:
+    """Its first cycles may be refused, or stop: the report says nothing else of the order that stands, and nothing is trusted of that."""
+    path = small_system(tmp_path, lower=STOPS)
+    found = prove_system(path, LITTLE).of("lower", (Sort.FAILED_STAYS, "", "report"))
+    assert found.proved
+    assert found.trusts == ("`station` keeps to the protocol",)
+    ts = transition_systems(path)["lower"]
+    others = ((leaf, how) for leaf, how in ts.program.adopted.items() if leaf != "report.status_report")
+    forgets = replace(ts.program, restart=tuple((VariableName(leaf), how) for leaf, how in others))
+    proof = prove_level(ts.of(forgets), LITTLE)
+    assert Sort.FAILED_STAYS in {owed.sort for owed in proof.parts[0].open}
 
 
 # --- what verdicts rest on -------------------------------------------------------------------------
@@ -1112,8 +1125,8 @@ def test_a_line_that_only_the_first_cycle_runs_is_reached_and_a_state_that_nothi
 def test_a_fourth_status_answers_nothing(tmp_path: Path) -> None:
     waits = small_text(
         "lower",
-        ("| 4    | false       | /= going  |       ||                | done       |",
-         "| 4    | false       | /= going  |       ||                | waits      |"),
+        ("| 4    | false       | d_state   |       ||                | done       |",
+         "| 4    | false       | d_state   |       ||                | waits      |"),
         ("procedure done", "procedure waits {\n  status_report := waiting\n}\n\nprocedure done"),
     )  # fmt: skip
     words = small_text("words", ("done, executing, failed }", "done, executing, failed, waiting }"))

@@ -68,6 +68,8 @@ ASSUMPTION, table `work`: assumption `in_step`
 NO_DEFAULT, table `work`: DEFAULT is not reached
 ONE_LINE, table `work`: no two lines match
 ECHOES, table ``: the report echoes the command that it answers: `report`
+DONE_STAYS, table ``: done stays done: `report`
+FAILED_STAYS, table ``: failed stays failed: `report`
 NUMBERED, table ``: the order changes only with its number: `to_lower.input_command`
 NEXT_NUMBER, table ``: numbers are used one after the other: `to_lower`
 WAITS, table ``: no other command replaces an order before its echo, but for a new command: `to_lower`
@@ -170,6 +172,8 @@ no two lines match, pause: proved
 some line matches, go: proved
 no two lines match, go: proved
 the report echoes the command that it answers, : proved
+done stays done, : proved
+failed stays failed, : proved
 a command number is taken up once, : proved
 does nothing when it matches again, : proved
 the command ends, pause: proved
@@ -186,7 +190,11 @@ def test_claims_of_a_level_rest_on_these_and_no_others(lower: tuple[TransitionSy
         assert claim.trusts == ()
     ends = ["every command ends, : proved", "    rests on the command ends,pause,; the command ends,go,"]
     ends += ["the command that rests ends, : proved", "    rests on the command ends,pause,"]
-    assert found == [*RUNNING.splitlines(), *RESTING.splitlines(), *ends]
+    stands = [
+        "its report stands once it has answered, : proved",
+        "    rests on the level runs as its tables say,,; the report echoes the command that it answers,,report",
+    ]
+    assert found == [*RUNNING.splitlines(), *RESTING.splitlines(), *stands, *ends]
 
 
 def test_what_levels_assume_of_each_other_is_told_word_for_word(
@@ -435,7 +443,7 @@ def test_the_questions_of_a_certificate_are_named_and_are_about_values_in_range(
     asked = certificate(*lower)
     assert [name for name in asked if not name.startswith(("lines", "ends"))] == [
         "first", "restart", "step pause", "step go", "goals first", "goals restart",
-        "goals some_line", "goals one_line", "goals echoes", "goals once",
+        "goals some_line", "goals one_line", "goals echoes", "goals done_stays", "goals failed_stays", "goals once", "stands 1",
     ]  # fmt: skip
     for text in asked.values():
         for line in text.splitlines():

@@ -13,7 +13,7 @@ from rcsc.commands import run
 from rcsc.compose.contract.claims import Verdict
 from rcsc.compose.contract.obligations import Sort, obligations, unstated
 from rcsc.compose.contract.transition import GHOST
-from rcsc.compose.counterexample.trace import stopping
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, stopping, traces
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import prove_level
 from rcsc.compose.proof.system import prove_transition_systems, transition_systems
@@ -88,7 +88,7 @@ def test_every_field_of_an_order_is_numbered_but_a_declared_stream(tmp_path: Pat
             edit_file(dock.parent / "words.rcs", ("    target_mm : ", "    stream target_mm : "))
 
 
-@pytest.mark.parametrize(("restart", "left"), [(" restart bad", []), ("", [Sort.KEPT])])
+@pytest.mark.parametrize(("restart", "left"), [(" restart bad", []), ("", [Sort.FAILED_STAYS])])
 def test_an_order_that_stands_at_a_restart_has_failed(restart: str, left: list[Sort], tmp_path: Path) -> None:
     """A level that writes the protocol by hand owes it, too: campaigns watch it as `failed stays failed`."""
     shutil.copytree(
@@ -97,8 +97,37 @@ def test_an_order_that_stands_at_a_restart_has_failed(restart: str, left: list[S
     if not restart:
         edit_file(tmp_path / "drive.rcs", ("stage restart bad", f"stage{restart}"))
     proof = prove_level(transition_systems(tmp_path / "system.toml")["drive"], Effort(walks=6, cycles=40))
-    assert not proof.open
-    assert [one.sort for one in proof.unstated if one.applies] == left
+    assert [one.sort for one in proof.open] == left
+    assert not proof.unstated
+
+
+IDLE = "| idle  | false       | idle   |        |                      |        ||                  | 0          | done       |"
+BAD = "| bad   | false       | bad    |        |                      |        ||                  | 0          | fail       |"
+
+
+@pytest.mark.parametrize(
+    ("line", "status", "left", "statuses"),
+    [
+        (BAD, ("fail", "done"), [Sort.FAILED_STAYS], [2, 0]),
+        (BAD, ("fail", "executing"), [Sort.FAILED_STAYS], [2, 1]),
+        (IDLE, ("done", "executing"), [Sort.DONE_STAYS], [0, 1]),
+        (BAD, ("fail", ""), [], []),
+    ],
+)
+def test_a_level_by_hand_takes_no_answer_back(
+    line: str, status: tuple[str, str], left: list[Sort], statuses: list[int], tmp_path: Path
+) -> None:
+    """A run from the first cycle shows it, as campaigns find it; a line that leaves the status alone is proved."""
+    shutil.copytree(
+        DOCK.parent / "dock", tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache")
+    )
+    edit_file(tmp_path / "drive.rcs", (line, line.replace(*status)))
+    ts = transition_systems(tmp_path / "system.toml")["drive"]
+    proof = prove_level(ts, Effort(walks=6, cycles=40, looks=False))
+    assert [one.sort for one in proof.open] == left
+    for key, trace in traces(ts, proof.open, TraceSearch(4)).items():
+        assert isinstance(trace, Trace), key
+        assert [step.after["report.status_report"] for step in trace.steps[-2:]] == statuses
 
 
 FORGETS = """

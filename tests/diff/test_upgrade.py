@@ -192,6 +192,8 @@ def test_the_other_names_go_on_meaning_what_they_do(tmp_path: Path) -> None:
     assert adopted == {
         "cur_state": Fixed(0),
         "failure": Fixed(1),
+        "report.status_report": Fixed(2),
+        "report.failure": Fixed(1),
         "inc_command_seen": SameAs("command.inc_command"),
         **dict.fromkeys(("report.inc_command_echo", "report.ref_command_echo"), Stands()),
     }

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 
 from rcsc.campaign.shrink import shrink
 from rcsc.commands import run as rcsc
+from rcsc.compose.contract.obligations import Sort
 from rcsc.episodes.cycle import Broken
 from rcsc.episodes.episode import (
     BufferFault,
@@ -355,6 +356,22 @@ class TestSeededDefects:
         found, seed = first_found(path)
         assert found == {"drive: failed stays failed"}
         assert "restarted" in fault_classes(draw(seed, path))
+
+    @pytest.mark.parametrize(
+        ("line", "was", "now", "word"),
+        [
+            ("idle  | false       | idle ", "done", "executing", Sort.DONE_STAYS),
+            ("bad   | false       | bad  ", "fail", "done", Sort.FAILED_STAYS),
+        ],
+    )
+    def test_a_drive_that_takes_back_what_it_answered(
+        self, line: str, was: str, now: str, word: Sort, dock: Path
+    ) -> None:
+        """Found by the word that `rcsc prove` has for it."""
+        row = f"| {line}  |        |                      |        ||                  | 0          | {was} "
+        path = changed(dock, "drive.rcs", (row, row.replace(f"| {was} ", f"| {now} ")))
+        readings = (Reading("base.bumper", True, 10, 10),)
+        assert f"drive: {word}" in names(run(Episode(orders=(UNDOCK, DOCK), readings=readings), path))
 
     def test_a_level_that_does_not_number_a_new_order(self, dock: Path) -> None:
         path = changed(dock, "supervisor.rcs", (" or to_drive.target_mm /= old_order.target_mm", ""))

@@ -308,8 +308,8 @@ def test_an_echo_that_goes_back_is_found_in_a_cycle_that_a_fault_ends(right: tup
 
 
 def test_every_sort_of_obligation_is_watched() -> None:
-    """But those that are several others, that runs of two levels show, or that every campaign asks anyway (`AnswerStays`)."""
-    assert {sort.name for sort in Sort} - WATCHED <= {"PROTOCOL", "SAME_ORDER", "OF_ITS_ORDER", "KEPT"}
+    """But those that are several others, or that runs of two levels show."""
+    assert {sort.name for sort in Sort} - WATCHED <= {"PROTOCOL", "SAME_ORDER", "OF_ITS_ORDER"}
 
 
 def test_every_trust_is_told_from_the_others() -> None:

@@ -130,8 +130,8 @@ def explored(role: Role, most: int = 4000, seen: set[State] | None = None) -> Ex
         if key not in found.least:
             found.restarted.add(key)
 
-    _search(role, [role.start], seen, found, first, most)
-    _search(role, restarts(role), seen, found, later, most)
+    _search(role, [role.start], seen, found, first, most, anew=False)
+    _search(role, restarts(role), seen, found, later, most, anew=True)
     found.states = len(seen)
     return found
 
@@ -143,6 +143,8 @@ def _search(
     found: Explored,
     say: Callable[[Key, int], None],
     most: int,
+    *,
+    anew: bool,
 ) -> None:
     depth, wave = 1, [canonical(role, start) for start in starts]
     while wave:
@@ -157,7 +159,7 @@ def _search(
                     continue
                 if ran.line:
                     found.lines.add((ran.table, ran.line))
-                keys = list(broken(role, before, taken, ran))
+                keys = list(broken(role, before, taken, ran, anew=anew and depth == 1))
                 fresh = any(not found.breaks(key) for key in keys)
                 for key in keys:
                     say(key, depth)

@@ -13,7 +13,7 @@ from itertools import chain, product
 from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.obligations import Sort
 from rcsc.lang.interpret import Fault
-from rcsc.lang.model import OneTable, Value
+from rcsc.lang.model import Enum, OneTable, Value
 from tests.small_hierarchies.compiled import Stated
 from tests.small_hierarchies.level import EARLY, FLAG, UNDEFINED, Key, Ran, Role, looks, overlooking
 
@@ -149,6 +149,7 @@ def wanted(role: Role) -> frozenset[Key]:
     if role.links.above is not None:
         found.add((Sort.ECHOES, "", role.links.above.report))
         found |= {(Sort.ONCE, "", FLAG)} if FLAG in role.leaves else set()
+        found |= {(STAYS[said], "", role.links.above.report) for said in STAYS if said in _statuses(role)}
     for below, _, fields in role.numbered:
         found.add((Sort.NEXT_NUMBER, "", below.order))
         found |= {(Sort.NUMBERED, "", leaf) for leaf in fields}
@@ -162,10 +163,35 @@ def wanted(role: Role) -> frozenset[Key]:
     return frozenset(found)
 
 
-def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], ran: Ran) -> Iterator[Key]:
-    """The obligations that a cycle breaks; one that a fault ends publishes nothing, and breaks those of its table only."""
+STAYS = {"done": Sort.DONE_STAYS, "failed": Sort.FAILED_STAYS}
+"""What a level that writes the protocol by hand may report of an order for good."""
+
+
+def _statuses(role: Role) -> tuple[str, ...]:
+    """What a level that writes the protocol by hand can report; nothing of one that declares it, which states what it keeps."""
+    above = role.links.above
+    if above is None or role.program.roles is not None:
+        return ()
+    kind = role.program.variable(f"{above.report}.status_report").type
+    return kind.members if isinstance(kind, Enum) else ()
+
+
+def broken(
+    role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], ran: Ran, *, anew: bool = False
+) -> Iterator[Key]:
+    """The obligations that a cycle breaks; one that a fault ends publishes nothing, and breaks those of its table only.
+
+    Args:
+        role: The level.
+        before: Its leaves before the cycle, the order as it was taken last.
+        taken: What the cycle takes.
+        ran: What it did.
+        anew: Whether it is the first that takes anything since the level began anew.
+    """
     if ran.fault is UNDEFINED:
         return  # nobody can say what it does
+    if ran.fault not in {Fault.NO_LINE, Fault.SEVERAL_LINES}:
+        yield from _taken_back(role, before, taken, ran.after, anew=anew)
     if ran.fault is Fault.ADMIT:
         yield from _broken_by_refusal(role, before, ran)
         return
@@ -186,6 +212,28 @@ def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], 
             if ran.after[leaf] not in {ran.middle[leaf], ran.after[waiting]}:
                 yield Sort.DEFERRED, "", leaf
         yield from _broken_stated(role, before, ran.after)
+
+
+def _taken_back(
+    role: Role,
+    before: Mapping[str, Value],
+    taken: Mapping[str, Value],
+    after: Mapping[str, Value],
+    *,
+    anew: bool,
+) -> Iterator[Key]:
+    """What was said of the order taken last, and is not said any more: begun anew, that it failed; of one to rest nothing stays."""
+    above, words = role.links.above, _statuses(role)
+    if above is None or not words:
+        return
+    order, echo = before[f"{above.order}.inc_command"], f"{above.report}.inc_command_echo"
+    command = f"{above.order}.input_command"
+    if before[command] == 0 or taken[command] != before[command] or after[echo] != order:
+        return
+    was, now = (words[int(leaves[f"{above.report}.status_report"])] for leaves in (before, after))
+    was = "failed" if anew else was if before[echo] == order else ""
+    if was in STAYS and was in words and now != was:
+        yield STAYS[was], "", above.report
 
 
 def _broken_by_refusal(role: Role, before: Mapping[str, Value], ran: Ran) -> Iterator[Key]:

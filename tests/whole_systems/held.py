@@ -45,15 +45,14 @@ MOST = 400
 COMPARED = frozenset(
     {
         Sort.ASSUMPTION, Sort.SOME_LINE, Sort.ONE_LINE, Sort.NO_DEFAULT, Sort.ECHOES, Sort.NUMBERED, Sort.NEXT_NUMBER,
-        Sort.WAITS, Sort.ONCE, Sort.ANSWERED, Sort.PAUSES, Sort.DEFERRED, Sort.INVARIANT, Sort.PROPERTY, Sort.OWED,
-        Sort.ENDS, Sort.SAFE,
+        Sort.WAITS, Sort.ONCE, Sort.ANSWERED, Sort.PAUSES, Sort.DONE_STAYS, Sort.FAILED_STAYS, Sort.DEFERRED, Sort.INVARIANT,
+        Sort.PROPERTY, Sort.OWED, Sort.ENDS, Sort.SAFE,
     }
 )  # fmt: skip
 """Sorts of claims that are held against every run."""
 LEFT_OUT: Mapping[str, str] = {
     Sort.SAME_ORDER: "a level's contract, not its claim: compared as the contract of what it takes",
     Sort.OF_ITS_ORDER: "a level's contract, not its claim: compared as the contract of what it takes",
-    Sort.KEPT: "is never called proved: where it may not hold, the level is said to be not looked at",
     Sort.PROTOCOL: "names all sorts of the protocol at once where they cannot be stated",
 }
 """Sorts that are no claims of their own, with the reason."""

@@ -19,8 +19,9 @@ from tests.small_hierarchies.explored import adopted
 from tests.small_hierarchies.level import EARLY, UNDEFINED, Ran, Role
 from tests.small_hierarchies.world import NUMBERS, answered, broken, ordered
 
-LAST, FRESH = "#last", "#fresh"
-"""What is remembered of a level besides its leaves: the number of the order taken last; that it began anew and no cycle ended well."""
+LAST, TOLD, FRESH, ANEW = "#last", "#told", "#fresh", "#anew"
+"""What is remembered of a level besides its leaves: number and command of the order taken last; that it began anew and no cycle ended
+well, and that none took anything."""
 NUMBER = Int(0, NUMBERS - 1)
 Claimed = tuple[str, str, str]
 """A claim about a level: sort, table and name."""
@@ -115,7 +116,7 @@ class Part:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """What a state of it holds."""
-        return (*self.role.leaves, LAST, FRESH)
+        return (*self.role.leaves, LAST, TOLD, FRESH, ANEW)
 
     @cached_property
     def free(self) -> tuple[str, ...]:
@@ -187,18 +188,23 @@ class Part:
 
     def begins(self) -> State:
         """Its state before the first cycle."""
+        return (*self.role.start.values(), *self._order_in(self.role.start), False, False)
+
+    def _order_in(self, leaves: Mapping[str, Value]) -> State:
+        """Number and command of its order."""
         above = self.role.links.above
-        last = 0 if above is None else self.role.start[f"{above.order}.inc_command"]
-        return (*self.role.start.values(), last, False)
+        return (
+            (0, 0)
+            if above is None
+            else (leaves[f"{above.order}.inc_command"], leaves[f"{above.order}.input_command"])
+        )
 
     def anew(self, before: State, given: Mapping[str, Value], stands: Mapping[str, Value]) -> State:
         """Its state when it begins anew: what comes from outside is as it was taken last."""
         now = dict(zip(self.names, before, strict=True))
         outside = {leaf: now[leaf] for leaf in self.role.inputs if leaf not in self.fed}
         after = adopted(self.role, {**self.role.start, **outside, **given}, stands)
-        above = self.role.links.above
-        last = 0 if above is None else after[f"{above.order}.inc_command"]
-        return (*(after[leaf] for leaf in self.role.leaves), last, True)
+        return (*(after[leaf] for leaf in self.role.leaves), *self._order_in(after), True, True)
 
     def moves(self, before: State, given: tuple[str, ...], values: State) -> list[Move]:
         """Each different thing that its next cycle can do, given what it takes from other levels."""
@@ -326,13 +332,14 @@ class Part:
         above = self.role.links.above
         number = None if above is None else f"{above.order}.inc_command"
         same = number is not None and taken.get(number, now[number]) == now[LAST]
-        before = now if number is None else {**now, number: now[LAST]}
+        before = dict(now)
+        if above is not None:
+            before |= {f"{above.order}.inc_command": now[LAST], f"{above.order}.input_command": now[TOLD]}
         breaks = tuple(self._broken(now, before, taken, ran))
         after = dict(ran.after)
         if ran.fault is not Fault.ADMIT:
-            after[FRESH] = fresh and ran.fault in EARLY
-            if number is not None:
-                after[LAST] = after[number]
+            after[FRESH], after[ANEW] = fresh and ran.fault in EARLY, False
+            after[LAST], after[TOLD] = self._order_in(after)
         after.update(self._forgotten)
         goes_on = ran.fault in {Fault.OK, Fault.ADMIT, *EARLY}
         outside = tuple((leaf, taken[leaf]) for leaf in self.free)
@@ -370,7 +377,7 @@ class Part:
         self, now: Mapping[str, Value], before: Mapping[str, Value], taken: Mapping[str, Value], ran: Ran
     ) -> Iterator[Claimed]:
         """What the cycle breaks; of a subordinate too what it is taken to keep to."""
-        yield from broken(self.role, before, taken, ran)
+        yield from broken(self.role, before, taken, ran, anew=bool(now[ANEW]))
         for below in self.role.links.below:
             if f"{below.report}.inc_command_echo" in self.fed and not answered(below, now, taken):
                 yield CONTRACT, "", below.report

@@ -11,7 +11,7 @@ from itertools import combinations
 from typing import TypeAlias
 
 from rcsc.compose.contract.claims import SAFE
-from rcsc.compose.contract.environment import Below, leaves_under
+from rcsc.compose.contract.environment import Above, Below, leaves_under
 from rcsc.compose.contract.properties import invariants, kept_within, owed, properties
 from rcsc.compose.contract.transition import Cycle, TableAt, TransitionSystem, successor
 from rcsc.lang.interval_sets import meet
@@ -44,12 +44,15 @@ class Sort(StrEnum):
     OF_ITS_ORDER = "what is reported under the number of the last order is about that order"
     PAUSES = "a PAUSE is passed on in the cycle that takes it"
     DEFERRED = "no state is written directly while another is pending"
+    DONE_STAYS = (
+        "done stays done"  # of a level that writes the protocol by hand; others state it as a property
+    )
+    FAILED_STAYS = "failed stays failed"
     OWED = "its outputs are as other levels assume"
     INVARIANT = "invariant"
     PROPERTY = "property"
     ENDS = "the command ends"  # not a condition on one cycle: `termination`, `lasso`
     PROTOCOL = "orders and reports"  # all of its sorts at once
-    KEPT = "failed stays failed"  # likewise; levels that declare whom they serve state it as a property
     SAFE = SAFE[0]
 
 
@@ -61,6 +64,8 @@ BROKEN = {
     Sort.WAITS: "another command replaces an order of `{}` that is not echoed",
     Sort.ONCE: "a command number is taken up again",
     Sort.ANSWERED: "the new command is passed over: seen once more, `{}` is down",
+    Sort.DONE_STAYS: "an order that was done is reported otherwise",
+    Sort.FAILED_STAYS: "an order that has failed is reported otherwise",
     Sort.DEFERRED: "`{}` is written directly while another value is pending",
     Sort.OWED: "its outputs are not as `{}` says",
     Sort.INVARIANT: "invariant `{}` does not hold",
@@ -195,6 +200,35 @@ def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     )
     late = values.both(cycle.refused, as_before)
     yield Obligation(Sort.ECHOES, "", above.report, values.either(values.both(number, command), late))
+    if ts.program.roles is None:
+        yield from _answer_stays(ts, cycle, above)
+
+
+def _answer_stays(ts: TransitionSystem, cycle: Cycle, above: Above) -> Iterator[Obligation]:
+    """State that what was reported of the order taken last stays, but of the command that rests; what stands at a restart has failed.
+
+    Levels that declare whom they serve state it as properties. No proof of a neighbour takes it for granted: the contract says nothing of
+    a status, and that an answer comes and stays is shown by a level's own termination, on which that of its superior rests.
+    """
+    kind = ts.kinds[above.status]
+    if not isinstance(kind, Enum):
+        return
+    rests = values.equal(cycle.before[above.command], values.constant(ts.kinds[above.command], 0))
+    same = values.equal(cycle.taken[above.command], cycle.before[above.command])
+    about, again = (
+        values.equal(leaves[above.echo], cycle.before[above.number]) for leaves in (cycle.before, cycle.after)
+    )
+    for sort, member in ((Sort.DONE_STAYS, above.done), (Sort.FAILED_STAYS, above.failed)):
+        if member not in kind.members:
+            continue
+        said = values.constant(kind, kind.members.index(member))
+        answered = values.both(about, values.equal(cycle.before[above.status], said))
+        if cycle.anew:
+            answered = values.truth(sort is Sort.FAILED_STAYS)
+        asked = values.all_of((answered, again, same, values.negation(rests)))
+        yield Obligation(
+            sort, "", above.report, values.follows(asked, values.equal(cycle.after[above.status], said))
+        )
 
 
 def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:

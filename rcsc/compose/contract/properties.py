@@ -31,6 +31,7 @@ from rcsc.lang.model import (
     Among,
     Apply,
     Bool,
+    Enum,
     Expr,
     Kind,
     Literal,
@@ -181,7 +182,7 @@ def _held(condition: Expr, state: Mapping[str, Value], kinds: Mapping[str, Scala
 def every_predicate(
     ts: TransitionSystem, cycle: Cycle, obligations: Iterable[Node], closely: int = 0
 ) -> tuple[Predicate, ...]:
-    """Choose the predicates of tables and procedures, and those of invariants and properties.
+    """Choose the predicates of tables and procedures, those of invariants and properties, and of answers that stay.
 
     Those of a lower `closely` come first, in the same order, because clauses name predicates by position.
     """
@@ -192,7 +193,9 @@ def every_predicate(
         if _stated_conditions(ts)
         else ()
     )
-    chosen = (*first, *stated)
+    there = {predicate.name for predicate in (*first, *stated)}
+    answers = (one for one in _of_answers(ts, cycle, cone(cycle, wanted)) if one.name not in there)
+    chosen = (*first, *stated, *answers)
     if closely:
         there = {predicate.name for predicate in chosen}
         closer = predicates(ts, cycle, wanted, closely)
@@ -230,6 +233,20 @@ def _stated_predicates(
                 if predicate.name not in there and read and read <= inside:
                     by_name.setdefault(predicate.name, predicate)
     return tuple(by_name.values())
+
+
+def _of_answers(ts: TransitionSystem, cycle: Cycle, inside: frozenset[str]) -> Iterator[Predicate]:
+    """Make the predicates of what a level that writes the protocol by hand has reported of the order taken last."""
+    above = ts.links.above
+    if above is None or ts.program.roles is not None or not isinstance(kind := ts.kinds[above.status], Enum):
+        return
+    told = {name for name in values.variables([cycle.after[above.status]]) if ts.kinds.get(name) == kind}
+    for leaf in (above.status, *sorted(told - {above.status})):
+        if leaf in inside:
+            yield Predicate(leaf, kind)
+    if {above.number, above.echo} <= inside:
+        pair = sorted((above.number, above.echo))
+        yield Predicate(pair[0], Bool(), pair[1])
 
 
 def _of_one_cycle(part: Expr) -> Expr:

@@ -121,6 +121,7 @@ class Cycle:
         strange: Inputs that such a cycle may leave outside their ranges.
         calls: Calls of extern procedures, in the order in which they can be made.
         settled: Every leaf before the preprocess, and `acted`, before the postprocess.
+        anew: Whether it is the first after a restart.
     """
 
     before: Leaves
@@ -140,6 +141,7 @@ class Cycle:
     seen: tuple[Leaves, ...] = ()
     untaken: Node = FALSE
     strange: frozenset[str] = frozenset()
+    anew: bool = False
 
     @property
     def every(self) -> tuple[TableAt, ...]:

@@ -55,6 +55,7 @@ class CycleRun:
         matched: Every line that matched, DEFAULT left out.
         answers: The results of each call of an extern procedure, in order.
         stages: The tables that ran before it in the cycle.
+        anew: Whether it is the first after a restart.
     """
 
     taken: Mapping[str, Value]
@@ -67,6 +68,7 @@ class CycleRun:
     matched: tuple[str, ...] = ()
     answers: tuple[ExternAnswer, ...] = ()
     stages: tuple["StageRun", ...] = ()
+    anew: bool = False
 
     @property
     def ends_the_run(self) -> bool:
@@ -293,7 +295,8 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool
             | Sort.DEFERRED
             | Sort.OWED
             | Sort.ENDS
-            | Sort.KEPT
+            | Sort.DONE_STAYS
+            | Sort.FAILED_STAYS
             | Sort.PROTOCOL
         ):
             return _broken_between(ts, obligation, step)
@@ -369,6 +372,7 @@ def as_cycle(ts: TransitionSystem, step: CycleRun) -> Cycle:
             )
         ),
         seen=seen,
+        anew=step.anew,
     )
 
 

@@ -9,7 +9,7 @@ value that fits.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from rcsc.compose.contract.environment import Below
@@ -192,6 +192,7 @@ class Unrolled:
         if self.cycles:  # a fault would have ended the run
             self._run.add(self.cycles[-1].goes_on)
         cycle = self.ts.cycle(self._now, f" {at}")
+        cycle = replace(cycle, anew=self.search.restarted and at == 1)
         self.cycles.append(cycle)
         self._now = cycle.after
         self._run.add(cycle.contract)
@@ -348,7 +349,9 @@ def _ran(
     start: Mapping[str, Value],
     search: TraceSearch,
 ) -> Trace:
-    return Trace(obligation.shown, ran_on(ts, start, given), search.restarted, search.legal)
+    first, *later = ran_on(ts, start, given)
+    steps = replace(first, anew=search.restarted), *later
+    return Trace(obligation.shown, steps, search.restarted, search.legal)
 
 
 def _breaks(ts: TransitionSystem, obligation: Obligation, trace: Trace, cycles: int) -> bool:

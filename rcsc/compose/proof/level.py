@@ -32,9 +32,6 @@ from rcsc.symbolic.values import TRUE
 
 TOGETHER = 50
 """All questions about a level together may take the steps of so many; later ones are not decided."""
-ANEW = (
-    "an order that stands when the level starts anew has failed, and the first cycle may report it otherwise"
-)
 TRIES = (64, 64, 16, 16, 4, 1)
 """What part of its steps a question of the confirmation gets, try after try: what one search gives up another often refutes at once."""
 
@@ -191,13 +188,18 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
     wanted = obligations(ts, cycle)
     seen: Context | None = None
     ends: tuple[Ending, ...] = ()
-    stands, fails = False, True
+    stands = False
     try:
         with smt.together(TOGETHER * effort.limits.steps):
             invariant = search(ts, firsts, cycle, wanted, effort, known.clauses)
             keep_candidates(cache, ts, invariant, known)
             asked = _asked_anew(invariant.predicates, firsts, cycle, effort.limits)
-            aside = {Sort.NUMBERED, Sort.PROPERTY} if ts.refuses else {Sort.NUMBERED}
+            aside = {
+                Sort.NUMBERED,
+                Sort.DONE_STAYS,
+                Sort.FAILED_STAYS,
+            }  # no line in context and no ending goes by them
+            aside |= {Sort.PROPERTY} if ts.refuses else set()
             looks = effort.looks and not any(wanted[at].sort not in aside for at in invariant.open)
             flow = Flow(ts, asked, invariant.clauses)
             if looks and (
@@ -216,7 +218,7 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
             verdicts = list(_verdicts(ts, asked, invariant, wanted))
             if looks:
                 seen, ends = context(ts, asked, invariant.clauses, invariant.ran), tuple(flow.endings())
-                stands, fails = flow.report_stands(), flow.failed_stays()
+                stands = flow.report_stands()
             _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
         invariant, seen, ends, stands = FoundInvariant(), None, (), False
@@ -233,7 +235,6 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
         endings=ends,
         unstated=(
             *unstated(ts),
-            *([] if fails else [Unstated(Sort.KEPT, "", ANEW)]),
             *(Unstated(Sort.ENDS, "", why) for why in no_answers(ts)),
         ),
         stands=stands,
@@ -289,7 +290,7 @@ def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:
     """Return the cycles with which a level can begin, by name."""
     return {
         "first": ts.cycle(ts.initial(), " at first"),
-        "restart": ts.cycle(ts.restarted(), " at restart"),
+        "restart": replace(ts.cycle(ts.restarted(), " at restart"), anew=True),
     }
 
 
@@ -415,7 +416,7 @@ def _looked_again(ts: TransitionSystem, proof: LevelProof, asked: Confirmation) 
     for ending in flow.endings():
         ends.append(ending)
         scripts |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
-    stands, _ = flow.report_stands(), flow.failed_stays()
+    stands = flow.report_stands()
     scripts |= {f"stands {number}": text for number, text in enumerate(_refuted(asked), 1)}
     if (seen, tuple(ends), stands) != (proof.context, proof.endings, proof.stands):
         scripts["lines and endings as before"] = "(set-logic ALL)\n(check-sat)\n"

@@ -133,16 +133,6 @@ def answered(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
     return values.either(ended, values.both(cycle.middle[below.late], values.negation(rests)))
 
 
-def failed_anew(ts: TransitionSystem, restart: Cycle) -> Node:
-    """Return the condition that the first cycle after a restart reports the order that stands as failed, but the command that rests."""
-    above = ts.links.above
-    assert above is not None
-    rests = values.equal(restart.taken[above.command], values.constant(ts.kinds[above.command], 0))
-    again = values.equal(restart.after[above.echo], restart.before[above.number])
-    premise = values.all_of((again, values.negation(rests), values.negation(restart.refused)))
-    return values.follows(premise, _says(ts, above.status, restart.after, above.failed))
-
-
 def _says_more(ts: TransitionSystem, report: str) -> bool:
     """Return whether a report has fields besides what it echoes and its status."""
     made = {f"{report}.{part}" for part in (ECHO, ECHOED, STATUS)}
@@ -267,17 +257,6 @@ class Flow:
         if above is None or above.outside or not reports(self.ts) or not _says_more(self.ts, above.report):
             return []
         return [stands(self.ts, self.asked.cycle)]
-
-    def failed_stays(self) -> bool:
-        """Return whether the order that stands at a restart has failed; levels that declare whom they serve state it as a property."""
-        if self.ts.program.roles is not None or not reports(self.ts):
-            return True
-        restart = self.asked.firsts[-1]
-        solver = self.asked.beginning(restart)
-        broken = self.asked.keyed.term(values.negation(failed_anew(self.ts, restart)))
-        solver.add(*self.asked.keyed.ranges)
-        self.asked.rested_on.append(solver)
-        return not may(solver, broken)
 
     def report_stands(self) -> bool:
         """Return whether the level's report stands once it has answered, as termination above may need it."""

@@ -349,6 +349,24 @@ def _stands(_: Claim, reader: Reader, level: ProvedLevel) -> Check:
     return check
 
 
+def _answer_stays(_: Claim, reader: Reader, level: ProvedLevel, *, failed: bool) -> Check:
+    """What was answered of the order taken last stays, but of the command that rests; what stands at a restart has failed."""
+    above = level.above
+    assert above is not None
+    number, command, echo, status = map(reader.at, (above.number, above.command, above.echo, above.status))
+    word, shown = above.failed if failed else above.done, reader.sign.leaves[status].shown
+
+    def check(now: Now) -> str:
+        was, order = now.before, now.stood[number]
+        answered = failed if now.restarted else was[echo] == order and shown(was[status]) == word
+        same = not now.took or now.values[command] == now.stood[command]
+        asked = answered and same and now.values[echo] == order and now.stood[command] != 0
+        said = shown(now.values[status])
+        return f"order {order} was {word}, and is {said}" if asked and said != word else ""
+
+    return check
+
+
 def _contract(claim: Claim, reader: Reader, level: ProvedLevel) -> Check:
     return contract(claim.name, reader, level)
 
@@ -399,6 +417,8 @@ _MAKERS: Mapping[str, Callable[[Claim, Reader, ProvedLevel], Check]] = {
     "CONTRACT": _contract,
     "GIVEN": _given,
     "STANDS": _stands,
+    "DONE_STAYS": partial(_answer_stays, failed=False),
+    "FAILED_STAYS": partial(_answer_stays, failed=True),
     "AGAIN": _again,
 }
 WATCHED = frozenset({*_MAKERS, "ENDS"})

@@ -26,7 +26,7 @@ class Now:
         before: All leaves as the last cycle left them, or as the level began.
         stood: The same of the last cycle that took its inputs.
         values: All leaves now, inputs as they were taken.
-        anew: Whether it is the first cycle, or the first after a restart.
+        anew: Whether it is the first cycle, or the first after a restart, that takes its inputs; `restarted`, the latter.
         lines: Table and line of each that ran.
         seen: All leaves as the first table saw them, once that was computed (`Reader.prepared`).
     """
@@ -37,6 +37,7 @@ class Now:
     values: Values
     fault: int
     anew: bool
+    restarted: bool
     lines: tuple[tuple[str, str], ...]
     seen: dict[str, Value] | None = field(default=None)
 

@@ -43,6 +43,7 @@ class ProvedHolds:
         self._before: dict[str, Values] = {}
         self._stood: dict[str, Values] = {}
         self._anew: set[str] = set(self._readers)
+        self._restarted: set[str] = set()
 
     def _take(self, level: ProvedLevel) -> None:
         reader, ending = self._readers[level.name], dict[str, Claim]()
@@ -67,6 +68,7 @@ class ProvedHolds:
         for name in cycle.restarted & self._readers.keys():
             self._before[name] = self._stood[name] = cycle.before[name]
             self._anew.add(name)
+            self._restarted.add(name)
         ran = [(level.name, self._now(cycle, level)) for level in cycle.ran if level.name in self._readers]
         for name, now in ran:
             self._trusts.watch(name, now)
@@ -79,11 +81,13 @@ class ProvedHolds:
         name, values = level.name, level.values
         before = self._before.get(name) or cycle.before[name]
         stood = self._stood.setdefault(name, before)
-        now = Now(level, before, stood, values, level.fault, name in self._anew, level.lines)
+        anew = name in self._anew, name in self._restarted
+        now = Now(level, before, stood, values, level.fault, *anew, level.lines)
         self._before[name] = values
         if now.took:
             self._stood[name] = values
             self._anew.discard(name)
+            self._restarted.discard(name)
         return now
 
     def _wrong(self, name: str, now: Now) -> Iterator[tuple[Claim, str]]:

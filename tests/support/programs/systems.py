@@ -82,18 +82,19 @@ def lower_level(
     seen: str = "on := false",
     begin: str = "",
     work: str = "",
-    idle: str = "4 | false | /= going | | || | done",
+    idle: str = "4 | false | d_state | | || | done",
     parts: str = "",
     after: str = "answer",
 ) -> str:
-    """Return a lower level with these lines of table `go`, besides one that takes a command and one that rests (`idle`).
+    """Return a lower level with these lines of table `go`, besides one that takes a command, one that rests (`idle`), and one that failed.
 
     Its lines test `on`, which the preprocess sets by the statements `seen`; `begin` and `work` are the statements of the
     procedures that take a command and that lines may call. `declared` are more variables, all read by the preprocess, and
     `parts` more procedures and modules; `after` is what the postprocess runs.
     """
     names = re.findall(r"^(?:state|input) (\w+)", declared, re.MULTILINE)
-    rows = ("1 | true | | | || state(going); begin | executing", idle, *lines)
+    failed = "f | false | f_state | | || | failed"
+    rows = ("1 | true | | | || state(going); begin | executing", idle, failed, *lines)
     return LOWER.format(
         declared=declared,
         parts=parts,
@@ -132,6 +133,7 @@ module answer reads command, inc_command_seen, status_report writes report {{
 procedure state(value : stage) {{ cur_state := value }}
 procedure executing {{ status_report := executing }}
 procedure done {{ status_report := done }}
+procedure failed {{ status_report := failed }}
 procedure begin {{
   {begin}
 }}
