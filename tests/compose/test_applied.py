@@ -14,6 +14,7 @@ from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
 from rcsc.solvers import smt
 from rcsc.table.mending import Outcome
+from tests.applied import campaign
 from tests.support.programs.systems import solo_system
 from tests.support.programs.texts import edit_file
 from tests.support.proved import obligation_of
@@ -138,3 +139,8 @@ def test_a_cell_of_a_used_file_is_written_there(tmp_path: Path) -> None:
     ts = level(tmp_path, f"use part\n{LEVEL}")
     (help_,) = helps(ts, finding(ts, Sort.ONE_LINE, "p and r"))
     assert help_.startswith("in line `p` write `<= 1` under `a`: proved to part")
+
+
+def test_what_is_proved_of_drawn_tables_holds_of_their_texts() -> None:
+    came, _ = campaign(9, "short")
+    assert came[Outcome.HOLDS] >= 9
