@@ -6,6 +6,7 @@ changed in a certificate changes something that is checked.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 from rcsc.certify.table import RejectedError
@@ -99,7 +100,7 @@ def _node(forms: int, assumptions: int) -> _Check:
 
 
 def _pairs(count: int) -> _Check:
-    """Check a list of numbers below a count, each once, with what is not 0."""
+    """Check a list of numbers below a count, ascending, with what is not 0."""
     below = _below(count)
 
     def pair(value: Any) -> bool:
@@ -111,7 +112,7 @@ def _pairs(count: int) -> _Check:
             and value[1] != 0
         )
 
-    return lambda pairs: _list_of(pairs, pair) and _distinct([at for at, _ in pairs])
+    return lambda pairs: _list_of(pairs, pair) and all(a[0] < b[0] for a, b in pairwise(pairs))
 
 
 def _below(count: int) -> _Check:

@@ -98,7 +98,7 @@ def _certificate(
         "table": table.name,
         "assumptions": list(assumptions),
         "columns": [columns[column] for column in needed],
-        "forms": [[[place[column], k] for column, k in forms[form]] for form in used],
+        "forms": [sorted([place[column], k] for column, k in forms[form]) for form in used],
         "tree": [_renumbered(node, number) for node in tree],
     }
 
@@ -117,7 +117,7 @@ def _renumbered(node: Shown, number: Mapping[int, int]) -> Shown:
         case ["s", form, cut]:
             return ["s", number[form], cut]
         case ["e", multipliers]:
-            return ["e", [[number[form], k] for form, k in multipliers]]
+            return ["e", sorted([number[form], k] for form, k in multipliers)]
         case ["b", count, parts]:
             return ["b", count, None if parts is None else [number[form] for form in parts]]
     return node

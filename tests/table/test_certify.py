@@ -4,7 +4,7 @@ import ast
 import copy
 import json
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
 from itertools import combinations_with_replacement, product
 from math import isnan
@@ -23,7 +23,7 @@ from rcsc.certify.settle import script, values_in
 from rcsc.certify.table import TableChecker
 from rcsc.certify.values import INT, Term, Terms, parts_first, spanned
 from rcsc.host.files.read import Malformed, json_of
-from rcsc.lang.interpret import call, evaluate, holds, matching_lines
+from rcsc.lang.interpret import call, evaluate, holds, initial, matching_lines
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import AssumptionName, Program, Read, Table, Value, key_bounds, key_of, value_of_key
 from rcsc.lang.resolve import compile_text
@@ -1120,6 +1120,89 @@ def test_whatever_is_said_otherwise_or_besides_is_refused(text: str) -> None:
         if not certify(program, made).problems
     ]  # fmt: skip
     assert accepted == []
+
+
+def near(node: Any, words: Sequence[str], at: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:
+    """Every way to say one thing a little otherwise, as another certificate might; where, and the whole as it is then."""
+    match node:
+        case bool():
+            yield at, not node
+        case int():
+            yield from ((at, node + by) for by in (-1, 1))
+        case str():
+            yield from ((at, word) for word in words if word != node)
+        case list():
+            yield from ((at, node[:k] + node[k + 1 :]) for k in range(len(node)))
+            pairs = (k for k in range(len(node) - 1) if node[k] != node[k + 1])
+            yield from ((at, [*node[:k], node[k + 1], node[k], *node[k + 2 :]]) for k in pairs)
+    parts = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, part in parts:
+        for where, other in near(part, words, (*at, key)):
+            made = copy.copy(node)
+            made[key] = other
+            yield where, made
+
+
+def texts_of(node: Any) -> Iterator[str]:
+    if isinstance(node, dict | list):
+        for part in node.values() if isinstance(node, dict) else node:
+            yield from texts_of(part)
+    elif isinstance(node, str):
+        yield node
+
+
+def is_right(program: Program, where: tuple[Any, ...], entry: Any) -> bool:
+    """Whether what stands there now is another right proof, as the interpreter sees it: at every input, or at those that are named."""
+    [table] = program.tables
+    conditions = {str(one.name): one.condition for one in program.assumptions}
+    assumed = [conditions[name] for name in entry["assumptions"]]
+    first = initial(program)
+    if where[2] == "witness":
+        owed = [
+            *(conditions[name] for name in table.assumptions),
+            *(one.condition for one in program.invariants),
+        ]
+        return all(holds(condition, first | entry["witness"]) for condition in owed)
+    if where[2] != "tree":
+        return False
+    for values in product(*(range(lo, hi + 1) for lo, hi in (key_bounds(v.type) for v in program.variables))):
+        now = first | dict(zip((v.name for v in program.variables), values, strict=True))
+        kind, of, *_ = _reached(entry, now)
+        lines = [
+            all(test is None or holds(test.condition, now) for test in line.tests) for line in table.lines
+        ]
+        if not (not holds(assumed[of], now) if kind == "a" else lines[of] and sum(lines) == 1):
+            return False
+    return True
+
+
+def _reached(entry: Any, now: Any) -> Any:
+    """The end of the tree to which an input comes: at a split, low ones go to the first part."""
+    at, tree = 0, entry["tree"]
+    while tree[at][0] == "s":
+        _, form, most = tree[at]
+        at += 1
+        if sum(int(now[entry["columns"][column]]) * by for column, by in entry["forms"][form]) > most:
+            open_ = 1  # passes over the first part
+            while open_:
+                open_ += 1 if tree[at][0] == "s" else -1
+                at += 1
+    return tree[at]
+
+
+@pytest.mark.parametrize(
+    ("text", "rights"),
+    [(BOXES, 0), (RELATED, 4), (WITNESSED, 3), (STOPPED, 2)],
+    ids=["boxes", "related", "witnessed", "stopped"],
+)
+def test_whatever_is_said_a_little_otherwise_is_refused_or_right(text: str, rights: int) -> None:
+    """A number by one, another word of the certificate's, two parts in the other order, a part less: each that is accepted is judged."""
+    program = program_of(text)
+    certificate = certificate_of(program)
+    made = list(near(certificate, sorted(set(texts_of(certificate)))))
+    accepted = [(where, other) for where, other in made if not certify(program, other).problems]
+    assert [where for where, other in accepted if not is_right(program, where, other["tables"][0])] == []
+    assert len(accepted) == rights
 
 
 @pytest.mark.parametrize("of", ["form", "column", "assumption", "program", "witness", "twice"])
