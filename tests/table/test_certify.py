@@ -770,6 +770,33 @@ def test_a_condition_of_one_leaf_that_is_undefined_for_some_value_is_certified()
     assert certify(program, certificate).whole
 
 
+def _condition(rng: random.Random, depth: int) -> str:
+    """Draw a condition in which parts come again, as themselves and as their opposites."""
+    if depth == 0:
+        return rng.choice(("q", "p", "n > 1", "n = 2", "n < m"))
+    first, second = _condition(rng, depth - 1), _condition(rng, depth - 1)
+    shape = rng.choice(
+        ("(not ({0})) and ({0}) or {1}", "({0}) and ({1})", "({0}) or ({1})", "({0}) xor ({1})")
+    )
+    return shape.format(first, second)
+
+
+@pytest.mark.parametrize("default", ["| no | false ||", "| no | DEFAULT ||"])
+def test_what_is_proved_of_any_condition_is_certified(default: str) -> None:
+    rng = random.Random(7)  # noqa: S311  # no secret
+    for _ in range(60):
+        heading = _condition(rng, rng.randint(1, 3))
+        text = (
+            "input q : bool\ninput p : bool\ninput n : int 0 .. 3\ninput m : int 0 .. 3\n"
+            f"table t {{\n| line | {heading} ||\n| yes | true ||\n{default}\n}}\n"
+        )
+        program = compile_text(text)
+        if not isinstance(program, Program):
+            continue  # no value satisfies a cell
+        certificate = prove_program(program, Options()).certificate
+        assert certificate is None or not certify(program, certificate).problems, text
+
+
 def test_a_procedure_that_only_a_procedure_calls_owes_nothing_by_itself() -> None:
     program = program_of(
         "input a : int 0 .. 9\nstate s : int 0 .. 9\nprocedure more(k : int 0 .. 9) { s := k + 4 }\n"

@@ -282,6 +282,10 @@ class Tree:
         if all(cut.form in self._singles for cut in region.cuts) and all(
             not line.rest and self._singles.issuperset(line.boxes) for line in region.lines
         ):
+            lines = [self._dropped(region, line) for line in region.lines]
+            if lines != region.lines:
+                region.lines = lines
+                return self._decide(region)
             boxes = [line.boxes for line in self._candidates(region)]
             extents = {form: self._range(region, form) for box in boxes for form in box}
             wrong = _defect(Boxes(extents, boxes), cover=not self.default)
