@@ -31,9 +31,16 @@ WRONG = [
     ("l0", "released", "begun", "WAITS"),
     ("l0", "deferred", "new_command", "UNREACHED"),
     ("l0", "deferred", "ECHO = SENT or status_in = done", "AGAIN"),
+    ("l0", "numbered", "false", "FAILED_STAYS"),
+    ("l1", "next", "SENT", "STANDS"),
     ("l1", "taken", "command.inc_command /= inc_command_seen or status_report = failed", "ONCE"),
 ]
 """A slip of the hand in a level, and a kind of claims that it makes false."""
+SLIPS_OF_LINES = [
+    ("| true || begin | order_pause | done |", "| true || begin | order_work | done |", {"PAUSES", "WAITS"}),
+    ("|  ||  | order_pause | done |", "|  ||  | order_pause | failed |", {"DONE_STAYS", "STANDS"}),
+]
+"""The same in a line of the first level's tables; all kinds that it makes false."""
 
 SAFE = {
     "lv.rcs": """
@@ -167,6 +174,16 @@ class TestClaimsOfRightTables:
     ) -> None:
         its, claims = stand(written(tmp_path, of(slipped(level, name, text)))), right[1]
         assert kind in broken(its, claims, (drawn_episode(its, 22, at) for at in range(4)))
+
+    @pytest.mark.parametrize(("line", "slip", "kinds"), SLIPS_OF_LINES)
+    def test_break_by_lines(
+        self, tmp_path: Path, right: tuple[Stand, Claims], line: str, slip: str, kinds: set[str]
+    ) -> None:
+        texts = of(RIGHT)
+        assert line in texts["l0.rcs"]
+        texts["l0.rcs"] = texts["l0.rcs"].replace(line, slip)
+        its, claims = stand(written(tmp_path, texts)), right[1]
+        assert kinds <= broken(its, claims, (drawn_episode(its, 22, at) for at in range(4)))
 
     def test_nothing_explains_it_but_older_values(self, right: tuple[Stand, Claims], tmp_path: Path) -> None:
         its = stand(written(tmp_path, of(slipped("l0", "echo", ""))))
