@@ -81,6 +81,20 @@ def planted(folder: Path) -> Path:
     return mark
 
 
+@pytest.mark.parametrize("command", [["check"], ["fmt", "--check"], ["prove"], ["compile", "-q"]])
+def test_a_command_about_tables_imports_nothing_of_their_folder(command: list[str], tmp_path: Path) -> None:
+    """In a process of its own, begun in the folder; an extern procedure names a module there, too."""
+    mark = planted(tmp_path / "dock")
+    with (tmp_path / "dock" / "drive.rcs").open("a", encoding="utf-8") as table:
+        table.write(
+            '\nextern procedure look writes look_seen python "base:look" c "look"\nstate look_seen : bool\n'
+        )
+    asked = (*COMMAND[:-2], *command, ".")
+    said = subprocess.run(asked, cwd=tmp_path / "dock", capture_output=True, text=True, check=False)
+    assert said.returncode in {0, 1}, said.stderr
+    assert not mark.exists()
+
+
 def test_opening_a_folder_runs_none_of_its_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Before somebody agreed, whatever a page asks; tables, proofs and graphs are there. Once a folder."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
