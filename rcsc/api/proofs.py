@@ -99,6 +99,7 @@ class Claim:
         verdict: `proved`, `assumed`, or why not.
         proved: Whether it holds, and all that it rests on.
         rests_on: Claims that it rests on and that are not proved, in words.
+        trusts: What it takes for granted of what no level is responsible for, in words: that an input is never refused, say.
     """
 
     level: str
@@ -108,6 +109,7 @@ class Claim:
     verdict: str
     proved: bool
     rests_on: tuple[str, ...] = ()
+    trusts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,6 +237,7 @@ def _claims(proof: SystemProof) -> Iterator[Claim]:
                 else "rests on what is not proved",
                 closed.proved,
                 rests,
+                tuple(closed.trusts),
             )
 
 

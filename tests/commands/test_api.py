@@ -116,6 +116,7 @@ def test_a_proof_says_what_the_command_says(capsys: pytest.CaptureFixture[str]) 
         assert [(one.level, one.what, one.table, one.name, one.verdict) for one in proof.claims] == [
             (level, goal["what"], goal["table"], goal["name"], goal["verdict"]) for level, goal in claims
         ]
+        assert [one.trusts for one in proof.claims] == [tuple(goal["trusts"]) for _, goal in claims]
         shown = [finding for finding in form["findings"] if finding["reproduces"]]
         runs = [found for found in proof.unproved if found.run]
         assert [[row.line for row in found.run] for found in runs] == [

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+import rcsc
 from rcsc.commands import run
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.proof.system import SystemProof, transition_systems
@@ -61,8 +62,12 @@ def test_a_line_that_a_safe_value_takes_away_trusts_that_nothing_is_refused(
 
 def test_a_property_about_an_input_trusts_that_no_other_is_refused(tmp_path: Path) -> None:
     """One that does not look at inputs trusts nothing: a refused cycle changes no output without a safe value."""
-    whole = prove_system(solo_system(tmp_path, GUARDED), LITTLE)
-    assert trusts(whole, Sort.PROPERTY, "", "only_guarded") == ("`level` of level `solo` is never refused",)
+    path = solo_system(tmp_path, GUARDED)
+    whole = prove_system(path, LITTLE)
+    words = ("`level` of level `solo` is never refused",)
+    assert trusts(whole, Sort.PROPERTY, "", "only_guarded") == words
+    [claim] = [each for each in rcsc.prove(path, cycles=0).claims if each.name == "only_guarded"]
+    assert (claim.proved, claim.trusts) == (True, words)
     assert trusts(whole, Sort.PROPERTY, "", "bounded") == ()
     assert trusts(whole, Sort.SOME_LINE, "t") == ()
 
