@@ -507,7 +507,7 @@ def test_features_that_come_later_come_last(upper: TransitionSystem) -> None:
         assert len({predicate.name for predicate in more}) == len(more)
     assert len(more) > len(few) > 1  # what a procedure decides by, behind what the property speaks of
     without = upper.of(replace(upper.program, properties=()))
-    assert "status_report" in {predicate.name for predicate in chosen(upper)} - {
+    assert "old_command" in {predicate.name for predicate in chosen(upper)} - {
         predicate.name for predicate in chosen(without)
     }
 
@@ -521,7 +521,7 @@ def chosen(ts: TransitionSystem, closely: int = 0) -> tuple[Predicate, ...]:
 
 
 def test_an_invariant_that_a_restart_breaks_is_told_by_check_and_shown(tmp_path: Path) -> None:
-    """Nothing that the lower level does fails; but it begins anew with a failure, as `run.adopt` says."""
+    """No order that the lower level takes fails; but it begins anew with a failure, as `run.adopt` says, and says so from then on."""
     ts = with_properties(
         tmp_path,
         "lower",
@@ -531,7 +531,10 @@ def test_an_invariant_that_a_restart_breaks_is_told_by_check_and_shown(tmp_path:
         finding.message
         for finding in prove_program(ts.program, Options()).findings
         if finding.severity is Severity.ERROR
-    ] == ["the values after a restart do not satisfy invariant `never_fails`"]
+    ] == [
+        "line `f` of table `go` can break invariant `never_fails`",
+        "the values after a restart do not satisfy invariant `never_fails`",
+    ]
     assert verdicts(prove_level(ts, LITTLE)) == {"never_fails": False, "under_way": True}
     obligation = stated(ts)["never_fails"]
     assert shortest(ts, obligation) is None
