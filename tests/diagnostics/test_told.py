@@ -197,8 +197,8 @@ input b : int 0 .. 1000000
 input c : int 0 .. 1000000
 {assume}table t {assuming} {{
   | line | when                               ||
-  | one  | a * b * c = 999999999989 or a < 9  ||
-  | two  | a * b * c /= 999999999989 and a > 9 ||
+  | one  | a * b * c /= 999999999989 or a < 9 ||
+  | two  | a * b * c = 999999999989 and a > 9 ||
 {more}}}
 """
 
