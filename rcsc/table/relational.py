@@ -236,7 +236,8 @@ class _Decision:
         with smt.within(self.spare):
             findings: tuple[TableFinding, ...] = (*(each.grown() for each in found), *dead)
         if search.undecided:
-            findings = (*findings, Undecided(f"{search.undecided} regions of the input space"))
+            many = "1 region" if search.undecided == 1 else f"{search.undecided} regions"
+            findings = (*findings, Undecided(f"{many} of the input space"))
         names = tuple(self.table.assumptions[at] for at in kept)
         certificate = (
             tree_certificate(self.table, self.universe, search.nodes, names) if search.proved else None

@@ -212,7 +212,7 @@ def verdict(more: str, assume: str) -> TableVerdict:
 @pytest.mark.parametrize(
     ("more", "assume", "words"),
     [
-        ("", "", ["whether line `two` can match", "2 regions of the input space"]),
+        ("", "", ["whether line `two` can match", "1 region of the input space"]),
         ("| d | DEFAULT ||\n", "", ["what no line matches", "whether line `two` can match"]),
         ("", "assume it assumed : a * b > 7 and a * b < 11\n", ["its assumptions"]),
     ],
