@@ -42,8 +42,8 @@ from rcsc.testing.inputs.sampling import declarations, snapshot
 
 MOST_CPU_S = 2.0
 """Of one command, on one table."""
-MOST_OF_PAIRS_CPU_S = 15.0
-"""Of the graph of lines, which asks about each pair of them, whether the table is wrong or not."""
+MOST_OF_PROOFS_CPU_S = 15.0
+"""Of what proves something of its own, whether a table is wrong or not: `diff`, and the graph of lines, which asks about each pair."""
 HANGS_S = 40
 """Past so much it is broken off."""
 MOST_LINES_OF_MASKS = 8
@@ -550,7 +550,7 @@ def _wrong_soon(place: Path) -> bool:
 
 
 def _is_late(name: str, took_s: float) -> bool:
-    return took_s > (MOST_OF_PAIRS_CPU_S if name == "graph --lines" else MOST_CPU_S)
+    return took_s > (MOST_OF_PROOFS_CPU_S if name in ("graph --lines", "diff") else MOST_CPU_S)
 
 
 def _timed(place: Path, text: str, rng: Rng) -> tuple[dict[str, float], list[str]]:

@@ -23,7 +23,7 @@ from rcsc.solvers.options import Options
 from rcsc.symbolic.evaluation import TooLongError
 from rcsc.table.cover import UndecidedError
 
-MOST_OF_A_PART = 2
+MOST_OF_A_PART = 1
 """Questions' worth of steps that a table, all procedures or all levels may take."""
 
 

@@ -210,6 +210,8 @@ class Space:
             trial_ = {**box, **parts}
             if spare.spent or any(_meet(trial_, other) for other in others):
                 return False
+            if smt.gives_up("how wide a region is"):
+                raise UndecidedError
             with smt.within(spare):
                 self.queries += 1
                 return bad.check(*self._inside(trial_)) is Answer.UNSATISFIABLE

@@ -36,7 +36,7 @@ MOST_TRIED = 60
 """Proposals of one program that are tried."""
 MOST_CELLS = 60_000
 """Cells of the tables that are proved anew for them, all together."""
-STEPS_OF_A_CELL = 200
+STEPS_OF_A_CELL = 60
 """What a cell of a table costs that is read and decided anew, in steps of Z3."""
 
 
@@ -75,7 +75,7 @@ def mended(
         smt.leave_open("whether a repair mends")
         return verdict.findings
     trials = _Trials(verdict, root, loaded, replace(options, brief=True, bare=True, jobs=1), known)
-    with smt.within(smt.Budget(min(WRONG_STEPS, options.together), of_all=True)):
+    with smt.within(smt.Budget(min(2 * WRONG_STEPS, options.together), of_all=True)):
         return tuple(_tried(finding, trials) for finding in verdict.findings)
 
 

@@ -55,7 +55,7 @@ Exit status: 0 same meaning, 1 changed, 2 usage, an error, or not decided.""",
               help="Write it to FILE instead of standard output.")  # fmt: skip
 @click.option("--color", type=click.Choice([color.value for color in Color]), default="auto", show_default=True,
               help="Colour the text; `auto` on a terminal, unless NO_COLOR is set.")  # fmt: skip
-@steps_option(1)
+@steps_option(6)
 @click.option("--memory", type=click.IntRange(min=64), default=4096, show_default=True, metavar="MB",
               help="Memory limit of the solver.")  # fmt: skip
 @click.option("--follow", is_flag=True,
