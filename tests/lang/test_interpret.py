@@ -338,6 +338,16 @@ def test_what_an_extern_procedure_gives_is_admitted() -> None:
     assert done.snapshot["done"] is False
 
 
+@pytest.mark.usefixtures("_extern")
+def test_of_several_tables_only_the_last_one_s_line_is_told_though_what_an_earlier_one_asks_is_refused() -> (
+    None
+):
+    more = "table u {\n  | line | a    ||\n  | y    | >= 0 ||\n}\nlevel l {\n  period 40 [ms]\n  table t\n  table u\n}\n"
+    made = program_of(EXTERN + more)
+    done = cycle(made, made.levels[0], {**initial(made), "a": 1, "b": 3})
+    assert (done.fault, done.fault_at, done.line, done.line_index) == (Fault.EXTERN, "c", None, -1)
+
+
 def test_cycles_of_drawn_programs_are_those_of_an_evaluator_of_its_own() -> None:
     ended: Counter[int] = Counter()
     for number in range(60):
