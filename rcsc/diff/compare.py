@@ -23,9 +23,6 @@ from rcsc.solvers.options import Options
 from rcsc.symbolic.evaluation import TooLongError
 from rcsc.table.cover import UndecidedError
 
-MOST_OF_A_PART = 1
-"""Questions' worth of steps that a table, all procedures or all levels may take."""
-
 
 def compare(
     name: str, before: Program, after: Program, options: Options, *, follow: bool = False
@@ -43,7 +40,9 @@ def compare(
     compared: list[ComparedPart] = []
     for what, steps in _steps(versions):
         try:
-            with smt.together(MOST_OF_A_PART * options.steps):
+            with smt.together(
+                options.steps
+            ):  # a table, all procedures or all levels take no more than a question may
                 compared += steps()
         except given_up:
             undecided.append(what)

@@ -382,7 +382,7 @@ class Workspace:
     def _outcome(self, checked: Checked, source: Source, told: Diagnostic, text: str) -> bool | None:
         """Whether nothing is wrong with the table in a text; None where the finding is still there, or another has come."""
         trial = self.trial({source.name: text})
-        with smt.within(smt.Budget(MOST_OF_A_REPAIR, of_all=True)):
+        with smt.together(MOST_OF_A_REPAIR, of_all=True):
             after = trial.checked(checked.reading.path)
         before = {key(each) for each in serious(checked.diagnostics)}
         now = {key(each) for each in serious(after.diagnostics)}

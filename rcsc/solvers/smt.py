@@ -177,9 +177,9 @@ def _absorb() -> None:
 
 
 @contextmanager
-def together(steps: int) -> Iterator[Budget]:
-    """Inside, all questions of all solvers take at most so many steps."""
-    budget = Budget(steps)
+def together(steps: int, *, of_all: bool = False) -> Iterator[Budget]:
+    """Inside, all questions of all solvers take at most so many steps; with `of_all` what is charged outside Z3, too."""
+    budget = Budget(steps, of_all)
     with within(budget):
         yield budget
 

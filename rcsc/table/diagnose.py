@@ -70,10 +70,10 @@ def diagnostics(
     """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
     table = verdict.table
     few = min(WRONG_STEPS, options.together)
-    with smt.within(smt.Budget(few, of_all=True)):
+    with smt.together(few, of_all=True):
         verdict = replace(verdict, findings=tuple(likely(program, table, verdict.findings, options)))
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
-    with smt.within(smt.Budget(few, of_all=True)):
+    with smt.together(few, of_all=True):
         shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
         effects = [_effects(program, table, each, options) for each in overlaps[MOST_PAIRS:MOST_COMPARED]]
     shown = grouped(table, overlaps, shown)
@@ -104,7 +104,7 @@ def diagnostics(
                 Code.OVERLAP, message, Label(table.span), notes=notes, witnesses=others, only_listed=True
             )
         )
-    with smt.within(smt.Budget(few, of_all=True)):
+    with smt.together(few, of_all=True):
         rest = list(_others(program, verdict, options, unproved))
     return shown + rest + _lower(table)
 

@@ -162,7 +162,7 @@ def _unproved(program: Program, findings: Iterable[Diagnostic]) -> frozenset[str
 def _met(program: Program, verdict: TableVerdict, options: Options) -> Met:
     """Prove what a table says of pairs of its lines; soon, where something else is wrong with it."""
     soon = options.few if verdict.refuted else options
-    with smt.within(smt.Budget(soon.steps if verdict.refuted else soon.together, of_all=verdict.refuted)):
+    with smt.together(soon.steps if verdict.refuted else soon.together, of_all=verdict.refuted):
         return met(program, verdict.table, soon)
 
 

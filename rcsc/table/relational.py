@@ -317,7 +317,8 @@ class _Decision:
         """Z3's answer about a region, as the tree asks it."""
         if len(asked.candidates) > _MOST_CANDIDATES or smt.spent() or (self.few and self.rest.spent):
             return NoWitness.UNKNOWN
-        self.rest.left -= _STEPS_OF_A_QUESTION * self.few
+        if self.few:
+            self.rest.left -= _STEPS_OF_A_QUESTION
         bounds = self.spelled(asked)
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
         for snapshot, found in self.tried:
@@ -327,8 +328,7 @@ class _Decision:
                 self.few = True
                 return snapshot
         z3 = self.asked
-        with smt.within(self.rest) if self.few else nullcontext():
-            answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
+        answer = self.holds(*(encode(condition, z3.frame) for condition in conditions))
         if answer is Answer.SATISFIABLE:
             self.few = True
             return self.model(z3)
