@@ -66,9 +66,12 @@ def points(variables: Sequence[Variable]) -> Iterator[Point]:
 
 
 def towards(point: Point, tests: Sequence[Test], kinds: Mapping[str, Scalar], random: Random) -> Point:
-    """The point changed so that tests of one variable, and masks of words, hold, each by itself; the last that changes a variable wins."""
+    """The point changed so that tests of one variable, then masks of words, hold, each by itself; the last that changes a variable wins.
+
+    A mask comes after: it leaves bits free, so that what was chosen for a range mostly stays in it.
+    """
     moved = dict(point)
-    for test in tests:
+    for test in sorted(tests, key=lambda test: not test.box):
         name = str(test.variables[0]) if test.variables else ""
         if test.box:
             first, last = random.choice(test.box)
