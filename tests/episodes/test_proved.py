@@ -20,6 +20,7 @@ from rcsc.episodes.stand import Stand, stand
 from tests.claims import WITHIN, drawn_episode, played, proved_claims_of
 from tests.small_hierarchies.made import Hierarchy, hierarchy
 from tests.small_hierarchies.text import files
+from tests.support.programs.texts import edited
 
 RIGHT = hierarchy(22, frozenset(range(9)))
 """Three levels, as they have to be."""
@@ -42,6 +43,11 @@ SLIPS_OF_LINES = [
     ("|  ||  | order_pause | done |", "|  ||  | order_pause | failed |", {"DONE_STAYS", "STANDS"}),
 ]
 """The same in a line of the first level's tables; all kinds that it makes false."""
+BLIND = (
+    ("| 0 | true |  |", "| 0 | true | s1 |"),
+    ("| 99 | DEFAULT |  |  |  ||  |", "| 99 | DEFAULT |  |  |  || begin |"),
+)
+"""DEFAULT takes a new command, which then is new no more."""
 
 SAFE = {
     "lv.rcs": """
@@ -64,6 +70,47 @@ level lv { period 40 [ms] table t }
     '[buffers]\n"out.x" = "lv.x"\n"out.y" = "lv.y"\n' + WITHIN,
 }
 
+PAIR = {
+    "w.rcs": """
+input x : int 0 .. 9
+output o : int 0 .. 9
+table t {
+  | line | x    || o     |
+  |------|------||-------|
+  | low  | < 5  || x     |
+  | high | >= 5 || 9 - x |
+}
+level w { period 40 [ms] table t }
+""",
+    "r.rcs": """
+input o : int 0 .. 9
+state seen : int 0 .. 9
+output z : bool
+invariant little : seen <= 4
+property shown : z implies o <= 3
+assume small assumed monitored : o <= 4
+table t assuming small {
+  | line | o                   || seen | z     |
+  |------|---------------------||------|-------|
+  | few  | <= 3                || o    | true  |
+  | most | 4                   || 4    | false |
+  | rest | DEFAULT unreachable || 0    | true  |
+}
+level r { period 40 [ms] table t }
+""",
+    "system.toml": 'name = "sn"\ngenerated = "generated"\ntick_ms = 40\n[[level]]\nname = "w"\n[[level]]\nname = "r"\n'
+    '[buffers]\n"out.x" = "w.x"\n"w.o" = "r.o"\n' + WITHIN,
+}
+"""One level reads what another writes, and rests on it."""
+OF_THE_PAIR = {"OWED", "GIVEN", "ASSUMPTION", "NO_DEFAULT", "PROPERTY"}
+"""Kinds of claims that a number too high by one makes false."""
+SLIPS_OF_CODE = [
+    ("w.py", "s.o = s.x", "s.o = s.x + 20", "SAFE"),
+    ("r.py", "s.seen = s.o", "s.seen = s.o + 2", "INVARIANT"),
+    ("w.py", "        return 0\n", "        return -1\n", "SOME_LINE"),
+    ("w.py", "        return 0\n", "        return -2\n", "ONE_LINE"),
+]
+"""A slip in the Python of one of them, and the kind of claims that it makes false: no table that does so is compiled."""
 
 TIMELY = {
     "lv.rcs": """
@@ -185,6 +232,27 @@ class TestClaimsOfRightTables:
         texts["l0.rcs"] = texts["l0.rcs"].replace(line, slip)
         its, claims = stand(written(tmp_path, texts)), right[1]
         assert kinds <= broken(its, claims, (drawn_episode(its, 22, at) for at in range(6)))
+
+    def test_of_a_command_that_is_passed_over_break(
+        self, tmp_path: Path, right: tuple[Stand, Claims]
+    ) -> None:
+        texts = of(RIGHT)
+        its = stand(written(tmp_path, {**texts, "l0.rcs": edited(texts["l0.rcs"], *BLIND)}))
+        assert "ANSWERED" in broken(its, right[1], (drawn_episode(its, 22, at) for at in range(4)))
+
+    def test_of_what_another_level_writes_break(self, tmp_path: Path) -> None:
+        claims = proved_claims_of(written(tmp_path / "right", PAIR))
+        slip = PAIR["w.rcs"].replace("|| x     |", "|| x + 1 |")
+        its = stand(written(tmp_path / "wrong", {**PAIR, "w.rcs": slip}))
+        assert broken(its, claims, (drawn_episode(its, 1, at) for at in range(3))) == OF_THE_PAIR
+
+    @pytest.mark.parametrize(("file", "right", "slip", "kind"), SLIPS_OF_CODE)
+    def test_break_by_code(self, tmp_path: Path, file: str, right: str, slip: str, kind: str) -> None:
+        path = written(tmp_path, PAIR)
+        claims, code = proved_claims_of(path), tmp_path / "generated" / "python" / file
+        code.write_text(edited(code.read_text(encoding="utf-8"), (right, slip)), encoding="utf-8")
+        its = stand(path)
+        assert kind in broken(its, claims, (drawn_episode(its, 1, at) for at in range(3)))
 
     def test_nothing_explains_it_but_older_values(self, right: tuple[Stand, Claims], tmp_path: Path) -> None:
         its = stand(written(tmp_path, of(slipped("l0", "echo", ""))))
@@ -323,6 +391,14 @@ def test_an_echo_that_goes_back_is_found_in_a_cycle_that_a_fault_ends(right: tup
     )
     outcome = loop.finish()
     assert not outcome.findings
+
+
+def test_every_kind_of_claim_is_seen_broken() -> None:
+    """Those without a table of their own by tests above: a command that is passed over, one that goes on for ever."""
+    kinds = {kind for *_, kind in WRONG} | {kind for *_, some in SLIPS_OF_LINES for kind in some}
+    kinds |= {kind for *_, kind in SLIPS_OF_CODE} | OF_THE_PAIR
+    kinds |= {"ANSWERED", "ENDS"}
+    assert kinds == WATCHED
 
 
 def test_every_sort_of_obligation_is_watched() -> None:
