@@ -83,6 +83,20 @@ def test_masks_that_two_lines_share_are_tried() -> None:
     assert "RCS409" not in {each.code for each in found}
 
 
+def test_regions_that_are_shown_are_cut_out_once() -> None:
+    """Sixty-four are shown, over thirty bits: each time all of them, it takes two and a half times as many steps."""
+    rng = random.Random(3)  # noqa: S311 - a draw that repeats
+    masks = ["0b" + "".join(rng.choice("01xxx") for _ in range(15)) for _ in range(8)]
+    rows = "".join(
+        f"| n{at} | {one} | {other} || {at} |\n"
+        for at, (one, other) in enumerate(zip(masks[::2], masks[1::2], strict=True))
+    )
+    declared = "input a : int 0 .. 32767\ninput b : int 0 .. 32767\noutput o : int 0 .. 9\n"
+    with counted(MOST_STEPS):
+        [found] = reported(f"{declared}table t {{\n| line | a | b || o |\n{rows}}}\n")
+    assert found.code == "RCS401"
+
+
 def test_trials_of_helps_are_bounded_outside_the_solver_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """The trial needs no solver: its tree of regions counts, a node as so many steps."""
     rows = "| p | <= 3 | a + b < 10 || 1 |\n| q | >= 3 | a + b < 10 || 2 |\n| r | | a + b >= 10 || 2 |\n"

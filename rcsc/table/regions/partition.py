@@ -230,6 +230,7 @@ class Gaps(Generic[Axis]):
     _shown: list[BoxLine[Axis]] = field(default_factory=list)
     _without: set[tuple[int, int]] = field(default_factory=set)
     _sliced: "dict[Axis, Sliced] | None" = None
+    _regions: "list[Piece[Axis]]" = field(default_factory=list)
     _looked_at: int = 0
 
     @classmethod
@@ -263,12 +264,12 @@ class Gaps(Generic[Axis]):
         axes = self._axes(shown)
         self._without = set()
         alive = _any(1 << at for at, boxes in enumerate([*self.table.lines, *shown]) if all(boxes.values()))
-        regions = [self.table.piece(1, region) for region in shown]  # they meet no line and not each other
         below, idle = list[tuple[Sliced, int]](), -1
         for axis in reversed(axes.values()):
             idle &= axis.idle
             below.append((axis, idle))
-        return self._search(0, alive, below[::-1], [*self.pieces, *regions])
+        pieces = [*self.pieces, *self._regions]  # regions meet no line and not each other
+        return self._search(0, alive, below[::-1], pieces)
 
     def _least_hole(self, holes: list[Hole[Axis]], shown: Sequence[BoxLine[Axis]]) -> Cell[Axis] | None:
         """The hole with the least place of all, once the regions shown are taken out; they are those shown before, and more."""
@@ -285,12 +286,13 @@ class Gaps(Generic[Axis]):
         return min(cells, key=lambda cell: [low for low, _ in cell.values()], default=None)
 
     def _axes(self, shown: Sequence[BoxLine[Axis]]) -> dict[Axis, "Sliced"]:
-        """The axes in slices, with the lines and after them the regions shown."""
-        if self._sliced is None:
-            self._sliced = self.table.sliced()
-        axes = self._sliced
-        for at, region in enumerate(shown, len(self.table.lines)):
-            axes = {name: axis.also(1 << at, region.get(name)) for name, axis in axes.items()}
+        """The axes in slices, with the lines and after them the regions shown: those shown before, and more."""
+        axes = self.table.sliced() if self._sliced is None else self._sliced
+        for region in shown[len(self._regions) :]:
+            bit = 1 << len(self.table.lines) + len(self._regions)
+            axes = {name: axis.also(bit, region.get(name)) for name, axis in axes.items()}
+            self._regions.append(self.table.piece(1, region))
+        self._sliced = axes
         return axes
 
     def _search(

@@ -66,7 +66,7 @@ class Part:
     @property
     def ones(self) -> int:
         """The word that has ones here and nowhere else."""
-        return self.kind.high << self.low
+        return ((1 << self.bits) - 1) << self.low
 
     def of(self, leaf: Variable) -> Expr:
         """The bits as a number, of the word in whole."""
