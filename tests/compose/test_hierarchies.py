@@ -77,6 +77,15 @@ def test_the_proof_and_the_enumeration_agree_of_random_hierarchies() -> None:
     assert counts["pairs together"] > 0
 
 
+def test_the_command_taken_last_is_remembered_though_no_number_tells_it(tmp_path: Path) -> None:
+    """Where the level above changes an order under its number, what was answered of the order before has to be known."""
+    role = roles(said(plain(), 0, numbered="new_command"), tmp_path)["l1"]
+    assert role.links.above is not None
+    assert role.links.above.numbered == ()
+    [taken] = {leaf for leaf in role.inputs if leaf.endswith(".input_command")}
+    assert canonical(role, {**role.start, taken: 1})[taken] == 1
+
+
 def test_a_hierarchy_is_the_same_each_time_and_others_are_others() -> None:
     assert files(hierarchy(7)) == files(hierarchy(7))
     assert len({files(hierarchy(seed))["l0.rcs"] for seed in range(40)}) > 30

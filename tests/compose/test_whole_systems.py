@@ -50,6 +50,11 @@ def test_what_is_proved_holds_in_runs_of_the_whole() -> None:
         assert counts[f"event: {event.value[0]}"] > 0, event
 
 
+def test_a_first_number_keeps_its_name_where_nothing_was_published() -> None:
+    """A level that begins anew before its first report says the first number again, which by then has another name."""
+    assert held(drawn(1_001_227), 1_001_227, Counter()) == []
+
+
 def test_every_kind_is_drawn() -> None:
     systems = [drawn(seed) for seed in range(400)]
     kinds = Counter(kind for made in systems for kind in made.kinds)

@@ -195,7 +195,7 @@ class Role:
         """Inputs whose last values the contract, or an obligation, speaks of."""
         found = {f"{below.report}.inc_command_echo" for below in self.links.below}
         if (above := self.links.above) is not None:
-            found |= {f"{above.order}.inc_command", *above.numbered}
+            found |= {f"{above.order}.inc_command", f"{above.order}.input_command", *above.numbered}
         found |= {name.removeprefix(BEFORE) for name in self._stated if name.startswith(BEFORE)}
         return frozenset(found & set(self.inputs))
 

@@ -133,6 +133,8 @@ class Whole:
         for at in self.out[level]:
             if (held := now.stands[at]) is not None:
                 stands |= dict(zip(self.wires[at].given, held, strict=True))
+            elif at in self._reports:  # the first number, by the name that it has now
+                stands[self.wires[at].given[0]] = now.seen[at][0]
         after = part.anew(now.levels[level], given, stands)
         return replaced(now, level, after)
 
@@ -165,6 +167,11 @@ class Whole:
                 )
                 found.append((upper, mine, part.names.index(number), lower, theirs, order, report))
         return found
+
+    @cached_property
+    def _reports(self) -> frozenset[int]:
+        """The wires whose records begin with an echo."""
+        return frozenset(report for *_, report in self._between)
 
     def named(self, now: Now) -> Now:
         """The same state: numbers from outside by their first names, those between two levels by their age only."""
