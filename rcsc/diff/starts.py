@@ -8,8 +8,8 @@ Which version a file was written for stands nowhere in it. A project whose `rcsc
 written out, since then, and is left as it is.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import TypeVar
 
 from rcsc.lang.model import (
@@ -19,6 +19,7 @@ from rcsc.lang.model import (
     Program,
     Real,
     Scalar,
+    Single,
     Type,
     Value,
     key_bounds,
@@ -26,6 +27,7 @@ from rcsc.lang.model import (
     start,
     value_of_key,
 )
+from rcsc.lang.operator_table import single
 from rcsc.lang.project import Loaded, project_root, starts_at_zero
 from rcsc.lang.resolve import closure, resolve
 from rcsc.lang.resolve.variables import element
@@ -38,14 +40,18 @@ FieldT = TypeVar("FieldT", bound=tree.FieldDecl)
 def written_out(
     loaded: Loaded, names: Sequence[str], programs: Mapping[str, Program]
 ) -> tuple[dict[str, tree.File], list[str]]:
-    """Return the files of `names` that change, and what was written, in words."""
+    """Return the files of `names` that change, and what was written, in words.
+
+    A number is written as the program writes it already where it does, since no text has two numbers that are one double.
+    """
     files: dict[str, tree.File] = {}
     words: list[str] = []
     users = {name: root for root in programs for name in closure(root, loaded)}
     for name in names:
         if starts_at_zero(project_root(name)):
             continue
-        work = _File(programs[users[name]])
+        files_used = [loaded.files[used] for used in closure(users[name], loaded)]
+        work = _File(programs[users[name]], _texts(files_used))
         before = loaded.files[name]
         after = replace(before, declarations=tuple(map(work.declaration, before.declarations)))
         if work.words:
@@ -76,6 +82,7 @@ class _File:
     """One file, in the words of a program that uses it."""
 
     program: Program
+    texts: Mapping[tuple[bool, float], str]
     words: list[str] = field(default_factory=list)
 
     def declaration(self, written: tree.Declaration) -> tree.Declaration:
@@ -118,12 +125,35 @@ class _File:
         said = safe is not None or not isinstance(scalar, Int | Real) or scalar.low <= 0 <= scalar.high
         if said and (start(scalar) if safe is None else safe) == least:
             return None
-        value = _spelled(scalar, least)
+        value = _spelled(scalar, least, self.texts)
         self.words.append(f"`{place}` says `= {spell_expr(value)}`, with which it started")
         return value
 
 
-def _spelled(kind: Scalar, value: Value) -> tree.Expr:
+def _texts(files: Iterable[tree.File]) -> dict[tuple[bool, float], str]:
+    """How numbers with a point are written in the files, by whether they become singles and by the value; bounds of singles first."""
+    written = [(literal, bound) for file in files for literal, bound in _literals(file, False)]
+    texts: dict[tuple[bool, float], str] = {}
+    for literal, _ in sorted(written, key=lambda each: not each[1]):
+        value = float(literal.text.replace("_", ""))
+        texts.setdefault((False, value), literal.text)
+        texts.setdefault((True, single(value)), literal.text)
+    return texts
+
+
+def _literals(part: object, bound: bool) -> Iterator[tuple[tree.RealLiteral, bool]]:
+    """Yield each number with a point, and whether it bounds a single."""
+    if isinstance(part, tree.RealLiteral):
+        yield part, bound
+    elif isinstance(part, tuple):
+        for each in part:
+            yield from _literals(each, bound)
+    elif is_dataclass(part):
+        for inner in fields(part):
+            yield from _literals(getattr(part, inner.name), bound or isinstance(part, tree.SingleType))
+
+
+def _spelled(kind: Scalar, value: Value, texts: Mapping[tuple[bool, float], str]) -> tree.Expr:
     match kind:
         case Bool():
             return tree.BoolLiteral(bool(value))
@@ -131,5 +161,7 @@ def _spelled(kind: Scalar, value: Value) -> tree.Expr:
             return tree.Reference(tree.Name(spell(kind, value)))
         case Int() | Real():
             text = spell(kind, abs(value))
+            if isinstance(kind, Real):
+                text = texts.get((isinstance(kind, Single), abs(value)), text)
             number = tree.IntLiteral(text) if isinstance(kind, Int) else tree.RealLiteral(text)
             return tree.Unary("-", number) if value < 0 else number

@@ -84,6 +84,9 @@ def upgrade(loaded: Loaded, names: Sequence[str]) -> Upgraded:
     rewritten = replace(loaded, files=work.files(kept))
     started, values = written_out(rewritten, names, programs)
     rewritten = replace(rewritten, files={**rewritten.files, **started})
+    for root in roots:
+        if not isinstance(unread := resolve(root, rewritten), Program):
+            return Upgraded({}, diagnostics=tuple(unread))
     files = {name: rewritten.files[name] for name in (*changed, *started)}
     done = (*(f"{each.file}: {each.words}" for each in kept), *values)
     return Upgraded(files, done, (*left, *started_otherwise(rewritten, programs)))

@@ -269,6 +269,20 @@ def test_what_started_with_the_least_of_its_type_still_does(tmp_path: Path) -> N
     assert (same, again.changed) == (text, 0)
 
 
+def test_a_start_is_written_as_its_number_stands_in_the_text(tmp_path: Path) -> None:
+    """Two numbers of a text that are one double, or one single, are an error: none is written beside one that is there."""
+    text = """const least = 0.10000000149011612
+const lowest = -1.50000000000000001
+input greatest : single -3.4028234663852886e38 .. 3.0e38
+input near : real 0.10000000000000000555 .. 1.0
+input named : single least .. 1.0
+input at : real lowest .. 1.0
+state far : array[2] of real -1e300 .. 2.0
+state ready : bool
+"""
+    assert starts(upgraded(tmp_path, text)[1]) == starts(text, least_first=True)
+
+
 def test_a_project_written_since_keeps_its_starts(tmp_path: Path) -> None:
     path = tmp_path / "a.rcs"
     path.write_text("output speed : int -400 .. 400 safe 0\n", encoding="utf-8")
