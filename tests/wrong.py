@@ -352,7 +352,7 @@ def commands(
     names = list(by_shell) if every else ["check", rng.choice(list(by_shell)[1:])]
     for name in names:
         yield name, rcsc(*by_shell[name])
-    if not every and rng.randrange(4):
+    if not every and rng.randrange(8):
         return
     workspace = Workspace()
     path = str(file)
