@@ -89,6 +89,23 @@ def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = 
     return tuple(now)
 
 
+def unlike(sign: Signature, values: Values, given: Values) -> dict[int, Value]:
+    """Return what a start anew leaves, of each leaf of which it never leaves what stands in `values`.
+
+    Args:
+        sign: The level's program.
+        values: All leaves, from which it is said to have gone on.
+        given: Those that its last cycle left; its buffers hold their outputs, or nothing of it yet.
+    """
+    leaves = sign.leaves
+    first = [values[at] if leaf.kind == "input" else leaf.initial for at, leaf in enumerate(leaves)]
+    outputs = {at: given[at] for at, leaf in enumerate(leaves) if leaf.kind == "output"}
+    ways = [adopt(sign, tuple(first), stands) for stands in (outputs, {})]
+    return {
+        at: ways[0][at] for at in range(len(leaves)) if all(repr(way[at]) != repr(values[at]) for way in ways)
+    }
+
+
 @dataclass(frozen=True, slots=True)
 class Fixed:
     """The leaf at a position starts with a value."""

@@ -548,7 +548,7 @@ def rewritten(  # what a forger may change
     metadata: Callable[[str, dict[str, str]], dict[str, str]] = lambda _, said: said,
     topic: Callable[[str], str] = lambda said: said,
     channel_data: Callable[[dict[str, str]], dict[str, str]] = lambda said: said,
-    message: Callable[[int, bytes], tuple[int, bytes]] = lambda tick, data: (tick, data),
+    message: Callable[[int, bytes], tuple[int, bytes] | None] = lambda tick, data: (tick, data),
 ) -> Path:
     """The log as another program writes it, every CRC right."""
     from mcap.reader import make_reader
@@ -572,8 +572,9 @@ def rewritten(  # what a forger may change
                     number,
                     channel_data(dict(channel.metadata)),
                 )
-            tick, data = message(said.sequence, said.data)
-            out.add_message(channels[channel.topic], said.log_time, data, said.log_time, tick)
+            kept = message(said.sequence, said.data)
+            if kept is not None:
+                out.add_message(channels[channel.topic], said.log_time, kept[1], said.log_time, kept[0])
         for one in several if chain else ():
             if one.name.startswith(("rcsc.chain", "rcsc.seal")):
                 out.add_metadata(one.name, dict(one.metadata))
@@ -647,6 +648,10 @@ FORGED: Mapping[str, Mapping[str, Any]] = {
     "a tick far away": {"message": lambda tick, data: (2**32 - 1 if tick == 30 else tick, data)},
     "a tick before": {"message": lambda tick, data: (29 if tick == 30 else tick, data)},
     "a longer record": {"message": lambda tick, data: (tick, data + b"x")},
+    "a cycle left out": {"message": lambda tick, data: None if tick == 20 else (tick, data)},
+    "ticks of another length": {"metadata": _facts("tick_ms", lambda said: str(int(said) // 2))},
+    "ticks that no period has": {"metadata": _facts("tick_ms", lambda said: str(int(said) - 1))},
+    "a level twice": {"metadata": _facts("levels", lambda said: said * 2)},
 }  # fmt: skip
 
 

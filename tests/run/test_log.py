@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -18,7 +19,7 @@ from mcap.writer import Writer
 
 from rcsc.commands.group import commands
 from rcsc.run.adopt import Begun
-from rcsc.run.description import Description, LevelSpec, Wire, description
+from rcsc.run.description import BadDescription, Description, LevelSpec, Wire, description
 from rcsc.run.levels import Query
 from rcsc.run.log.export import coverage, csv_text, json_text
 from rcsc.run.log.queries import BadExpression, predicate
@@ -354,8 +355,37 @@ def test_what_other_tables_lack_is_named_and_not_said_to_be_the_same(tmp_path: P
     result = run("replay", logged, "--executor", "python", "--generated", folder)
     assert "nothing differs" not in result.output
     assert "nothing that these tables have differs" in result.output
-    assert "not compared: gripper.to_primitive.opening_mm" in result.output
+    assert "not in these tables, and so not compared: gripper.to_primitive.opening_mm" in result.output
+    assert "not in the log, and so not compared: gripper.to_primitive.width_mm" in result.output
     assert "not compared" not in run("replay", logged, "--executor", "python").output
+
+
+def with_level(log: Log, name: str, **changed: Any) -> Log:
+    """The log, with something of one level changed."""
+    levels = (replace(level, **changed) if level.name == name else level for level in log.levels)
+    return replace(log, levels=tuple(levels))
+
+
+def test_a_bit_of_no_assumption_differs(logged: Path) -> None:
+    """It has no word in which it could be told; its bytes are others all the same."""
+    log = read(logged)
+    packed = log.level("task").track.packed
+    packed[20] = packed[20][:-1] + b"\x80"
+    moment = Replay(log, REPO / "generated", "python").first_difference()
+    assert moment is not None
+    assert moment.tick == 20
+    (difference,) = next(cycle for cycle in moment.cycles if cycle.level == "task").differences
+    assert difference.name.startswith("assumptions_failed")
+    assert difference.then != difference.now
+
+
+def test_what_a_log_says_of_a_level_is_what_its_tables_are(log: Log) -> None:
+    sign = log.level("task").sign
+    forged = with_level(
+        log, "task", sign=replace(sign, leaves=(*sign.leaves[:-1], replace(sign.leaves[-1], unit="kg")))
+    )
+    with pytest.raises(BadDescription, match="bears their digest"):
+        Replay(forged, REPO / "generated", "python")
 
 
 def test_a_log_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
@@ -368,11 +398,22 @@ def test_a_log_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
 # --- restarts ---
 
 
+def slower(folder: Path) -> Path:
+    """The generated folder, beside a log, of tables whose VISION runs in every third tick."""
+    generated = folder / "generated"
+    if not generated.exists():
+        shutil.copytree(REPO / "generated", generated)
+        symbols = generated / "c" / "vision.json"
+        text = symbols.read_text(encoding="utf-8")
+        assert text.count('"period_ms": 40') == 1
+        symbols.write_text(text.replace('"period_ms": 40', '"period_ms": 120'), encoding="utf-8")
+    return generated
+
+
 def restarted(path: Path, kind: Kind) -> Path:
     """A run in which levels are started again, each before the cycle with the number after."""
-    running = system(kind)
+    running = system(kind, slower(path.parent))
     levels = {level.name: level for level in running.levels}
-    levels["vision"].level = replace(levels["vision"].level, period_ms=120)
     checkpoints: dict[int, Values] = {}
     with Recorder(running, path) as recorder:
         running.watch.append(recorder)
@@ -405,7 +446,7 @@ STARTED = {
 
 @pytest.mark.parametrize("kind", ["c", "python"])
 def test_restarts_are_recorded_and_replayed_exactly(again_and_again: Path, kind: Kind) -> None:
-    again = Replay(read(again_and_again), REPO / "generated", kind)
+    again = Replay(read(again_and_again), slower(again_and_again.parent), kind)
     moments = list(again.moments())
     assert [moment.tick for moment in moments if moment.differs] == []
     began = {
@@ -417,6 +458,30 @@ def test_restarts_are_recorded_and_replayed_exactly(again_and_again: Path, kind:
     assert began == STARTED
     assert not again.go(33).differs
     assert again.back().cycles[0].restarted is Begun.ANEW
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "leaf"), [("task", 33, "cur_state"), ("gripper", 21, "to_primitive.opening_mm")]
+)
+def test_a_restart_that_leaves_what_none_does_differs(
+    again_and_again: Path, name: str, at: int, leaf: str
+) -> None:
+    """Anew, and from a checkpoint: even where the cycle after it leaves the same."""
+    log = read(again_and_again)
+    level = log.level(name)
+    place = level.sign.index[leaf]
+    forged = tuple(
+        replace(
+            restart, values=(*restart.values[:place], restart.values[place] + 1, *restart.values[place + 1 :])
+        )
+        if restart.tick == at
+        else restart
+        for restart in level.restarts
+    )
+    again = Replay(with_level(log, name, restarts=forged), slower(again_and_again.parent), "python")
+    told = [one.name for cycle in again.go(at).cycles if cycle.level == name for one in cycle.differences]
+    assert leaf in told
+    assert not again.go(at - 1).differs
 
 
 def test_the_executors_record_the_same_restarts(tmp_path: Path, again_and_again: Path) -> None:
@@ -440,7 +505,7 @@ def test_every_restart_is_in_the_log_and_said(again_and_again: Path) -> None:
     shown = run("log", again_and_again).output
     assert "started again before cycle 21: from the state that its last cycle left" in shown
     assert shown.count("started again") == 9
-    args = ["--generated", REPO / "generated", "--executor", "python", "--at", 33]
+    args = ["--generated", slower(again_and_again.parent), "--executor", "python", "--at", 33]
     assert run("replay", again_and_again, *args).output.count("started again, anew") == 2
 
 

@@ -66,13 +66,14 @@ def command(
     if moment is not None and moment.differs:
         return _differs(file, again, moment)
     if tick is None:
-        lacking = again.lacking
-        differs = "nothing that these tables have differs" if lacking else "nothing differs"
+        lacking, unlogged = again.lacking, again.unlogged
+        of = " that these tables have" if lacking else " that the log has" if unlogged else ""
         other = "" if again.unchanged else ", by other executors than ran then"
-        click.echo(f"{len(log.ticks)} ticks replayed{other}: {differs}; {log.checked.text}")
-        if lacking:
-            more = f", and {len(lacking) - SHOWN} more" if len(lacking) > SHOWN else ""
-            click.echo(f"not in these tables, and so not compared: {', '.join(lacking[:SHOWN])}{more}")
+        click.echo(f"{len(log.ticks)} ticks replayed{other}: nothing{of} differs; {log.checked.text}")
+        for where, names in (("these tables", lacking), ("the log", unlogged)):
+            if names:
+                more = f", and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+                click.echo(f"not in {where}, and so not compared: {', '.join(names[:SHOWN])}{more}")
     if not log.complete:
         return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {log.checked.text}")
     return 0

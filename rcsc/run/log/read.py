@@ -15,6 +15,7 @@ from mcap.records import Channel, McapRecord, Message, Metadata
 from rcsc.host.files.names import identifier, shown
 from rcsc.run.adopt import Begun
 from rcsc.run.description import Description, wire_of
+from rcsc.run.log import cadence
 from rcsc.run.log.finding import FINDING, LoggedFinding, finding_of
 from rcsc.run.log.records import ChainCheck, Seal, records
 from rcsc.run.log.schema import (
@@ -291,7 +292,18 @@ class _Reading:
         held = sum(len(track.ticks) for track in self.tracks.values())
         if log.last - log.first > _ALWAYS_TICKS + _TICKS_A_MESSAGE * held:
             raise ValueError(f"{log.last - log.first} ticks and {held} records")
+        self._check(log)
         return log
+
+    def _check(self, log: Log) -> None:
+        """Raises: ValueError: The records are not those of one run."""
+        cycles = {level.name: (level.track.ticks, level.level.period_ms) for level in log.levels}
+        cadence.check_named([level.name for level in log.levels], self.signs)
+        cadence.check_begun(ticks for ticks, _ in cycles.values())
+        if log.finding is None:  # in which levels run when they like
+            cadence.check_cycles(cycles, log.tick_ms, whole=log.complete)
+        for level in log.levels:
+            cadence.check_restarts(level.name, [each.tick for each in level.restarts], log.ticks)
 
     def _level(self, name: str) -> LoggedLevel:
         sign = self.signs[name]

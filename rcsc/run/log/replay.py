@@ -1,6 +1,6 @@
 """Replay: every level runs again from the recorded state with the recorded inputs, and must leave what it left then.
 
-A restarted level runs from the state that was recorded of its restart.
+A restarted level runs from the state that was recorded of its restart, which must be one that a restart leaves.
 
 In: a log and a folder of generated executors. Out: moments, and differences in the words of the tables. With another
 folder than that of the log it is a what-if: the first difference is where the other tables leave other values; another
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rcsc.run.adopt import Begun
+from rcsc.run.adopt import Begun, unlike
 from rcsc.run.answers import Answers, told
 from rcsc.run.description import BadDescription
 from rcsc.run.executors import Executor
@@ -75,6 +75,7 @@ class _Again:
         same: Whether the signature is the recorded one, so that bytes can be compared.
         aside: What is shown but makes no difference alone: in a what-if, which line it was.
         lacking: What the log has and these tables have not: leaves, and values that were put as the initial one.
+        unlogged: Leaves that these tables have and the log has not.
     """
 
     logged: LoggedLevel
@@ -87,6 +88,7 @@ class _Again:
     inputs: frozenset[int] = frozenset()
     carried: tuple[tuple[int, int], ...] = ()
     lacking: dict[str, None] = field(default_factory=dict)
+    unlogged: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         then = self.logged.sign
@@ -96,6 +98,9 @@ class _Again:
         )
         gone = (leaf.name for leaf in then.leaves if leaf.name not in self.sign.index)
         self.lacking = dict.fromkeys(f"{self.logged.name}.{name}" for name in gone)
+        self.unlogged = tuple(
+            f"{self.logged.name}.{leaf.name}" for leaf in self.sign.leaves if leaf.name not in then.index
+        )
 
     def cycle(self, at: int, answers: Answers) -> ReplayedCycle | None:
         """Run the cycle whose record has this place; None for the state that recording started from.
@@ -117,11 +122,28 @@ class _Again:
             self.logged.name,
             _line(self.logged.sign, self.logged.level, recorded),
             _line(self.sign, self.level, now),
-            () if equal else self._differences(recorded, now),
+            (*self._begun(at), *(() if equal else self._differences(recorded, now))),
             recorded,
             now,
             None if restart is None else restart.begun,
         )
+
+    def _begun(self, at: int) -> Iterator[ReplayDifference]:
+        """Yield what the restart before a cycle is said to have left and does not leave."""
+        restart, track = self.logged.restarted(at), self.logged.track
+        if restart is None or not self.same:
+            return
+        given, leaves = track.layout.unpack(track.packed[at - 1]), self.sign.leaves
+        if restart.begun is Begun.CHECKPOINT:
+            state = struct.pack(self.sign.form(range(len(leaves))), *restart.values)
+            known = any(content.startswith(state) for content in track.packed[:at])  # of any cycle
+            wrong = {} if known else dict(enumerate(given[: len(leaves)]))
+        else:
+            wrong = unlike(self.sign, restart.values, given)
+        for place, value in wrong.items():
+            then, now = (leaves[place].shown(each) for each in (restart.values[place], value))
+            if then != now:
+                yield ReplayDifference(leaves[place].name, then, now)
 
     def _put(self, before: Values, recorded: Values) -> None:
         """Put the state before the cycle, and its inputs; keep what the log does not hold.
@@ -151,7 +173,17 @@ class _Again:
             for name, then in then_words.items()
             if name in now_words and now_words[name] != then
         )
-        return differences if any(difference.name not in self.aside for difference in differences) else ()
+        if any(difference.name not in self.aside for difference in differences):
+            return differences
+        return tuple(self._unspoken(recorded, now)) if self.same and not self.aside else ()
+
+    def _unspoken(self, recorded: Values, now: Values) -> Iterator[ReplayDifference]:
+        """Yield what differs where both have the same words, as a bit of no assumption."""
+        names = (*(leaf.name for leaf in self.sign.leaves), "line", "fault", "fault_at", *self.sign.failed)
+        for name, form, *both in zip(names, self.packed.format[1:], recorded, now, strict=True):
+            then, here = (struct.pack(f"<{form}", value).hex() for value in both)
+            if then != here:
+                yield ReplayDifference(name, f"0x{then}", f"0x{here}")
 
 
 def _translated(then: Leaf, now: Leaf, value: Value) -> Value:
@@ -187,7 +219,7 @@ class Replay:
         """Builds the executors.
 
         Raises:
-            BadDescription: The generated programs do not fit the log.
+            BadDescription: The generated programs do not fit the log, or are not as a log says that bears their digest.
             NotBuilt: The C could not be built.
         """
         system = self.log.system(self.generated)
@@ -197,6 +229,11 @@ class Replay:
                 raise BadDescription(f"program `{sign.program}` has no level `{name}`")
         by_level = executors(system, signs, self.kind)
         self.unchanged = fingerprints(system) == dict(self.log.programs)
+        for level in self.log.levels:
+            if self.unchanged and signs[level.name] != level.sign:
+                raise BadDescription(
+                    f"the log says of level `{level.name}` what these tables are not, and bears their digest"
+                )
         self._levels = tuple(
             _again(level, signs[level.name], by_level[level.name], self.unchanged)
             for level in self.log.levels
@@ -248,6 +285,11 @@ class Replay:
     def lacking(self) -> tuple[str, ...]:
         """Return what the log has and these tables lack, as far as it ran: it was not compared, or put as initial."""
         return tuple(name for level in self._levels for name in level.lacking)
+
+    @property
+    def unlogged(self) -> tuple[str, ...]:
+        """Return what these tables have and the log lacks: it was not compared."""
+        return tuple(name for level in self._levels for name in level.unlogged)
 
     def first_difference(self) -> ReplayMoment | None:
         """The first tick in which a level leaves something else than was recorded; None for none."""
