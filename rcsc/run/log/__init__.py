@@ -21,6 +21,6 @@ Nothing in a log is trusted, compiled or run. What it costs: the bytes of the st
 most after a kill. Needs the extra `log`.
 
 Modules, in the order the data flows: `schema` (what a log says of itself), `records` (the chain), `recorder`; `cadence`
-(which records a run has), `read`, `states` (a state in words), `ticks` (a run, tick by tick), `finding` (what a finding's log adds), `queries`,
-`replay`, `export`, `plot`.
+(which records a run has), `read`, `states` (a state in words), `ticks` (a run, tick by tick), `finding` (what a
+finding's log adds), `queries`, `replay`, `export`, `plot`.
 """
