@@ -17,6 +17,7 @@ import rcsc.compose.counterexample.explain
 import rcsc.compose.counterexample.trace
 import rcsc.lang.interpret
 from rcsc.commands import run
+from rcsc.commands.shared.proved import pauses
 from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.obligations import ObligationKey, Sort, may_meet
 from rcsc.compose.contract.transition import TransitionSystem
@@ -279,7 +280,21 @@ def test_the_state_in_which_a_restart_begins_is_the_first_row(
     [begun, *_] = [line for line in told.err.splitlines() if "restart  " in line]
     assert re.match(r"\s*\|\s*\| restart ", begun)
     assert "cur_state = f_state" in told.err
-    assert "PAUSE is the first command: `rest` of `upper`, `pause` of `lower`" in told.out
+    every = "PAUSE is the first command: `rest` of `upper`, `pause` of `lower`; a restart orders it, and an empty buffer holds it"
+    assert every in told.out.splitlines()
+
+
+def test_it_is_said_where_a_restart_or_an_empty_buffer_orders_another_command(tmp_path: Path) -> None:
+    words = small_text("words", ("input_command : lower_command", "input_command : lower_command = go"))
+    named, whole = (
+        "adopt to_lower.input_command := go\n",
+        transition_systems(small_system(tmp_path, words=words)),
+    )
+    [said] = pauses(whole)
+    assert said.endswith("; a restart orders it, and an empty buffer holds it but for `to_lower` of `upper`")
+    ts = small_level(tmp_path, "upper", upper=small_text("upper") + named)
+    [said] = pauses({"upper": ts})
+    assert said.endswith("; a restart orders it but for `to_lower` of `upper`, and an empty buffer holds it")
 
 
 def test_where_a_pause_is_not_passed_on_it_is_said_what_is_taken_for_one(tmp_path: Path) -> None:

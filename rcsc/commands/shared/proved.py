@@ -1,6 +1,6 @@
 """What `rcsc prove` says of lines in their context, of how commands end, and of the system as a whole."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from operator import attrgetter
@@ -20,7 +20,7 @@ from rcsc.compose.contract.claims import (
     spelled,
 )
 from rcsc.compose.contract.obligations import Sort, pause_of
-from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.transition import Leaves, TransitionSystem
 from rcsc.compose.proof.assume_guarantee import not_for_ever
 from rcsc.compose.proof.context import Context
 from rcsc.compose.proof.level import LevelProof, certificate
@@ -280,7 +280,22 @@ def pauses(systems: Mapping[str, TransitionSystem]) -> Iterator[str]:
     first = {name: pause_of(ts) for name, ts in systems.items()}
     if any(first.values()):
         paused = ", ".join(f"`{member}` of `{name}`" for name, member in first.items() if member)
-        yield f"PAUSE is the first command: {paused}; a restart orders it, and an empty buffer holds it"
+        again = _unless("a restart orders it", systems, TransitionSystem.restarted)
+        empty = _unless("an empty buffer holds it", systems, TransitionSystem.initial)
+        yield f"PAUSE is the first command: {paused}; {again}, and {empty}"
+
+
+def _unless(
+    said: str, systems: Mapping[str, TransitionSystem], begins: Callable[[TransitionSystem], Leaves]
+) -> str:
+    """What is said of the orders with which levels begin, and of which it is not so."""
+    others = [
+        f"`{below.order}` of `{name}`"
+        for name, ts in systems.items()
+        for below in ts.links.below
+        if not ((order := begins(ts)[below.command]).known and order.low == 0)
+    ]
+    return f"{said} but for {', '.join(others)}" if others else said
 
 
 def confirmed(ts: TransitionSystem, proof: LevelProof) -> dict[str, bool]:
