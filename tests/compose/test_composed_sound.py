@@ -709,10 +709,32 @@ def test_an_echo_never_goes_back_so_that_nothing_is_trusted_of_the_cycle_after_a
     assert set(adopted.values()) == {Stands()}
     others = {VariableName(leaf): how for leaf, how in ts.program.adopted.items() if leaf not in adopted}
     forgets = replace(ts.program, restart=tuple(others.items()))
-    proof = next(one for one in whole.levels if one.level == "lower")
-    words = "assumption `loaded` of level `lower` does not fail in the first cycle after a restart"
-    claimed = of_level(ts.of(forgets), proof)
-    assert [key for key, claim in claimed if words in claim.trusts] == [(Sort.ECHOES, "", "report")]
+    assert Sort.ECHOES in {owed.sort for owed in prove_level(ts.of(forgets), LITTLE).open}
+
+
+@pytest.mark.parametrize(
+    ("order", "adopted"), [("to_lower", "adopt to_lower.inc_command := 1\n"), ("told", "")]
+)
+def test_a_restart_gives_no_order_a_number_that_one_before_it_had(
+    order: str, adopted: str, tmp_path: Path
+) -> None:
+    """As `adopt` would, or where the order is not called so that its number goes by its name: the level below takes it for that one."""
+    path = small_system(tmp_path, upper=small_text("upper").replace("to_lower", order) + adopted)
+    path.write_text(path.read_text(encoding="utf-8").replace("to_lower", order), encoding="utf-8")
+    whole = prove_system(path, LITTLE)
+    assert whole.of("upper", (Sort.NEXT_NUMBER, "", order)).verdict is Verdict.NOT_PROVED
+    assert ("upper", (Sort.NEXT_NUMBER, "", order)) in whole.of("lower", RUNS).lacks
+    systems = transition_systems(path)
+    found = next(
+        each
+        for each in explain(systems, whole, TraceSettings(description(path), 3))
+        if each.obligation.sort is Sort.NEXT_NUMBER
+    )
+    assert found.finding is not None
+    assert found.finding.restarted
+    assert found.notes == (
+        f"after a restart `{order}.inc_command` may be the number of an earlier order: it does not count on from that",
+    )
 
 
 def test_a_level_that_begins_anew_says_failed_though_it_takes_nothing_yet(tmp_path: Path) -> None:

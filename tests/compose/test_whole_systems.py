@@ -138,10 +138,6 @@ def test_a_safe_value_that_a_refused_input_shows_is_seen_by_the_next_cycle(tmp_p
 def test_what_a_claim_trusts_is_left_out_and_nothing_else() -> None:
     assert speaks_of(()) == Event.EARLY_ANEW.rank
     assert speaks_of(("`op` keeps to the protocol",)) == Event.EARLY_ANEW.rank
-    assert (
-        speaks_of(("no extern procedure is refused in the first cycle after a restart",))
-        == Event.REFUSED.rank
-    )
     assert speaks_of((f"`x` of level `a` is {of_claims.NEVER_REFUSED}",)) == Event.ANEW.rank
     assert speaks_of((f"`x` of level `a` is {of_claims.NOT_FOR_EVER}",)) == Event.EARLY_ANEW.rank
 

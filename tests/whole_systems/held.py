@@ -65,7 +65,7 @@ LEFT_OUT_BESIDES: Mapping[str, str] = {
 }
 FOR_EVER = (NOT_FOR_EVER, "refused only finitely often")
 """How what is trusted ends of refusals that may be, but not for ever."""
-NO_REFUSAL, NOT_AT_FIRST, ANY = 1, 2, 3
+NO_REFUSAL, ANY = 1, 3
 """Ranks of events of which a claim speaks."""
 
 
@@ -209,10 +209,7 @@ def _claimed(follows: Mapping[Need, Closed], level: str) -> dict[Key, int]:
 def speaks_of(trusts: Sequence[str]) -> int:
     """The greatest rank of the events of which a claim speaks that trusts this."""
     refused = [one for one in trusts if "refused" in one and not one.endswith(FOR_EVER)]
-    if any("first cycle after a restart" not in one for one in refused):
-        return NO_REFUSAL
-    first = [one for one in trusts if "first cycle after a restart" in one]
-    return NOT_AT_FIRST if first else ANY
+    return NO_REFUSAL if refused else ANY
 
 
 def _ends(follows: Mapping[Need, Closed], proof: LevelProof, fed: frozenset[str]) -> dict[str, Ends]:

@@ -17,6 +17,7 @@ from rcsc.compose.contract.transition import Cycle, TableAt, TransitionSystem, s
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Bool, Enum, Kind, Line, OneTable, Program, Table, pending
+from rcsc.lang.restart import After, Stands
 from rcsc.symbolic import values
 from rcsc.symbolic.values import Node
 from rcsc.table import boxes
@@ -198,10 +199,16 @@ def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     as_before = values.all_of(  # after a refused result the report may be as late as if the level had not run
         values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in leaves_under(ts.program, above.report)
     )
-    late = values.both(cycle.refused, as_before)
+    stood = not cycle.anew or _echo_stands(ts, above)
+    late = values.all_of((cycle.refused, as_before, values.truth(stood)))
     yield Obligation(Sort.ECHOES, "", above.report, values.either(values.both(number, command), late))
     if ts.program.roles is None:
         yield from _answer_stays(ts, cycle, above)
+
+
+def _echo_stands(ts: TransitionSystem, above: Above) -> bool:
+    """Return whether a restart leaves what the report echoes as it was: else an older report may follow a newer one."""
+    return all(ts.program.adopted.get(leaf) == Stands() for leaf in (above.echo, above.echoed))
 
 
 def _answer_stays(ts: TransitionSystem, cycle: Cycle, above: Above) -> Iterator[Obligation]:
@@ -240,14 +247,20 @@ def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
             if leaf != below.number and leaf not in below.streams:
                 kept = values.equal(cycle.before[leaf], cycle.after[leaf])
                 yield Obligation(Sort.NUMBERED, "", leaf, values.follows(same, kept))
-        yield Obligation(
-            Sort.NEXT_NUMBER, "", below.order, values.either(same, values.equal(after, successor(before)))
-        )
+        counts = values.either(same, values.equal(after, successor(before)))
+        if cycle.anew:
+            counts = values.both(counts, values.truth(counts_on(ts, below)))
+        yield Obligation(Sort.NEXT_NUMBER, "", below.order, counts)
         if ts.links.above is not None:
             kept = values.equal(cycle.before[below.command], cycle.after[below.command])
             yield Obligation(Sort.WAITS, "", below.order, values.follows(_waiting(ts, cycle, below), kept))
             if not list(_no_pause(ts, below)):
                 yield Obligation(Sort.PAUSES, "", below.order, _passes_on_a_pause(ts, cycle, below))
+
+
+def counts_on(ts: TransitionSystem, below: Below) -> bool:
+    """Return whether the order of a restart has a number that none had before: the subordinate may have taken any other already."""
+    return ts.program.adopted.get(below.number) == After(below.echo)
 
 
 def command_stays(ts: TransitionSystem, cycle: Cycle) -> Node:

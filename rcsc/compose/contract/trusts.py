@@ -16,10 +16,6 @@ class Trust(Enum):
     PROTOCOL = "`LEVEL` keeps to the protocol"
     REFUSED = "INPUTS of level `LEVEL` ARE never refused"
     NOT_FOR_EVER = "INPUTS of level `LEVEL` ARE not refused for ever"
-    EXTERN_AT_RESTART = "no extern procedure is refused in the first cycle after a restart"
-    ASSUMPTION_AT_RESTART = (
-        "assumption `NAME` of level `LEVEL` does not fail in the first cycle after a restart"
-    )
     RESTS = "`LEVEL` comes to rest some time where it is told to, and stays so"
     ANSWERS = "`LEVEL` answers every order that is not replaced, and stays so"
     STILL = "the values in `NAME` of level `LEVEL` stand still meanwhile"

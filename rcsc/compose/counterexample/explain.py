@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rcsc.compose.contract.beginning import Starts
-from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, pairs
+from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, counts_on, pairs
 from rcsc.compose.contract.properties import invariant_kept
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.applied import Texts
@@ -152,7 +152,7 @@ def _level(
             yield from _with_repairs(ts, every_pair, proof, settings, texts)
         else:
             explanation = _explanation(ts, obligation, results.get(obligation.key))
-            explanation = replace(explanation, notes=_as_it_begins(ts, obligation))
+            explanation = replace(explanation, notes=tuple(_as_it_begins(ts, obligation)))
             yield (
                 replace(explanation, supposed=_supposed(ts, obligation, proof))
                 if obligation.key not in results
@@ -160,14 +160,14 @@ def _level(
             )
 
 
-def _as_it_begins(ts: TransitionSystem, obligation: Obligation) -> tuple[str, ...]:
-    """Say that the values at first, or after a restart, break an invariant."""
-    found = at_first(ts.program) if obligation.sort is Sort.INVARIANT else ()
-    return tuple(
-        " ".join((finding.message, *(f"({note})" for note in finding.notes)))
-        for finding in found
-        if finding.message.endswith(f"`{obligation.name}`") and finding.code is Code.INVARIANT_INITIAL
-    )
+def _as_it_begins(ts: TransitionSystem, obligation: Obligation) -> Iterator[str]:
+    """Say that the values at first, or after a restart, break an invariant, or give an order a number that another had."""
+    for below in ts.links.below:
+        if (obligation.sort, obligation.name) == (Sort.NEXT_NUMBER, below.order) and not counts_on(ts, below):
+            yield f"after a restart `{below.number}` may be the number of an earlier order: it does not count on from that"
+    for finding in at_first(ts.program) if obligation.sort is Sort.INVARIANT else ():
+        if finding.message.endswith(f"`{obligation.name}`") and finding.code is Code.INVARIANT_INITIAL:
+            yield " ".join((finding.message, *(f"({note})" for note in finding.notes)))
 
 
 def _supposing(

@@ -33,7 +33,6 @@ from rcsc.compose.contract.obligations import Obligation, Sort, asks, resting_ta
 from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.termination import Ending
-from rcsc.lang.restart import Stands
 from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
 
@@ -90,8 +89,7 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
 
 def _trusted(ts: TransitionSystem, proof: LevelProof, obligation: Obligation) -> tuple[str, ...]:
     """List what an obligation trusts that no level is responsible for."""
-    of_a_restart = tuple(_of_a_restart(ts, proof)) if obligation.sort is Sort.ECHOES else ()
-    return (*of_a_restart, never_refused(ts)) if proof.needs_admission(obligation.key) else of_a_restart
+    return (never_refused(ts),) if proof.needs_admission(obligation.key) else ()
 
 
 def never_refused(ts: TransitionSystem) -> str:
@@ -114,22 +112,6 @@ def _refusable(ts: TransitionSystem) -> tuple[str, ...]:
     for leaf in ts.refusable:
         parts.setdefault(leaf.partition(".")[0].partition("[")[0], []).append(leaf)
     return tuple(f"`{leaves[0] if len(leaves) == 1 else whole}`" for whole, leaves in parts.items())
-
-
-def _of_a_restart(ts: TransitionSystem, proof: LevelProof) -> Iterator[str]:
-    """Yield assumptions that the first cycle after a restart does not end early; else an older report follows a newer one.
-
-    None where the level then still echoes what it echoed before.
-    """
-    above = ts.links.above
-    if above is None or all(ts.program.adopted.get(leaf) == Stands() for leaf in (above.echo, above.echoed)):
-        return
-    if asks(ts.program):
-        yield "no extern procedure is refused in the first cycle after a restart"
-    stops = {str(name) for table in ts.program.tables for name in table.stops}
-    failing = {obligation.name for obligation in proof.open if obligation.sort is Sort.ASSUMPTION}
-    for name in sorted(stops & failing):
-        yield f"assumption `{name}` of level `{proof.level}` does not fail in the first cycle after a restart"
 
 
 def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:

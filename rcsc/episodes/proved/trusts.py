@@ -6,13 +6,16 @@ time that a command takes (that somebody answers, that values stand still) is lo
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 from rcsc.episodes.proved.checks import Check, contract
 from rcsc.episodes.proved.claims import Claims, ProvedLevel, Trusted
-from rcsc.episodes.proved.cycles import EXTERN, Now, Reader
+from rcsc.episodes.proved.cycles import Now, Reader
 from rcsc.episodes.stand import Stand
 from rcsc.lang.interpret import UNDEFINED, holds
-from rcsc.run.signature import STOPPED, Values
+
+if TYPE_CHECKING:
+    from rcsc.run.signature import Values
 
 MEANWHILE = frozenset({"ANSWERS", "RESTS", "STILL", "EXTERNS_FINITE", "NOT_FOR_EVER", "STATES"})
 """Kinds that no cycle alone can break."""
@@ -70,20 +73,6 @@ def _refused(_: Trusted, __: Reader, ___: Stand) -> Check:
     return lambda now: "" if now.took else now.level.fault_text
 
 
-def _extern_at_restart(_: Trusted, __: Reader, ___: Stand) -> Check:
-    return lambda now: now.level.fault_text if now.anew and now.fault == EXTERN else ""
-
-
-def _assumption_at_restart(trusted: Trusted, _: Reader, __: Stand) -> Check:
-    def stops(now: Now) -> bool:
-        return now.level.sign.fault_at(now.level.values) == trusted.name
-
-    def check(now: Now) -> str:
-        return now.level.fault_text if now.anew and now.fault == STOPPED and stops(now) else ""
-
-    return check
-
-
 def _declared(trusted: Trusted, reader: Reader, _: Stand) -> Check:
     """A fact that a table declares: as the first table of the cycle saw it, where that can be computed."""
     condition = next(fact.condition for fact in reader.program.assumptions if fact.name == trusted.name)
@@ -120,7 +109,5 @@ def _same_answer(trusted: Trusted, reader: Reader, stand: Stand) -> Check:
 _MAKERS: Mapping[str, Callable[[Trusted, Reader, Stand], Check]] = {
     "DECLARED": _declared,
     "REFUSED": _refused,
-    "EXTERN_AT_RESTART": _extern_at_restart,
-    "ASSUMPTION_AT_RESTART": _assumption_at_restart,
     "DATABASE": _same_answer,
 }
