@@ -37,9 +37,11 @@ LASTING = (1, 2, 5, 20, 60, 200)
 LONG = (1000, 4000)
 """Ticks of a window: of a buffer, or else of a plant's fault too."""
 TOGETHER = 0.5
-"""How often a restart comes while an input is refused."""
+"""How often a restart comes while an input is refused, or lies outside its range."""
 STILL, REFUSED = 0.15, 0.08
 """Where no plant is given: how often a field from outside never moves, and how often a value of it is a refused one."""
+PAST = 0.1
+"""How often a value is one that the level moves to the edge of its range."""
 MOVING = (30, 100, 300)
 """Ticks in which it does."""
 UNORDERED = (50, 200, 1000)
@@ -186,8 +188,11 @@ def _harm(random: Random, its: Stand, episode: Episode) -> Episode:
 
 
 def _restart(random: Random, its: Stand, episode: Episode) -> Episode:
-    """A level starts anew at any moment; where inputs are refused, often while one is."""
-    refused = [reading for reading in episode.readings if reading.refused]
+    """A level starts anew at any moment; where inputs are refused or lie outside their ranges, often while one does."""
+    past = {field.name: field.past for field in its.fields}
+    refused = [
+        reading for reading in episode.readings if reading.refused or reading.value in past[reading.field]
+    ]
     at = tick(random)
     if refused and random.random() < TOGETHER:
         window = random.choice(refused)
@@ -198,8 +203,14 @@ def _restart(random: Random, its: Stand, episode: Episode) -> Episode:
 
 def _reading(random: Random, its: Stand, episode: Episode) -> Episode:
     field = random.choice(its.fields)
-    value = between(random, field.leaf, field.edges)
-    return _held(episode, Reading(field.name, setting_of(field.leaf, value), *_window(random, LASTING)))
+    return _held(episode, Reading(field.name, _read(random, field), *_window(random, LASTING)))
+
+
+def _read(random: Random, field: Field) -> Setting:
+    """A value that the level takes, as it is or at the edge of its range."""
+    if field.past and random.random() < PAST:
+        return setting_of(field.leaf, random.choice(field.past))
+    return setting_of(field.leaf, between(random, field.leaf, field.edges))
 
 
 def _refused(random: Random, its: Stand, episode: Episode) -> Episode:
@@ -225,11 +236,7 @@ def moving(random: Random, its: Stand) -> Iterator[Reading]:
         while at < last:
             ticks = random.choice((1, lasting, 2 * lasting))
             refused = bool(field.refused) and random.random() < REFUSED
-            value = (
-                refusable(random, field)
-                if refused
-                else setting_of(field.leaf, between(random, field.leaf, field.edges))
-            )
+            value = refusable(random, field) if refused else _read(random, field)
             yield Reading(field.name, value, at, at + ticks - 1, refused=refused)
             at += ticks
 

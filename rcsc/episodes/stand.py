@@ -4,6 +4,7 @@ In: a description, compiled, with the sources of its levels. Out: a `Stand`: sig
 there are, the values at which something may turn. It is read once as long as none of its files changes.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -34,7 +35,7 @@ class Field:
     Attributes:
         name: As a script calls it; `buffer` and `place` say where it is, `level` and `leaf` who takes it, and as what.
         edges: Values of its type at which something may turn.
-        refused: Values that the level refuses, some of them.
+        refused: Values that the level refuses, some of them; `past`, those that it moves to the edge of its range.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Field:
     leaf: Leaf
     edges: tuple[Value, ...]
     refused: tuple[Value, ...]
+    past: tuple[Value, ...] = ()
 
     def refuses(self, value: Value) -> bool:
         """Whether the level refuses a value."""
@@ -201,7 +203,10 @@ def _fields(
             variable = programs[level].variable(leaf.name)
             asked = (level, leaf.name) in keys  # a feed is asked about it before the level refuses it
             refused = () if asked else tuple(_refused(variable))
-            fields.append(Field(column, buffer.name, place, level, leaf, edges[level][leaf.name], refused))
+            past = () if asked else tuple(_past(variable))
+            fields.append(
+                Field(column, buffer.name, place, level, leaf, edges[level][leaf.name], refused, past)
+            )
     return fields
 
 
@@ -210,6 +215,12 @@ def _refused(variable: Variable) -> Iterator[Value]:
     for value in outside(variable.type):
         if variable.admit is Admit.REJECT or value != value:  # noqa: PLR0124
             yield value
+
+
+def _past(variable: Variable) -> Iterator[Value]:
+    """Yield values that a level moves to the edge of its range."""
+    if variable.admit is Admit.CLAMP:
+        yield from (value for value in outside(variable.type) if math.isfinite(value))
 
 
 _SWITCHES: dict[tuple[tuple[tuple[str, int], ...], str], tuple[str, ...]] = {}

@@ -60,6 +60,41 @@ def test_a_line_that_a_safe_value_takes_away_trusts_that_nothing_is_refused(
     assert run(["prove", str(path), "--no-cache", "--strict"]) == (0 if more else 1)
 
 
+@pytest.mark.parametrize(
+    ("kind", "trusted"),
+    [
+        ("int 0 .. 2 clamp", True),
+        ("int 0 .. 255 clamp", False),
+        ("int -9 .. 65535 clamp", True),
+        ("bool", False),
+    ],
+)
+def test_a_property_that_looks_back_at_what_is_clamped_trusts_what_stands_at_a_restart(
+    kind: str, trusted: bool, tmp_path: Path
+) -> None:
+    """Where the level begins anew its inputs stand as they came; the first cycle moves them to the edge."""
+    text = f"""input x : {kind}
+output o : bool
+property back : was x in {{{"true, false" if kind == "bool" else kind.removeprefix("int ").removesuffix(" clamp")}}}
+property here : x in {{{"true, false" if kind == "bool" else kind.removeprefix("int ").removesuffix(" clamp")}}}
+property aside : o or not o
+table t {{
+  | line | o     || o     |
+  |------|-------||-------|
+  | on   | false || true  |
+  | off  | true  || false |
+}}
+level solo {{ period 40 [ms] table t }}
+"""
+    path = solo_system(tmp_path, text)
+    whole = prove_system(path, LITTLE)
+    words = ("`x` of level `solo` is in range where it begins anew",) if trusted else ()
+    assert trusts(whole, Sort.PROPERTY, "", "back") == words
+    assert trusts(whole, Sort.PROPERTY, "", "here") == trusts(whole, Sort.PROPERTY, "", "aside") == ()
+    assert run(["prove", str(path), "--no-cache"]) == 0
+    assert run(["prove", str(path), "--no-cache", "--strict"]) == (1 if trusted else 0)
+
+
 def test_a_property_about_an_input_trusts_that_no_other_is_refused(tmp_path: Path) -> None:
     """One that does not look at inputs trusts nothing: a refused cycle changes no output without a safe value."""
     path = solo_system(tmp_path, GUARDED)

@@ -304,6 +304,31 @@ class TestFalseClaims:
         assert trusted.kind == "REFUSED"
         assert broken(safe, only(claim), iter((self.REFUSED,))) == set()
 
+    @pytest.mark.parametrize(
+        ("admit", "trust"),
+        [
+            (" clamp", "`x` of level `lv` is in range where it begins anew"),
+            ("", "`x`, `y` of level `lv` are never refused"),
+        ],
+    )
+    def test_one_that_trusts_what_stands_where_the_level_begins_anew(
+        self, tmp_path: Path, admit: str, trust: str
+    ) -> None:
+        """No cycle has seen it: in the next one, a tick later, another value has come."""
+        text = edited(
+            SAFE["lv.rcs"],
+            ("0 .. 9", f"0 .. 9{admit}"),
+            ("period 40", "period 80"),
+            ("o = 2 implies was o = 1", "was x <= 9"),
+        )
+        its = stand(written(tmp_path, {**SAFE, "lv.rcs": text}))
+        stood = Reading("out.x", 255, 3, 3, refused=not admit)
+        episode = Episode(readings=(stood,), restarts=(Restart(3, "lv"),), ticks=12)
+        claim = Claim("lv", "PROPERTY", "", "rises", "property `rises`")
+        assert broken(its, only(claim), iter((episode,))) == {"PROPERTY"}
+        trusted = replace(claim, trusts=(Trusted(*trust_of(trust), trust),))
+        assert broken(its, only(trusted), iter((episode,))) == set()
+
     def test_one_that_trusts_what_nobody_knows_is_told(self, safe: Stand) -> None:
         strange = Trusted(*trust_of("the moon is full"), "the moon is full")
         of_ = watched(only(Claim("lv", "SAFE", "", "", "values", (strange,))), safe)

@@ -46,7 +46,7 @@ class Event(Choice):
 
 LEFT_OUT = {
     "a level goes on from its checkpoint": "it is as it was after its last cycle: nothing has happened",
-    "a value is clamped": "a table sees a value of its range, which it may see anyway",
+    "a value is clamped": "a table sees a value of its range, which it may see anyway; of a restart see `test_refusals`",
 }
 """Events that no run here has, with the reason."""
 NEVER = {

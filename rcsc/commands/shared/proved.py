@@ -11,6 +11,7 @@ import click
 from rcsc.compose.contract.claims import (
     AGAIN,
     ENDING,
+    IN_RANGE,
     RUNS,
     UNREACHED,
     Key,
@@ -121,7 +122,7 @@ class Summary:
 
     Attributes:
         claims: How many there are, agreements between levels counted; `proved`, how many of them are, and `open`, how many are not.
-        trusting: How many of those proved trust that inputs are not refused.
+        trusting: How many of those proved trust that inputs are not refused, and the same in words.
         lacks: What else is not shown, kind by kind. This, and what trusts, ends with status 1 under `--strict` alone.
     """
 
@@ -129,6 +130,7 @@ class Summary:
     proved: int
     open: int
     trusting: int
+    trusted: str
     lacks: tuple[str, ...]
 
     def status(self, *, strict: bool) -> int:
@@ -139,7 +141,7 @@ class Summary:
         """The verdict, with its colour."""
         many = counted(self.proved, "claim")
         if self.trusting:
-            many += f", {self.trusting} of them trusting that inputs are not refused"
+            many += f", {self.trusting} of them trusting that {self.trusted}"
         rest = ", ".join(self.lacks)
         if self.open:
             text = f"not proved: {self.open} of {counted(self.claims, 'claim')}"
@@ -148,6 +150,14 @@ class Summary:
         if not rest:
             return click.style(f"proved: {many}", fg="green", bold=True) + status
         return click.style(f"proved in part: {many}", fg="yellow", bold=True) + f"; but {rest}{status}"
+
+
+def _trusted(whole: SystemProof) -> str:
+    """What claims trust of inputs, in short."""
+    clamped = [trust.endswith(IN_RANGE) for trust in whole.admitting]
+    if all(clamped):
+        return "inputs are in range at a restart"
+    return f"inputs are not refused{' or out of range' if any(clamped) else ''}"
 
 
 def summary(whole: SystemProof) -> Summary:
@@ -166,6 +176,7 @@ def summary(whole: SystemProof) -> Summary:
         proved,
         still_open + not_agreed,
         trusting_,
+        _trusted(whole),
         tuple(_lacking(whole)),
     )
 

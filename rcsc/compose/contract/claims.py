@@ -164,8 +164,13 @@ DECLARED = ", as it is declared"
 """The suffix of a trusted assumption that a table declares."""
 
 
-NEVER_REFUSED, NOT_FOR_EVER = "never refused", "not refused for ever"
-"""How what is trusted of refusals ends: a claim about each cycle needs the first, one that something ends the second."""
+NEVER_REFUSED, NOT_FOR_EVER, IN_RANGE = (
+    "never refused",
+    "not refused for ever",
+    "in range where it begins anew",
+)
+"""How what is trusted of refusals, and of what would be clamped, ends: a claim about each cycle needs the first and the last, one that
+something ends the second."""
 
 
 def declared(trusts: Iterable[str]) -> tuple[str, ...]:
@@ -176,7 +181,7 @@ def declared(trusts: Iterable[str]) -> tuple[str, ...]:
 
 def of_refusals(trust: str) -> bool:
     """Return whether something is trusted not to be refused, at all or for ever."""
-    return trust.endswith((NEVER_REFUSED, NOT_FOR_EVER))
+    return trust.endswith((NEVER_REFUSED, NOT_FOR_EVER, IN_RANGE))
 
 
 def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> str:

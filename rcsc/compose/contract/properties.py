@@ -82,6 +82,9 @@ def properties(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
         holds = _true(stated.condition, leaves)
         if cycle.untaken is not FALSE:
             holds = _with_refusals(program, cycle, stated.condition, leaves, holds)
+        elif cycle.strange and REFUSED in cycle.before:  # at a restart nothing is clamped yet
+            clamped = frozenset(str(earlier(name)) for name in cycle.strange)
+            holds = values.choice(cycle.before[REFUSED], _opened(stated.condition, clamped, leaves), holds)
         yield stated.name, holds
 
 

@@ -14,6 +14,7 @@ from rcsc.lang.interpret import chosen_table
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (  # fmt: skip
     Action,
+    Admit,
     Assumption,
     Bool,
     Call,
@@ -43,7 +44,7 @@ from rcsc.symbolic.values import FALSE, TRUE, Node
 GHOST = "asked "
 """Prefix of ghosts, which the proof remembers and the level does not: that the database was asked, and for which keys."""
 REFUSED = f"{GHOST}and an input was refused"
-"""The ghost of properties that look back at inputs: the cycle before was refused."""
+"""The ghost of properties that look back at inputs: before the cycle these stand as they came, admitted by none."""
 _REFUSED = "an input is refused:"
 """Of a cycle: whether the environment ends it by an input. Its variables are no leaves: a leaf has no colon."""
 Leaves = dict[str, Node]
@@ -118,7 +119,7 @@ class Cycle:
         refused: The condition that the cycle ends early, by a refused input or result, or a failed stopping assumption;
             `unmatched`, before the table is matched; `interrupted`, before its line is done.
         untaken: The condition that an input is refused: then nothing is taken, and inputs before the next cycle are as last taken.
-        strange: Inputs that such a cycle may leave outside their ranges.
+        strange: Inputs that such a cycle may leave outside their ranges; where none is refused, those that a restart may.
         calls: Calls of extern procedures, in the order in which they can be made.
         settled: Every leaf before the preprocess, and `acted`, before the postprocess.
         anew: Whether it is the first after a restart.
@@ -190,7 +191,8 @@ class TransitionSystem:
         kinds: The type of each leaf and ghost, by name.
         inputs: The leaves that each cycle takes, in declared order.
         trusted: Assumptions about what stands outside that the tables declare: part of the contract.
-        refuses: Whether cycles that an input ends are cycles, too; else nothing is refused, which is then to be trusted.
+        refuses: Whether cycles that an input ends are cycles, too, and inputs stand as they came where the level begins anew; else nothing
+            is refused or stands outside its range, which is then to be trusted.
     """
 
     program: Program
@@ -226,6 +228,13 @@ class TransitionSystem:
         """The inputs that may be refused, in declared order: what a level writes never is."""
         return tuple(str(v.name) for v in self._of_outside() if refusable(v))
 
+    @property
+    def clamped(self) -> tuple[str, ...]:
+        """The inputs that properties look back at and that cycles move to the edge: where the level begins anew, none has done so yet."""
+        if REFUSED not in self.kinds:
+            return ()
+        return tuple(str(v.name) for v in self._of_outside() if v.admit is Admit.CLAMP and unadmitted(v))
+
     def _of_outside(self) -> Iterator[Variable]:
         """Yield the inputs that no level writes: the operator, the plant, the database, or nobody."""
         for variable in self.program.variables:
@@ -233,11 +242,11 @@ class TransitionSystem:
                 yield variable
 
     def refusing(self) -> "TransitionSystem":
-        """Return the same level in an environment in which inputs may be refused."""
-        return replace(self, refuses=bool(self.refusable))
+        """Return the same level in an environment in which inputs may be refused, and stand outside their ranges where it begins anew."""
+        return replace(self, refuses=bool(self.refusable or self.clamped))
 
     def admitting(self) -> "TransitionSystem":
-        """Return the same level in an environment in which no input is ever refused."""
+        """Return the same level in an environment in which no input is ever refused, nor stands outside its range."""
         return replace(self, refuses=False) if self.refuses else self
 
     def _of_the_environment(self) -> frozenset[str]:
@@ -341,9 +350,9 @@ class TransitionSystem:
         Results of extern procedures are named with it, too: cycles in one query need different suffixes.
         """
         cycle = self._admitted(before, suffix, taken)
-        return (
-            self._or_refused(cycle, values.variable(f"{_REFUSED}{suffix}", Bool())) if self.refuses else cycle
-        )
+        if not (self.refuses and self.refusable):
+            return cycle
+        return self._or_refused(cycle, values.variable(f"{_REFUSED}{suffix}", Bool()))
 
     def _or_refused(self, cycle: Cycle, untaken: Node) -> Cycle:
         """Return the cycle as it is if nothing is refused, and else as one that takes nothing (`Event.INPUT_REFUSED`).
@@ -421,6 +430,7 @@ class TransitionSystem:
         return Cycle(
             before, taken, contract, middle, tables, after,
             run.ended, unmatched, interrupted, calls, settled, acted, undeclared, tuple(stages), tuple(seen),
+            strange=frozenset(self.clamped if self.refuses else ()),
         )  # fmt: skip
 
     def tables(self, choice: TableChoice, seen: Leaves, *, matched: bool) -> tuple[TableAt, ...]:

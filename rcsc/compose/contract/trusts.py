@@ -15,6 +15,7 @@ class Trust(Enum):
     DATABASE = "the same question has the same answer in `NAME` of level `LEVEL`"
     PROTOCOL = "`LEVEL` keeps to the protocol"
     REFUSED = "INPUTS of level `LEVEL` ARE never refused"
+    CLAMPED = "INPUTS of level `LEVEL` ARE in range where it begins anew"
     NOT_FOR_EVER = "INPUTS of level `LEVEL` ARE not refused for ever"
     RESTS = "`LEVEL` comes to rest some time where it is told to, and stays so"
     ANSWERS = "`LEVEL` answers every order that is not replaced, and stays so"

@@ -4,7 +4,7 @@ In: transition systems of all levels. Out: `Promise`s, each with the obligations
 they do. Source: Misra and Chandy, "Proofs of networks of processes", 1981; the induction over cycles is in `compose.__doc__`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from rcsc.compose.contract.claims import (
@@ -14,6 +14,7 @@ from rcsc.compose.contract.claims import (
     DECLARED,
     ENDING,
     GIVEN,
+    IN_RANGE,
     NEVER_REFUSED,
     NOT_FOR_EVER,
     RESTING,
@@ -71,7 +72,7 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
         if obligation.key != SAFE:
             yield obligation.key, Claim(verdict, runs, _trusted(ts, proof, obligation))
     if proof.context is not None:
-        trusts = (never_refused(ts),) if proof.looked_admitting else ()
+        trusts = admitted(ts) if proof.looked_admitting else ()
         for line in proof.context.unreached:
             yield (UNREACHED, *line), Claim(Verdict.PROVED, runs, trusts)
         if not proof.context.repeated and not proof.context.restless:
@@ -79,7 +80,7 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     for ending in proof.endings:
         yield (Sort.ENDS, ending.table, ""), _of_ending(ts, ending, admitting=proof.ends_admitting(ending))
     if proof.stands and ts.links.above is not None:
-        trusts = (never_refused(ts),) if proof.stands_admitting else ()
+        trusts = admitted(ts) if proof.stands_admitting else ()
         yield STANDS, Claim(Verdict.PROVED, (*runs, (name, (Sort.ECHOES, "", ts.links.above.report))), trusts)
     if proof.endings:
         every = tuple((name, (Sort.ENDS, ending.table, "")) for ending in proof.endings)
@@ -89,29 +90,28 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
 
 def _trusted(ts: TransitionSystem, proof: LevelProof, obligation: Obligation) -> tuple[str, ...]:
     """List what an obligation trusts that no level is responsible for."""
-    return (never_refused(ts),) if proof.needs_admission(obligation.key) else ()
+    return admitted(ts) if proof.needs_admission(obligation.key) else ()
 
 
-def never_refused(ts: TransitionSystem) -> str:
-    """Return the assumption of a claim that a cycle without inputs would break."""
-    inputs = _refusable(ts)
-    return f"{', '.join(inputs)} of level `{ts.level.name}` {'is' if len(inputs) == 1 else 'are'} {NEVER_REFUSED}"
+def admitted(ts: TransitionSystem) -> tuple[str, ...]:
+    """Return the assumptions of a claim that a cycle without inputs, or inputs that none has admitted yet, would break."""
+    said = (_said(ts, ts.refusable, NEVER_REFUSED), _said(ts, ts.clamped, IN_RANGE))
+    return tuple(trust for trust in said if trust)
 
 
 def not_for_ever(ts: TransitionSystem) -> str:
     """Return the assumption of a claim that cycles without inputs only put off."""
-    inputs = _refusable(ts)
-    return (
-        f"{', '.join(inputs)} of level `{ts.level.name}` {'is' if len(inputs) == 1 else 'are'} {NOT_FOR_EVER}"
-    )
+    return _said(ts, ts.refusable, NOT_FOR_EVER)
 
 
-def _refusable(ts: TransitionSystem) -> tuple[str, ...]:
-    """List the inputs that can be refused: a record or an array of which several parts can be once, with its name."""
+def _said(ts: TransitionSystem, inputs: Iterable[str], ends: str) -> str:
+    """Say something of inputs, a record or an array of which several parts are meant once, with its name; nothing of none."""
     parts: dict[str, list[str]] = {}
-    for leaf in ts.refusable:
+    for leaf in inputs:
         parts.setdefault(leaf.partition(".")[0].partition("[")[0], []).append(leaf)
-    return tuple(f"`{leaves[0] if len(leaves) == 1 else whole}`" for whole, leaves in parts.items())
+    names = [f"`{leaves[0] if len(leaves) == 1 else whole}`" for whole, leaves in parts.items()]
+    verb = "is" if len(names) == 1 else "are"
+    return f"{', '.join(names)} of level `{ts.level.name}` {verb} {ends}" if names else ""
 
 
 def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
@@ -140,7 +140,7 @@ def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     within = [verdict for obligation, verdict in proof.verdicts if obligation.key == SAFE]
     invariants = tuple((name, (Sort.INVARIANT, "", invariant)) for invariant in ts.safety.invariants)
     rests = ((name, RUNS), *invariants) if within else invariants
-    yield SAFE, Claim(worst(within), rests, (never_refused(ts),) if proof.needs_admission(SAFE) else ())
+    yield SAFE, Claim(worst(within), rests, admitted(ts) if proof.needs_admission(SAFE) else ())
 
 
 def _of_ending(ts: TransitionSystem, ending: Ending, *, admitting: bool) -> Claim:
@@ -157,8 +157,10 @@ def _of_ending(ts: TransitionSystem, ending: Ending, *, admitting: bool) -> Clai
     trusts += [f"the values in `{record}` of level `{name}` stand still meanwhile" for record in ending.still]
     if asks(ts.program):
         trusts.append(f"extern procedures of level `{name}` are {NOT_FOR_EVER}")
-    if ts.refusable:
-        trusts.append(never_refused(ts) if admitting else not_for_ever(ts))
+    if admitting:
+        trusts += admitted(ts)
+    elif ts.refusable:
+        trusts.append(not_for_ever(ts))
     needs = tuple(
         (other.name, RESTING if other.answers_in_time else ENDING) for other in below if not other.outside
     )

@@ -12,7 +12,7 @@ from rcsc.episodes.proved.checks import Check, contract
 from rcsc.episodes.proved.claims import Claims, ProvedLevel, Trusted
 from rcsc.episodes.proved.cycles import Now, Reader
 from rcsc.episodes.stand import Stand
-from rcsc.lang.interpret import UNDEFINED, holds
+from rcsc.lang.interpret import UNDEFINED, admit, holds
 
 if TYPE_CHECKING:
     from rcsc.run.signature import Values
@@ -69,8 +69,27 @@ def _records(level: ProvedLevel, outside: str) -> list[str]:
     return [*above, *(below.report for below in level.below if below.name == outside)]
 
 
-def _refused(_: Trusted, __: Reader, ___: Stand) -> Check:
-    return lambda now: "" if now.took else now.level.fault_text
+def _refused(_: Trusted, reader: Reader, __: Stand) -> Check:
+    """No cycle is refused; none would be that took what stands where the level begins anew."""
+
+    def check(now: Now) -> str:
+        if not now.took:
+            return now.level.fault_text
+        stood = admit(reader.program, reader.snapshot(now.before)) if now.restarted else {}
+        return f"`{stood}` stood outside its range" if isinstance(stood, str) else ""
+
+    return check
+
+
+def _clamped(_: Trusted, reader: Reader, __: Stand) -> Check:
+    """Inputs stand in their ranges where the level begins anew."""
+
+    def check(now: Now) -> str:
+        stood = reader.snapshot(now.before) if now.restarted else {}
+        moved = admit(reader.program, stood) if stood else stood
+        return "an input stood outside its range" if moved != stood else ""
+
+    return check
 
 
 def _declared(trusted: Trusted, reader: Reader, _: Stand) -> Check:
@@ -109,5 +128,6 @@ def _same_answer(trusted: Trusted, reader: Reader, stand: Stand) -> Check:
 _MAKERS: Mapping[str, Callable[[Trusted, Reader, Stand], Check]] = {
     "DECLARED": _declared,
     "REFUSED": _refused,
+    "CLAMPED": _clamped,
     "DATABASE": _same_answer,
 }

@@ -85,20 +85,23 @@ def refusable(variable: Variable) -> bool:
 
     What cannot be refused in C cannot come through a buffer either: a buffer holds that type.
     """
+    return unadmitted(variable) and (isinstance(variable.type, Real) or variable.admit is not Admit.CLAMP)
+
+
+def unadmitted(variable: Variable) -> bool:
+    """Return whether an input may stand outside its range until a cycle takes it: it is refused or clamped then, and was neither yet.
+
+    So it stands after a cycle that was refused, and where the level begins anew.
+    """
     match variable.type:
         case Real():
             return True
         case Bool():
             return False
         case Enum(members=members):
-            return variable.admit is not Admit.CLAMP and len(members) not in {1 << 8, 1 << 16}
+            return len(members) not in {1 << 8, 1 << 16}
         case Int():
-            return variable.admit is not Admit.CLAMP and key_bounds(variable.type) not in _WHOLE
-
-
-def unadmitted(variable: Variable) -> bool:
-    """Return whether an input may stand outside its range after a cycle that was refused: it is refused or clamped, and was neither yet."""
-    return not isinstance(variable.type, Bool) and (refusable(variable) or variable.admit is Admit.CLAMP)
+            return key_bounds(variable.type) not in _WHOLE
 
 
 _WHOLE = frozenset(
