@@ -15,6 +15,8 @@ from typing import TypeAlias
 Value: TypeAlias = bool | int | float
 
 NUMBERS = 65536
+NUMBERED = (0, NUMBERS - 1)
+"""The range in which numbers are counted on: they go round in it, and leave any other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +91,11 @@ def _failed(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
 
 def _seen(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
     seen, taken = parts.get("inc_command_seen"), parts.get("command.inc_command")
-    if seen is None or taken is None or seen.whole is None or taken.whole is None:
-        return
-    if seen.whole[0] <= taken.whole[0] and taken.whole[1] <= seen.whole[1]:
-        yield "inc_command_seen", SameAs("command.inc_command")
+    if seen is not None and taken is not None and seen.whole == taken.whole == NUMBERED:
+        yield (
+            "inc_command_seen",
+            SameAs("command.inc_command"),
+        )  # no other number stands there, not even a refused one
 
 
 def _reports(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
@@ -115,8 +118,9 @@ def _orders(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
             continue
         record, _, field = name.partition(".")
         if field == "input_command":
-            yield name, Fixed(0)
+            if part.members:
+                yield name, Fixed(0)
             continue
         echo = f"{record.removeprefix(_ORDER)}.{_ECHOES.get(field, '')}"
-        if part.whole is not None and echo in parts and parts[echo].whole is not None:
+        if part.whole == NUMBERED and echo in parts and parts[echo].whole == NUMBERED:
             yield name, After(echo)

@@ -10,8 +10,9 @@ from rcsc.compose.contract.properties import properties
 from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
 from rcsc.episodes.episode import FAULTS, MADE
 from rcsc.lang.interpret import Fault, answering, cycle, initial
-from rcsc.lang.model import Kind, Value
-from rcsc.lang.protocol.environment import EARLY, ENVIRONMENT, Event, Kept, refusable
+from rcsc.lang.model import Kind, Value, key_bounds
+from rcsc.lang.protocol.environment import EARLY, ENVIRONMENT, Event, Kept, refusable, unadmitted
+from rcsc.lang.restart import NUMBERED, After, Fixed, SameAs
 from rcsc.run.signature import FAULTS as FAULT_NAMES
 from rcsc.symbolic import values
 from tests.support.programs.stages import program_of
@@ -189,3 +190,34 @@ def test_a_refused_input_stands_outside_its_range_for_what_looks_at_it() -> None
     plain = dict(properties(program, ts.cycle(ts.havoc())))
     assert plain["ranged"] is values.TRUE
     assert plain["back"] is values.TRUE
+
+
+BY_HAND = """input command : order
+input arm : report
+output to_arm : order
+state inc_command_seen : {0} = 2
+record order {{ inc_command : {0} = 2  input_command : {0} = 2 }}
+record report {{ inc_command_echo : {0} = 2 }}
+"""
+
+
+@pytest.mark.parametrize(
+    "kind", ["int 0 .. 65535", "int 0 .. 9", "int 2 .. 90000", "int -5 .. 5", "int 0 .. 90000"]
+)
+def test_a_level_begins_anew_in_its_ranges_whatever_its_numbers_are(kind: str) -> None:
+    """Numbers that are counted on go round in one range; what stands in an input may be refused, and is taken over where it cannot be."""
+    program = program_of(BY_HAND.format(kind))
+    kinds = {str(variable.name): variable for variable in program.variables}
+    bounds = {name: key_bounds(variable.type) for name, variable in kinds.items()}
+    for leaf, adopted in program.adopted.items():
+        low, high = bounds[leaf]
+        match adopted:
+            case Fixed(value):
+                assert low <= value <= high, leaf
+            case After(echo):
+                assert {bounds[leaf], bounds[echo]} == {NUMBERED}
+            case SameAs(other):
+                assert not unadmitted(kinds[other]), leaf
+                assert bounds[other] == bounds[leaf]
+    counted = {leaf for leaf, adopted in program.adopted.items() if isinstance(adopted, After | SameAs)}
+    assert counted == ({"to_arm.inc_command", "inc_command_seen"} if kind == "int 0 .. 65535" else set())

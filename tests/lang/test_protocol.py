@@ -657,6 +657,12 @@ def test_levels_without_a_superior_and_without_subordinates_are_levels() -> None
             "RCS301",
             "of its own type",
         ),
+        (
+            "level cell",
+            "input taken : int 0 .. 9\noutput shot : int 0 .. 9\nadopt shot after taken\nlevel cell",
+            "RCS301",
+            "`shot` is no `int 0 .. 65535`",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_declaration_is_said_where_it_stands(

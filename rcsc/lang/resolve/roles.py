@@ -32,7 +32,7 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.protocol import Flags, Parties, Party, Watched, condition, in_step
 from rcsc.lang.resolve.variables import value_given
-from rcsc.lang.restart import ECHOED, Adopted, After, Fixed, SameAs, Stands, by_names
+from rcsc.lang.restart import ECHOED, NUMBERED, Adopted, After, Fixed, SameAs, Stands, by_names
 from rcsc.lang.syntax import tree
 
 
@@ -153,6 +153,10 @@ def _declared(scope: Scope, written: tree.AdoptDecl) -> dict[str, Adopted]:
         return {}
     if not isinstance(place.type, Int) or echo.type != place.type or echo.kind is not Kind.INPUT:
         scope.report(Code.KIND, "a number is counted on from an input of its own type", written.value.span)
+        return {}
+    if (place.type.low, place.type.high) != NUMBERED:
+        message = f"`{place.name}` is no `int {NUMBERED[0]} .. {NUMBERED[1]}`: the number after the last of these is the first"
+        scope.report(Code.KIND, message, written.place.span)
         return {}
     return {str(place.name): After(str(echo.name))}
 
