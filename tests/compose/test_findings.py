@@ -41,7 +41,7 @@ from rcsc.run.unproved import UnprovedExecutors, marked
 from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
 from tests.support.programs.stages import shipped
-from tests.support.programs.systems import SYSTEM, small_level, small_system, small_text
+from tests.support.programs.systems import SYSTEM, alone, small_level, small_system, small_text
 from tests.support.programs.texts import edit_file, edited, without_row
 from tests.support.proved import every_obligation, obligation_of, shortest, time_line
 
@@ -358,6 +358,34 @@ def test_where_the_interpreter_parts_from_the_solver_is_said(monkeypatch: pytest
     with pytest.raises(NotReproducedError) as raised:
         shortest(ts, obligation)
     assert raised.value.beside == ("cycle 2: `to_lower.input_command` = drill by the solver, rest as it ran",)
+
+
+FAR = """
+input go : bool
+input y : real 0.0 .. 2.0
+state way : real 0.0 .. 2.0
+state far : bool
+output on : bool
+assume believed assumed : far or not go
+property never : not on
+module notice reads way writes far { far := way * 0.5 >= 0.75 }
+table t assuming believed {
+  | line | go    || on    | way             |
+  |------|-------||-------|-----------------|
+  | on   | true  || true  | way             |
+  | off  | false || false | min(2.0, y * y) |
+}
+level l { preprocess notice table t }
+"""
+
+
+def test_a_run_against_what_is_declared_is_not_shown() -> None:
+    """The square of `y` may be anything to the solver, which takes the fact for so: as it runs, the fact fails where the property does."""
+    ts = alone(FAR)
+    assert ts.trusted == {"believed"}
+    with pytest.raises(NotReproducedError) as raised:
+        shortest(ts, obligation_of(ts, Sort.PROPERTY, "", "never"))
+    assert raised.value.guessed
 
 
 def test_arithmetic_that_was_left_open_is_no_bug(tmp_path: Path) -> None:

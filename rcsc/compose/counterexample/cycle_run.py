@@ -254,6 +254,12 @@ def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
     )
 
 
+def as_declared(ts: TransitionSystem, step: CycleRun) -> bool:
+    """Return whether all that is trusted of what stands outside held where the tables ran: the search may have left it open."""
+    failed = {*step.failed, *(name for stage in step.stages for name in stage.failed)}
+    return not failed & ts.trusted
+
+
 def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
     """Return whether the cycle, as it ran, breaks the obligation.
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from rcsc.compose.contract.obligations import Obligation, Sort, command_stays
 from rcsc.compose.contract.transition import NUMBERS, Cycle, TransitionSystem
-from rcsc.compose.counterexample.cycle_run import CycleRun, as_cycle, ran_on
+from rcsc.compose.counterexample.cycle_run import CycleRun, as_cycle, as_declared, ran_on
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceSearch, Unrolled
 from rcsc.compose.proof.termination import answered, unanswered
 from rcsc.lang.interpret import UNDEFINED, Fault
@@ -98,7 +98,7 @@ def _reproduced(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) ->
         first = lasso_of(ts, table, steps)
     except UNDEFINED:
         return NotReproducedError(shown, undefined=True)
-    if first is None:
+    if first is None or not all(as_declared(ts, step) for step in steps):
         return NotReproducedError(shown, guessed=run.guessed)
     return Lasso(Trace(shown, steps, run.search.restarted, run.search.legal), first)
 

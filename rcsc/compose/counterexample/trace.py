@@ -16,7 +16,7 @@ from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, obligations, pairs
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem, successor
-from rcsc.compose.counterexample.cycle_run import CycleRun, Given, broken, ran_on
+from rcsc.compose.counterexample.cycle_run import CycleRun, Given, as_declared, broken, ran_on
 from rcsc.compose.counterexample.simplest import Bounded, Simplest, constant_of
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.interpret import (
@@ -355,4 +355,5 @@ def _ran(
 
 
 def _breaks(ts: TransitionSystem, obligation: Obligation, trace: Trace, cycles: int) -> bool:
-    return len(trace.steps) == cycles and broken(ts, obligation, trace.steps[-1])
+    ran = len(trace.steps) == cycles and all(as_declared(ts, step) for step in trace.steps)
+    return ran and broken(ts, obligation, trace.steps[-1])
