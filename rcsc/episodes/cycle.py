@@ -40,6 +40,7 @@ class Cycle:
     Attributes:
         tick: Of the cycle that has just been done, from 1.
         before: What each level had after its last cycle that was no fault; at first, and after a restart, what it begins with.
+        left: What it had after its last cycle, whatever ended that: what `was` means in a property.
         ran: The levels that ran.
         said: What was last published in each buffer.
         restarted: Levels that started anew before this cycle.
@@ -52,6 +53,7 @@ class Cycle:
     operator: EpisodeOperator
     said: Mapping[str, Values]
     before: dict[str, Values]
+    left: dict[str, Values]
     tick: int = 0
     ran: tuple[RunningLevel, ...] = ()
     restarted: frozenset[str] = frozenset()

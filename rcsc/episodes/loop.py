@@ -173,7 +173,7 @@ class Loop:
         self.system = System(its.system, levels, (outside,), self._memory, watch=[self._after])
         self.cycle = Cycle(
             {level.name: level for level in levels}, self._stage.plants, self.operator, self._memory.said,
-            {level.name: level.initial for level in levels},
+            {level.name: level.initial for level in levels}, {level.name: level.initial for level in levels},
         )  # fmt: skip
         self._properties = properties(its, its.system.within, claims)
         self._explained, self._seen = Explanations(its), _Seen()
@@ -273,7 +273,7 @@ class Loop:
         except BadState as error:
             self._find(Broken(f"{name}: {RESTARTS}", str(error), name), self.system.tick + 1)
         level = self.system.level(name)
-        self.cycle.before[name] = level.values
+        self.cycle.before[name] = self.cycle.left[name] = level.values
 
     def _to_refuse(self, tick: int) -> Mapping[str, frozenset[str]]:
         """Leaves that hold what their level must refuse, by level; of several readings of a field the last holds."""
@@ -308,6 +308,7 @@ class Loop:
             for broken in watcher.watch(cycle):
                 self._find(broken, system.tick)
         for level in ran:
+            cycle.left[level.name] = level.values
             if level.fault in (0, STOPPED):
                 cycle.before[level.name] = level.values
 

@@ -97,25 +97,37 @@ class LevelProperty:
     before: Mapping[str, int]
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """The values on which it does not hold."""
+        """The values on which it does not hold; what a refused cycle left of inputs alone breaks nothing."""
         level = cycle.levels[self.level]
         if level not in cycle.ran or level.fault:
             return
-        values, earlier = level.values, cycle.before[self.level]
-        snapshot: dict[str, Value] = {name: values[at] for name, at in self.now.items()}
-        snapshot |= {name: earlier[at] for name, at in self.before.items()}
-        try:
-            if holds(self.property.condition, snapshot):
-                return
-            what = ""
-        except UNDEFINED as error:
-            what = f"not defined ({error}): "
+        left, taken = cycle.left[self.level], cycle.before[self.level]
+        what = self._wrong(level.values, left)
+        if what is None or (
+            left != taken and self._wrong(level.values, _inputs_of(level, taken, left)) is None
+        ):
+            return
         leaves = level.sign.leaves
-        words = [f"`{name}` = {leaves[at].shown(values[at])}" for name, at in self.now.items()]
-        words += [f"`{name}` = {leaves[at].shown(earlier[at])}" for name, at in self.before.items()]
+        words = [f"`{name}` = {leaves[at].shown(level.values[at])}" for name, at in self.now.items()]
+        words += [f"`{name}` = {leaves[at].shown(left[at])}" for name, at in self.before.items()]
         where = level.ran if level.level.stages else f"line `{level.line}`"
         text = f"`{self.property.text}` is false in {where}: {what}{', '.join(words)}"
         yield Broken(f"{self.level}: {self.property.name}", text, self.level)
+
+    def _wrong(self, values: Values, earlier: Values) -> str | None:
+        """Why it does not hold: blank where it is false, why it is not defined; None where it holds."""
+        snapshot: dict[str, Value] = {name: values[at] for name, at in self.now.items()}
+        snapshot |= {name: earlier[at] for name, at in self.before.items()}
+        try:
+            return None if holds(self.property.condition, snapshot) else ""
+        except UNDEFINED as error:
+            return f"not defined ({error}): "
+
+
+def _inputs_of(level: RunningLevel, taken: Values, left: Values) -> Values:
+    """What a cycle left, with the inputs that were taken last: a refused one took none."""
+    inputs = {at for at, leaf in enumerate(level.sign.leaves) if leaf.kind == "input"}
+    return tuple(taken[at] if at in inputs else value for at, value in enumerate(left))
 
 
 def _of_level(level: str, sign: Signature, stated: model.Property) -> LevelProperty:

@@ -297,6 +297,20 @@ class TestFalseClaims:
         assert broken(safe, only(never), iter((self.REFUSED,))) == {"UNREACHED"}
         assert broken(safe, only(never), iter((replace(self.REFUSED, readings=()),))) == set()
 
+    def test_of_what_was_before_a_refused_input_is_of_the_cycle_that_it_ended(self, tmp_path: Path) -> None:
+        """The safe value stood there, whatever stood before it: so the property holds, and it is proved."""
+        falls = "property falls : o = 0 implies was o /= 1\nproperty rises"
+        path = written(tmp_path, {**SAFE, "lv.rcs": edited(SAFE["lv.rcs"], ("property rises", falls))})
+        its, claims = stand(path), proved_claims_of(path)
+        assert {"falls", "rises"} <= {claim.name for claim in claims.every if not claim.trusts}
+        for tick in range(6):
+            refused = Reading("out.x", 10, tick, tick, refused=True)
+            assert (
+                not Loop(Episode(executor="python", readings=(refused,), ticks=12), its, claims)
+                .finish()
+                .findings
+            )
+
     def test_one_that_trusts_that_nothing_is_refused(self, safe: Stand) -> None:
         words = "`x`, `y` of level `lv` are never refused"
         trusted = Trusted(*trust_of(words), words)
