@@ -33,6 +33,7 @@ from rcsc.episodes.episode import Episode, Restart
 from rcsc.episodes.loop import Loop
 from rcsc.episodes.outcome import EpisodeFinding
 from rcsc.episodes.proved.claims import Claims
+from rcsc.episodes.proved.cycles import EXTERN
 from rcsc.episodes.proved.watch import PROVED, ProvedHolds
 from rcsc.episodes.sampling import draw_on
 from rcsc.episodes.stand import Stand, stand
@@ -122,11 +123,19 @@ def drawn_episode(its: Stand, seed: int, number: int) -> Episode:
     return replace(episode, executor="python", restarts=(*episode.restarts, *more))
 
 
+class _GoesOn(Loop):
+    """An episode that a refused result does not end: what is proved is proved of the cycles after it, too."""
+
+    def _expected(self, tick: int) -> bool:
+        faulted = [level for level in self.cycle.ran if level.fault and level.fault != EXTERN]
+        return self.system.tick == tick + 1 and (not faulted or super()._expected(tick))
+
+
 def broken_in(episode: Episode, its: Stand, claims: Claims) -> tuple[Loop, list[EpisodeFinding]]:
     """An episode that was run, and the claims that it breaks."""
     NOWHERE.random = Random(episode.seed)  # noqa: S311  # likewise
     sys.modules["nowhere"] = NOWHERE
-    loop = Loop(episode, its, claims)
+    loop = _GoesOn(episode, its, claims)
     outcome = loop.finish()
     return loop, [found for found in outcome.findings if f": {PROVED}: " in found.property]
 

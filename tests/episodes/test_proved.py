@@ -457,6 +457,13 @@ def test_every_trust_is_told_from_the_others() -> None:
         )
 
 
+def test_a_report_with_which_a_level_begins_answers_nothing() -> None:
+    """It begins with *done*, and says *executing* of what stands there from its first cycle on: its answers stand all the same."""
+    one = played(5021, 2)
+    assert one.kinds["STANDS"]
+    assert not one.broken
+
+
 def test_the_command_plays_drawn_systems() -> None:
     one = played(3, 2)
     assert not one.broken

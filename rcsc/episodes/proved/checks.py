@@ -331,7 +331,7 @@ def _given(claim: Claim, reader: Reader, level: ProvedLevel) -> Check:
 
 
 def _stands(_: Claim, reader: Reader, level: ProvedLevel) -> Check:
-    """A report that answers a command stays as it is while it is about that command."""
+    """A report that answers a command stays as it is while it is about that command; what it begins with answers nothing."""
     above = level.above
     assert above is not None
     report = reader.record(above.report)
@@ -341,7 +341,7 @@ def _stands(_: Claim, reader: Reader, level: ProvedLevel) -> Check:
     def check(now: Now) -> str:
         was, is_ = now.before, now.values
         said = reader.sign.leaves[status].shown(was[status])
-        ended = said == above.done or (said == above.failed and was[echoed] != 0)
+        ended = not now.anew and (said == above.done or (said == above.failed and was[echoed] != 0))
         about = was[echo] == is_[echo] == now.stood[number] and was[echoed] == now.stood[command]
         same = was[report.start : report.stop] == is_[report.start : report.stop]
         return "" if same or not (ended and about) else f"`{above.report}` changes once it has said {said}"
