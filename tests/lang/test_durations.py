@@ -152,6 +152,7 @@ def after(*edits: tuple[str, str]) -> str:
     ("text", "code", "message"),
     [
         (after(("for delay", "for 0.25 [s]")), "RCS317", "`0.25 [s]` is no whole number of cycles of 100 ms, 1 or more"),
+        (after(("for delay", "for 900000000 [s]")), "RCS317", "`900000000 [s]` is more than 4294967295 cycles of 100 ms"),
         (after(("for delay", "for 0 [s]")), "RCS317", "`0 [s]` is no whole number of cycles of 100 ms, 1 or more"),
         (after(("for delay", "for 3")), "RCS302", "what has to hold does so for a time in `ms` or `s`"),
         (after(("for delay", "for x")), "RCS305", "a time is a constant"),

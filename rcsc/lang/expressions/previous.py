@@ -86,7 +86,9 @@ def cycles_of(scope: Scope, time: Value, unit: Unit, span: Span) -> int | None:
     if exact != cycles or not 1 <= cycles <= MOST_CYCLES:
         below = min(max(exact.numerator // exact.denominator, 1), MOST_CYCLES - 1)
         near = " or ".join(f"`{_in_ms(number * period)}`" for number in (below, below + 1))
-        message = f"`{time} [{unit[0][0]}]` is no whole number of cycles of {period} ms, 1 or more"
+        whole = f"no whole number of cycles of {period} ms, 1 or more"
+        wrong = whole if cycles <= MOST_CYCLES else f"more than {MOST_CYCLES} cycles of {period} ms"
+        message = f"`{time} [{unit[0][0]}]` is {wrong}"
         scope.report(Code.NO_CYCLES, message, span, f"write {near}")
         return None
     return cycles
