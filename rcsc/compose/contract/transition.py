@@ -214,14 +214,14 @@ class TransitionSystem:
             self.kinds[f"{GHOST}{asked.into}"] = Bool()
             for key in asked.keys:
                 self.kinds[f"{GHOST}{asked.into} {key}"] = self.kinds[key]
-        if self._looks_back():
+        if self._looked_back_at():
             self.kinds[REFUSED] = Bool()
         self.trusted = self._of_the_environment()
 
-    def _looks_back(self) -> bool:
-        """Return whether a property looks back at an input, which a refused cycle left as it came."""
-        inputs = {str(earlier(leaf)) for leaf in self.inputs}
-        return any(inputs & set(map(str, read_by(stated.condition))) for stated in self.program.properties)
+    def _looked_back_at(self) -> frozenset[str]:
+        """Find the inputs that a property looks back at, which a refused cycle left as they came."""
+        read = {str(name) for stated in self.program.properties for name in read_by(stated.condition)}
+        return frozenset(leaf for leaf in self.inputs if str(earlier(leaf)) in read)
 
     @property
     def refusable(self) -> tuple[str, ...]:
@@ -231,9 +231,9 @@ class TransitionSystem:
     @property
     def clamped(self) -> tuple[str, ...]:
         """The inputs that properties look back at and that cycles move to the edge: where the level begins anew, none has done so yet."""
-        if REFUSED not in self.kinds:
-            return ()
-        return tuple(str(v.name) for v in self._of_outside() if v.admit is Admit.CLAMP and unadmitted(v))
+        looked_at = self._looked_back_at()
+        past = (v for v in self._of_outside() if v.admit is Admit.CLAMP and unadmitted(v))
+        return tuple(str(v.name) for v in past if v.name in looked_at)
 
     def _of_outside(self) -> Iterator[Variable]:
         """Yield the inputs that no level writes: the operator, the plant, the database, or nobody."""
