@@ -26,6 +26,7 @@ from rcsc.run.adopt import adopt
 from rcsc.run.description import description
 from rcsc.run.system import signatures
 from rcsc.solvers.options import Options
+from rcsc.solvers.sat import GaveUpError
 from tests.support.programs.texts import edit_file
 
 DOCK = Path(__file__).parents[1] / "data" / "protocol"
@@ -273,10 +274,27 @@ def test_where_no_run_is_found_the_cycle_is_shown_at_which_the_proof_stops(
     assert last["wrong"] == "property `soon` is broken"
     assert run(asked) == 1
     said = capsys.readouterr().err
-    assert "no run of 8 cycles or fewer shows it" in said
+    assert "no run of 8 cycles or fewer was found" in said
     assert "whether that is ever reached is not known" in said
+    assert "the solver gave up" not in said
     assert run([*asked, "--trace", "0", "--level", "drive"]) == 1
     assert "proof stops" not in capsys.readouterr().err, "nothing was looked for"
+
+
+def test_a_run_on_which_the_solver_gave_up_is_not_said_not_to_be(
+    dock: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _counting(dock, 40)
+
+    def gives_up(*_: object) -> bool:
+        raise GaveUpError
+
+    monkeypatch.setattr("rcsc.compose.counterexample.trace.Unrolled.reaches", gives_up)
+    assert run(["prove", str(dock), "--level", "drive", "--no-cache", "--certificate", "/dev/null/x"]) == 1
+    assert "error[RCS502]: /dev/null/x cannot be written" in capsys.readouterr().err
+    assert run(["prove", str(dock), "--level", "drive", "--no-cache"]) == 1
+    said = capsys.readouterr().err
+    assert "no run of 8 cycles or fewer was found; the solver gave up on some" in said
 
 
 def test_where_a_run_is_found_nothing_is_supposed(dock: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -69,7 +69,7 @@ def say_explanation(
             err=True,
         )
     elif cycles and not explanation.beside:
-        click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
+        click.echo(f"  = note: {_no_run(systems[explanation.level], explanation, cycles)}", err=True)
         _say_supposed(systems, explanation)
     _say_notes(explanation, cycles)
     for line in explanation.helps:
@@ -77,8 +77,17 @@ def say_explanation(
     if explanation.together:
         click.echo(f"  = note: {explanation.together}", err=True)
     if explanation.others:
-        click.echo(f"  = note: no such run shows both of lines {', '.join(explanation.others)}", err=True)
+        click.echo(
+            f"  = note: no such run was found of both of lines {', '.join(explanation.others)}", err=True
+        )
     _say_logs(explanation)
+
+
+def _no_run(ts: TransitionSystem, explanation: Explanation, cycles: int) -> str:
+    """Say that no run was found, and where none was looked for."""
+    among = " among those in which no input is refused" if ts.refusable else ""
+    gave_up = "; the solver gave up on some" if explanation.gave_up else ""
+    return f"no run of {cycles} cycles or fewer was found{among}{gave_up}"
 
 
 def _say_logs(explanation: Explanation) -> None:

@@ -396,10 +396,13 @@ def _say_not_agreed(proof: SystemProof) -> None:
 
 def _write(folder: Path, systems: dict[str, TransitionSystem], proof: SystemProof) -> None:
 
-    folder.mkdir(parents=True, exist_ok=True)
-    for level in proof.levels:
-        for name, text in certificate(systems[level.level], level).items():
-            write_atomically(folder / f"{level.level} {name}.smt2".replace(" ", "_"), text.encode())
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for level in proof.levels:
+            for name, text in certificate(systems[level.level], level).items():
+                write_atomically(folder / f"{level.level} {name}.smt2".replace(" ", "_"), text.encode())
+    except OSError as error:
+        raise UnwritableError(str(folder), error.strerror or "no reason given") from error
 
 
 def _as_json(

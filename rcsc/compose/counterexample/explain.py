@@ -49,6 +49,7 @@ class Explanation:
         supposes: Of a run of one level alone: for each other level, the inputs for which it gives values that are supposed of it.
         notes: What is known of it without a run: what may go on for ever, or that the values after a restart break it.
         undefined: Whether the run that was found meets an operation that is not defined.
+        gave_up: Whether the solver gave up on a search for a run, so that there may be one among those that were looked at.
     """
 
     level: str
@@ -66,6 +67,7 @@ class Explanation:
     supposes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     undefined: bool = False
+    gave_up: bool = False
 
     @property
     def warns(self) -> bool:
@@ -145,14 +147,19 @@ def _level(
         if obligation.sort is Sort.ONE_LINE
     }
     asked = [part for obligation in wanted for part in parted.get(obligation.key) or [obligation]]
-    results = _searched(ts, asked, settings)
+    gave_up = set[ObligationKey]()
+    results = _searched(ts, asked, settings, gave_up)
     for obligation in wanted:
         if obligation.key in parted:
-            every_pair = list(_pairs(ts, obligation, parted[obligation.key], results))
+            every_pair = [
+                replace(each, gave_up=any(part.key in gave_up for part in parted[obligation.key]))
+                for each in _pairs(ts, obligation, parted[obligation.key], results)
+            ]
             yield from _with_repairs(ts, every_pair, proof, settings, texts)
         else:
             explanation = _explanation(ts, obligation, results.get(obligation.key))
-            explanation = replace(explanation, notes=tuple(_as_it_begins(ts, obligation)))
+            notes = tuple(_as_it_begins(ts, obligation))
+            explanation = replace(explanation, notes=notes, gave_up=obligation.key in gave_up)
             yield (
                 replace(explanation, supposed=_supposed(ts, obligation, proof))
                 if obligation.key not in results
@@ -188,14 +195,14 @@ def _supposed(ts: TransitionSystem, obligation: Obligation, proof: LevelProof) -
 
 
 def _searched(
-    ts: TransitionSystem, asked: list[Obligation], settings: TraceSettings
+    ts: TransitionSystem, asked: list[Obligation], settings: TraceSettings, gave_up: set[ObligationKey]
 ) -> dict[ObligationKey, TraceResult]:
     """Run the searches one after the other, each for what is still open."""
     results: dict[ObligationKey, TraceResult] = {}
     for search in settings.searches(str(ts.level.name)):
         left = [obligation for obligation in asked if obligation.key not in results]
         if left:
-            results |= traces(ts, left, search)
+            results |= traces(ts, left, search, gave_up)
     return results
 
 

@@ -104,9 +104,12 @@ def usual_length(systems: Iterable[TransitionSystem]) -> int:
 
 
 def traces(
-    ts: TransitionSystem, wanted: Sequence[Obligation], search: TraceSearch
+    ts: TransitionSystem,
+    wanted: Sequence[Obligation],
+    search: TraceSearch,
+    gave_up: set[ObligationKey] | None = None,
 ) -> dict[ObligationKey, TraceResult]:
-    """Find the shortest trace of each obligation that has one, all in one search."""
+    """Find the shortest trace of each obligation that has one, all in one search; note those on which the solver gave up."""
     run = Unrolled(ts, search)
     waiting = {obligation.key: obligation for obligation in wanted}
     results: dict[ObligationKey, TraceResult] = {}
@@ -125,6 +128,8 @@ def traces(
                     del waiting[key]
             except GaveUpError:
                 del waiting[key]
+                if gave_up is not None:
+                    gave_up.add(key)
     return results
 
 
