@@ -19,7 +19,7 @@ from rcsc.run.faults import faults_of, switch
 from rcsc.run.orders.numbered import Orders
 from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun, line_to
 from rcsc.run.orders.roles import COMMAND, Served, field_of, served
-from rcsc.run.plant.load import Staged
+from rcsc.run.plant.staged import Staged
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.signature import Leaf, Signature, Value, Values
 from rcsc.run.system import System, assemble, signatures

@@ -21,7 +21,7 @@ from rcsc.run.description import BadDescription, Description, description, place
 from rcsc.run.executors import NotBuilt
 from rcsc.run.orders.script import BadScript, script_path
 from rcsc.run.plant.bind import BadPlant
-from rcsc.run.plant.load import MODELS, chosen
+from rcsc.run.plant.load import chosen
 
 _MODEL_FILES = frozenset(
     {".xml", ".mjcf", ".urdf", ".stl", ".obj", ".msh", ".dae", ".skn", ".png", ".hf", ".bin"}
@@ -79,10 +79,10 @@ def _plant(spec: PlantSpec) -> Iterator[Path]:
 
 
 def _module(spec: PlantSpec) -> Iterator[NamedFile]:
-    """The installed module that a plant is, or that binds its model, wherever it is installed."""
-    name = (spec.python if spec.model is None else MODELS).partition(":")[0]
+    """The installed module that a plant is, wherever it is installed."""
+    name = spec.python.partition(":")[0]
     with contextlib.suppress(ModuleNotFoundError, ValueError):  # which is told when the plant is loaded
-        found = None if name.endswith(".py") else importlib.util.find_spec(name)
+        found = None if not name or name.endswith(".py") else importlib.util.find_spec(name)
         if found is not None and found.origin is not None:
             yield name, Path(found.origin)
 

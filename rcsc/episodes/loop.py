@@ -24,7 +24,7 @@ from rcsc.run.orders.numbered import Latest
 from rcsc.run.orders.roles import FAILED
 from rcsc.run.orders.together import Together
 from rcsc.run.plant.bind import PlantFailed
-from rcsc.run.plant.load import Staged
+from rcsc.run.plant.staged import Staged
 from rcsc.run.plant.staging import StageOrder, staged
 from rcsc.run.signature import STOPPED, Value, Values
 from rcsc.run.system import Outside, System, check_answered, executors

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.run.description import NO_DATA, BadDescription, Description, description
-from rcsc.run.plant.load import Staged, by_hand
+from rcsc.run.plant.load import by_hand
+from rcsc.run.plant.staged import Staged
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.signature import Signature
 from rcsc.run.system import Kind, assemble, signatures

@@ -11,12 +11,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from rcsc.run.plant.models.space import ModelSpace
 from rcsc_cell.cell.mujoco_model import mjcf
 from rcsc_cell.cell.physical import Physical
 from rcsc_cell.cell.plant import Grip, Plant
 from rcsc_cell.cell.reach import home
 from rcsc_cell.cell.ready import Backend, lying, plant
-from rcsc_cell.cell.space import ModelSpace
 from rcsc_cell.database.ask import Database
 from rcsc_cell.vision.flood import Features
 from rcsc_cell.workstation.prepared import prepare

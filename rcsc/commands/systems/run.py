@@ -31,7 +31,7 @@ from rcsc_cell.pages.report import report
 from rcsc_cell.pages.witness import RunWitness, names
 
 if TYPE_CHECKING:
-    from rcsc.run.plant.load import Staged
+    from rcsc.run.plant.staged import Staged
     from rcsc_cell.live import Live
 
 UNORDERED_TICKS = 1000

@@ -34,8 +34,8 @@ Trusted: the file of a plant that a description names, which is imported and run
 Modules, in the order the data flows: `fields` (what a class declares), `units`, `values` (a field against leaves), `held` (what
 a plant holds, for a run that goes on in another process), `bind`
 (a class against the buffers), `space` (how it looks, for who watches),
-`load` (a plant by its name), `staging` (with its script). A model for MuJoCo is bound by
-data in `rcsc_cell.bound`.
+`staged` (what stands outside, made), `load` (a plant by its name), `staging` (with its script); `models` (a model for MuJoCo, bound by
+data).
 """
 
 from typing import Protocol

@@ -8,12 +8,11 @@ import importlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
 from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeAlias
+from typing import Any
 
 from rcsc.host.described import KeyPath, nearest
 from rcsc.host.files.names import BadName, within
@@ -21,71 +20,9 @@ from rcsc.lang.project import project_root
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description
 from rcsc.run.levels import Query
-from rcsc.run.orders.operator import Operator, ScriptedRun
-from rcsc.run.orders.stopped import StoppedRuns
 from rcsc.run.plant.bind import BadPlant, BoundPlant, bind, plant_page, raised, told
+from rcsc.run.plant.staged import Setup, Staged, StageFunction
 from rcsc.run.signature import Signature, Value, Values
-from rcsc.run.system import Outside
-
-MODELS = "rcsc_cell.bound.model_plant:staged"
-"""Makes a plant of a MuJoCo model; imported by name, for the core needs no simulator."""
-
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """What a plant is made for.
-
-    Attributes:
-        system: The description; `signs` the signatures of its levels, by name.
-        spec: The plant, as it is declared.
-        seed: Of what is random in it.
-        script: What is to be ordered, as the user calls it; empty where nothing is.
-        database: A database to be used as it is; None for the system's own.
-        answers_only: Whether only the answers to feeds are wanted: a level's process needs no plant.
-    """
-
-    system: Description
-    signs: Mapping[str, Signature]
-    spec: PlantSpec
-    seed: int = 0
-    script: str = ""
-    database: Path | None = None
-    answers_only: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Staged:
-    """What stands outside a system, ready for its first tick.
-
-    Attributes:
-        outside: In the order in which they step.
-        queries: The answers to what feeds ask.
-        operator: Who gives the orders of the script, where the plant reads scripts of its own.
-        pictures: How it looks now: an SVG document by the kind of picture, each drawn when it is called.
-        witness: Makes what watches a run in the plant's own way (`rcsc_cell.pages.witness`).
-        resume: Keeps a stopped run; None where the plant cannot be put back.
-    """
-
-    outside: tuple[Outside, ...] = ()
-    queries: Mapping[str, Query] = field(default_factory=dict)
-    operator: Operator | None = None
-    pictures: Mapping[str, Callable[[], str]] = field(default_factory=dict)
-    witness: Callable[[ScriptedRun], Any] | None = None
-    resume: StoppedRuns | None = None
-
-    @property
-    def over(self) -> bool:
-        """Whether something outside says that the run is at its end."""
-        return any(getattr(part, "over", False) for part in self.outside)
-
-    @property
-    def plants(self) -> tuple[BoundPlant, ...]:
-        """The plants among them whose fields are bound."""
-        return tuple(part for part in self.outside if isinstance(part, BoundPlant))
-
-
-StageFunction: TypeAlias = Callable[[Setup], Staged]
-"""A plant that does more than fields can say is a function."""
 
 
 def by_hand(system: Description) -> str | None:
@@ -147,12 +84,19 @@ def load(
     if spec is None:
         return Staged()
     given = spec not in system.plants
-    factory = _factory(system, spec, given=given) if spec.model is None else named(system, spec, MODELS)
+    factory = _factory(system, spec, given=given) if spec.model is None else _of_a_model()
     if not inspect.isclass(factory):
         stage: StageFunction = factory
         return stage(Setup(system, signs, spec, seed, script, database, answers_only))
     bound = bind(system, signs, spec, factory, seed)
     return Staged((bound,), _queries(system, bound), pictures=bound.pictures)
+
+
+def _of_a_model() -> StageFunction:
+    """Return what makes a plant of a MuJoCo model; the core needs no simulator."""
+    from rcsc.run.plant.models.model_plant import staged  # keep lazy: of an extra
+
+    return staged
 
 
 def _queries(system: Description, bound: BoundPlant) -> dict[str, Query]:

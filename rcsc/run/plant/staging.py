@@ -16,7 +16,8 @@ from rcsc.run.orders.operator import Operator, ScriptOperator
 from rcsc.run.orders.script import outside_buffers, read_script, script_path
 from rcsc.run.orders.stopped import Restorable, StoppedRuns
 from rcsc.run.orders.together import Together
-from rcsc.run.plant.load import Staged, load
+from rcsc.run.plant.load import load
+from rcsc.run.plant.staged import Staged
 from rcsc.run.signature import Signature
 from rcsc.run.system import Outside, signatures
 

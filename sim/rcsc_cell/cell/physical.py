@@ -13,11 +13,11 @@ import mujoco
 import numpy as np
 
 from rcsc.host.files.plain import finite, plain, read
+from rcsc.run.plant.models.space import ModelSpace
 from rcsc_cell.cell.arm import Joints
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.mujoco_model import GAIN_N_M, USUAL, Body, Make, mjcf
 from rcsc_cell.cell.plant import CYCLE_S, EMPTY_MM, JAWS_MM, Grip, Noise, noise_of, put_noise
-from rcsc_cell.cell.space import ModelSpace
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import Pose, Rotation, Vector
 from rcsc_cell.vision.camera import Camera

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rcsc.host.cache import open_cache
 from rcsc.run.orders.stopped import StoppedRuns
-from rcsc.run.plant.load import Setup, Staged
+from rcsc.run.plant.staged import Setup, Staged
 from rcsc_cell.workstation.orders import KINDS
 from rcsc_cell.workstation.prepared import database_of, needs_cell, safe_places, script_path
 from rcsc_cell.workstation.script import read_script

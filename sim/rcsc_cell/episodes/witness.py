@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from rcsc.run.plant.models.solid import solid
 from rcsc.run.plant.space import Space as SpaceOfPlant
 from rcsc.run.signature import Values
 from rcsc.run.system import System
@@ -18,7 +19,6 @@ from rcsc_cell.database.build import depth_mm
 from rcsc_cell.database.pose import Vector, minus, pose_of
 from rcsc_cell.pages.report import Figure, Placement, Story
 from rcsc_cell.pages.witness import RunWitness
-from rcsc_cell.pictures.solid import solid
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import outline
 from rcsc_cell.workstation.station import RowResult, Workstation

@@ -1,4 +1,4 @@
-"""Pictures of the cell, and of any model, all SVG text.
+"""Pictures of the cell, all SVG text.
 
 No graphics driver, no browser and no script: the same state gives the same text on one machine, so that pictures can
 be compared in tests and opened anywhere.
@@ -7,12 +7,11 @@ be compared in tests and opened anywhere.
 >>> stick((560, 0, 725, 560, 0, 625, 460, 0, 725), 80.0, None).startswith("<svg")
 True
 
-A *solid* picture draws the faces of MuJoCo's shapes from far to near. A *stick* figure is the arm in three
-projections and a perspective, as section 10 of the paper has it; it needs nine numbers and no physics, so it can be
-drawn of a log. A *scene* is the cell as far as a log says it.
+A *stick* figure is the arm in three projections and a perspective, as section 10 of the paper has it; it needs nine
+numbers and no physics, so it can be drawn of a log. A *scene* is the cell as far as a log says it. What MuJoCo moves is
+drawn by `rcsc.run.plant.models.solid`.
 
 Nothing here is trusted for a proof. What it costs: time by the faces that are drawn.
 
-Modules, in the order the data flows: `solid` draws a MuJoCo model (`shapes`, `order`), `stick` the stick figure
-(`views`, `things`); `scene` finds in a log where everything is.
+Modules, in the order the data flows: `stick` draws the stick figure (`views`, `things`); `scene` finds in a log where everything is.
 """

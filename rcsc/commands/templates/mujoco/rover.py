@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import mujoco
 
 from rcsc.run.plant import Fault, Range
-from rcsc_cell.cell.space import ModelSpace
+from rcsc.run.plant.models.space import ModelSpace
 
 MODEL = Path(__file__).with_name("rover.xml")
 FAR_M = 2.0

@@ -14,10 +14,10 @@ import mujoco
 from rcsc.host.described import Document, KeyPath, nearest
 from rcsc.run.plant import fields
 from rcsc.run.plant.bind import Buffer
+from rcsc.run.plant.models.model_units import driven_in, sensed_in
 from rcsc.run.plant.units import Factor, factor
 from rcsc.run.plant.values import FlagLink, MemberLink, NumberLink
 from rcsc.run.signature import Leaf, Value
-from rcsc_cell.bound.model_units import driven_in, sensed_in
 
 ONE = Factor(Fraction(1))
 BY_HAND = 'write the plant in Python: `[plant] python = "plant.py"`'

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rcsc_cell.pictures.shapes import Floats, Integers
+from rcsc.run.plant.models.shapes import Floats, Integers
 
 Bools = NDArray[np.bool_]
 

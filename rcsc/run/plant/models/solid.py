@@ -13,8 +13,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from rcsc_cell.pictures.order import Faces, painted
-from rcsc_cell.pictures.shapes import Floats, Integers, Solid, box, capsule, cylinder
+from rcsc.run.plant.models.order import Faces, painted
+from rcsc.run.plant.models.shapes import Floats, Integers, Solid, box, capsule, cylinder
 
 DRAWN_GROUPS = (0, 1, 2)
 NEAR_M = 0.05

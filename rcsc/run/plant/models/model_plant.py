@@ -16,12 +16,12 @@ import numpy as np
 from rcsc.host.described import Document
 from rcsc.host.files.plain import finite
 from rcsc.run.plant.bind import BadPlant, PlantFailed, buffers_of, parties_of, plant_page
-from rcsc.run.plant.load import Setup, Staged
+from rcsc.run.plant.models.bindings import ActuatorBinding, Binder, FaultBinding, SensorBinding, ends
+from rcsc.run.plant.models.solid import View, solid
+from rcsc.run.plant.models.space import ModelSpace
+from rcsc.run.plant.staged import Setup, Staged
 from rcsc.run.plant.values import BadValue
 from rcsc.run.signature import Leaf, Value, Values
-from rcsc_cell.bound.bindings import ActuatorBinding, Binder, FaultBinding, SensorBinding, ends
-from rcsc_cell.cell.space import ModelSpace
-from rcsc_cell.pictures.solid import View, solid
 
 KEPT = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """What of a model's state its next step is made of, and nothing that it only computes."""
