@@ -11,7 +11,16 @@ shown is escaped, and data of a script stand in an element that no browser runs:
 >>> "<" in packed("</script>")
 False
 
-Reports of runs, findings, and what the studio shares are made in this way.
+The *report* of a run has rows, lines that ran, pictures of what stands outside where there are any, and the run tick by tick by the
+studio's parts. The page of a *finding* has no script; it draws what `rcsc prove --log` kept, cycle by cycle.
 
-Modules: `frame` reads templates; `page.html.jinja` is what all pages have in common.
+>>> from rcsc.pages.report import ReportRow, Story, page
+>>> "every row done" in page(Story("dock", [ReportRow(1, "dock", "done", 70)]))
+True
+
+Any system has these; a plant may add what is true of it alone (`Staged.witness`). Nothing here is trusted for a proof. What it costs: a
+copy of what is drawn, a cycle; a report keeps a picture every 25 cycles at the least.
+
+Modules, in the order the data flows: `frame` reads templates, of which `page.html.jinja` is what all pages have in common; `drawn` says
+what draws the world outside; `witness` watches a run, `log_page` reads one; `report` and `finding_page` are pages.
 """

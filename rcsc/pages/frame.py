@@ -49,3 +49,7 @@ def packed(data: Any) -> Markup:
     """Write data into a `script` element that is none: gzip, in letters that mean nothing to HTML; the same for the same."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return Markup(base64.b64encode(compressed(text.encode())).decode())  # noqa: S704  # nothing is left that means something to HTML
+
+
+PAGES = environment("rcsc", "pages")
+"""The templates of this folder."""

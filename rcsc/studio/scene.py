@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 from rcsc.diagnostics.codes import Code
+from rcsc.pages.drawn import Drawing
 from rcsc.run.levels import RunningLevel, StateTableError
 from rcsc.run.log.read import Log
 from rcsc.run.plant.space import Space, space_of
@@ -27,20 +28,6 @@ MOST_KEPT = 50_000
 MOST_TRACED = 1500
 NO_SPACE = "what stands outside says nothing of how it looks in space: a plant has a method `space`, or is a model for MuJoCo"
 NO_POSES = "a log holds no poses: only what buffers say is drawn"
-
-
-class Drawing(Protocol):
-    """A picture of a tick: `rcsc_cell.pictures.scene.DrawnScene`."""
-
-    @property
-    def svg(self) -> str:
-        """The document."""
-        ...
-
-    @property
-    def caption(self) -> tuple[str, ...]:
-        """Notes on it, a sentence each."""
-        ...
 
 
 class Drawer(Protocol):

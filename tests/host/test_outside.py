@@ -30,6 +30,7 @@ from rcsc.graph.formats.state_graph import Edge, StateGraph
 from rcsc.host.files import csv_text
 from rcsc.host.files.names import BadName, identifier, inside, within
 from rcsc.host.files.read import CheckedFields, Malformed, content, json_of, lines_of, toml_of, xml_of
+from rcsc.pages.frame import quoted
 from rcsc.run.description import BadDescription, description
 from rcsc.run.log.read import UnreadableLog, read
 from rcsc.run.log.recorder import Recorder
@@ -37,7 +38,6 @@ from rcsc.run.log.records import MOST_CHUNK, ChainCheck, Seal, records
 from rcsc.run.signature import signature
 from rcsc.run.system import System, assemble
 from rcsc.shell.typed_names import kind_of
-from rcsc_cell.pages.page import quoted
 from tests.support.programs.stages import emitted, shipped
 from tests.support.programs.texts import system
 

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 from rcsc.commands import run
+from rcsc.pages.log_page import MOST_PICTURES, story_of
+from rcsc.pages.report import Story, page
 from rcsc.run.description import description
 from rcsc.run.log.export import coverage
 from rcsc.run.log.read import read
@@ -13,8 +15,6 @@ from rcsc.run.log.recorder import Recorder
 from rcsc.run.orders.operator import RowResult, ScriptedRun
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.system import assemble, signatures
-from rcsc_cell.pages.log_page import MOST_PICTURES, story_of
-from rcsc_cell.pages.report import Story, page
 from tests.run.test_log import record
 from tests.support.cells import SYSTEM
 from tests.support.films import film_of, unset_in

@@ -15,6 +15,8 @@ from rcsc.commands import run
 from rcsc.commands.shared.played import with_ticks
 from rcsc.host.files.names import BadName
 from rcsc.host.files.read import CheckedFields, Malformed, json_of
+from rcsc.pages.report import page
+from rcsc.pages.witness import RunWitness, variables
 from rcsc.run.adopt import Begun
 from rcsc.run.description import Description, LevelSpec, Wire
 from rcsc.run.executors import PythonExecutor
@@ -26,8 +28,6 @@ from rcsc.run.log.schema import signature_from, signature_text
 from rcsc.run.orders.operator import ScriptedRun
 from rcsc.run.signature import Leaf, signature_of
 from rcsc.run.system import System, assemble
-from rcsc_cell.pages.report import page
-from rcsc_cell.pages.witness import RunWitness, variables
 from tests.run.test_log import REPO, restarted, system
 from tests.support.films import film_of, unset_in
 from tests.support.programs.stages import emitted, program_of

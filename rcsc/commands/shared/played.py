@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rcsc.pages.report import Story
     from rcsc.run.log.read import Log  # of an extra
-    from rcsc_cell.pages.report import Story
 
 
 def with_ticks(story: "Story", log: "Log", drawn: Sequence[str]) -> "Story":

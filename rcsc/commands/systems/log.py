@@ -15,6 +15,9 @@ from rcsc.commands.shared.stopped import stopped
 from rcsc.commands.shared.systems import NoSystem, system_path
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files import write_atomically
+from rcsc.pages.finding_page import trace
+from rcsc.pages.log_page import drawn_first, story_of
+from rcsc.pages.report import report as run_page
 from rcsc.run.description import NO_DATA, BadDescription, description
 from rcsc.run.log import export
 from rcsc.run.log.export import coverage
@@ -23,9 +26,6 @@ from rcsc.run.log.read import Log, LoggedLevel, read
 from rcsc.run.log.records import Seal
 from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
 from rcsc_cell.database.build import BadData
-from rcsc_cell.pages.finding_page import trace
-from rcsc_cell.pages.log_page import drawn_first, story_of
-from rcsc_cell.pages.report import report as run_page
 from rcsc_cell.pictures.scene import DrawnCell, same_system
 
 _TO = click.Path(dir_okay=False, path_type=Path)

@@ -18,6 +18,8 @@ from rcsc.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLANT, SY
 from rcsc.diagnostics.codes import Code
 from rcsc.host.children import scratch
 from rcsc.host.files.read import content, json_of
+from rcsc.pages.report import report
+from rcsc.pages.witness import RunWitness, names
 from rcsc.run.description import BadDescription, Description, description
 from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
 from rcsc.run.orders.script import BadScript
@@ -27,8 +29,6 @@ from rcsc.run.processes.serve import Factory
 from rcsc.run.processes.supervisor import Supervisor, run_processes
 from rcsc.run.signature import Signature
 from rcsc.run.system import assemble, signatures
-from rcsc_cell.pages.report import report
-from rcsc_cell.pages.witness import RunWitness, names
 
 if TYPE_CHECKING:
     from rcsc.run.plant.staged import Staged

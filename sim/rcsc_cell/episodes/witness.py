@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from rcsc.pages.report import Figure, Placement, Story
+from rcsc.pages.witness import RunWitness
 from rcsc.run.plant.models.solid import solid
 from rcsc.run.plant.space import Space as SpaceOfPlant
 from rcsc.run.signature import Values
@@ -17,8 +19,6 @@ from rcsc_cell.cell.plant import Latest, Plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import depth_mm
 from rcsc_cell.database.pose import Vector, minus, pose_of
-from rcsc_cell.pages.report import Figure, Placement, Story
-from rcsc_cell.pages.witness import RunWitness
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import outline
 from rcsc_cell.workstation.station import RowResult, Workstation

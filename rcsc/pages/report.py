@@ -14,7 +14,7 @@ from typing import Protocol
 from markupsafe import Markup
 
 from rcsc.host.files import write_atomically
-from rcsc_cell.pages.page import PAGES
+from rcsc.pages.frame import PAGES
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class ReportRow:
 
 @dataclass(frozen=True, slots=True)
 class CellPicture:
-    """A picture of the cell at a tick; `svg` is a document of `rcsc_cell.pictures`."""
+    """A picture of the cell at a tick; `svg` is a document."""
 
     tick: int
     caption: str

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rcsc.host.files import write_atomically
+from rcsc.pages.drawn import Cell, Drawing
+from rcsc.pages.frame import PAGES
 from rcsc.run.log.finding import LoggedFinding
 from rcsc.run.log.read import Log
 from rcsc.run.log.ticks import LoggedTick, frames
-from rcsc_cell.pages.page import PAGES
-from rcsc_cell.pictures.scene import DrawnCell, DrawnScene
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +30,10 @@ class _Tick:
     ms: int
     mark: str
     broken: bool
-    drawn: DrawnScene | None
+    drawn: Drawing | None
 
 
-def trace(path: Path, log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str = "") -> None:
+def trace(path: Path, log: Log, finding: LoggedFinding, cell: Cell | None, why_not: str = "") -> None:
     """Writes the page.
 
     Args:
@@ -49,7 +49,7 @@ def trace(path: Path, log: Log, finding: LoggedFinding, cell: DrawnCell | None, 
     write_atomically(path, page(log, finding, cell, why_not).encode())
 
 
-def page(log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str = "") -> str:
+def page(log: Log, finding: LoggedFinding, cell: Cell | None, why_not: str = "") -> str:
     """The page; arguments as those of `trace`."""
     return PAGES.get_template("trace.html.jinja").render(
         finding=finding,
@@ -63,7 +63,7 @@ def page(log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str 
 _SIGNS: Mapping[bool, str] = {True: "\N{CHECK MARK}", False: "\N{BALLOT X}"}
 
 
-def _tick(frame: LoggedTick, log: Log, finding: LoggedFinding, cell: DrawnCell | None) -> _Tick:
+def _tick(frame: LoggedTick, log: Log, finding: LoggedFinding, cell: Cell | None) -> _Tick:
     broken = frame.tick == finding.broken_at
     mark = "broken here" if broken else "what comes of it" if frame.tick > finding.broken_at else ""
     drawn = None if cell is None else cell.drawn(frame.tick)
@@ -86,7 +86,7 @@ def _notes(log: Log, finding: LoggedFinding) -> list[str]:
     return notes
 
 
-def about_cell(cell: DrawnCell | None, why_not: str) -> str:
+def about_cell(cell: Cell | None, why_not: str) -> str:
     """What the pictures of the cell rest on; arguments as those of `trace`."""
     if cell is None:
         return f"No cell is drawn: {why_not}"

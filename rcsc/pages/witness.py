@@ -12,12 +12,12 @@ from functools import partial
 from itertools import chain
 from typing import Protocol
 
+from rcsc.pages.report import CellPicture, Figure, Matched, ReportRow, Story
 from rcsc.run.adopt import Begun
 from rcsc.run.levels import RunningLevel
 from rcsc.run.orders.operator import ScriptedRun
 from rcsc.run.system import System
 from rcsc.run.unset.since import LevelSeen, Unsets
-from rcsc_cell.pages.report import CellPicture, Figure, Matched, ReportRow, Story
 
 FRAMES_APART, LONG_APART = 25, 80
 """Cycles between pictures of the filmstrip: at the least, and in the middle of a long row."""
@@ -26,7 +26,7 @@ MOST_SERIES = 8
 
 
 class LivePage(Protocol):
-    """The page that follows a run (`rcsc_cell.live`)."""
+    """A page that follows a run."""
 
     def publish(self, tick: int, values: Mapping[str, float | str]) -> None:
         """The values after a tick."""

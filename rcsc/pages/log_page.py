@@ -7,15 +7,15 @@ What only who watched the run knew (script, parts, timing) is not in a log, and 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from rcsc.pages.drawn import Cell
+from rcsc.pages.finding_page import about_cell
+from rcsc.pages.report import CellPicture, Matched, ReportRow, Story
+from rcsc.pages.witness import FRAMES_APART, MOST_SERIES
 from rcsc.run.log.export import coverage
 from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import Log
 from rcsc.run.log.states import LogColumn
 from rcsc.run.log.ticks import LoggedTick, Order, Reported, TickValue, frames
-from rcsc_cell.pages.finding_page import about_cell
-from rcsc_cell.pages.report import CellPicture, Matched, ReportRow, Story
-from rcsc_cell.pages.witness import FRAMES_APART, MOST_SERIES
-from rcsc_cell.pictures.scene import DrawnCell
 
 MOST_PICTURES = 60
 """Pictures of the cell in a page; a long run has them further apart."""
@@ -43,7 +43,7 @@ class _Ordered:
 
 def story_of(
     log: Log,
-    cell: DrawnCell | None = None,
+    cell: Cell | None = None,
     why_not: str = "",
 ) -> Story:
     """Return what a page shows of the log.
@@ -143,7 +143,7 @@ def _outside(log: Log, known: Collection[str]) -> Iterator[str]:
             )
 
 
-def _pictures(log: Log, cell: DrawnCell | None, ordered: Sequence[_Ordered]) -> list[CellPicture]:
+def _pictures(log: Log, cell: Cell | None, ordered: Sequence[_Ordered]) -> list[CellPicture]:
     """The cell at even distances, the last tick among them."""
     if cell is None or not log.ticks:
         return []
