@@ -93,7 +93,7 @@ def _of_tables() -> Iterator[Step]:
         versions = ("examples/acquire_published.rcs", "task/acquire.rcs")
         yield Step(f"diff-{form}", ("diff", *versions, "--format", form))
     yield Step("trace", ("trace", "task/acquire.rcs", "--out", "trace", "--no-vectors"), ("tables/trace/*",))
-    yield Step("trace-find", ("trace", "task/acquire.rcs", "--find", "acquire.1"))
+    yield Step("trace-find", ("trace", "task/acquire.rcs", "--find", "acquire 1"))
     yield Step("db-check", ("db", "check"))
     yield Step("db-build", ("db", "build", "-o", "cell.db"))
     yield Step("db-show", ("db", "show", "--database", "cell.db"))
