@@ -215,3 +215,65 @@ def test_a_fact_holds_of_what_the_reader_begins_with(first: str, begins: bool, t
     assert whole.of("upper", (Sort.OWED, "", "lower.fact")).verdict is Verdict.PROVED
     assert whole.of("lower", (Sort.ASSUMPTION, "go", "fact")).proved == begins
     assert whole.proved == begins
+
+
+WRITES = """
+input x : int 0 .. 9
+output o : int 0 .. 9
+table t {
+  | line | x      || o |
+  |------|--------||---|
+  | all  | 0 .. 9 || x |
+}
+level w { period 40 [ms] table t }
+"""
+READS = """
+input o : int 0 .. 9
+input e : bool
+output seen : int 0 .. 9
+assume one assumed : ONE
+assume two assumed : TWO
+property never : seen /= 3
+table t assuming one, two {
+  | line | o      || seen |
+  |------|--------||------|
+  | all  | 0 .. 9 || o    |
+}
+level r { period 40 [ms] table t }
+"""
+BOTH = """
+name = "s"
+generated = "generated"
+tick_ms = 40
+[[level]]
+name = "w"
+[[level]]
+name = "r"
+[buffers]
+"out.x" = "w.x"
+"w.o" = "r.o"
+"out.e" = "r.e"
+"""
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "both"),
+    [
+        ("o = 3 implies e", "o = 3 implies e", True),
+        ("o = 3 implies e", "o = 3 implies not e", False),
+        ("e", "o = 3 implies not e", False),
+        ("not e", "o = 3 implies not e", True),
+    ],
+)
+def test_facts_that_no_input_keeps_together_are_not_trusted(
+    one: str, two: str, both: bool, tmp_path: Path
+) -> None:
+    """Each alone can be kept from outside; together they would say of what another level writes that it is never 3, which it is."""
+    reads = edited(READS, ("ONE", one), ("TWO", two))
+    for name, text in (("w.rcs", WRITES), ("r.rcs", reads), ("system.toml", BOTH)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    whole = prove_system(tmp_path / "system.toml", LITTLE)
+    assert whole.of("r", (Sort.ASSUMPTION, "t", "one")).verdict is Verdict.TRUSTED
+    trusted = whole.of("r", (Sort.ASSUMPTION, "t", "two")).verdict is Verdict.TRUSTED
+    assert trusted == both
+    assert whole.of("r", (Sort.PROPERTY, "", "never")).verdict is Verdict.NOT_PROVED

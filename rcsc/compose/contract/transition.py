@@ -30,6 +30,7 @@ from rcsc.lang.model import (  # fmt: skip
     Snapshot,
     Table,
     TableChoice,
+    Value,
     Variable,
     earlier,
 )
@@ -258,29 +259,65 @@ class TransitionSystem:
         cycle = self.cycle(self.havoc())
         # What tables before the last compute of inputs is the level's own: it is owed, not taken for granted.
         known = Run(self.procedures, self.kinds, dict(cycle.prepared))
-        trusted = set[str]()
+        trusted, mixed = set[str](), list[tuple[Assumption, set[str]]]()
         for assumption in wanted:
-            name = str(assumption.name)
             read = values.variables([known.evaluate(assumption.condition)]).keys() - cycle.before.keys()
             leaves = {leaf for leaf, node in cycle.taken.items() if read & values.variables([node]).keys()}
             outside = {leaf for leaf in leaves if self.links.written_as(leaf) is None}
-            if read and (outside == leaves or self._keepable(assumption, outside)):
-                trusted.add(name)
+            if read and outside == leaves:
+                trusted.add(str(assumption.name))
+            elif read and outside:
+                mixed.append((assumption, outside))
+        kept: dict[str, Value] = {}
+        # together: facts that could each be kept from outside may say something of what a level writes
+        for assumption, outside in mixed:
+            chosen = self._kept_by(assumption, outside, kept, trusted)
+            if chosen is not None:
+                kept |= chosen
+                trusted.add(str(assumption.name))
         return frozenset(trusted)
 
-    def _keepable(self, assumption: Assumption, outside: Collection[str]) -> bool:
-        """Return whether these inputs alone can make an assumption true wherever it stands, whatever the levels write."""
+    def _kept_by(
+        self,
+        assumption: Assumption,
+        outside: Collection[str],
+        kept: Mapping[str, Value],
+        trusted: Collection[str],
+    ) -> dict[str, Value] | None:
+        """Find values of these inputs that make an assumption true wherever it stands, whatever the levels write.
+
+        Args:
+            assumption: It speaks of what levels write, too.
+            outside: The inputs that come from outside.
+            kept: Values that some have already.
+            trusted: Names of assumptions that have to be true with it.
+        """
         kinds = {leaf: self.kinds[leaf] for leaf in self.inputs if leaf in outside}
-        if not kinds:
-            return False
         free = {leaf: values.variable(f"{leaf} taken", self.kinds[leaf]) for leaf in self.inputs}
+        given = {f"{leaf} taken" for leaf in (*kinds, *kept)}
+        about = [
+            key
+            for key, node in self._assumed(free).items()
+            if key[1] == assumption.name
+            or (key[1] in trusted and not given.isdisjoint(values.variables([node])))
+        ]
         for chosen in outside_values(assumption.condition, kinds):
-            taken = free | {leaf: values.constant(kinds[leaf], value) for leaf, value in chosen.items()}
-            every = self.cycle(self.havoc(), taken=taken).every
-            said = [node for at in every for name, node in at.assumptions.items() if name == assumption.name]
-            if all(node.known and node.low for node in said):
-                return True
-        return False
+            both = {**kept, **chosen}
+            taken = {leaf: values.constant(self.kinds[leaf], value) for leaf, value in both.items()}
+            said = self._assumed(free | taken)
+            same = all(both[leaf] == value for leaf, value in kept.items())
+            if same and all(said[key].known and said[key].low for key in about):
+                return chosen
+        return None
+
+    def _assumed(self, taken: Leaves) -> dict[tuple[int, str], Node]:
+        """Return the assumptions of each table that may run, by the table's place and their names, for these inputs."""
+        every = self.cycle(self.havoc(), taken=taken).every
+        return {
+            (place, str(name)): node
+            for place, at in enumerate(every)
+            for name, node in at.assumptions.items()
+        }
 
     def havoc(self) -> Leaves:
         """Return an arbitrary state: the start of a step of induction."""
