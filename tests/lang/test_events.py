@@ -121,7 +121,7 @@ def test_after_a_restart_states_were_what_they_adopt_and_inputs_what_they_are_in
     assert (adopted["was_count"], adopted["was_m"]) == (Fixed(4), Fixed(1))
     assert not {"was_p", "was_on", "was_list[0]"} & adopted.keys()
     by_hand = (
-        "record c { inc_command : int 0 .. 9 }\ninput command : c\nstate inc_command_seen : int 0 .. 9\n"
+        "record c { inc_command : int 0 .. 65535 }\ninput command : c\nstate inc_command_seen : int 0 .. 65535\n"
         "output new : bool\nprocedure look { new := @C(inc_command_seen) }"
     )
     restart = dict(program_of(by_hand).restart or ())

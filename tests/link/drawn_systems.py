@@ -1,13 +1,14 @@
 """Systems of two and three levels, drawn: periods, ranges, types, buffers to parts, to oneself and to what stands outside.
 
 Their tables are trivial; what differs is what is carried, when, and what a restart makes of it. Numbers may be narrower than the
-protocol's, so that a start anew may find none that fits; an invariant may forbid what a start anew sets. Orders take the greatest
+protocol's, and then a start anew counts none on; an invariant may forbid what a start anew sets. Orders take the greatest
 number every other time, so that a restart meets it.
 """
 
 from pathlib import Path
 from random import Random
 
+from rcsc.lang.restart import NUMBERED
 from tests.support.programs.texts import system
 
 PERIODS = (
@@ -30,7 +31,7 @@ enum status {{ done, executing, failed }}
 type number = int 0 .. {most}
 record pair {{ a : int 0 .. 9  b : array[2] of job }}
 record order {{ inc_command : number  input_command : job  goal : pair }}
-record answer {{ inc_command_echo : int 5 .. {most}  ref_command_echo : job  status_report : status }}
+record answer {{ inc_command_echo : int {least} .. {most}  ref_command_echo : job  status_report : status }}
 """
 LEVEL = """
 use words
@@ -89,7 +90,9 @@ def drawn_system(folder: Path, random: Random, *, most: int = 0) -> Path:
     most = most or random.choice((255, 65535, 9, 4294967295))
     names = ["top", "middle", "low"][-len(periods) :]
     (folder / "rcsc.toml").write_text('name = "drawn"\n', encoding="utf-8")
-    (folder / "words.rcs").write_text(WORDS.format(most=most), encoding="utf-8")
+    (folder / "words.rcs").write_text(
+        WORDS.format(most=most, least=0 if most == NUMBERED[1] else 5), encoding="utf-8"
+    )
     buffers = {"out.order": f"{names[0]}.command", f"{names[0]}.report": "out.report"}
     for at, (name, period) in enumerate(zip(names, periods, strict=True)):
         last = at == len(names) - 1

@@ -61,7 +61,7 @@ SWAPS = (
     ("== UINT64_C(0)", "!= UINT64_C(0)"), ("!= UINT64_C(0)", "== UINT64_C(0)"), ("UINT64_C(1)", "UINT64_C(2)"),
     ("(at < 0)", "(at < 1)"), ("% UINT64_C(2)", "% UINT64_C(3)"), ("% UINT64_C(3)", "% UINT64_C(2)"),
     ("% UINT64_C(4)", "% UINT64_C(2)"), ("== DRAWN_LEVEL_NONE", "!= DRAWN_LEVEL_NONE"),
-    ("UINT64_C(255)", "UINT64_C(256)"), ("65536", "65535"), ("_echo;", "_echo + 1u;"),
+    ("65536", "65535"), ("_echo;", "_echo + 1u;"),
 )  # fmt: skip
 
 
@@ -79,14 +79,13 @@ def mutants(text: str) -> Iterator[tuple[str, str]]:
 
 SAME = r"without now\.to_low\.input_command = \w+;?"  # it is 0 in the initial state
 UNTRIED = {
-    9: rf"{SAME}|with (65535|UINT64_C\(256\))|without at = 0;|without at = low_check|at < 1",  # 10 fits the type, and not the range
-    255: rf"{SAME}|with 65535|without at = \w+_check|at < 1",  # 256 does not fit the type
+    9: rf"{SAME}|without at = 0;|without at = \w+_check|at < 1",  # a start anew counts no such number on
     65535: rf"{SAME}|without at = \w+_check|at < 1",
 }
 """By the greatest number of an order: what changes nothing, or nothing that this system can show."""
 
 
-@pytest.mark.parametrize("most", [9, 255, 65535])
+@pytest.mark.parametrize("most", [9, 65535])
 def test_mutants_are_caught(most: int, tmp_path: Path) -> None:
     random = drawing(1)
     path = drawn_system(tmp_path, random, most=most)
