@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from rcsc.commands import run
+from tests.quick import chosen, quick
 
 # A shell's `&` begins a command with SIGINT ignored, which all its children inherit; tests send it to them.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -83,11 +84,16 @@ def _missing(tool: str) -> bool:
     return not any(shutil.which(name) for name in (BROWSERS if tool == "chromium" else (tool,)))
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` is asked
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leaves out what needs a tool that is no Python package and not here; the end of the run says so.
+    """Marks what is quick (`tests.quick`); leaves out what needs a tool that is no Python package and not here, as the run's end says.
 
     `.ci/run` installs them, and fails where it cannot; what not every release has, it names in its summary.
     """
+    quick_ones = chosen()
+    for item in items:
+        if quick(item.nodeid.partition("[")[0].removeprefix("tests/"), quick_ones):
+            item.add_marker("quick")
     left_out = [
         item
         for item in items
