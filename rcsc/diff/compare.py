@@ -40,9 +40,8 @@ def compare(
     compared: list[ComparedPart] = []
     for what, steps in _steps(versions):
         try:
-            with smt.together(
-                options.steps
-            ):  # a table, all procedures or all levels take no more than a question may
+            # a table, all procedures or all levels take no more than a question may
+            with smt.together(options.steps):
                 compared += steps()
         except given_up:
             undecided.append(what)

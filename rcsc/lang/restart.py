@@ -92,10 +92,8 @@ def _failed(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
 def _seen(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
     seen, taken = parts.get("inc_command_seen"), parts.get("command.inc_command")
     if seen is not None and taken is not None and seen.whole == taken.whole == NUMBERED:
-        yield (
-            "inc_command_seen",
-            SameAs("command.inc_command"),
-        )  # no other number stands there, not even a refused one
+        # no other number stands there, not even a refused one
+        yield "inc_command_seen", SameAs("command.inc_command")
 
 
 def _reports(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:

@@ -5,8 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from shutil import copytree, ignore_patterns
 
+from rcsc.commands import group
+
 ROOT = Path(__file__).parents[2]
 _LEFT_OUT = ignore_patterns(".rcsc-cache", "__pycache__", "generated", "kept")
+COMMANDS = tuple(name.rpartition(".")[2] for name in group.COMMANDS)
+"""Every command."""
 FORMATS = ("line", "json", "sarif", "github")
 LEVELS = ("task", "emove", "primitive", "vision", "gripper")
 
@@ -151,10 +155,3 @@ def _of_words() -> Iterator[Step]:
         yield Step(f"help-{command}", (command, "--help"))
     yield Step("explain", ("explain",))
     yield from (Step(f"completion-{one}", ("completion", one)) for one in ("bash", "zsh", "fish"))
-
-
-COMMANDS = (
-    "campaign", "certify", "check", "compile", "completion", "db", "diff", "evidence", "explain", "fmt", "graph", "log", "lsp", "new",
-    "prove", "replay", "run", "shell", "studio", "table", "test", "trace",
-)  # fmt: skip
-"""Every command."""

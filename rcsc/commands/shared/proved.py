@@ -300,12 +300,11 @@ def _unless(
     said: str, systems: Mapping[str, TransitionSystem], begins: Callable[[TransitionSystem], Leaves]
 ) -> str:
     """What is said of the orders with which levels begin, and of which it is not so."""
-    others = [
-        f"`{below.order}` of `{name}`"
-        for name, ts in systems.items()
-        for below in ts.links.below
-        if not ((order := begins(ts)[below.command]).known and order.low == 0)
-    ]
+    others = []
+    for name, ts in systems.items():
+        begun = begins(ts)
+        orders = ((below.order, begun[below.command]) for below in ts.links.below)
+        others += [f"`{order}` of `{name}`" for order, node in orders if not (node.known and node.low == 0)]
     return f"{said} but for {', '.join(others)}" if others else said
 
 

@@ -192,6 +192,8 @@ class TransitionSystem:
         kinds: The type of each leaf and ghost, by name.
         inputs: The leaves that each cycle takes, in declared order.
         trusted: Assumptions about what stands outside that the tables declare: part of the contract.
+        refusable: The inputs that may be refused, in declared order: what a level writes never is.
+        clamped: The inputs that properties look back at and cycles move to the edge: where the level begins anew, none has done so yet.
         refuses: Whether cycles that an input ends are cycles, too, and inputs stand as they came where the level begins anew; else nothing
             is refused or stands outside its range, which is then to be trusted.
     """
@@ -205,6 +207,8 @@ class TransitionSystem:
     kinds: dict[str, Scalar] = field(init=False)
     inputs: tuple[str, ...] = field(init=False)
     trusted: frozenset[str] = field(init=False, default=frozenset())
+    refusable: tuple[str, ...] = field(init=False, default=())
+    clamped: tuple[str, ...] = field(init=False, default=())
 
     def __post_init__(self) -> None:
         """Derives types, inputs and trusted assumptions from the program."""
@@ -215,26 +219,19 @@ class TransitionSystem:
             self.kinds[f"{GHOST}{asked.into}"] = Bool()
             for key in asked.keys:
                 self.kinds[f"{GHOST}{asked.into} {key}"] = self.kinds[key]
-        if self._looked_back_at():
+        looked_at = self._looked_back_at()
+        if looked_at:
             self.kinds[REFUSED] = Bool()
+        outside = list(self._of_outside())
+        self.refusable = tuple(str(v.name) for v in outside if refusable(v))
+        past = (v for v in outside if v.admit is Admit.CLAMP and unadmitted(v))
+        self.clamped = tuple(str(v.name) for v in past if v.name in looked_at)
         self.trusted = self._of_the_environment()
 
     def _looked_back_at(self) -> frozenset[str]:
         """Find the inputs that a property looks back at, which a refused cycle left as they came."""
         read = {str(name) for stated in self.program.properties for name in read_by(stated.condition)}
         return frozenset(leaf for leaf in self.inputs if str(earlier(leaf)) in read)
-
-    @property
-    def refusable(self) -> tuple[str, ...]:
-        """The inputs that may be refused, in declared order: what a level writes never is."""
-        return tuple(str(v.name) for v in self._of_outside() if refusable(v))
-
-    @property
-    def clamped(self) -> tuple[str, ...]:
-        """The inputs that properties look back at and that cycles move to the edge: where the level begins anew, none has done so yet."""
-        looked_at = self._looked_back_at()
-        past = (v for v in self._of_outside() if v.admit is Admit.CLAMP and unadmitted(v))
-        return tuple(str(v.name) for v in past if v.name in looked_at)
 
     def _of_outside(self) -> Iterator[Variable]:
         """Yield the inputs that no level writes: the operator, the plant, the database, or nobody."""
@@ -303,10 +300,11 @@ class TransitionSystem:
         ]
         for chosen in outside_values(assumption.condition, kinds):
             both = {**kept, **chosen}
+            if any(both[leaf] != value for leaf, value in kept.items()):
+                continue
             taken = {leaf: values.constant(self.kinds[leaf], value) for leaf, value in both.items()}
             said = self._assumed(free | taken)
-            same = all(both[leaf] == value for leaf, value in kept.items())
-            if same and all(said[key].known and said[key].low for key in about):
+            if all(said[key].known and said[key].low for key in about):
                 return chosen
         return None
 
