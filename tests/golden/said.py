@@ -18,6 +18,7 @@ _FIGURES = (
     (re.compile(r"(?m)(^(?:level|in) .*?|^)\b\d+\.\d+ s\b(?= in all|$)"), r"\1# s"),
     (re.compile(r"\d+\.\d s, by an earlier run"), "# s, by an earlier run"),
     (re.compile(r"played now in .*"), "played now in #"),
+    (re.compile(r"-[0-9a-f]{16}\.jsonl"), "-#.jsonl"),  # a digest of rcsc's own sources, too
     (re.compile(r"in \d[\d.]* s: \d+ times as fast"), "in # s: # times as fast"),
     (re.compile(r'("[a-z_]*(?:_s|_ms|seconds|milliseconds|took|time)": )[\d.]+'), r"\1#"),
 )
