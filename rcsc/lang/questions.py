@@ -1,15 +1,14 @@
-"""A region's question as conditions of the model: is there an input at which not one line holds?
+"""A region as conditions of the model, and conditions joined.
 
-In: bounds on forms, and lines. Out: expressions whose conjunction
-is to be refuted. The checker of certificates states the same question by itself (`certify.table`).
+In: bounds on forms. Out: expressions whose conjunction holds in the region. The checker of certificates states the same by itself
+(`certify.table`).
 
-A bound that no condition can say (a distance between two doubles, in ranks) is left out: the
-question then covers more than the region, so that a refutation still stands.
+A bound that no condition can say (a distance between two doubles, in ranks) is left out: what is asked then covers more than the
+region, so that a refutation still stands.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import reduce
-from itertools import combinations
 
 from rcsc.lang.model import (
     Among,
@@ -20,9 +19,7 @@ from rcsc.lang.model import (
     Int,
     Literal,
     Op,
-    Program,
     Real,
-    Table,
     key_bounds,
     value_of_key,
 )
@@ -30,40 +27,9 @@ from rcsc.lang.model import (
 _TRUE = Literal(True, Bool())
 
 
-def question(
-    program: Program,
-    table: Table,
-    assumptions: Sequence[str],
-    bounds: Iterable[tuple[list[tuple[Expr, int]], int, int]],
-    candidates: Sequence[int],
-) -> list[Expr]:
-    """Conditions that together say: in the region, under the assumptions, it goes wrong.
-
-    Args:
-        program: Where the assumptions are declared.
-        table: Whose lines.
-        assumptions: Names of those that may be used.
-        bounds: The region: sums of terms with factors, each with its least and its greatest key.
-        candidates: Positions of the lines that may hold there.
-    """
-    asked = [a.condition for a in program.assumptions if a.name in assumptions]
-    return [*asked, *located(bounds), fault(table, candidates)]
-
-
 def located(bounds: Iterable[tuple[list[tuple[Expr, int]], int, int]]) -> list[Expr]:
     """Conditions that hold in a region, as far as conditions express it."""
     return [condition for terms, low, high in bounds for condition in _within(terms, low, high)]
-
-
-def fault(table: Table, candidates: Sequence[int]) -> Expr:
-    """Two of the candidates hold, or none does (where no DEFAULT may be reached)."""
-    lines = [
-        conjunction(test.condition for test in table.lines[i].tests if test is not None) for i in candidates
-    ]
-    wrong = [conjunction(pair) for pair in combinations(lines, 2)]
-    if table.default is None or table.default.unreachable:
-        wrong.append(conjunction(negation(line) for line in lines))
-    return disjunction(wrong)
 
 
 def conjunction(conditions: Iterable[Expr]) -> Expr:

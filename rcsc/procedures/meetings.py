@@ -2,17 +2,18 @@
 
 In: a program, whose tables may rely on its invariants, and one of its tables. Out: what is wrong, and whether the proof rests on
 the table's assumptions. The effects of two lines are compared as values (`symbolic.alike`), wherever both come through; where they
-differ the least such input is shown, with what each line leaves there.
+differ such an input is shown, the least that a few steps find, with what each line leaves there.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Effects, Label, MatchedLine, Severity, WitnessColumn
-from rcsc.lang.model import AssumptionName, Line, Meeting, Program, Table, spell
+from rcsc.lang.model import AssumptionName, Line, Meeting, Program, Table, Value, spell
 from rcsc.solvers.options import Options
-from rcsc.symbolic.alike import Disagreement, alike, disagreement, meets
+from rcsc.solvers.smt import Answer
+from rcsc.symbolic.alike import Disagreement, alike, disagreement, meeting
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,19 +40,20 @@ def met(program: Program, table: Table, options: Options) -> Met:
     grounds = [replace(table, assumptions=names) for names in dict.fromkeys(((), invariants, every))]
     findings: list[Diagnostic] = []
     relied: set[AssumptionName] = set()
-    for meeting in table.meetings:
-        there = meets(program, grounds[-1], meeting.where, options)
-        if there is False:
-            findings.append(_never(table, meeting))
-        elif meeting.same:
-            pair = _pair(table, meeting)
+    for pair_said in table.meetings:
+        there = meeting(program, grounds[-1], pair_said.where, options)
+        if there is Answer.UNSATISFIABLE:
+            findings.append(_never(table, pair_said))
+        elif pair_said.same:
+            pair = _pair(table, pair_said)
+            near = None if isinstance(there, Answer) else there
             for ground in grounds:
-                effects = alike(program, ground, pair, options, meeting.where)
+                effects = alike(program, ground, pair, options, pair_said.where, near)
                 if effects.same:
                     relied |= {*ground.assumptions}
                     break
             else:
-                findings.append(_apart(program, grounds[-1], meeting, effects, options))
+                findings.append(_apart(program, grounds[-1], pair_said, effects, options, near or {}))
     return Met(tuple(findings), frozenset(relied))
 
 
@@ -69,7 +71,12 @@ def _never(table: Table, meeting: Meeting) -> Diagnostic:
 
 
 def _apart(
-    program: Program, table: Table, meeting: Meeting, effects: Effects, options: Options
+    program: Program,
+    table: Table,
+    meeting: Meeting,
+    effects: Effects,
+    options: Options,
+    near: Mapping[str, Value],
 ) -> Diagnostic:
     """Report that two lines do not do the same, with an input, or that nobody could tell."""
     names = f"lines `{meeting.first}` and `{meeting.second}` of table `{table.name}`"
@@ -77,7 +84,7 @@ def _apart(
         helps = ("give each query more steps with `--steps`, or simplify the lines",)
         message = f"whether {names} do the same could not be decided"
         return Diagnostic(Code.UNDECIDED, message, Label(meeting.span), help=helps)
-    shown = disagreement(program, table, _pair(table, meeting), options, meeting.where)
+    shown = disagreement(program, table, _pair(table, meeting), options, meeting.where, near)
     first, second = (table.lines[at] for at in _pair(table, meeting))
     return Diagnostic(
         Code.NOT_THE_SAME,

@@ -4,7 +4,7 @@ In: a table and two of its lines. Out: `Effects`: that they do, or what they lea
 same where their actions come to their end alike, call the same extern procedures in the same states with the same values, and
 leave every variable the same: text plays no part. Z3 is asked under what the table may rely on, and of each variable by itself;
 what folds, or differs for an input that is tried, is not asked. Of two lines that are said to do the same, `disagreement` tells an
-input for which they do not, and `meets` whether there is one at all for which it is said.
+input for which they do not, and `meeting` one for which it is said.
 
 It costs some inputs that are tried, and a question a variable that none of them shows to be left different.
 """
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from rcsc.diagnostics.diagnostic import Effects
 from rcsc.lang.model import Expr, Line, Program, Table, Value, VariableName
 from rcsc.solvers import smt
-from rcsc.solvers.options import Options
+from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import trial, values
 from rcsc.symbolic.effect import Meaning, Shared, differences, value_after
@@ -72,28 +72,44 @@ def alike(
         return Effects(same=None)
 
 
-def meets(program: Program, table: Table, where: Expr, options: Options) -> bool | None:
-    """Whether some input that the table's assumptions admit is in `where`; None where nobody could tell."""
-    if smt.gives_up("whether two lines meet"):
-        return None
+def meeting(program: Program, table: Table, where: Expr, options: Options) -> Mapping[str, Value] | Answer:
+    """Find some input in `where` that the table's assumptions admit: what is looked at; else that there is none, or `UNKNOWN`."""
+    if _over("whether two lines meet"):
+        return Answer.UNKNOWN
     try:
-        answer = _possible(list(_here(program, table, [where], _starting(program))), options)
+        nodes = list(_here(program, table, [where], _starting(program)))
+        return answered(("meeting",), nodes, lambda: _point(nodes, options))
     except smt.troubles():
-        return None
-    return None if answer is Answer.UNKNOWN else answer is Answer.SATISFIABLE
+        return Answer.UNKNOWN
 
 
 def disagreement(
-    program: Program, table: Table, pair: tuple[int, int], options: Options, where: Expr
+    program: Program,
+    table: Table,
+    pair: tuple[int, int],
+    options: Options,
+    where: Expr,
+    near: Mapping[str, Value],
 ) -> Disagreement | None:
-    """Find the least input in `where` for which two lines, by position, do not do the same; None where none is found."""
+    """Find an input in `where` for which two lines, by position, do not do the same; None where none is found.
+
+    It is the least that a few steps show; values of `near` are tried first.
+    """
     lines = table.lines[pair[0]], table.lines[pair[1]]
-    if smt.gives_up("for which input two lines do not do the same"):
+    if _over("for which input two lines do not do the same"):
         return None
     try:
-        return _Comparison(program, table, lines, where).disagreement(options)
+        return _Comparison(program, table, lines, where).disagreement(options, near)
     except smt.troubles():
         return None
+
+
+def _over(what: str) -> bool:
+    """Whether nothing more is asked: then nothing is put into Z3's words, either, which takes longer than to ask."""
+    if smt.spent():
+        smt.leave_open(what)
+        return True
+    return smt.gives_up(what)
 
 
 def _spelled(line: Line) -> list[object]:
@@ -139,7 +155,7 @@ class _Comparison:
         open_ = [
             change for change in dict.fromkeys(each for _, each in self.changes) if change is not values.TRUE
         ]
-        seen = {values.TRUE} | (trial.met(self.here, open_, near) if open_ else set())
+        seen = {values.TRUE, *(trial.met(self.here, open_, near) if open_ else ())}
         answers = {
             name: Answer.SATISFIABLE if change in seen else _possible([*self.here, change], options)
             for name, change in self.changes
@@ -148,16 +164,18 @@ class _Comparison:
         unknown = Answer.UNKNOWN in answers.values()
         return Effects(False if differ else None if unknown else True, differ)
 
-    def disagreement(self, options: Options) -> Disagreement | None:
-        """Find the least input for which something is left different, and what."""
-        nodes = [*self.here, values.any_of(change for _, change in self.changes)]
+    def disagreement(self, options: Options, near: Mapping[str, Value]) -> Disagreement | None:
+        """Find an input for which something is left different, the least that a few steps show, and what."""
+        wanted = values.any_of(change for _, change in self.changes)
+        nodes = [*self.here, wanted]
         free = values.variables(nodes)
         kinds = {variable.name: variable for variable in self.program.variables}
         shown = [variable for variable in self.program.variables if str(variable.name) in free]
-        solver = Solver(options.limits)
-        solver.add(*values.domain(free.values()), *map(values.term_of, nodes))
+        solver = _stated(nodes, options)
         frame = Frame({name: values.term_of(node) for name, node in free.items()})
-        witness = least_witness(solver, shown, frame)
+        witness = least_witness(
+            solver, shown, frame, smt.Budget(WRONG_STEPS), trial.met(self.here, [wanted], near).get(wanted)
+        )
         if witness is None or solver.check() is not Answer.SATISFIABLE:
             return None
         results = []
@@ -180,12 +198,23 @@ def _here(program: Program, table: Table, conditions: Iterable[Expr], shared: Sh
 
 
 def _possible(nodes: list[Node], options: Options) -> Answer:
-    if smt.gives_up("whether anything is so"):
+    if _over("whether anything is so"):
         return Answer.UNKNOWN
+    return answered(("possible",), nodes, lambda: _stated(nodes, options).check())
 
-    def asked() -> Answer:
-        solver = Solver(options.limits)
-        solver.add(*values.domain(values.variables(nodes).values()), *map(values.term_of, nodes))
-        return solver.check()
 
-    return answered(("possible",), nodes, asked)
+def _point(nodes: list[Node], options: Options) -> Mapping[str, Value] | Answer:
+    """Values for which all nodes hold; else Z3's answer."""
+    solver = _stated(nodes, options)
+    answer = solver.check()
+    if answer is not Answer.SATISFIABLE:
+        return answer
+    free = values.variables(nodes)
+    return {name: solver.value(values.term_of(node), node.kind) for name, node in free.items()}
+
+
+def _stated(nodes: list[Node], options: Options) -> Solver:
+    """A solver that knows that all nodes hold."""
+    solver = Solver(options.limits)
+    solver.add(*values.domain(values.variables(nodes).values()), *map(values.term_of, nodes))
+    return solver

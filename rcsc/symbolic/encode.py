@@ -4,7 +4,7 @@ In: a program's leaves and expressions. Out: terms whose values are exactly `int
 that is defined; that it is defined is proved apart (`obligations`).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
@@ -161,18 +161,28 @@ def least_where(
 
 
 def least_witness(
-    solver: Solver, variables: Iterable[Variable], frame: Frame, spare: smt.Budget | None = None
+    solver: Solver,
+    variables: Iterable[Variable],
+    frame: Frame,
+    spare: smt.Budget | None = None,
+    known: Mapping[str, Value] | None = None,
 ) -> dict[str, Value] | None:
     """The least values, in declared order, for which what is asserted holds; None where none is found.
 
     Any model of Z3's may change with its version; the least one depends on the question alone. Where the
     solver gives up on the way, the values found last stand: a witness still, but not the least. The solver is
-    left with the witness asserted. `spare`: what may be spent once some is known.
+    left with the witness asserted. `spare`: what may be spent once some is known. `known`: such values, where some are; Z3 is not
+    asked for others then.
     """
     shown = list(variables)
-    if solver.check() is not Answer.SATISFIABLE:
+    if known is not None:
+        last: dict[str, int] = {
+            variable.name: key_of(variable.type, known[variable.name]) for variable in shown
+        }
+    elif solver.check() is Answer.SATISFIABLE:
+        last = _model(solver, shown, frame)
+    else:
         return None
-    last = _model(solver, shown, frame)
 
     def up_to(variable: Variable, _low: int, limit: int) -> int | None:
         nonlocal last

@@ -89,8 +89,8 @@ def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:
     return _all_hold(list(parts_first(condition)), [condition], point)
 
 
-def met(conditions: Sequence[Node], goals: Sequence[Node], near: Mapping[str, Value]) -> set[Node]:
-    """Find goals that hold at some point at which all conditions hold; what is not found may hold at another.
+def met(conditions: Sequence[Node], goals: Sequence[Node], near: Mapping[str, Value]) -> dict[Node, Point]:
+    """Find goals that hold at some point at which all conditions hold, each with such a point; what is not found may hold at another.
 
     Args:
         conditions: As of `witness`.
@@ -99,7 +99,7 @@ def met(conditions: Sequence[Node], goals: Sequence[Node], near: Mapping[str, Va
     """
     order = list(parts_first(*conditions, *goals))
     variables = [node for node in order if node.op == Shape.VARIABLE]
-    random, found = Random(0), set[Node]()  # noqa: S311  # a sample, not a secret
+    random, found = Random(0), dict[Node, Point]()  # noqa: S311  # a sample, not a secret
     tries = min(SAMPLES, EVALUATIONS // max(1, len(order)))
     for number in range(tries):
         if len(found) == len(goals) or smt.gives_up("what trial finds"):
@@ -113,7 +113,7 @@ def met(conditions: Sequence[Node], goals: Sequence[Node], near: Mapping[str, Va
         }
         known = _known(order, point)
         if all(known[condition] for condition in conditions):
-            found |= {goal for goal in goals if known[goal]}
+            found = {goal: point for goal in goals if known[goal]} | found
     return found
 
 

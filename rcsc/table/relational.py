@@ -15,6 +15,7 @@ from random import Random
 
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interpret import UNDEFINED, matching_lines
+from rcsc.lang.leaves import parts
 from rcsc.lang.model import (
     AssumptionName,
     Expr,
@@ -27,7 +28,7 @@ from rcsc.lang.model import (
     key_of,
     value_of_key,
 )
-from rcsc.lang.questions import located, question
+from rcsc.lang.questions import located
 from rcsc.solvers import smt
 from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.solvers.search import furthest
@@ -65,6 +66,8 @@ _MOST_LINES_TRIED = 200
 """Lines of a table above which no inputs are tried by the interpreter."""
 _AIMED, _MOST_PAIRS_AIMED = 8, 200
 """Inputs that are tried for each line, and pairs of lines for which one is."""
+_FEWEST_POINTS = 40
+"""Inputs that are tried whatever a table's conditions cost, beside those that are aimed."""
 _STEPS_OF_A_SAMPLE = 10
 """What it costs to have the interpreter look whether a line matches, in steps of Z3."""
 _STEPS_OF_A_QUESTION = 4_000
@@ -161,7 +164,7 @@ class _Decision:
         self._asked: TableSolver | None = None
         self._tried: tuple[tuple[Snapshot, frozenset[int]], ...] | None = None
         self.spare = smt.Budget(WRONG_STEPS, of_all=True)
-        self.rest = smt.Budget(WRONG_STEPS)
+        self.rest = smt.Budget(WRONG_STEPS // 2)
         self.few = few
         self.models: list[tuple[Snapshot, frozenset[int]]] = []
 
@@ -185,7 +188,14 @@ class _Decision:
         """Yield inputs, then some that lines, and pairs of them, are likely to match: a mask of a word matches few others."""
         random = Random(0)  # noqa: S311  # a sample, not a secret
         points = list(trial.points(self.program.variables))
-        yield from points
+        nodes = sum(
+            1
+            for line in self.table.lines
+            for test in line.tests
+            if test is not None
+            for _ in parts(test.condition)
+        )
+        yield from points[: max(_FEWEST_POINTS, trial.EVALUATIONS // max(1, nodes))]
         kinds = {str(v.name): v.type for v in self.program.variables}
         tests = [[test for test in line.tests if test is not None] for line in self.table.lines]
         for one in tests * _AIMED:
@@ -319,20 +329,29 @@ class _Decision:
             return NoWitness.UNKNOWN
         if self.few:
             self.rest.left -= _STEPS_OF_A_QUESTION
-        bounds = self.spelled(asked)
-        conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
+        region, fewest = located(self.spelled(asked)), 1 if must_cover(self.table) else 0
         for snapshot, found in self.tried:
-            if len(found.intersection(asked.candidates)) != 1 and all(
-                fold(condition, snapshot) for condition in conditions
+            if not fewest <= len(found.intersection(asked.candidates)) <= 1 and all(
+                fold(condition, snapshot) for condition in region
             ):
                 self.few = True
                 return snapshot
         z3 = self.asked
-        answer = self.holds(*(encode(condition, z3.frame) for condition in conditions))
+        answer = self.holds(
+            *(encode(condition, z3.frame) for condition in region), self.fault(asked.candidates)
+        )
         if answer is Answer.SATISFIABLE:
             self.few = True
             return self.model(z3)
         return NoWitness.NONE if answer is Answer.UNSATISFIABLE else NoWitness.UNKNOWN
+
+    def fault(self, candidates: Sequence[int]) -> Term:
+        """State that two of the candidates match, or none does (where no DEFAULT may be reached)."""
+        lines = list(map(self.asked.line, candidates))
+        wrong = [smt.all_of(pair) for pair in combinations(lines, 2)]
+        if must_cover(self.table):
+            wrong.append(smt.negation(smt.any_of(lines)))
+        return smt.any_of(wrong)
 
     def holds(self, *terms: Term) -> Answer:
         """Z3's answer to what else may be wrong: with all steps, as long as nothing is."""
@@ -372,7 +391,10 @@ class _Decision:
             for _, found_there in self.tried:
                 pairs.update(combinations(sorted(found_there), 2))
             self.few |= bool(pairs)
-        with smt.within(self.spare):
+        with (
+            smt.within(self.spare),
+            smt.together(WRONG_STEPS // 4),
+        ):  # one hard question leaves some for the least inputs
             for asked in search.doubtful:
                 pairs.update(self.others(asked, pairs))
         found: list[_Found] = []

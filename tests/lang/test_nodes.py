@@ -216,13 +216,16 @@ def test_a_point_that_is_found_is_as_low_as_each_variable_goes() -> None:
 def test_a_goal_is_met_only_where_all_conditions_hold() -> None:
     low, seven = values.compare(Op.LT, N, whole(0)), values.compare(Op.EQ, N, whole(7))
     goals = [low, seven, values.both(low, B), values.negation(low)]
-    assert trial.met([], goals, {"n": 7, "b": False}) == set(goals)  # first near, then anywhere
-    assert trial.met([values.negation(low)], goals, {"n": -1}) == {seven, goals[3]}
-    assert trial.met([low, seven], goals, {}) == set()
+    found = trial.met([], goals, {"n": 7, "b": False})  # first near, then anywhere
+    assert found.keys() == set(goals)
+    assert all(trial.holds_at(goal, point) for goal, point in found.items())
+    assert found[seven] == {"n": 7, "b": False}
+    assert trial.met([values.negation(low)], goals, {"n": -1}).keys() == {seven, goals[3]}
+    assert not trial.met([low, seven], goals, {})
     divided = values.arithmetic(Op.DIV, (M, N), Int(-100, 100))
     none = values.compare(Op.EQ, divided, whole(0))  # is not defined there, nor is its negation
-    assert trial.met([values.compare(Op.EQ, N, whole(0))], [none, values.negation(none)], {}) == set()
-    assert trial.met([values.compare(Op.EQ, N, whole(1))], [none, values.negation(none)], {}) != set()
+    assert trial.met([values.compare(Op.EQ, N, whole(0))], [none, values.negation(none)], {}) == {}
+    assert trial.met([values.compare(Op.EQ, N, whole(1))], [none, values.negation(none)], {}) != {}
 
 
 def test_the_points_that_are_tried_are_always_the_same() -> None:

@@ -83,6 +83,29 @@ def test_masks_that_two_lines_share_are_tried() -> None:
     assert "RCS409" not in {each.code for each in found}
 
 
+def test_an_input_for_which_lines_differ_is_known_before_the_least_is_sought(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nothing else is wrong, so that all steps of a proof are there: over doubles and 64 bits the least took 14,000,000."""
+    mask = "0bx0xx0xx00xxx00x0xxx1xx10xx1x1xxxxxxx1xxxxx00x00x10x11x001xxxxx01"
+    rows = (
+        f"| n0 | >= 0.75 | {mask} | not (a > 65535) || 0 |\n"
+        "| n1 same n0 | not in 0.5 .. 0.75 | | c * 2.0 > 1.0 or a mod 3 = 1 || 1 |\n| rest | DEFAULT | | || 1 |\n"
+    )
+    declared = (
+        "input a : int 0 .. 65535\ninput c : real 0.0 .. 1.0\ninput d : int 0 .. 18446744073709551615\n"
+    )
+    text = f"{declared}output o : int 0 .. 9\ntable t {{\n| line | c | d | when || o |\n{rows}}}\n"
+    with smt.together(1_000_000_000) as budget:
+        [found] = (each for each in reported(text) if each.code == "RCS422")
+    assert budget.left > 993_000_000
+    monkeypatch.setattr("rcsc.symbolic.alike.WRONG_STEPS", 1)  # any input does
+    [soon] = (each for each in reported(text) if each.code == "RCS422")
+    assert found.witnesses
+    assert soon.witnesses
+    assert found.notes == soon.notes == ("`o` is then 0 by `n0`, 1 by `n1`", "they differ in: o")
+
+
 def test_regions_that_are_shown_are_cut_out_once() -> None:
     """Sixty-four are shown, over thirty bits: each time all of them, it takes two and a half times as many steps."""
     rng = random.Random(3)  # noqa: S311 - a draw that repeats
