@@ -16,6 +16,10 @@ from tests.studio.served import page, serving
 pytestmark = pytest.mark.needs("chromium")
 OVERLAP = ("< 2500 || tick             | 400 ", "       || tick             | 400 ")
 """A line whose cell is emptied matches where another does."""
+OFFERED = (
+    "[...document.querySelector('.table-choice')?.options ?? []].some(({ text }) => text.startsWith('goto '))"
+)
+"""The table is among those that one can choose."""
 NOW = "Number(document.querySelector('#time [role=slider]').getAttribute('aria-valuenow'))"
 """The tick that the time line shows."""
 
@@ -23,7 +27,7 @@ NOW = "Number(document.querySelector('#time [role=slider]').getAttribute('aria-v
 def by_mouse(seat: Seat) -> None:
     """To the table that is wrong, its repair taken, the file written, and the system run to the end."""
     seat.click(seat.button("Tables"))
-    seat.wait("document.querySelector('.table-choice')?.options.length")
+    seat.wait(OFFERED)
     seat.choose(".table-choice", "goto ")
     _told_at_the_cell(seat)
     seat.click(seat.button("Run the table at it"))
@@ -42,6 +46,7 @@ def by_mouse(seat: Seat) -> None:
 def by_keys(seat: Seat) -> None:
     """The same without a mouse: what is used is reached by a key, or by going on to it."""
     seat.press("2")
+    seat.wait(OFFERED)  # a letter chooses among what is there
     seat.go_to("Table", kind="SELECT")
     seat.press("g")
     _told_at_the_cell(seat)
