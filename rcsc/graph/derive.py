@@ -4,6 +4,7 @@ In: a program and one of its tables, as written too. Out: a `StateGraph`, and no
 none. Which line leads from which state to which is answered by Z3 (`relation.steps`); the words on the edges are the table's own.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from rcsc.diagnostics.codes import Code
@@ -31,8 +32,8 @@ from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_condition, spell_expr
 from rcsc.relation.steps import MOST_STATES, Step, Steps, UnansweredError
+from rcsc.solvers import smt
 from rcsc.solvers.options import Options
-from rcsc.solvers.smt import troubles
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +71,13 @@ def derive(
         if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
     )
     try:
-        return _Derivation(program, table, file, written, Steps(program, table, chosen, options)).derived()
+        with smt.together(options.together):
+            return _Derivation(
+                program, table, file, written, Steps(program, table, chosen, options)
+            ).derived()
     except UnansweredError:
         return _undecided(table)
-    except troubles():
+    except smt.troubles():
         return _undecided(table)
 
 
@@ -146,7 +150,8 @@ class _Derivation:
         for at, line in enumerate(self._lines()):
             edges += self._edges(at, line, [step for step in steps if step.line == at], states)
         common = self._common(edges)
-        edges = [self._eased(edge, common) for edge in edges]
+        values = {self._spelled(value): value for value in states}
+        edges = [self._eased(edge, common, values) for edge in edges]
         self._comments()
         used = tuple(
             name for name in map(self._spelled, states) if any(name in (e.source, e.target) for e in edges)
@@ -282,18 +287,15 @@ class _Derivation:
         own = [labels.terms_of(edge.guard) for edge in edges if edge.source != ANY]
         return [term for term in own[0] if all(term in terms for terms in own)] if len(own) > 1 else []
 
-    def _eased(self, edge: Edge, common: list[tree.Expr]) -> Edge:
+    def _eased(self, edge: Edge, common: list[tree.Expr], values: Mapping[str, Value]) -> Edge:
         if edge.default:
             return edge
         at = next(at for at, line in enumerate(self._lines()) if line.name == edge.line)
-        source = None if edge.source == ANY else self._value(edge.source)
+        source = None if edge.source == ANY else values[edge.source]
         terms = self._terms(at, self.steps.needed(at, source))
         if source is not None:
             terms = [term for term in terms if term not in common]
         return replace(edge, shown=labels.guard(terms))
-
-    def _value(self, name: str) -> Value:
-        return next(value for value in self.steps.states() if self._spelled(value) == name)
 
     def _comments(self) -> None:
         many = (

@@ -32,6 +32,7 @@ from rcsc.relation.follow import following
 from rcsc.relation.same import Differs, Same, compare
 from rcsc.relation.steps import Steps
 from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Solver, Term
 from tests.support.programs.stages import program_of
 from tests.support.programs.texts import edit_file, edited
 
@@ -68,6 +69,27 @@ def said(entry: FoundTable, text: str, form: str) -> Against:
     """The verdict on the table that the graph's text says."""
     table = tabled(FORMS[form].read(text))
     return against(entry.loaded, entry.root, entry.program, entry.table, table, OPTIONS)
+
+
+def test_the_states_are_asked_for_once_however_many_edges_there_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Forty states, and lines that leave each of them: 200 edges, for each of which 40 questions were asked."""
+    members = ", ".join(f"m{at}" for at in range(40))
+    rows = "".join(f"| n{at} | {at} | not in {{m{at}}} || m{at} |\n" for at in range(5))
+    declared = f"enum e {{ {members} }}\ninput a : int 0 .. 5\nstate s : e\n"
+    text = f"{declared}table t {{\n| line | a | s || s |\n{rows}| rest | DEFAULT | || s |\n}}\n"
+    asked: list[Solver] = []
+    check = Solver.check
+
+    def counted(solver: Solver, *terms: Term) -> Answer:
+        asked.append(solver)
+        return check(solver, *terms)
+
+    monkeypatch.setattr(Solver, "check", counted)
+    drawn = graph_of(found_in(text, tmp_path), "s").graph
+    assert len(drawn.edges) > 190
+    assert len(asked) < 40 + 6 * 40 * 2 + 2 * len(drawn.edges)
 
 
 def of_name(file: str, name: str) -> list[FoundTable]:
