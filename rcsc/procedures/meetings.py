@@ -22,10 +22,12 @@ class Met:
 
     Attributes:
         relied: The invariants and assumptions on which it rests that they do the same.
+        open: Pairs of which nobody could tell whether they ever match together.
     """
 
     findings: tuple[Diagnostic, ...]
     relied: frozenset[AssumptionName] = frozenset()
+    open: frozenset[tuple[str, str]] = frozenset()
 
     @property
     def wrong(self) -> bool:
@@ -40,8 +42,11 @@ def met(program: Program, table: Table, options: Options) -> Met:
     grounds = [replace(table, assumptions=names) for names in dict.fromkeys(((), invariants, every))]
     findings: list[Diagnostic] = []
     relied: set[AssumptionName] = set()
+    open_: set[tuple[str, str]] = set()
     for pair_said in table.meetings:
         there = meeting(program, grounds[-1], pair_said.where, options)
+        if there is Answer.UNKNOWN:
+            open_.add((str(pair_said.first), str(pair_said.second)))
         if there is Answer.UNSATISFIABLE:
             findings.append(_never(table, pair_said))
         elif pair_said.same:
@@ -54,7 +59,7 @@ def met(program: Program, table: Table, options: Options) -> Met:
                     break
             else:
                 findings.append(_apart(program, grounds[-1], pair_said, effects, options, near or {}))
-    return Met(tuple(findings), frozenset(relied))
+    return Met(tuple(findings), frozenset(relied), frozenset(open_))
 
 
 def _pair(table: Table, meeting: Meeting) -> tuple[int, int]:

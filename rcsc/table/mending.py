@@ -238,6 +238,8 @@ class _Trials:
         elsewhere = {key(each) for each in serious(after.findings)} - self.told
         if was is None or not was.whole or not now.whole or any(Code.UNDECIDED in each for each in elsewhere):
             return Outcome.OPEN
+        if after.unmet - self.verdict.unmet:  # a declaration may have become one that never applies
+            return Outcome.OPEN
         if elsewhere or not now.within(was):
             return Outcome.FAILS
         match finding.code:

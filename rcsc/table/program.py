@@ -50,6 +50,7 @@ class ProgramVerdict:
         program: What was proved, with the stopping assumptions of the tables that were looked at.
         unproved: Invariants, and assumptions declared `proved`, that are not proved: what rests on one is not, either.
         unsafe: Tables with a line that owes what is not shown.
+        unmet: Pairs of lines that are said to match together, of which nobody could tell whether they ever do.
     """
 
     findings: tuple[Diagnostic, ...]
@@ -59,6 +60,7 @@ class ProgramVerdict:
     program: Program
     unproved: frozenset[str] = frozenset()
     unsafe: frozenset[str] = frozenset()
+    unmet: frozenset[tuple[str, str]] = frozenset()
 
     @property
     def certificate(self) -> Mapping[str, object] | None:
@@ -136,7 +138,8 @@ def prove_program(
     wrong = any(finding.severity is Severity.ERROR for finding in reported)
     if wrong or only is not None:
         unsafe = frozenset((*owed.unsafe, *(str(name) for name, each in meetings.items() if each.wrong)))
-        return ProgramVerdict(reported, None, verdicts, owed.tally, program, unproved, unsafe)
+        unmet = frozenset(pair for each in meetings.values() for pair in each.open)
+        return ProgramVerdict(reported, None, verdicts, owed.tally, program, unproved, unsafe, unmet)
     proved = ProvedProgram(program, seal_of_proof())
     return ProgramVerdict(reported, proved, verdicts, owed.tally, program)
 

@@ -2,11 +2,14 @@
 
 import random
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.solvers import smt
+from rcsc.solvers.smt import Answer
+from rcsc.symbolic.alike import meeting
 from tests import wrong
 from tests.support.programs.stages import reported
 from tests.support.steps import counted
@@ -129,6 +132,30 @@ def test_trials_of_helps_are_bounded_outside_the_solver_too(monkeypatch: pytest.
     assert reported(text)[0].help[0].startswith(f"{begins}proved")
     monkeypatch.setattr("rcsc.table.mending.WRONG_STEPS", 100)
     assert reported(text)[0].help[0].startswith(f"{begins}not proved")
+
+
+def test_a_repair_is_proved_only_where_it_is_known_that_an_order_still_applies(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What a repair changes may leave nothing of an order of two lines: of which `rcsc check` would warn."""
+    rows = "| p | <= 3 || 1 |\n| q | >= 3 || 2 |\n| r above q | 7 || 2 |\n"
+    text = f"input a : int 0 .. 9\noutput o : int 0 .. 9\ntable t {{\n| line | a || o |\n{rows}}}\n"
+    begins = "in line `p` write `<= 2` under `a`: "
+    assert _overlap_of(text).help[0].startswith(f"{begins}proved")
+    answers: list[object] = []
+
+    def once(*asked: Any) -> object:
+        answers.append(Answer.UNKNOWN if answers else meeting(*asked))
+        return answers[-1]
+
+    monkeypatch.setattr("rcsc.procedures.meetings.meeting", once)
+    assert _overlap_of(text).help[0].startswith(f"{begins}not proved")
+    assert len(answers) > 1
+
+
+def _overlap_of(text: str) -> Diagnostic:
+    [found] = (each for each in reported(text) if each.code == "RCS402")
+    return found
 
 
 @pytest.mark.parametrize("number", range(200, 206))
