@@ -71,7 +71,7 @@ def derive(
         if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
     )
     try:
-        with smt.together(options.together):
+        with smt.together(options.drawn):
             return _Derivation(
                 program, table, file, written, Steps(program, table, chosen, options)
             ).derived()

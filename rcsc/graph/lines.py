@@ -15,6 +15,7 @@ from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.relation.follow import Follow, following
 from rcsc.relation.steps import UnansweredError
+from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 
 _MOST = 2 / 3
@@ -24,7 +25,8 @@ _MOST = 2 / 3
 def derive_lines(program: Program, table: Table, file: tree.File, options: Options) -> Derived | Diagnostic:
     """The graph of a table's lines; the level that runs the table, if one does, is followed for a whole cycle."""
     try:
-        follows = following(program, table, options)
+        with smt.together(options.drawn):
+            follows = following(program, table, options)
     except UnansweredError:
         message = f"which lines of table `{table.name}` can follow which is not decided within the limits"
         return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))

@@ -7,6 +7,8 @@ STEPS = 20_000_000
 """Steps of Z3 (its `rlimit`) a question: some seconds, and the same verdict on every machine."""
 TOGETHER = 20
 """All questions about a table, or about a procedure, take at most as many steps as so many of them may."""
+DRAWN = 3
+"""All questions about one graph take at most as many steps as so many of them may; the largest shipped one takes 16,000,000."""
 
 WRONG_STEPS = 200_000
 """Steps of Z3 for what is said of a table beside that something is wrong with it, each kind of it for all findings together: the least
@@ -66,6 +68,11 @@ class Options:
     def together(self) -> int:
         """What all questions about one table, or one procedure, may cost."""
         return TOGETHER * self.steps
+
+    @property
+    def drawn(self) -> int:
+        """What all questions about one graph may cost."""
+        return DRAWN * self.steps
 
     @property
     def few(self) -> "Options":

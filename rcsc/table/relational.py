@@ -327,9 +327,11 @@ class _Decision:
         """Z3's answer about a region, as the tree asks it."""
         if len(asked.candidates) > _MOST_CANDIDATES or smt.spent() or (self.few and self.rest.spent):
             return NoWitness.UNKNOWN
+        fewest = 1 if must_cover(self.table) else 0
+        self.few = self.few or any(not fewest <= len(found) <= 1 for _, found in self.tried)
         if self.few:
             self.rest.left -= _STEPS_OF_A_QUESTION
-        region, fewest = located(self.spelled(asked)), 1 if must_cover(self.table) else 0
+        region = located(self.spelled(asked))
         for snapshot, found in self.tried:
             if not fewest <= len(found.intersection(asked.candidates)) <= 1 and all(
                 fold(condition, snapshot) for condition in region
@@ -472,7 +474,8 @@ class _Decision:
 
     def gap(self, search: Search) -> list[_Found]:
         """The least input that no line matches, if there is one; also where DEFAULT takes it."""
-        if must_cover(self.table) and not search.gaps and not search.witnesses:
+        tried = self._tried is not None and bool(self.tried_by())  # in a region that was given up, perhaps
+        if must_cover(self.table) and not (search.gaps or search.witnesses or tried):
             return []
         many = len(self.clauses) > _MOST_LINES_GROWN
         if many and not must_cover(self.table):

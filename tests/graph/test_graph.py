@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 import pytest
 from click.testing import CliRunner
 
+from rcsc.commands import run as rcsc
 from rcsc.commands.group import commands
 from rcsc.commands.shared.graphs import WrongError, found_tables
 from rcsc.diagnostics.codes import Code
@@ -90,6 +91,21 @@ def test_the_states_are_asked_for_once_however_many_edges_there_are(
     drawn = graph_of(found_in(text, tmp_path), "s").graph
     assert len(drawn.edges) > 190
     assert len(asked) < 40 + 6 * 40 * 2 + 2 * len(drawn.edges)
+
+
+@pytest.mark.parametrize("form", [*EVERY_FORM, "svg"])
+def test_a_table_whose_lines_match_nothing_has_an_empty_graph_and_is_told_so(
+    tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "case.rcs"
+    rows = "| n0 | > 3 | < 3 || m0 |\n| n1 | 1 | 2 || m1 |\n"
+    file.write_text(
+        f"enum e {{ m0, m1 }}\ninput a : int 0 .. 5\nstate s : e\ntable t {{\n| line | a | a || s |\n{rows}}}\n"
+    )
+    assert rcsc(["graph", f"{file}:t", "--state", "s", "--form", form]) == 0
+    told = capsys.readouterr().err
+    assert told.count("matches nothing") == (0 if form == "svg" else 2)
+    assert ("no table is read back from an empty graph" in told) == (form != "svg")
 
 
 def of_name(file: str, name: str) -> list[FoundTable]:

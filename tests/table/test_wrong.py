@@ -123,6 +123,43 @@ def test_regions_that_are_shown_are_cut_out_once() -> None:
     assert found.code == "RCS401"
 
 
+def test_regions_of_a_gap_in_many_holes_are_bounded() -> None:
+    """Two lines leave hundreds of holes, of which each region shown makes more: sixty-four took 85 million steps."""
+    enums = "".join(
+        f"enum e_{name} {{ {', '.join(f'{name}_{at}' for at in range(300))} }}\n" for name in "cf"
+    )
+    declared = (
+        f"{enums}input a : int -5 .. 5\ninput b : int 0 .. 9223372036854775807\ninput c : e_c\ninput d : bool\n"
+        "input f : e_f\noutput o : int 0 .. 9\n"
+    )
+    rows = (
+        "| n0 | not (a mod 3 = 1) | false | not in 2 .. 5 | | /= c_52 | /= f_166 || 0 |\n"
+        "| n1 | not (f = f_0) | false | | 7514331052644248927 | in {c_222, c_251} | not in {f_74, f_143, f_18} || 1 |\n"
+    )
+    with counted(20_000_000):
+        found = reported(f"{declared}table t {{\n| line | when | d | a | b | c | f || o |\n{rows}}}\n")
+    assert "RCS401" in {each.code for each in found}
+
+
+def test_what_inputs_that_are_tried_show_is_known_before_a_region_is_asked_about() -> None:
+    """No line matches most inputs: that regions over doubles are covered is asked in few steps, not in those of a proof."""
+    declared = (
+        "input a : real -1e308 .. 1e308\ninput b : real -1e308 .. 1e308\noutput o : int 0 .. 9\n"
+        "assume f_0 : a * 2.0 > -1e+308\n"
+    )
+    rows = (
+        "| n0 | | > 0.5 | | >= -5e+307 || 2 |\n"
+        "| n1 above n2 | /= 5e+307 | < -1.0 | not (a * 2.0 > -1e+308) | -1e+308 .. -5e+307 || 0 |\n"
+        "| n2 | | 0.0 | b * 2.0 > -1e+308 implies b * 2.0 > -1e+308 | <= 0.0 || 1 |\n"
+    )
+    with smt.together(1_000_000_000) as budget:
+        found = reported(
+            f"{declared}table t assuming f_0 {{\n| line | b | b * 1e308 - a * 1e308 | when | a || o |\n{rows}}}\n"
+        )
+    assert budget.left > 995_000_000
+    assert "RCS401" in {each.code for each in found}
+
+
 def test_trials_of_helps_are_bounded_outside_the_solver_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """The trial needs no solver: its tree of regions counts, a node as so many steps."""
     rows = "| p | <= 3 | a + b < 10 || 1 |\n| q | >= 3 | a + b < 10 || 2 |\n| r | | a + b >= 10 || 2 |\n"

@@ -114,6 +114,11 @@ def _draw(entry: FoundTable, form: str, derived: Derived, out: Path | None, opti
     name = entry.table.name
     for lost in derived.lost:
         click.echo(f"note[{Code.GRAPH_LOSES.value}]: {name}: not in the graph: {lost}", err=True)
+    if not derived.graph.edges:
+        click.echo(
+            f"{name}: no line matches any input, and no table is read back from an empty graph", err=True
+        )
+        return
     questions = _read_back(entry, form, text, options)
     click.echo(
         f"{name}: the table read back from the graph does the same: proved, {questions} questions", err=True

@@ -22,6 +22,8 @@ MOST_PAIRS = 10_000
 """Overlapping pairs that are told apart; a report shows a few."""
 BUDGET = 5_000_000
 """Budget of a search for gaps: lines, pairs and slices looked at, the same on every machine."""
+MOST_CUT = 20_000
+"""Holes looked at, together, as the regions shown are cut out of them one by one: some tenths of a second."""
 MANY = 64
 """Above so many lines a certificate leaves the parting axis of each pair to the checker."""
 
@@ -257,7 +259,8 @@ class Gaps(Generic[Axis]):
         None where there is none.
 
         Raises:
-            BudgetError: It was not found within `BUDGET`. Where the count is exact nothing is looked at in vain, and this never happens.
+            BudgetError: It was not found within `BUDGET`, where the count is not exact; or to cut the regions shown out of the holes takes
+                more than `MOST_CUT`. Where nothing is shown, and the count is exact, this never happens.
         """
         if self.holes is not None:
             return self._least_hole(self.holes, shown)
@@ -275,6 +278,9 @@ class Gaps(Generic[Axis]):
         """The hole with the least place of all, once the regions shown are taken out; they are those shown before, and more."""
         extents = self.table.extents
         for region in shown[len(self._shown) :]:
+            self._looked_at += len(holes)
+            if self._looked_at > MOST_CUT:
+                raise BudgetError
             holes = list(islice(without(holes, region, extents), MOST_PAIRS + 1))
             if len(holes) > MOST_PAIRS:
                 raise BudgetError
