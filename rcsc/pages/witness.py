@@ -1,4 +1,4 @@
-"""Who watches a run, for the page that follows it and the report: rows, values, lines that ran, pictures where there are any.
+"""Who watches a run, for the report: rows, values, lines that ran, pictures where there are any.
 
 In: a run. Out: what has become of its rows, and a `Story`. It looks at the run from outside, and nothing that runs looks at
 it. The paper's cell adds what is true of the cell alone.
@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from typing import Protocol
 
 from rcsc.pages.report import CellPicture, Figure, Matched, ReportRow, Story
 from rcsc.run.adopt import Begun
@@ -25,26 +24,6 @@ MOST_SERIES = 8
 """Curves of the report where the description has no displays."""
 
 
-class LivePage(Protocol):
-    """A page that follows a run."""
-
-    def publish(self, tick: int, values: Mapping[str, float | str]) -> None:
-        """The values after a tick."""
-        ...
-
-    def frame_due(self, kind: str) -> bool:
-        """Whether a picture of a kind would be looked at."""
-        ...
-
-    def frame(self, kind: str, svg: str) -> None:
-        """A picture."""
-        ...
-
-    def row(self, number: int, text: str, state: str) -> None:
-        """What has become of a row of the script."""
-        ...
-
-
 @dataclass(slots=True)
 class RunWitness:
     """Watches every cycle of a run; in `System.watch`.
@@ -52,7 +31,6 @@ class RunWitness:
     Attributes:
         run: System and operator.
         pictures: How what stands outside looks: an SVG document by kind, drawn when it is called.
-        live: The page that follows; None where nobody looks.
         film: Whether pictures for a report are kept.
         seconds: Spent on watching.
         matched: How often each line ran, by level, table and line.
@@ -60,7 +38,6 @@ class RunWitness:
 
     run: ScriptedRun
     pictures: Mapping[str, Callable[[], str]] = field(default_factory=dict)
-    live: LivePage | None = None
     film: bool = False
     seconds: float = 0.0
     frames: list[CellPicture] = field(default_factory=list)
@@ -68,7 +45,6 @@ class RunWitness:
     unset: Unsets = field(init=False)
     _row: int = -1
     _drawn: int = -FRAMES_APART
-    _told: int = -1
 
     def __post_init__(self) -> None:
         """Notes what nobody has set at the beginning: nothing, where the run goes on from another."""
@@ -86,8 +62,6 @@ class RunWitness:
         self.look()
         if self.film:
             self._film(system)
-        if self.live is not None:
-            self._show(self.live, system)
         self.seconds += time.perf_counter() - begun
 
     def look(self) -> None:
@@ -155,35 +129,6 @@ class RunWitness:
         """What is said of the plant at the end, a line each."""
         yield from ()
 
-    # --- the page ---
-
-    def finish(self) -> None:
-        """The page sees how the last row ended."""
-        if self.live is not None:
-            self._tell(self.live)
-
-    def _tell(self, live: LivePage) -> None:
-        """What has become of the rows; those to come stand there from the start."""
-        operator = self.run.operator
-        if operator is None:
-            return
-        if self._told < 0:
-            for row in operator.rows:
-                live.row(row.number, row.text, "")
-        for end in operator.results[max(0, self._told) :]:
-            live.row(end.row.number, end.row.text, end.state)
-        if self._told != len(operator.results) and operator.at < len(operator.rows):
-            row = operator.rows[operator.at]
-            live.row(row.number, row.text, "running")
-        self._told = len(operator.results)
-
-    def _show(self, live: LivePage, system: System) -> None:
-        self._tell(live)
-        live.publish(system.tick, variables(system, self.unset.now))
-        for kind, drawing in self.pictures.items():
-            if live.frame_due(kind):
-                live.frame(kind, drawing())
-
 
 def _seen(level: RunningLevel) -> LevelSeen:
     return LevelSeen(level.name, level.sign, level.level, level.values)
@@ -191,27 +136,6 @@ def _seen(level: RunningLevel) -> LevelSeen:
 
 def _published(system: System, name: str) -> bool:
     return system.buffers.latest(name) is not None
-
-
-def variables(system: System, unset: Mapping[str, frozenset[int]] | None = None) -> dict[str, float | str]:
-    """Every leaf of every level by its whole name; words for what the tables have words for.
-
-    Args:
-        system: After a tick.
-        unset: By level the places of leaves that are left out, as nobody has set them.
-    """
-    missing = unset or {}
-    return {
-        f"{level.name}.{leaf.name}": leaf.shown(value) if leaf.members else float(value)
-        for level in system.levels
-        for at, (leaf, value) in enumerate(zip(level.sign.leaves, level.values, strict=False))
-        if at not in missing.get(level.name, ())
-    }
-
-
-def names(system: System) -> tuple[str, ...]:
-    """The names of all these."""
-    return tuple(f"{level.name}.{leaf.name}" for level in system.levels for leaf in level.sign.leaves)
 
 
 def drawn_first(system: System) -> list[str]:

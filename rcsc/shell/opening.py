@@ -29,6 +29,8 @@ class Opening:
         script: Its name; empty where orders are given by hand.
         alone: Whether nothing stands outside the levels, and no database.
         seed: Of what is random in the plant.
+        database: A database to be used as it is; empty for the system's own.
+        faults: Of the plant, on from the first cycle.
         ordered: Whether the script that the description names gives the orders where `script` names none, as in `rcsc run`.
     """
 
@@ -38,6 +40,8 @@ class Opening:
     script: str = ""
     alone: bool = False
     seed: int = 0
+    database: str = ""
+    faults: tuple[str, ...] = ()
     ordered: bool = False
 
 
@@ -71,9 +75,12 @@ def _stage(system: Description, signs: Mapping[str, Signature], wanted: Opening)
     """
     plant = wanted.plant or by_hand(system) or ""
     try:
-        return staged(StageOrder(str(wanted.path), plant, wanted.script, seed=wanted.seed), system, signs)
+        order = StageOrder(
+            str(wanted.path), plant, wanted.script, wanted.database, wanted.seed, wanted.faults
+        )
+        return staged(order, system, signs)
     except BadDescription:
-        named = wanted.plant or wanted.script
+        named = wanted.plant or wanted.script or wanted.database
         if not named and system.database.name != NO_DATA and not system.database.is_file():
             return Staged()
         raise

@@ -13,7 +13,7 @@ from rcsc.shell.session import Session
 from rcsc.studio.build import Build
 from rcsc.studio.hub import Concern, Hub
 from rcsc.studio.plots import Plots
-from rcsc.studio.runs.live import LANE, WATCHED_RATE, Live
+from rcsc.studio.runs.live import LANE, WATCHED, Live, Pace
 from rcsc.studio.runs.logs import Logs
 from rcsc.studio.runs.timeline import TimeLine
 from rcsc.studio.scene import Cell, Drawer
@@ -29,7 +29,7 @@ def concerns(
     hub: Hub,
     agreement: Agreement,
     logs: Sequence[Path] = (),
-    rate: float | None = WATCHED_RATE,
+    pace: Pace = WATCHED,
     drawer: Drawer | None = None,
     first: Path | None = None,
 ) -> Sequence[Concern]:
@@ -40,11 +40,11 @@ def concerns(
         hub: What tells the pages, and does things in lanes.
         agreement: Whether the code of its folder may run.
         logs: That the user names; the first is shown at once.
-        rate: How many times as fast as the clock the system runs at first; None for as fast as it goes.
+        pace: How the system runs at first.
         drawer: Draws a tick of the cell, where somebody can.
         first: The file, or the folder, whose tables are shown first; else those of the system.
     """
-    live = Live(opening, hub.tell, lambda work, after_s: hub.do(LANE, work, after_s), rate)
+    live = Live(opening, hub.tell, lambda work, after_s: hub.do(LANE, work, after_s), pace)
     time = TimeLine(live, hub.tell)
     folders = tuple(dict.fromkeys((Path.cwd(), opening.path.resolve().parent)))
     kept = Logs(folders, tuple(logs), lambda *shown: hub.do(LANE, lambda: time.show(*shown)))

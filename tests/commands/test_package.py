@@ -230,7 +230,7 @@ def test_live_is_refused_before_anything_is_compiled(monkeypatch: pytest.MonkeyP
     ran = CliRunner().invoke(
         commands, ["run", "make_boxt", "--live", "--system", str(REPO / "tables/system.toml")]
     )
-    assert (ran.exit_code, "pip install 'rcsc[live]'" in ran.output) == (1, True)
+    assert (ran.exit_code, "pip install 'rcsc[studio]'" in ran.output) == (1, True)
 
 
 def test_a_package_that_no_extra_brings_is_a_bug(

@@ -30,6 +30,7 @@ TINY = {
     "rcsc run make_boxt": "rcsc run --no-compile --plant kinematic make_boxt",
     "rcsc run tests/data/dock --": "rcsc run --no-compile tests/data/dock --",
     "--processes": "--processes --help",
+    "--live": "--live --help",
     "rcsc studio": "rcsc studio --help",
     "rcsc campaign --episodes 1000": "rcsc campaign --no-compile --workers 1 --episodes 1",
     "rcsc campaign --plant mujoco --episodes 100": "rcsc campaign --no-compile --workers 1 --episodes 1 --seed 1",

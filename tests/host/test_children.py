@@ -388,7 +388,6 @@ ALLOWED = {
     ("rcsc/campaign/counterexamples.py", "concurrent.futures"),
     ("rcsc/studio/build.py", "concurrent.futures"),  # what it raises
     ("rcsc/editor/server/session.py", "concurrent.futures"),  # threads
-    ("sim/rcsc_cell/live/server.py", "concurrent.futures"),
 }
 
 

@@ -101,7 +101,6 @@ READERS_OF_FILES: Mapping[str, str] = {
     "rcsc/studio/server.py": "comes with the compiler",
     "rcsc/studio/share/document.py": "comes with the compiler",
     "rcsc/commands/new.py": "comes with the compiler",
-    "sim/rcsc_cell/live/server.py": "comes with the cell",
     "sim/rcsc_cell/cell/reach.py": "comes with the cell",
 }
 """Who may open something, and what."""

@@ -235,3 +235,41 @@ def test_a_moment_is_shared_by_keys(seat: Seat) -> None:
     assert seat.value("window.written[1]").startswith("dock_tick_")
     assert "<!doctype html>" in seat.value("window.written[0].text()")
     seat.press("escape")
+
+
+DISPLAYED = (
+    ("enum stage { idle, moving, bad }\n", "enum stage { idle, moving, bad }\nenum shown { way, other }\n"),
+    ("output report : drive_report\n", "output report : drive_report\noutput display : shown\n"),
+    (
+        "reads command, inc_command_seen, status_report writes report {\n",
+        (
+            "reads command, inc_command_seen, status_report, stage writes report, display {\n"
+            "  display := other\n  if stage = moving { display := way }\n"
+        ),
+    ),
+)
+"""The drive says which set of curves is looked at: its way while it moves."""
+
+
+def test_curves_follow_what_the_tables_choose_until_somebody_takes_one_away(tmp_path: Path) -> None:
+    system = dock(tmp_path / "dock", *DISPLAYED)
+    text = system.read_text(encoding="utf-8")
+    shows = 'other = ["drive.waited", "drive.command.target_mm"]'
+    system.write_text(text.replace("[displays]\n", f"[displays]\n{shows}\n"), encoding="utf-8")
+    legends = "[...document.querySelectorAll('.graph .legend')].map(({ innerText }) => innerText.trim().split(/\\s/)[0]).join(' ')"
+    with seated(Opening(system, script="dock.csv")) as seat:
+        seat.until("#state", "paused at cycle 0")
+        seat.press("s")
+        seat.until("#state", "paused at cycle 1")
+        seat.click("#views button[data-view=plots]")
+        seat.wait(f"{legends} === 'drive.waited drive.command.target_mm'")
+        seat.press("escape", "1", "r")
+        seat.write("drive.stage = moving")
+        seat.press("enter")
+        seat.until("#state", "paused at cycle")
+        seat.click("#views button[data-view=plots]")
+        seat.wait(f"{legends} === 'drive.travelled_mm drive.lateral_mm drive.speed_mm_s'")
+        seat.click(".graph button[aria-label^=Remove]")
+        seat.press("escape", "space")
+        seat.until("#state", "paused at")
+        seat.wait(f"{legends} === 'drive.lateral_mm drive.speed_mm_s'")

@@ -15,6 +15,7 @@ from rcsc.lang.project import project_root
 from rcsc.shell.opening import Opening
 from rcsc.studio.hub import Concern
 from rcsc.studio.project import concerns
+from rcsc.studio.runs.live import Pace
 from rcsc.studio.scene import Drawer
 from rcsc.studio.server import Server
 
@@ -37,7 +38,7 @@ def serving(
         [*others]
         if opening is None
         else [
-            *concerns(opening, server.hub, agreement or _agreed(opening), logs, None, drawer, first),
+            *concerns(opening, server.hub, agreement or _agreed(opening), logs, Pace(None), drawer, first),
             *others,
         ]
     )

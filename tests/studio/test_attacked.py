@@ -13,6 +13,7 @@ import pytest
 
 from rcsc.diagnostics.source import Source
 from rcsc.host.files.read import Malformed
+from rcsc.host.trust import Agreement
 from rcsc.lang.project import listed
 from rcsc.lang.written.changes import formatted
 from rcsc.shell.reload.refusal import Refused
@@ -367,6 +368,38 @@ def test_what_nobody_saved_is_kept_when_the_studio_ends(how: str, tmp_path: Path
     assert Path(where).read_bytes() == "# mine, \N{GREEK SMALL LETTER ALPHA}\n".encode() + before
     assert (system.parent / "drive.rcs").read_bytes() == before
     assert where not in listed([str(system.parent)])
+
+
+def test_a_run_that_is_watched_runs_in_the_studio_until_it_is_ended(tmp_path: Path) -> None:
+    """Who says what runs has agreed to it: the page is not asked, and nothing is kept of that."""
+    system = dock(tmp_path / "dock")
+    order = [
+        sys.executable,
+        "-c",
+        "import rcsc.commands; rcsc.commands.main()",
+        "run",
+        str(system),
+        "--live",
+        "-q",
+    ]
+    order += ["--executor", "python", "--rate", "20"]
+
+    async def watched(address: str) -> None:
+        async with page_at(address) as one:
+            rows = await one.heard("run.rows", over=True)
+            state = await one.heard("run.state", going=False, open=True, rate=20)
+            assert state["ended"].endswith("the script is at its end")
+            assert {row["state"] for row in rows["rows"]} == {"done"}
+
+    with subprocess.Popen(order, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as run:
+        assert run.stdout
+        told = run.stdout.readline()
+        assert told.startswith("the studio is at ")
+        asyncio.run(watched(told.split()[-1]))
+        run.send_signal(signal.SIGINT)
+        said = run.stdout.read()
+    assert (run.returncode, said) == (0, "the studio is closed\n")
+    assert not Agreement(system.parent).given
 
 
 async def _typed(address: str, text: str) -> None:

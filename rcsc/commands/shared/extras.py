@@ -16,7 +16,6 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "certify": ("cvc5",),
     "cluster": ("distributed",),
     "hypothesis": ("hypothesis",),
-    "live": ("aiohttp",),
     "lsp": ("pygls", "lsprotocol"),
     "parquet": ("pyarrow",),
     "plot": ("matplotlib",),

@@ -15,11 +15,14 @@ from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.played import with_ticks
 from rcsc.commands.shared.stopped import Ending, Interrupted, Stopped
 from rcsc.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLANT, SYSTEM, made, meant
+from rcsc.commands.systems.studio import serve
 from rcsc.diagnostics.codes import Code
 from rcsc.host.children import scratch
 from rcsc.host.files.read import content, json_of
+from rcsc.host.trust import Agreement
+from rcsc.lang.project import project_root
 from rcsc.pages.report import report
-from rcsc.pages.witness import RunWitness, names
+from rcsc.pages.witness import RunWitness
 from rcsc.run.description import BadDescription, Description, description
 from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
 from rcsc.run.orders.script import BadScript
@@ -29,10 +32,10 @@ from rcsc.run.processes.serve import Factory
 from rcsc.run.processes.supervisor import Supervisor, run_processes
 from rcsc.run.signature import Signature
 from rcsc.run.system import assemble, signatures
+from rcsc.shell.opening import Opening
 
 if TYPE_CHECKING:
     from rcsc.run.plant.staged import Staged
-    from rcsc_cell.live import Live
 
 UNORDERED_TICKS = 1000
 """Cycles of a run that no script ends."""
@@ -58,7 +61,6 @@ class RunOptions:
     kind: Literal["c", "python"]
     log: Path | None
     report: Path | None
-    live: bool
     rate: float | None
     most: int | None
     quiet: bool
@@ -78,7 +80,7 @@ Examples:
   rcsc run make_boxt --plant kinematic   without physics
   rcsc run make_boxt --log boxt.mcap     keep every cycle
   rcsc run make_boxt --report boxt.html  a page about it
-  rcsc run make_boxt --live              a page that follows it
+  rcsc run make_boxt --live              in the studio's page
   rcsc run make_boxt --processes         each level in a process of its own
   rcsc run make_boxt --resume            go on from the row that stopped it""",
 )
@@ -100,7 +102,7 @@ Examples:
 @click.option("--report", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
               help="Write a page about the run: its ticks, pictures, curves, lines, timing; one file that needs nothing else.")  # fmt: skip
 @click.option("--live", is_flag=True,
-              help="Show the run in a browser's page, at --rate; to this machine only.")  # fmt: skip
+              help="Run it in the studio: a page for a browser on this machine, at --rate, until Ctrl-C.")  # fmt: skip
 @COMPILES
 @click.option("--processes", is_flag=True,
               help="Each level in a process of its own, over shared memory, nothing else changed.")  # fmt: skip
@@ -127,8 +129,10 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         raise click.UsageError(
             "--resume, --live, --report, --log and --cycles are of one process; with --processes, use --from-row"
         )
+    if live and (resumes or from_row or report or cycles or log):
+        raise click.UsageError("with --live the page says how far it runs, and hands its log and report on")
     if live:
-        need("live")
+        need("studio")
     path, named = meant(target, system, script)
     if not made(path, compiles=compiles, quiet=quiet):
         return 1
@@ -142,10 +146,16 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         faults,
     )
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
-    paced = rate or (WATCHED_RATE if live or processes else None)
+    if live:
+        opening = Opening(
+            path, kind, order.plant, order.script, seed=seed, database=order.database, faults=faults
+        )
+        serve(opening, Agreement(Path(project_root(str(path))), given=True), runs_at=rate or WATCHED_RATE)
+        return 0
+    paced = rate or (WATCHED_RATE if processes else None)
     again = _command(target, system, script, database, executor, plant)
     title = named or described.name
-    asked = RunOptions(title, path, order, kind, log, report, live, paced, cycles, quiet, again)
+    asked = RunOptions(title, path, order, kind, log, report, paced, cycles, quiet, again)
     try:
         return _apart(asked, from_row) if processes else _run(asked, from_row, resumes)
     except ChildProcessError as error:
@@ -187,7 +197,9 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
     witness = stage.witness(run) if stage.witness else RunWitness(run, stage.pictures)
     witness.film = asked.report is not None
     ending = Ending()
-    with _recorded(run, asked, ending) as log, _followed(witness, asked):
+    with _recorded(run, asked, ending) as log:
+        if asked.rate is not None:
+            running.watch.append(_Pace(system.tick_ms / 1000 / asked.rate))
         running.watch.append(witness)
         try:
             with ending.inside():
@@ -250,37 +262,6 @@ def _recorded(run: ScriptedRun, asked: RunOptions, ending: Ending) -> Iterator[P
         yield path
     finally:
         recorder.close()
-
-
-@contextlib.contextmanager
-def _followed(witness: RunWitness, asked: RunOptions) -> Iterator[None]:
-    """Opens the page, where one was asked for, and keeps the clock's pace where one was named."""
-    system = witness.run.system
-    if asked.live:
-        live = _page(witness, asked)
-        witness.live = live
-        click.echo(f"{system.description.name} is at {live.start()}")
-        sys.stdout.flush()
-    if asked.rate is not None:
-        system.watch.append(_Pace(system.description.tick_ms / 1000 / asked.rate))
-    try:
-        yield
-    finally:
-        witness.finish()
-        if asked.live:
-            live.stop()
-
-
-def _page(witness: RunWitness, asked: RunOptions) -> "Live":
-    from rcsc_cell.live import Live  # of an extra
-
-    system = witness.run.system
-    try:
-        return Live(
-            names(system), system.description.displays, tick_ms=system.description.tick_ms, title=asked.title
-        )
-    except ValueError as error:
-        raise BadDescription(f"{asked.path}, displays: {error}") from error
 
 
 class _Pace:

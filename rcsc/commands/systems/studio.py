@@ -1,6 +1,7 @@
 """`rcsc studio`: tables, proof, running levels and cell in one page."""
 
 import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -59,9 +60,6 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     this machine; its address has a token that nobody else knows. Ctrl-C ends it; what was typed and not saved is kept, and it says where.
     """
     need("studio")
-    from rcsc.studio.project import concerns  # of an extra
-    from rcsc.studio.server import Server
-
     tables = tables_meant(target, logs) if system is None and script is None else None
     path, named = meant(target, system, script) if tables is None else (tables, "")
     if by_hand and named:
@@ -70,24 +68,55 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         description(path)  # what is wrong with it is told here; what is wrong with its tables, in the page
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     opening = Opening(path, kind, plant or "", named, alone, seed, ordered=not by_hand)
-    server, agreement = Server(port), Agreement(Path(project_root(str(path))))
+    agreement = Agreement(Path(project_root(str(path))))
     if trusts:
         agreement.give()
+    first = Path(target) if target is not None and tables is not None else None
+    serve(opening, agreement, port=port, opens=opens, logs=logs, first=first)
+    return 0
+
+
+def serve(
+    opening: Opening,
+    agreement: Agreement,
+    *,
+    port: int = 0,
+    opens: bool = False,
+    logs: Sequence[Path] = (),
+    first: Path | None = None,
+    runs_at: float | None = None,
+) -> None:
+    """Serve the page until Ctrl-C, and say what of it is kept.
+
+    Args:
+        opening: What is in it.
+        agreement: Whether the code of its folder may run.
+        port: Where to listen; 0 for a free one.
+        opens: Whether a browser is opened.
+        logs: That the user names; the first is shown at once.
+        first: The file, or the folder, whose tables are shown first; else those of the system.
+        runs_at: Run at once, so many times as fast as the clock; None where the page says when.
+    """
+    from rcsc.studio.project import concerns  # of an extra
+    from rcsc.studio.runs.live import WATCHED, Pace
+    from rcsc.studio.server import Server
+
+    server = Server(port)
 
     def told(address: str) -> None:
         click.echo(f"the studio is at {address}")
-        if path.is_file() and not agreement.given:
+        if opening.path.is_file() and not agreement.given:
             click.echo(
                 f"none of the code in {agreement.folder} runs before the page, or --trust, says that it may"
             )
         if opens:
             click.launch(held.enter_context(door(address)).as_uri())
 
+    pace = WATCHED if runs_at is None else Pace(runs_at, runs=True)
+    answer = concerns(opening, server.hub, agreement, logs, pace, _drawer(opening.path), first)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as held:
-        first = Path(target) if target is not None and tables is not None else None
-        server.serve(concerns(opening, server.hub, agreement, logs, drawer=_drawer(path), first=first), told)
+        server.serve(answer, told)
     click.echo("\n".join(("the studio is closed", *server.hub.partings)))
-    return 0
 
 
 def _drawer(path: Path) -> "Drawer | None":

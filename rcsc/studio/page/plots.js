@@ -19,6 +19,7 @@ export function mount(root, bus) {
 
   let graphs = []; // { names, over, element, plot, curves }
   let known = [], displays = {}, named = "", asked = null, shown = true, asking = false, again = false, last = 0;
+  let choosers = [], follows = false, chosen = ""; // variables called `display` name the set that is looked at, while nobody else has chosen
 
   // --- which there are ---
 
@@ -26,17 +27,17 @@ export function mount(root, bus) {
   const store = () => `studio.plots.${bus.latest("run.state")?.title ?? ""}`;
   function keep() {
     if (!keeps) return;
-    try { localStorage.setItem(store(), JSON.stringify(graphs.map(({ names, over }) => ({ names, over })))); } catch { /* a private window keeps nothing */ }
+    try { localStorage.setItem(store(), JSON.stringify(graphs.filter(({ followed }) => !followed).map(({ names, over }) => ({ names, over })))); } catch { /* a private window keeps nothing */ }
   }
 
-  async function add(text, quietly = false) {
+  async function add(text, quietly = false, followed = false) {
     const [drawn, over = ""] = text.split(/\s+over\s+/);
     const several = drawn.split(/[\s,]+/).filter(Boolean);
     if (!quietly) await names(); // who is quick types before it is known which there are
     const wrong = [...several, over].filter(Boolean).find((name) => !known.includes(name));
     if (!several.length) return undefined;
     if (wrong) return bus.say(`there is no variable \`${wrong}\``, { wrong: true, helps: near(wrong) });
-    const graph = { names: several, over, curves: [] };
+    const graph = { names: several, over, followed, curves: [] };
     graph.element = frame(graph);
     graphs.push(graph);
     list.append(graph.element);
@@ -51,7 +52,8 @@ export function mount(root, bus) {
     return found.length ? [`perhaps ${found.join(", ")}`] : [];
   };
 
-  function remove(graph) {
+  function remove(graph, byHand = false) {
+    if (byHand && graph.followed) rests();
     graph.plot?.destroy();
     graph.element.remove();
     graphs = graphs.filter((one) => one !== graph);
@@ -74,7 +76,7 @@ export function mount(root, bus) {
           keep();
           return soon();
         } }, more),
-        make("button", { type: "button", "aria-label": `Remove the graph of ${graph.names.join(", ")}`, onclick: () => remove(graph) }, "Remove")),
+        make("button", { type: "button", "aria-label": `Remove the graph of ${graph.names.join(", ")}`, onclick: () => remove(graph, true) }, "Remove")),
       place);
     Object.assign(graph, { legend, place });
     return element;
@@ -98,7 +100,8 @@ export function mount(root, bus) {
       const sets = Object.keys(displays);
       shows.hidden = !sets.length;
       empty.textContent = `No graph yet: name a variable above${sets.length ? ", or choose what the system shows" : ""}.`;
-      shows.replaceChildren(make("option", { value: "" }, "the system shows"), ...sets.map((name) => make("option", { value: name }, name)));
+      choosers = sets.length ? known.filter((name) => name.endsWith(".display")) : [];
+      shows.replaceChildren(make("option", { value: "" }, "the system shows"), ...choosers.length ? [make("option", { value: "*" }, "what the tables choose")] : [], ...sets.map((name) => make("option", { value: name }, name)));
       for (const graph of [...graphs]) if (![...graph.names, graph.over].filter(Boolean).every((name) => known.includes(name))) remove(graph);
       if (!graphs.length) remembered(sets);
     } catch (error) {
@@ -111,9 +114,32 @@ export function mount(root, bus) {
     let kept = null;
     try { kept = keeps ? JSON.parse(localStorage.getItem(store())) : null; } catch { /* none */ }
     for (const { names: several, over } of kept ?? []) if (several.every((name) => known.includes(name))) add(over ? `${several.join(" ")} over ${over}` : several.join(" "), true);
-    if (!kept && sets.length) for (const text of displays[sets[0]]) add(text, true);
+    follows = !kept && choosers.length > 0;
+    if (!kept && sets.length && !follows) for (const text of displays[sets[0]]) add(text, true);
   }
-  shows.addEventListener("change", () => { for (const text of displays[shows.value] ?? []) add(text); shows.value = ""; });
+  shows.addEventListener("change", () => {
+    if (shows.value === "*") { follows = true; chosen = ""; soon(); }
+    for (const text of displays[shows.value] ?? []) add(text);
+    shows.value = "";
+  });
+
+  /** What was followed stays as it is. */
+  function rests() {
+    follows = false;
+    for (const graph of graphs) graph.followed = false;
+    keep();
+  }
+
+  /** Show the set that the variable `display` that changed last names. */
+  async function follow() {
+    const { curves } = await bus.ask("plot.curves", { names: choosers });
+    const said = curves.map(({ members, changes }) => ({ at: changes.at(-1)?.[0] ?? -1, set: members[changes.at(-1)?.[1]] })).filter(({ set }) => displays[set]);
+    const { set } = said.sort((one, other) => other.at - one.at)[0] ?? {};
+    if (!set || set === chosen) return;
+    chosen = set;
+    for (const graph of graphs.filter(({ followed }) => followed)) remove(graph);
+    for (const text of displays[set]) await add(text, true, true);
+  }
 
   // --- curves ---
 
@@ -131,6 +157,7 @@ export function mount(root, bus) {
     last = performance.now();
     try {
       await names();
+      if (follows) await follow();
       for (const graph of [...graphs]) {
         const wanted = [...new Set([...graph.names, graph.over].filter(Boolean))];
         const answer = await bus.ask("plot.curves", { names: wanted });

@@ -68,7 +68,11 @@ function toolbar(bus, drawer) {
     go.setAttribute("aria-pressed", Boolean(of.going));
     for (const one of [go, step, until, rate]) one.disabled = !of.open || log;
     undo.disabled = !of.open || log || !of.undo;
-    if (document.activeElement !== rate) rate.value = of.rate ? String(of.rate) : "";
+    if (document.activeElement !== rate) {
+      const value = of.rate ? String(of.rate) : "";
+      if (![...rate.options].some((one) => one.value === value)) rate.append(make("option", { value }, `${value} times`));
+      rate.value = value;
+    }
     live.hidden = !log;
     said.replaceChildren(...(log ? [...spoken(run.finding ? `finding: ${run.finding.text}; ` : ""), `log ${run.name}${run.other ? `, of system ${run.other}, which is not the one that is open here` : ""}, ${run.text}`] : [of.ended ?? ""]));
     said.title = said.textContent;

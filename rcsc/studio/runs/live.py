@@ -44,6 +44,22 @@ _LOOKING = ("?", "help", "show", "lines", "levels", "buffers", "breaks", "faults
 """Commands that change nothing, and leave no mark on the time line."""
 
 
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How a system runs at first.
+
+    Attributes:
+        rate: How many times as fast as the clock; None for as fast as it goes.
+        runs: Whether it runs once it was opened for the first time, without being told to.
+    """
+
+    rate: float | None = WATCHED_RATE
+    runs: bool = False
+
+
+WATCHED = Pace()
+
+
 @dataclass(slots=True)
 class Going:
     """A run under way.
@@ -99,7 +115,7 @@ class Live:
         opening: Opening,
         tell: Callable[[str, Json], None],
         later: Callable[[Callable[[], None], float], None],
-        rate: float | None = WATCHED_RATE,
+        pace: Pace = WATCHED,
     ) -> None:
         """Prepare; open nothing yet.
 
@@ -107,7 +123,7 @@ class Live:
             opening: What `open` opens.
             tell: As `Hub.tell`.
             later: Has something done in this lane after so many seconds.
-            rate: How many times as fast as the clock it runs; None for as fast as it goes.
+            pace: How it runs at first.
         """
         self.opening, self._tell, self._later = opening, tell, later
         self.commands: Commands | None = None
@@ -119,7 +135,7 @@ class Live:
         self.cycle = 0
         self._going: Going | None = None
         self._ended = ""
-        self._rate = rate
+        self._rate, self._runs = pace.rate, pace.runs
         self._told_s = 0.0
         self._rows: object = None
 
@@ -166,6 +182,9 @@ class Live:
             told(commands.session)
         self._tell("run.orders", self._orders())
         self.changed()
+        if self._runs:
+            self._runs = False
+            self._begin(RunOrder(-1), lambda _: None)
 
     def close_because(self, *why: str) -> None:
         """Have nothing open, and say why."""

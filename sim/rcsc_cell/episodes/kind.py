@@ -67,7 +67,7 @@ def _faults(system: Path, plant: str) -> tuple[str, ...]:  # noqa: ARG001  # bot
 def _files(system: Path, plant: str, script: str) -> list[NamedFile]:  # noqa: ARG001  # both plants are of the same
     """The data, the scripts, and the programs around the executors."""
     scripts = [(f"scripts/{path.name}", path) for path in sorted(system.parent.glob("scripts/*.csv"))]
-    cell = sources(Path(__file__).parents[1], "live", "pictures")
+    cell = sources(Path(__file__).parents[1], "pictures")
     return [("data", description(system).database), *scripts, *run_sources(), *cell]
 
 
