@@ -38,3 +38,13 @@ def test_a_room_teaches_what_is_in_it(room: str) -> None:
 def test_most_rooms_show_an_example() -> None:
     shown = [room for room in ROOMS if ">>>" in (importlib.import_module(room).__doc__ or "")]
     assert len(shown) >= 20
+
+
+def test_nothing_in_rcsc_names_the_cell_not_even_in_a_string() -> None:
+    """The import contracts do not see `MODULE:NAME`; the map alone says that there is another package."""
+    named = [
+        str(path.relative_to(REPO))
+        for path in (REPO / "rcsc").rglob("*")
+        if path.is_file() and path.suffix != ".pyc" and b"rcsc_cell" in path.read_bytes()
+    ]
+    assert named == ["rcsc/README.md"]

@@ -22,5 +22,5 @@ Any system has these; a plant may add what is true of it alone (`Staged.witness`
 copy of what is drawn, a cycle; a report keeps a picture every 25 cycles at the least.
 
 Modules, in the order the data flows: `frame` reads templates, of which `page.html.jinja` is what all pages have in common; `drawn` says
-what draws the world outside; `witness` watches a run, `log_page` reads one; `report` and `finding_page` are pages.
+what draws the world outside, `data` who knows it; `witness` watches a run, `log_page` reads one; `report` and `finding_page` are pages.
 """

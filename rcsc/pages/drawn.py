@@ -1,5 +1,6 @@
 """What stands outside, drawn of a log: what a page asks of who can draw it."""
 
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 
@@ -25,6 +26,11 @@ class Cell(Protocol):
         """What the file is called that says where things are."""
         ...
 
-    def drawn(self, tick: int) -> Drawing:
-        """Draw a tick."""
+    @property
+    def displays(self) -> Mapping[str, Sequence[str]]:
+        """Sets of variables that its system shows."""
+        ...
+
+    def drawn(self, tick: int, *, projected: bool = False) -> Drawing:
+        """Draw a tick: in perspective alone, or in three projections with it."""
         ...

@@ -53,6 +53,7 @@ SYSTEM = Record(
     {
         "buffers": Entries(Member()),
         "data": Text(),
+        "data_python": Text(),
         "displays": Entries(Listing(Member())),
         "outside": Listing(Word()),
         "plant": Entries(Anything()),
@@ -107,6 +108,7 @@ class Description:
         displays: Sets of variables to look at, by the name that a level's `display` gives them.
         document: The file, for the places of what is wrong with it.
         plants: What may stand outside the levels; the first does when nobody says which.
+        data_python: `MODULE:NAME` of who knows the data (`rcsc.pages.data`); empty for nobody.
         script: The orders that are given when nobody says which; None where the description names none.
         within: Cycles without a fault in which every command from outside is to end when the system is tested.
     """
@@ -121,6 +123,7 @@ class Description:
     document: Document | None = field(default=None, compare=False, repr=False)
     plants: tuple[PlantSpec, ...] = ()
     script: Path | None = None
+    data_python: str = ""
     within: int = WITHIN
 
     def unfilled(self, inputs: Iterable[str]) -> tuple[str, ...]:
@@ -130,7 +133,7 @@ class Description:
         return tuple(name for name in inputs if name not in filled)
 
     def untaken(self, outputs: Iterable[str]) -> tuple[str, ...]:
-        """Which of these outputs, `level.variable`, no buffer takes; by `display` a page goes where there are displays."""
+        """Which of these outputs, `level.variable`, no buffer takes; a `display` is for the page, where there are displays."""
         taken = {wire.source for wire in self.wires}
         taken |= {f"{level.name}.display" for level in self.levels if self.displays}
         return tuple(name for name in outputs if name not in taken)
@@ -193,6 +196,7 @@ def _described(path: Path, document: Document, generated: Path, data: Path) -> D
         {name: tuple(shown) for name, shown in content.get("displays", {}).items()},
         document,
         within=content.get("campaign", {}).get("within", WITHIN),
+        data_python=content.get("data_python", ""),
     )
 
 

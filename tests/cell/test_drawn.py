@@ -32,7 +32,7 @@ from rcsc_cell.cell.arm import skeleton, solve
 from rcsc_cell.cell.reach import home
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import nine, pose_of
-from rcsc_cell.pictures.scene import DrawnCell, cell, same_system
+from rcsc_cell.pictures.scene import DrawnCell, cell
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import NAMED, Block, Mark
 from rcsc_cell.pictures.views import ALONE, TOP
@@ -343,9 +343,9 @@ def test_a_cell_is_drawn_of_its_own_system_only(
 ) -> None:
     system = description(SHIPPED)
     ours = read(found.logs["task"])
-    assert same_system(ours, system)
-    assert not same_system(replace(ours, facts={**ours.facts, "name": "another"}), system)
-    assert not same_system(ours, replace(system, levels=system.levels[1:]))
+    assert ours.is_of(system)
+    assert not replace(ours, facts={**ours.facts, "name": "another"}).is_of(system)
+    assert not ours.is_of(replace(system, levels=system.levels[1:]))
     log = published / "task_acquire_one_line_14_and_15.mcap"
     out = published / "no.html"
     assert run(["log", str(log), "--report", str(out), "--system", str(SHIPPED)]) == 1

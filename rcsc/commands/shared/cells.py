@@ -1,34 +1,29 @@
-"""The paper's cell, where a system has one: made of its data, drawn of a log."""
+"""What stands outside the levels, drawn of a log, where the system says who can draw it."""
 
 from pathlib import Path
 
+from rcsc.pages.data import known
+from rcsc.pages.drawn import Cell, Drawing
 from rcsc.run.description import NO_DATA, BadDescription, description
 from rcsc.run.log.read import Log
 from rcsc.run.system import signatures
-from rcsc_cell.database.build import BadData
-from rcsc_cell.pictures.scene import DrawnCell, DrawnScene, cell, same_system
-from rcsc_cell.pictures.views import ALONE, PICTURES
-from rcsc_cell.workstation.prepared import database_of
 
 
-def cell_of(log: Log, path: Path) -> DrawnCell:
-    """The cell of a description, to be drawn of a log.
+def cell_of(log: Log, path: Path) -> Cell:
+    """What a description's data draws of a log.
 
     Raises:
-        BadDescription: It is of another system, or of none that is compiled.
-        BadData: The system has no cell.
+        BadDescription: It is of another system, or of none that is compiled, or nobody knows its data.
+        CodedError: The data is not in order.
     """
     system = description(path)
-    if not same_system(log, system):
+    if not log.is_of(system):
         raise BadDescription(f"the log is of system `{log.facts['name']}`, and `{path}` of `{system.name}`")
     try:
         signs = signatures(system)
     except BadDescription as error:
         raise BadDescription(f"the tables of `{path}` are not compiled") from error
-    try:
-        return cell(log, system, database_of(system, signs))
-    except (KeyError, StopIteration) as error:
-        raise BadData((f"`{path}` has no level `task` that names parts",)) from error
+    return known(system).drawn(log, system, signs)
 
 
 class Drawn:
@@ -40,22 +35,24 @@ class Drawn:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._cell: DrawnCell | None = None
+        self._cell: Cell | None = None
+        self._log: Log | None = None
 
     @property
     def can(self) -> bool:
-        """Whether the system has data of which a cell could be made."""
+        """Whether the system says who could draw it."""
         try:
-            return description(self._path).database.name != NO_DATA
+            system = description(self._path)
         except BadDescription:
             return False
+        return system.database.name != NO_DATA and bool(system.data_python)
 
-    def __call__(self, log: Log, tick: int, *, projected: bool) -> DrawnScene:
+    def __call__(self, log: Log, tick: int, *, projected: bool) -> Drawing:
         """Draw a tick: in perspective alone, or in three projections with it.
 
         Raises:
-            BadDescription, BadData: There is no cell to be drawn of this log.
+            CodedError: There is nothing to be drawn of this log.
         """
-        if self._cell is None or self._cell.log is not log:
-            self._cell = cell_of(log, self._path)
-        return self._cell.drawn(tick, PICTURES if projected else ALONE)
+        if self._cell is None or self._log is not log:
+            self._cell, self._log = cell_of(log, self._path), log
+        return self._cell.drawn(tick, projected=projected)

@@ -1,4 +1,4 @@
-"""`rcsc db`: the cell's database."""
+"""`rcsc db`: the database that is made of a system's data."""
 
 from pathlib import Path
 
@@ -12,16 +12,10 @@ from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Span
-from rcsc.host.cache import open_cache
-from rcsc.host.children import scratch
 from rcsc.host.described import BadFile
+from rcsc.pages.data import known
 from rcsc.run.description import description
 from rcsc.run.system import signatures
-from rcsc_cell.cell.reach import checked
-from rcsc_cell.database.ask import open_database, tables_of
-from rcsc_cell.database.build import build as build_database
-from rcsc_cell.database.readable import lines_of
-from rcsc_cell.workstation.prepared import database_of, database_path, limits_of, needs_data, parts_of
 
 
 @click.group(
@@ -81,20 +75,10 @@ def _report(error: CodedError | None) -> Report:
 
 
 def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
-    """Build the database in a scratch folder, have the arm go everywhere in it, and only then write it; return its path."""
-    path = system_path(system)
-    described = description(path)
+    """Build the database, or only check it; return its path."""
+    described = description(system_path(system))
     signs = signatures(described)
-    needs_data(described)
-    parts, limits = parts_of(signs), limits_of(described, signs)
-    target = output or database_path(described)
-    with scratch("db") as folder:
-        tried = folder / "cell.sqlite"
-        build_database(described.database, tried, parts, limits)
-        checked(open_database(tried), open_cache(path.parent) if writes else None)
-    if writes:
-        build_database(described.database, target, parts, limits)
-    return target
+    return known(described).build(described, signs, output, writes=writes)
 
 
 @command.command(short_help="Show what the database says.")
@@ -104,14 +88,14 @@ def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
 def show(system: Path | None, database: Path | None, table: str | None) -> int:
     """Show a TABLE of the database with names and units, or how many rows each has; the file has every digit."""
     described = description(system_path(system))
-    database_of(described, signatures(described), database)
-    held = tables_of(database or database_path(described))
+    signs, data = signatures(described), known(described)
+    held = data.rows(described, signs, database)
     if table is None:
         for name in sorted(held):
-            click.echo(f"{name:14}{len(held[name].rows):6} rows")
+            click.echo(f"{name:14}{held[name]:6} rows")
         return 0
     if table not in held:
         raise click.BadParameter(f"choose from {', '.join(sorted(held))}", param_hint="TABLE")
-    for line in lines_of(held, table):
+    for line in data.lines(described, signs, database, table):
         click.echo(line)
     return 0

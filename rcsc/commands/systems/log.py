@@ -13,8 +13,10 @@ from rcsc.commands.shared.played import with_ticks
 from rcsc.commands.shared.show import writing
 from rcsc.commands.shared.stopped import stopped
 from rcsc.commands.shared.systems import NoSystem, system_path
+from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files import write_atomically
+from rcsc.pages.drawn import Cell
 from rcsc.pages.finding_page import trace
 from rcsc.pages.log_page import drawn_first, story_of
 from rcsc.pages.report import report as run_page
@@ -25,8 +27,6 @@ from rcsc.run.log.plot import plot as draw
 from rcsc.run.log.read import Log, LoggedLevel, read
 from rcsc.run.log.records import Seal
 from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
-from rcsc_cell.database.build import BadData
-from rcsc_cell.pictures.scene import DrawnCell, same_system
 
 _TO = click.Path(dir_okay=False, path_type=Path)
 
@@ -133,7 +133,7 @@ def _report(path: Path, log: Log, system: Path | None) -> None:
     if finding is not None:
         _written(path, lambda: trace(path, log, finding, cell, why_not))
         return
-    displays = _displays(log, system) if cell is None else cell.system.displays
+    displays = _displays(log, system) if cell is None else cell.displays
     story = with_ticks(story_of(log, cell, why_not), log, drawn_first(log, displays))
     _written(path, lambda: run_page(path, story))
 
@@ -142,7 +142,7 @@ def _displays(log: Log, system: Path | None) -> Mapping[str, Sequence[str]]:
     """What the system shows, where it is there and the log is of it; it may have no cell."""
     with contextlib.suppress(NoSystem, BadDescription):
         described = description(system_path(system))
-        if same_system(log, described):
+        if log.is_of(described):
             return described.displays
     return {}
 
@@ -182,7 +182,7 @@ def _summed(level: LoggedLevel) -> None:
         click.echo(f"  and {len(level.restarts) - SHOWN} times more")
 
 
-def _cell_of(log: Log, given: Path | None) -> tuple[DrawnCell | None, str]:
+def _cell_of(log: Log, given: Path | None) -> tuple[Cell | None, str]:
     """The cell, or None and a sentence that says why.
 
     Args:
@@ -196,7 +196,7 @@ def _cell_of(log: Log, given: Path | None) -> tuple[DrawnCell | None, str]:
         return cell_of(log, path), ""
     except NoSystem as error:
         return None, f"{error}; `--system` names one."
-    except (BadData, BadDescription) as error:
+    except CodedError as error:
         if given is not None:
             raise stopped(error) from error  # of the system that was named, not of the log
         return None, f"{error}; `--system` names another system."

@@ -144,6 +144,12 @@ class Log:
         """Whether the log is whole, and every byte as it was recorded."""
         return self.checked.seal is Seal.WHOLE
 
+    def is_of(self, system: Description) -> bool:
+        """Whether it is a log of this system, or of some of its levels."""
+        here = {(spec.name, spec.program) for spec in system.levels}
+        there = {(spec.name, spec.program) for spec in self.system().levels}
+        return self.facts["name"] == system.name and there <= here
+
     def system(self, generated: Path = _NOWHERE, database: Path = _NOWHERE) -> Description:
         """The description, with paths of here."""
         return system_of(self.facts, generated, database)

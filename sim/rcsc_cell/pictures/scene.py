@@ -20,7 +20,7 @@ from rcsc_cell.database.build import BadData
 from rcsc_cell.database.pose import Pose, Vector, pose_of
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import Mark, block, outline
-from rcsc_cell.pictures.views import ALONE, Perspective, View
+from rcsc_cell.pictures.views import ALONE, PICTURES
 
 PLATE, OPENING = ".plate", ".opening_mm"
 """How the names end of nine numbers of the wrist plate, and of how far the fingers are apart."""
@@ -80,8 +80,13 @@ class DrawnCell:
     data: str
     rest: Joints
 
-    def drawn(self, tick: int, pictures: Sequence[View | Perspective] = ALONE) -> DrawnScene:
-        """The cell as of a tick, in these pictures."""
+    @property
+    def displays(self) -> Mapping[str, Sequence[str]]:
+        """Sets of variables that its system shows."""
+        return self.system.displays
+
+    def drawn(self, tick: int, *, projected: bool = False) -> DrawnScene:
+        """The cell as of a tick: in perspective alone, or in three projections with it."""
         held = {level.name: level.track.latest(tick) for level in self.log.levels}
         states = {name: values for name, values in held.items() if values is not None}
         named = self._named(states)
@@ -103,7 +108,7 @@ class DrawnCell:
         outlines = tuple(map(outline, self.database.stations.values()))
         scene = Scene(outlines, (), self.database.hand.tool_mm, blocks, marks)
         return DrawnScene(
-            stick(plate, self._opening_mm(states), joints, scene, pictures),
+            stick(plate, self._opening_mm(states), joints, scene, PICTURES if projected else ALONE),
             (note, *self._told(named), *(f"`{other.name}` is marked." for other in others)),
         )
 
@@ -259,10 +264,3 @@ def cell(log: Log, system: Description, database: Database) -> DrawnCell:
     if rest is None:
         raise BadData(("the robot cannot be at its home",))
     return DrawnCell(log, system, database, system.database.name, rest)
-
-
-def same_system(log: Log, system: Description) -> bool:
-    """Whether a log is one of this system, or of some of its levels."""
-    here = {(spec.name, spec.program) for spec in system.levels}
-    there = {(spec.name, spec.program) for spec in log.system().levels}
-    return log.facts["name"] == system.name and there <= here
