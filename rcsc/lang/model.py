@@ -300,7 +300,7 @@ class Variable:
         previous_of: Of a hidden state, the leaf whose value after the cycle before it holds.
         line_of: Of a hidden state, the table whose line of this cycle it holds: 0 for none, else one more than the line's position.
         counts: Of a hidden state that counts cycles, the condition that has held for so many.
-        restart: What it has when the level starts anew; None where it is then as it is initially, or as `Program.restart` says.
+        restart: Value after a restart; None: the initial value, or what `Program.restart` says.
         given: Whether its initial value is written, or its safe one is it; else it starts with what `start` says, which nobody meant.
     """
 

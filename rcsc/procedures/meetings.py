@@ -68,7 +68,7 @@ def _pair(table: Table, meeting: Meeting) -> tuple[int, int]:
 
 
 def _never(table: Table, meeting: Meeting) -> Diagnostic:
-    """Warn that nothing is of what is said."""
+    """Warn that a `same` or `above` declaration never applies."""
     said = "are said to do the same" if meeting.same else "are ordered"
     message = f"lines `{meeting.first}` and `{meeting.second}` of table `{table.name}` {said}, and never match together"
     helps = (f"leave `{'same' if meeting.same else 'above'}` out, or correct the conditions",)

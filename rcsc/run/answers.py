@@ -75,7 +75,7 @@ def fits(c_type: str, value: Value) -> bool:
 
 
 def stand_in(function: str, given: Iterable[tuple[str, str]], results: Iterable[tuple[str, str]]) -> str:
-    """A C function that gives what it is told; arguments and results as (type, name)."""
+    """Return a C stub that replays recorded answers; arguments and results as (type, name)."""
     ins, outs = list(given), list(results)
     parameters = [*(f"{kind} {name}" for kind, name in ins), *(f"{kind} *{name}_out" for kind, name in outs)]
     body = [f"    (void){name};" for _, name in ins]

@@ -441,10 +441,10 @@ def test_the_same_order_comes_once_more_when_every_last_order_is_echoed() -> Non
         ("width_mm := 2", "width_mm := 2, width_mm := 3", "RCS202", "`width_mm` is given twice"),
         ("width_mm := 2", "width_mm := true", "RCS301", "`true`, which is bool"),
         ("hand := work;", "hnad := work(again);", "RCS201", "no variable is called `hnad`"),
-        ("choice = called", "choice = called(again)", "RCS301", "is an order, and no value"),
+        ("choice = called", "choice = called(again)", "RCS301", "is an order, not a value"),
         ("hand := work;", "next hand := work;", "RCS", ""),
-        ("commands hand : jobs", "state hand : job", "RCS301", "is an order, and no value"),
-        ("if choice", "local hand : job := work(again) if choice", "RCS301", "is an order, and no value"),
+        ("commands hand : jobs", "state hand : job", "RCS301", "is an order, not a value"),
+        ("if choice", "local hand : job := work(again) if choice", "RCS301", "is an order, not a value"),
     ],
 )
 def test_what_is_wrong_with_an_order_is_said_where_it_stands(

@@ -598,7 +598,7 @@ def test_sets_mean_what_they_name(cells: str, plain: str) -> None:
     ("declared", "cell", "code", "message"),
     [
         ("", "in ends", "RCS201", "no set is called `ends`"),
-        ("", "= ended", "RCS301", "`ended` is a set, and no value"),
+        ("", "= ended", "RCS301", "`ended` is a set, not a value"),
         ("", "in {ended, edges}", "RCS301", ""),
         ("set odd : status = {done, 5}", "done", "RCS301", ""),
         ("set odd : int 0 .. 9 = {8 .. 3}", "done", "RCS303", ""),

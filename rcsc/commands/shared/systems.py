@@ -38,7 +38,7 @@ COMPILES = click.option(
 
 
 class NoSystem(CodedError):  # noqa: N818  # what happened, not an error of ours
-    """Nobody says which system is meant, and there is none where one is looked for."""
+    """No system is named, and none found."""
 
     helps = ("say which with --system",)
 

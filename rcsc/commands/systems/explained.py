@@ -105,7 +105,7 @@ def _say_logs(explanation: Explanation) -> None:
 
 
 def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> str:
-    """What a property says, as it is written; empty for what is none."""
+    """Return the property's source text, or "" where it is none."""
     if explanation.obligation.sort is not Sort.PROPERTY:
         return ""
     return next(

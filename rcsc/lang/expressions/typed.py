@@ -89,7 +89,7 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
             return _function(scope, body, written)
         case tree.Order(command):
             scope.report(
-                Code.KIND, f"`{command.text}(...)` is an order, and no value", written.span, ORDER_STANDS
+                Code.KIND, f"`{command.text}(...)` is an order, not a value", written.span, ORDER_STANDS
             )
             return None
 
@@ -154,7 +154,7 @@ def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scal
     if name.text in scope.declared:
         return _path(scope, body, tree.Reference(name, span))
     if name.text in scope.set_names:
-        scope.report(Code.KIND, f"`{name.text}` is a set, and no value", name.span, f"write `in {name.text}`")
+        scope.report(Code.KIND, f"`{name.text}` is a set, not a value", name.span, f"write `in {name.text}`")
         return None
     if not scope.demand("value", name):
         return None

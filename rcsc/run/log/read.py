@@ -187,7 +187,7 @@ class Log:
 
 
 def read(path: Path) -> Log:
-    """Read a log; one that was cut off or changed is read as far as it is as recorded.
+    """Read a log; one that was cut off or changed, up to the first damaged record.
 
     Raises:
         UnreadableLog: It cannot be read, or is none.

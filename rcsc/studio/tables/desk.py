@@ -282,7 +282,7 @@ class Desk:
             self._look_at(each)
 
     def _sure(self, name: str) -> bool:
-        """Whether what is known of an open file is of its text as it is."""
+        """Whether the cached results of an open file match its current text."""
         known = self._known.get(name)
         return known is not None and known.version == self._open[name].version
 

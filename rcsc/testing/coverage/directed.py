@@ -89,7 +89,7 @@ class Watched(Run):
     ends: dict[tuple[str, int], Node] = field(default_factory=dict)
 
     def evaluate(self, expr: Expr) -> Node:
-        """As `Run.evaluate`; a mark gives what it is given."""
+        """Evaluate as `Run` does, recording each mark."""
         if not isinstance(expr, Apply):
             return Run.evaluate(self, expr)
         op: object = expr.op
