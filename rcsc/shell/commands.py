@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from rcsc.diagnostics.codes import Code
 from rcsc.run.faults import faults_of
 from rcsc.run.levels import RunningLevel
+from rcsc.run.orders.conditions import NAME
 from rcsc.run.orders.roles import COMMAND, served
 from rcsc.shell import typed_names
 from rcsc.shell.part_runs import call_of, part_names
@@ -20,8 +21,8 @@ from rcsc.shell.session import MOST_CYCLES, Session
 from rcsc.shell.typed_names import NamedLine
 
 Output = list[str]
-_SHOW = re.compile(rf"(?P<name>{typed_names.NAME})\s*\?$")
-_SET = re.compile(rf"(?P<name>{typed_names.NAME})\s*=(?!=)\s*(?P<value>.*)$")
+_SHOW = re.compile(rf"(?P<name>{NAME})\s*\?$")
+_SET = re.compile(rf"(?P<name>{NAME})\s*=(?!=)\s*(?P<value>.*)$")
 _SUFFIX = "_level"
 HELP = """\
 NAME                    run the module, procedure, owner or table of that name on the level chosen

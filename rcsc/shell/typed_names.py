@@ -12,9 +12,6 @@ from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Leaf, Signature, Value, number_word
 from rcsc.shell.reload.refusal import Refused
 
-NAME = r"[A-Za-z_][\w-]*(?:\[\d+\])*(?:\.[\w-]+(?:\[\d+\])*)*"
-"""A name, its parts joined by points; hyphens as FORTH has them."""
-
 
 @dataclass(frozen=True, slots=True)
 class NamedLine:

@@ -22,12 +22,13 @@ from rcsc.run.adopt import Begun
 from rcsc.run.description import BadDescription, Description, LevelSpec, Wire, description
 from rcsc.run.levels import Query
 from rcsc.run.log.export import coverage, csv_text, json_text
-from rcsc.run.log.queries import BadExpression, predicate
+from rcsc.run.log.queries import predicate
 from rcsc.run.log.read import Log, UnreadableLog, read
 from rcsc.run.log.recorder import CHUNK_MS, Recorder
 from rcsc.run.log.records import CHAIN, SEAL
 from rcsc.run.log.replay import Replay, find
 from rcsc.run.log.states import words
+from rcsc.run.orders.conditions import BadCondition
 from rcsc.run.signature import Values
 from rcsc.run.system import Kind, StateTableError, System, assemble
 from tests.support.programs.stages import emitted, program_of
@@ -671,7 +672,7 @@ def test_the_first_cycle_where_something_holds(log: Log) -> None:
     ],
 )  # fmt: skip
 def test_a_question_that_cannot_be_asked(log: Log, text: str) -> None:
-    with pytest.raises(BadExpression):
+    with pytest.raises(BadCondition):
         predicate(text, log)
 
 

@@ -478,6 +478,8 @@ def test_show_lines_levels_and_help(shell: Commands) -> None:
         "task.table = pause_task",
         "gripper.primitive.opening_mm < .5",
         "task.cur_state = task.cur_state.next",
+        "1 < tbuffer_boxt <= 10 < 30",
+        "not 1 < tbuffer_boxt < 3 and task.cur_state = 'd_state'",
     ],
 )
 def test_conditions_that_hold(shell: Commands, condition: str) -> None:
@@ -498,10 +500,12 @@ def test_conditions_that_hold(shell: Commands, condition: str) -> None:
         ("(new_command", Code.SHELL_COMMAND),
         ("new_command)", Code.SHELL_COMMAND),
         ("new_command and", Code.SHELL_COMMAND),
-        ("__import__('os')", Code.SHELL_COMMAND),
-        ("1 < tbuffer_boxt < 3", Code.SHELL_COMMAND),
+        ("__import__('os')", Code.SHELL_NAME),
+        ("1 < tbuffer_boxt < state_3", Code.SHELL_NAME),
+        ("1 + tbuffer_boxt < 3", Code.SHELL_COMMAND),
         ("nobody = 3", Code.SHELL_NAME),
         ("nobody", Code.SHELL_NAME),
+        ("'nobody'", Code.SHELL_NAME),
         ("not " * 1000 + "emove.idle", Code.SHELL_COMMAND),
         ("(" * 1000, Code.SHELL_COMMAND),
     ],

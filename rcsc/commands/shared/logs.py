@@ -15,8 +15,8 @@ from rcsc.diagnostics.source import Span
 from rcsc.run.description import BadDescription
 from rcsc.run.executors import NotBuilt
 from rcsc.run.levels import BadState
-from rcsc.run.log.queries import BadExpression
 from rcsc.run.log.read import UnreadableLog
+from rcsc.run.orders.conditions import BadCondition
 
 FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="FILE")
 SHOWN = 12
@@ -35,8 +35,8 @@ def told(command: Callable[..., int]) -> Callable[..., int]:
             return refuse(file, Code.LOG_UNREADABLE, str(error))
         except (BadDescription, NotBuilt, BadState) as error:
             return refuse(file, Code.NOT_REPLAYED, f"the log cannot be replayed: {error}")
-        except BadExpression as error:
-            raise click.UsageError(str(error)) from error
+        except BadCondition as error:
+            raise click.UsageError("; ".join((str(error), *error.helps))) from error
 
     return wrapped
 

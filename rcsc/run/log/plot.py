@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 from rcsc.host.files import written_whole
 from rcsc.run.log.export import valued
-from rcsc.run.log.queries import BadExpression, named_columns, nearest
+from rcsc.run.log.queries import named_columns, nearest
 from rcsc.run.log.read import Log
 from rcsc.run.log.states import LogColumn
+from rcsc.run.orders.conditions import BadCondition
 from rcsc.run.signature import Value
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def plot(log: Log, names: Sequence[str], path: Path, against: str | None = None)
     """Draws columns, one below the other, over time or over `against`.
 
     Raises:
-        BadExpression: There is no such column, or it is text.
+        BadCondition: There is no such column, or it is text.
         ModuleNotFoundError: matplotlib is not installed.
         OSError: The file could not be written.
     """
@@ -84,9 +85,9 @@ def _series(log: Log, names: Sequence[str]) -> list[_Series]:
     known = named_columns(log)
     for name in names:
         if name not in known:
-            raise BadExpression(nearest(name, known))
+            raise BadCondition(nearest(name, known))
         if not (known[name][1].members or known[name][1].c_type):
-            raise BadExpression(f"`{name}` is text, which has no place on an axis")
+            raise BadCondition(f"`{name}` is text, which has no place on an axis")
     curves = [_Series(name, known[name][1], []) for name in names]
     for _, values in valued(log, {name: known[name] for name in dict.fromkeys(names)}):
         by_name = dict(zip(dict.fromkeys(names), values, strict=True))

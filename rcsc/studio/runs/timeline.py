@@ -12,8 +12,9 @@ from typing import Any
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.model import Program
 from rcsc.run.description import BadDescription, description
-from rcsc.run.log.queries import BadExpression, predicate
+from rcsc.run.log.queries import predicate
 from rcsc.run.log.read import Log, LoggedLevel
+from rcsc.run.orders.conditions import BadCondition
 from rcsc.run.signature import Signature, number_word
 from rcsc.shell.reload.refusal import Refused
 from rcsc.studio.hub import PROVER, Ask, Handler, Json
@@ -239,8 +240,8 @@ class TimeLine:
             if id(log) not in asked:
                 try:
                     asked[id(log)] = predicate(text, log)
-                except BadExpression as error:
-                    raise Refused(Code.STUDIO, str(error)) from error
+                except BadCondition as error:
+                    raise Refused(Code.STUDIO, str(error), *error.helps) from error
             if count % _BREATH == 0:
                 ask.progress("searching", count, len(ticks))
             held = {one.name: values for one in log.levels if (values := one.track.latest(at)) is not None}

@@ -1,0 +1,209 @@
+"""Conditions on levels, as people type them: `task.cur_state = state_3 and not primitive.travelled_mm > 40`.
+
+In: a text, and who knows the names in it, of a running system or of a log. Out: a predicate over their values. The language is
+comparison, also in chains, `and`, `or`, `not`, parentheses, leaves, numbers and members, bare or quoted; `=` and `/=` are read as in
+tables, `==` and `!=` too. Nothing is ever handed to Python to evaluate.
+"""
+
+import operator
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
+
+from rcsc.run.signature import Value
+
+NAME = r"[A-Za-z_][\w-]*(?:\[\d+\])*(?:\.[\w-]+(?:\[\d+\])*)*"
+"""A name, its parts joined by points; hyphens as FORTH has them."""
+MOST_NESTED = 50
+State = TypeVar("State")
+
+_TOKEN = re.compile(
+    rf"\s*(?:(?P<number>-?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.]))|(?P<text>\"[^\"]*\"|'[^']*')|(?P<name>{NAME})"
+    r"|(?P<mark>==|!=|/=|<=|>=|[=<>()]))"
+)
+_COMPARE: Mapping[str, Callable[[Value | str, Value | str], bool]] = {
+    "==": operator.eq, "=": operator.eq, "!=": operator.ne, "/=": operator.ne,
+    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
+}  # fmt: skip
+_EQUALITY = {"==", "=", "!=", "/="}
+_BOOLS = {"true": True, "false": False, "True": True, "False": False}
+
+
+class BadCondition(Exception):  # noqa: N818  # what happened, not an error of ours
+    """A text is no condition: says why, and what helps.
+
+    Attributes:
+        value: Whether it is a value that its variable never has.
+    """
+
+    def __init__(self, why: str, *helps: str, value: bool = False) -> None:
+        super().__init__(why)
+        self.helps, self.value = helps, value
+
+
+class _Unread(BadCondition):
+    """Why the text is none; the text itself is to be named."""
+
+
+@dataclass(frozen=True, slots=True)
+class Operand(Generic[State]):
+    """One side of a comparison.
+
+    Attributes:
+        kind: `number`, `bool`, `member` (of an enumeration, or a text), or `word`, which the other side must know.
+        members: Which a member may be; empty where any text may stand.
+    """
+
+    text: str
+    kind: str
+    term: Callable[[State], Value | str]
+    members: tuple[str, ...] = ()
+
+
+class Names(Protocol[State]):
+    """Who knows what the names in a condition mean."""
+
+    def operand(self, name: str) -> Operand[State] | None:
+        """The variable of that name; None where there is none."""
+        ...
+
+    def member(self, word: str, members: tuple[str, ...]) -> str | None:
+        """The member that a word means; None where it means none."""
+        ...
+
+    def unknown(self, name: str) -> Exception:
+        """What to raise where a name is no variable."""
+        ...
+
+
+def condition(text: str, names: Names[State]) -> Callable[[State], bool]:
+    """Return what the text asks.
+
+    Raises:
+        BadCondition: It is no condition.
+        Exception: As `Names.unknown` has it.
+    """
+    try:
+        return _Reading(names, _tokens(text)).whole()
+    except _Unread as bad:
+        raise BadCondition(f"`{text.strip()[:200]}` is no condition: {bad}", *bad.helps) from bad
+
+
+def _tokens(text: str) -> list[str]:
+    tokens, at = [], 0
+    text = text.rstrip()
+    while at < len(text):
+        match = _TOKEN.match(text, at)
+        if match is None:
+            raise _Unread(
+                f"it cannot be read from `{text[at:].strip()[:200]}` on",
+                "write such as `task.cur_state = state_3 and not task.new_command`",
+            )
+        tokens.append(match[0].strip())
+        at = match.end()
+    return tokens
+
+
+@dataclass(slots=True)
+class _Reading(Generic[State]):
+    """Recursive descent; one method a rule, loosest first."""
+
+    names: Names[State]
+    tokens: list[str] = field(default_factory=list)
+
+    def whole(self) -> Callable[[State], bool]:
+        """Read all of it."""
+        holds = self.either(0)
+        if self.tokens:
+            raise _Unread(f"`{self.tokens[0]}` is not expected")
+        return holds
+
+    def took(self, word: str) -> bool:
+        """Take the next token if it is that word."""
+        if self.tokens and self.tokens[0].casefold() == word:
+            self.tokens.pop(0)
+            return True
+        return False
+
+    def either(self, depth: int) -> Callable[[State], bool]:
+        """Read `a or b`."""
+        parts = [self.both(depth)]
+        while self.took("or"):
+            parts.append(self.both(depth))
+        return parts[0] if len(parts) == 1 else lambda now: any(part(now) for part in parts)
+
+    def both(self, depth: int) -> Callable[[State], bool]:
+        """Read `a and b`."""
+        parts = [self.negation(depth)]
+        while self.took("and"):
+            parts.append(self.negation(depth))
+        return parts[0] if len(parts) == 1 else lambda now: all(part(now) for part in parts)
+
+    def negation(self, depth: int) -> Callable[[State], bool]:
+        """Read `not a`, `(a)`."""
+        if depth > MOST_NESTED:
+            raise _Unread("it is nested too deep")
+        if self.took("not"):
+            inner = self.negation(depth + 1)
+            return lambda now: not inner(now)
+        if self.took("("):
+            whole = self.either(depth + 1)
+            if not self.took(")"):
+                raise _Unread("`)` is missing")
+            return whole
+        return self.comparison()
+
+    def comparison(self) -> Callable[[State], bool]:
+        """Read `a < b`, `a < b < c`, or a bool alone."""
+        left = self.operand()
+        parts: list[Callable[[State], bool]] = []
+        while self.tokens and self.tokens[0] in _COMPARE:
+            mark, right = self.tokens.pop(0), self.operand()
+            parts.append(self.compared(left, mark, right))
+            left = right
+        if parts:
+            return parts[0] if len(parts) == 1 else lambda now: all(part(now) for part in parts)
+        if left.kind == "word":
+            raise self.names.unknown(left.text)
+        if left.kind != "bool":
+            raise _Unread(f"`{left.text}` is neither true nor false")
+        return lambda now: bool(left.term(now))
+
+    def operand(self) -> Operand[State]:
+        """Read a leaf, a number, a bool or a member."""
+        if not self.tokens or self.tokens[0] in {*_COMPARE, "(", ")"}:
+            raise _Unread("a value is missing")
+        token = self.tokens.pop(0)
+        if token[0].isdigit() or token[0] in "-.":
+            number = float(token) if re.search(r"[.eE]", token) else int(token)
+            return Operand(token, "number", lambda _: number)
+        if token in _BOOLS:
+            truth = _BOOLS[token]
+            return Operand(token, "bool", lambda _: truth)
+        known = None if token[0] in "\"'" else self.names.operand(token)
+        return known or Operand(token.strip("\"'"), "word", lambda _: token)
+
+    def compared(self, left: Operand[State], mark: str, right: Operand[State]) -> Callable[[State], bool]:
+        """Compare two operands that can be compared."""
+        left, right = self._meant(left, right), self._meant(right, left)
+        unlike = left.members and right.members and left.members != right.members
+        if left.kind != right.kind or unlike:
+            raise _Unread(f"`{left.text}` and `{right.text}` cannot be compared")
+        if left.kind != "number" and mark not in _EQUALITY:
+            raise _Unread(f"`{left.text}` and `{right.text}` have no order")
+        compare = _COMPARE[mark]
+        return lambda now: compare(left.term(now), right.term(now))
+
+    def _meant(self, operand: Operand[State], other: Operand[State]) -> Operand[State]:
+        """Read a bare word, or a line's number, as the member of the other side that it names."""
+        if other.kind == "member" and operand.kind in {"word", "number"}:
+            word = operand.text
+            member = self.names.member(word, other.members) if other.members else word
+            if member is None:
+                of = ", ".join(filter(None, other.members))
+                raise BadCondition(f"`{other.text}` is never `{word}`", f"it is one of {of}", value=True)
+            return Operand(word, "member", lambda _: member, other.members)
+        if operand.kind == "word":
+            raise self.names.unknown(operand.text)
+        return operand
