@@ -95,8 +95,11 @@ class Browser:
         self._tell("Fetch.enable", patterns=[{"urlPattern": pattern}])
 
     def let_go(self) -> None:
-        """Lets through what was held back, and all that comes."""
-        assert self._held_back, "nothing was held back"
+        """Lets through what was held back, once something was, and all that comes."""
+        until = time.monotonic() + PATIENCE_S
+        while not self._held_back:
+            assert time.monotonic() < until, "nothing was held back"
+            self.value("0")  # what the browser tells meanwhile is heard
         self._tell("Fetch.disable")
         self._held_back = False
 
