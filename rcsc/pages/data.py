@@ -4,14 +4,14 @@ In: a description. Out: what makes its database, shows it, and draws a log with 
 of the data, the plant answers.
 """
 
-import importlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Protocol, cast
 
 from rcsc.pages.drawn import Cell
-from rcsc.run.description import NO_DATA, BadDescription, Description
+from rcsc.run.description import BadDescription, Description, needs_data
 from rcsc.run.log.read import Log
+from rcsc.run.plant.load import installed
 from rcsc.run.signature import Signature
 
 
@@ -54,25 +54,14 @@ def known(system: Description) -> Data:
     Raises:
         BadDescription: There is no data, or nobody who knows it.
     """
+    needs_data(system)
     page = system.review()
-    if system.database.name == NO_DATA:
-        page.wrong(("data",), "the description names no `data`, of which the database would be made")
-        raise page.bad(BadDescription)
-    module, _, attribute = system.data_python.partition(":")
-    if not module:
+    if not system.data_python:
         page.wrong(
             ("data",),
             "the description does not say who knows its data",
             '`data_python = "MODULE:NAME"` names a Python object',
         )
         raise page.bad(BadDescription)
-    try:
-        return cast("Data", getattr(importlib.import_module(module), attribute))
-    except ModuleNotFoundError as error:
-        if error.name is not None and not module.startswith(error.name):
-            raise  # a package of an extra, which says so itself
-        wrong: Exception = error
-    except (AttributeError, ValueError, TypeError) as error:
-        wrong = error
-    page.wrong(("data_python",), f"`{system.data_python}` cannot be imported: {wrong}", "write `MODULE:NAME`")
-    raise page.bad(BadDescription) from wrong
+    found = installed(page, ("data_python",), system.data_python, "write `MODULE:NAME`", BadDescription)
+    return cast("Data", found)

@@ -1,6 +1,5 @@
 """What stands outside, drawn of a log: what a page asks of who can draw it."""
 
-from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 
@@ -24,11 +23,6 @@ class Cell(Protocol):
     @property
     def data(self) -> str:
         """What the file is called that says where things are."""
-        ...
-
-    @property
-    def displays(self) -> Mapping[str, Sequence[str]]:
-        """Sets of variables that its system shows."""
         ...
 
     def drawn(self, tick: int, *, projected: bool = False) -> Drawing:

@@ -230,6 +230,18 @@ NO_DATA = ".no-data"
 """Stands for the data of a system that has none: no such file is ever made."""
 
 
+def needs_data(system: Description) -> None:
+    """Refuse a system without data.
+
+    Raises:
+        BadDescription: It names none.
+    """
+    if system.database.name == NO_DATA:
+        page = system.review()
+        page.wrong(("data",), "the description names no `data`, of which the database would be made")
+        raise page.bad(BadDescription)
+
+
 def _check_parties(document: Document) -> None:
     """Check that levels have names of their own, and buffers a level at an end and known parties."""
     content = document.value

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations, islice
 from random import Random
 
@@ -217,6 +217,12 @@ class _Decision:
         except UNDEFINED:
             return None
 
+    @cached_property
+    def refuted_by_trial(self) -> bool:
+        """Whether some sample input is matched by two lines, or by none where one must."""
+        fewest = 1 if must_cover(self.table) else 0
+        return any(not fewest <= len(found) <= 1 for _, found in self.tried)
+
     def tried_by(self, *lines: int) -> list[Snapshot]:
         """The sample inputs that all these lines match; without one those that none matches."""
         return [
@@ -328,7 +334,7 @@ class _Decision:
         if len(asked.candidates) > _MOST_CANDIDATES or smt.spent() or (self.few and self.rest.spent):
             return NoWitness.UNKNOWN
         fewest = 1 if must_cover(self.table) else 0
-        self.few = self.few or any(not fewest <= len(found) <= 1 for _, found in self.tried)
+        self.few = self.few or self.refuted_by_trial
         if self.few:
             self.rest.left -= _STEPS_OF_A_QUESTION
         region = located(self.spelled(asked))

@@ -37,12 +37,12 @@ from rcsc.host.described import (
 from rcsc.host.files.names import MOST_FILE_CHARACTERS
 from rcsc.host.files.read import MOST_TOML_BYTES
 from rcsc.run.declared_plant import ACTUATOR, FAULT, MODEL, PYTHON, SENSOR
-from rcsc.run.description import FEED, LEVEL, SYSTEM, BadDescription, description
+from rcsc.run.description import FEED, LEVEL, SYSTEM, BadDescription, description, needs_data
 from rcsc.run.orders.script import OWN
 from rcsc.run.signature import Signature
 from rcsc.run.system import signatures
 from rcsc_cell.database.build import BadData, build
-from rcsc_cell.workstation.prepared import limits_of, needs_data, parts_of
+from rcsc_cell.workstation.prepared import limits_of, parts_of
 
 SHIPPED = ("tables/system.toml", "tables/cell.toml")
 

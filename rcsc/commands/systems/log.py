@@ -133,8 +133,7 @@ def _report(path: Path, log: Log, system: Path | None) -> None:
     if finding is not None:
         _written(path, lambda: trace(path, log, finding, cell, why_not))
         return
-    displays = _displays(log, system) if cell is None else cell.displays
-    story = with_ticks(story_of(log, cell, why_not), log, drawn_first(log, displays))
+    story = with_ticks(story_of(log, cell, why_not), log, drawn_first(log, _displays(log, system)))
     _written(path, lambda: run_page(path, story))
 
 

@@ -130,7 +130,9 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
             "--resume, --live, --report, --log and --cycles are of one process; with --processes, use --from-row"
         )
     if live and (resumes or from_row or report or cycles or log):
-        raise click.UsageError("with --live the page says how far it runs, and hands its log and report on")
+        raise click.UsageError(
+            "--resume, --from-row, --report, --log and --cycles are of a run that no page leads; leave --live out"
+        )
     if live:
         need("studio")
     path, named = meant(target, system, script)

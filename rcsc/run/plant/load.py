@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rcsc.host.described import KeyPath, nearest
+from rcsc.host.described import BadFile, Document, KeyPath, nearest
 from rcsc.host.files.names import BadName, within
 from rcsc.lang.project import project_root
 from rcsc.run.declared_plant import PlantSpec
@@ -196,6 +196,16 @@ def named(system: Description, spec: PlantSpec, name: str, key: str = "python") 
     Raises:
         BadPlant: There is no such thing.
     """
+    place, helps = (*spec.path, key), "write `FILE.py:CLASS`, or `MODULE:NAME`"
+    return installed(plant_page(system), place, name, helps, BadPlant)
+
+
+def installed(page: Document, place: KeyPath, name: str, helps: str, bad: type[BadFile]) -> Any:
+    """Return what `MODULE:NAME` names, of an installed package.
+
+    Raises:
+        BadFile: There is no such thing: `bad`, at this place of the page.
+    """
     module, _, attribute = name.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)
@@ -205,10 +215,5 @@ def named(system: Description, spec: PlantSpec, name: str, key: str = "python") 
         wrong: Exception = error
     except (AttributeError, ValueError, TypeError) as error:
         wrong = error
-    page = plant_page(system)
-    page.wrong(
-        (*spec.path, key),
-        f"`{name}` cannot be imported: {wrong}",
-        "write `FILE.py:CLASS`, or `MODULE:NAME`",
-    )
-    raise page.bad(BadPlant) from wrong
+    page.wrong(place, f"`{name}` cannot be imported: {wrong}", helps)
+    raise page.bad(bad) from wrong

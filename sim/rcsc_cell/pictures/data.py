@@ -14,7 +14,7 @@ from rcsc_cell.database.build import BadData
 from rcsc_cell.database.build import build as build_database
 from rcsc_cell.database.readable import lines_of
 from rcsc_cell.pictures.scene import DrawnCell, cell
-from rcsc_cell.workstation.prepared import database_of, database_path, limits_of, needs_data, parts_of
+from rcsc_cell.workstation.prepared import database_of, database_path, limits_of, parts_of
 
 
 class CellData:
@@ -24,7 +24,6 @@ class CellData:
         self, system: Description, signs: Mapping[str, Signature], output: Path | None, *, writes: bool
     ) -> Path:
         """Build it in a scratch folder, have the arm go everywhere in it, and only then write it."""
-        needs_data(system)
         parts, limits = parts_of(signs), limits_of(system, signs)
         target = output or database_path(system)
         with scratch("db") as folder:

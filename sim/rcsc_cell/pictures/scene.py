@@ -4,7 +4,7 @@ In: a log, a description of the same system, and the cell's database. Out: a pic
 is told by the description: it is what the database is asked for. A log holds numbers and names; where they are, the database says.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from rcsc.run.description import Description
@@ -79,11 +79,6 @@ class DrawnCell:
     database: Database
     data: str
     rest: Joints
-
-    @property
-    def displays(self) -> Mapping[str, Sequence[str]]:
-        """Sets of variables that its system shows."""
-        return self.system.displays
 
     def drawn(self, tick: int, *, projected: bool = False) -> DrawnScene:
         """The cell as of a tick: in perspective alone, or in three projections with it."""

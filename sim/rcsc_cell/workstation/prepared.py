@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import cast
 
 from rcsc.host.described import Document
-from rcsc.run.description import NO_DATA, BadDescription, Description, description
+from rcsc.run.description import BadDescription, Description, description, needs_data
 from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
 from rcsc.run.signature import Leaf, Signature
 from rcsc.run.system import Kind, Outside, System, assemble, signatures
@@ -76,18 +76,6 @@ def _limit(level: str, leaf: Leaf) -> Limit | None:
 def database_path(system: Description) -> Path:
     """Return the default path of the system's database."""
     return system.database.parent / ".rcsc-cache" / f"{system.name}.sqlite"
-
-
-def needs_data(system: Description) -> None:
-    """Refuse a system without data.
-
-    Raises:
-        BadDescription: It names none.
-    """
-    if system.database.name == NO_DATA:
-        page = system.review()
-        page.wrong(("data",), "the description names no `data`, of which the database would be made")
-        raise page.bad(BadDescription)
 
 
 def needs_cell(system: Description, signs: Mapping[str, Signature]) -> None:
