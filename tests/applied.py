@@ -21,7 +21,7 @@ from rcsc.lang.model import Program
 from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
 from rcsc.table.mending import Outcome, written
-from rcsc.table.repair import PartingCell, new_line, parting_cells
+from rcsc.table.repair import PartingCell, Partings, new_line
 from rcsc.table.verdict import Gap, Overlap
 from rcsc.testing.inputs.sampling import declarations, snapshot
 from tests.support.programs.systems import solo_system
@@ -57,7 +57,7 @@ def _cells(text: Text) -> Iterator[tuple[After, PartingCell | Change]]:
     names = [str(line.name) for line in text.table.lines]
     pairs = sorted(sorted(map(names.index, pair)) for pair in (text.before.pairs if text.before else ()))
     for first, second in pairs[:MOST_PAIRS]:
-        every = parting_cells(text.ts.program, text.table, Overlap(first, second, {}))
+        every = Partings(text.ts.program, text.table).cells(Overlap(first, second, {}))
         for cell in islice(every, MOST_CELLS):
             yield text.parted(cell), cell
 

@@ -17,7 +17,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, NewType
 
-from rcsc.lang.model import Bool, Real, Scalar, Single, Value
+from rcsc.lang.model import Bool, Int, Real, Scalar, Single, Value
 from rcsc.solvers.options import Limits
 
 Term = NewType("Term", object)
@@ -229,11 +229,26 @@ def _float_sort(kind: Real) -> Any:
     return _z3().Float32() if isinstance(kind, Single) else _z3().Float64()
 
 
+WIDE = 16
+"""Bits of a word above which it is a vector of bits, and no number: masks of many bits are hundreds of times quicker so."""
+
+
 def variable(name: str, kind: Scalar) -> Term:
-    """A fresh constant: Bool, IEEE double or single, or a mathematical integer (also for enumerations)."""
+    """A fresh constant: Bool, IEEE double or single, or a mathematical integer (also for enumerations).
+
+    A wide word, all whose bits are free, is a vector of them. Where that is calculated with otherwise than with its bits, it is the
+    integer that they are.
+    """
     z3 = _z3()
     if isinstance(kind, Bool):
         return Term(z3.Bool(name))
+    if (
+        isinstance(kind, Int)
+        and kind.low == 0
+        and kind.high.bit_length() > WIDE
+        and not kind.high & (kind.high + 1)
+    ):
+        return Term(z3.BitVec(name, kind.high.bit_length()))
     return Term(z3.FP(name, _float_sort(kind)) if isinstance(kind, Real) else z3.Int(name))
 
 
@@ -269,7 +284,7 @@ def fraction(value: float) -> Term:
 
 def as_number(term: Term) -> Term:
     """An integer among the real numbers."""
-    return Term(_z3().ToReal(term))
+    return Term(_z3().ToReal(_whole(term)))
 
 
 def truth(value: bool) -> Term:
@@ -294,6 +309,27 @@ def any_of(terms: Sequence[Term]) -> Term:
     return Term(_z3().Or(list(terms))) if terms else truth(False)
 
 
+def _whole(term: Term) -> Any:
+    """A whole number as an integer."""
+    z3: Any = _z3()
+    return z3.BV2Int(term) if z3.is_bv(term) else term
+
+
+def _alike(left: Term, right: Term) -> tuple[Any, Any]:
+    """Two whole numbers as terms of one sort: bits where both are, or one is a constant that has no more bits; else integers."""
+    z3: Any = _z3()
+    one: Any = left
+    other: Any = right
+    if z3.is_bv(one) and z3.is_bv(other):
+        wider = max(one.size(), other.size())
+        return z3.ZeroExt(wider - one.size(), one), z3.ZeroExt(wider - other.size(), other)
+    if z3.is_bv(one) and z3.is_int_value(other) and 0 <= other.as_long() < 1 << one.size():
+        return one, z3.BitVecVal(other.as_long(), one.size())
+    if z3.is_bv(other) and z3.is_int_value(one) and 0 <= one.as_long() < 1 << other.size():
+        return z3.BitVecVal(one.as_long(), other.size()), other
+    return _whole(left), _whole(right)
+
+
 def implication(left: Term, right: Term) -> Term:
     """Left implies right."""
     return Term(_z3().Implies(left, right))
@@ -301,37 +337,47 @@ def implication(left: Term, right: Term) -> Term:
 
 def choice(condition: Term, then: Term, orelse: Term) -> Term:
     """`then` where the condition holds, else `orelse`."""
-    return Term(then if then is orelse else _z3().If(condition, then, orelse))
+    return Term(then if then is orelse else _z3().If(condition, *_alike(then, orelse)))
 
 
 def equal(left: Term, right: Term, kind: Scalar) -> Term:
     """Equality of two values of the kind; 0.0 equals -0.0."""
-    return Term(_z3().fpEQ(left, right) if isinstance(kind, Real) else left == right)
+    if isinstance(kind, Real):
+        return Term(_z3().fpEQ(left, right))
+    a, b = _alike(left, right)
+    return Term(a == b)
 
 
 def at_most(left: Term, right: Term, kind: Scalar) -> Term:
     """`left <= right`; false comes before true."""
     z3: Any = _z3()
-    a: Any = left
     if isinstance(kind, Bool):
         return Term(z3.Implies(left, right))
-    return Term(z3.fpLEQ(left, right) if isinstance(kind, Real) else a <= right)
+    if isinstance(kind, Real):
+        return Term(z3.fpLEQ(left, right))
+    a, b = _alike(left, right)
+    return Term(z3.ULE(a, b) if z3.is_bv(a) else a <= b)
 
 
 def below(left: Term, right: Term, kind: Scalar) -> Term:
     """`left < right`; false comes before true."""
     z3: Any = _z3()
-    a: Any = left
     if isinstance(kind, Bool):
         return Term(z3.And(z3.Not(left), right))
-    return Term(z3.fpLT(left, right) if isinstance(kind, Real) else a < right)
+    if isinstance(kind, Real):
+        return Term(z3.fpLT(left, right))
+    a, b = _alike(left, right)
+    return Term(z3.ULT(a, b) if z3.is_bv(a) else a < b)
 
 
 def integer_operation(op: str, left: Term, right: Term) -> Term:
     """`+ - * / mod` of mathematical integers, the first three also of real numbers; `/` rounds toward zero, `mod` goes with it."""
     z3: Any = _z3()
-    a: Any = left
-    b: Any = right
+    if op in ("/", "mod") and z3.is_bv(left) and z3.is_int_value(right):
+        by: Any = right
+        if by.as_long() > 0:
+            return part(op, left, by.as_long())
+    a, b = _whole(left), _whole(right)
     if op in ("+", "-", "*"):
         return Term({"+": a + b, "-": a - b, "*": a * b}[op])
     size = z3.If(a >= 0, a, -a) / z3.If(b >= 0, b, -b)
@@ -341,8 +387,23 @@ def integer_operation(op: str, left: Term, right: Term) -> Term:
 
 def part(op: str, left: Term, right: int) -> Term:
     """`/` and `mod` of an integer that is not below zero by one above: of bits of words, which are many, in few terms."""
+    z3: Any = _z3()
     a: Any = left
-    return Term(a / right if op == "/" else a % right)
+    places = right.bit_length() - 1
+    if not z3.is_bv(a) or right != 1 << places:
+        return Term(_whole(left) / right if op == "/" else _whole(left) % right)
+    if places >= a.size():
+        return Term(z3.IntVal(0)) if op == "/" else left
+    if op == "/":
+        return Term(z3.Extract(a.size() - 1, places, a))
+    return Term(z3.Extract(places - 1, 0, a) if places else z3.IntVal(0))
+
+
+def masked(word: Term, care: int, value: int) -> Term | None:
+    """State that a word has these bits of those that are looked at; None for one that is a number."""
+    z3: Any = _z3()
+    a: Any = word
+    return Term(a & care == value) if z3.is_bv(a) else None
 
 
 def quotient(left: Term, right: float) -> Term:
@@ -360,15 +421,16 @@ def float_operation(op: str, left: Term, right: Term) -> Term:
 
 def minus(term: Term, kind: Scalar) -> Term:
     """The negative."""
-    a: Any = term
-    return Term(_z3().fpNeg(a) if isinstance(kind, Real) else -a)
+    return Term(_z3().fpNeg(term) if isinstance(kind, Real) else -_whole(term))
 
 
 def absolute(term: Term, kind: Scalar) -> Term:
     """The value without its sign."""
     z3: Any = _z3()
-    a: Any = term
-    return Term(z3.fpAbs(a) if isinstance(kind, Real) else z3.If(a < 0, -a, a))
+    if isinstance(kind, Real):
+        return Term(z3.fpAbs(term))
+    a = _whole(term)
+    return Term(z3.If(a < 0, -a, a))
 
 
 def to_float(term: Term, kind: Scalar, target: Real) -> Term:
@@ -376,7 +438,7 @@ def to_float(term: Term, kind: Scalar, target: Real) -> Term:
     z3: Any = _z3()
     if isinstance(kind, Real):
         return Term(z3.fpFPToFP(z3.RNE(), term, _float_sort(target)))
-    return Term(z3.fpRealToFP(z3.RNE(), z3.ToReal(term), _float_sort(target)))
+    return Term(z3.fpRealToFP(z3.RNE(), z3.ToReal(_whole(term)), _float_sort(target)))
 
 
 def to_integer(term: Term) -> Term:

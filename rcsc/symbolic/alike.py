@@ -11,9 +11,11 @@ It costs some inputs that are tried, and a question a variable that none of them
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from rcsc.diagnostics.diagnostic import Effects
-from rcsc.lang.model import Expr, Line, Program, Table, Value, VariableName
+from rcsc.lang.leaves import parts
+from rcsc.lang.model import Expr, Line, Program, Read, Table, Value, VariableName
 from rcsc.solvers import smt
 from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.solvers.smt import Answer, Solver
@@ -76,6 +78,11 @@ def meeting(program: Program, table: Table, where: Expr, options: Options) -> Ma
     """Find some input in `where` that the table's assumptions admit: what is looked at; else that there is none, or `UNKNOWN`."""
     if _over("whether two lines meet"):
         return Answer.UNKNOWN
+    relied = [each.condition for each in program.assumptions if each.name in table.assumptions]
+    seen = trial.aimed([where, *relied], program.variables)
+    if seen is not None:
+        read = {str(part.name) for each in (where, *relied) for part in parts(each) if isinstance(part, Read)}
+        return {name: value for name, value in seen.items() if name in read}
     try:
         nodes = list(_here(program, table, [where], _starting(program)))
         return answered(("meeting",), nodes, lambda: _point(nodes, options))
@@ -132,7 +139,6 @@ class _Comparison:
 
     Attributes:
         changes: What they can leave different, by name, and where.
-        here: What holds where they are compared.
     """
 
     def __init__(self, program: Program, table: Table, lines: tuple[Line, Line], where: Expr | None) -> None:
@@ -148,7 +154,13 @@ class _Comparison:
             if change is not values.FALSE
         ]
         tests = [test.condition for line in lines for test in line.tests if test is not None]
-        self.here = list(_here(program, table, tests if where is None else [where], self.shared))
+        self._stated = table, tests if where is None else [where]
+
+    @cached_property
+    def here(self) -> list[Node]:
+        """What holds where they are compared."""
+        table, conditions = self._stated
+        return list(_here(self.program, table, conditions, self.shared))
 
     def effects(self, options: Options, near: Mapping[str, Value]) -> Effects:
         """Say what can be left different, each name for itself."""

@@ -9,6 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 
+from rcsc.lang.expressions.words import mask_of
 from rcsc.lang.model import (
     Among,
     Apply,
@@ -65,6 +66,12 @@ def encode(expr: Expr, frame: Frame) -> Term:
             return smt.any_of([smt.equal(term, smt.literal(kind, value), kind) for value in values])
         case Apply(op=Op.DIV | Op.MOD as op, args=(number, Literal(value=by))) if _splits(number, by):
             return smt.part(op.value, encode(number, frame), int(by))
+        case Apply(op=Op.AND, args=(_, Apply(op=Op.EQ | Op.NE) as last)) if mask_of(last) is not None:
+            mask = mask_of(expr)
+            masked = None if mask is None else smt.masked(encode(mask.word, frame), mask.care, mask.value)
+            if masked is not None:
+                return masked
+            return operation(Op.AND, last.type, [encode(arg, frame) for arg in expr.args])
         case Apply(op=op, args=args):
             return operation(op, args[0].type, [encode(arg, frame) for arg in args])
 

@@ -3,15 +3,22 @@
 In: conditions. Out: values for which all hold, or nothing, which proves nothing. The same conditions give the same values.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from random import Random
+from typing import Self
 
 from rcsc.lang.expressions.words import mask_of
-from rcsc.lang.interpret import operated
+from rcsc.lang.interpret import UNDEFINED, holds, operated
 from rcsc.lang.leaves import conjuncts
 from rcsc.lang.model import (
+    Apply,
     Bool,
+    Box,
+    Expr,
     Op,
     Read,
     Real,
@@ -30,7 +37,7 @@ from rcsc.solvers.search import lowest
 from rcsc.symbolic.values import Node, Shape, parts_first
 from rcsc.symbolic.values import variable as variable_of
 
-SAMPLES = 400
+SAMPLES, FEW = 400, 32
 MOST_NODES = 1_500
 """Larger questions go to Z3 at once."""
 EVALUATIONS = 100_000
@@ -57,6 +64,20 @@ def witness(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | No
     return None if best is None else _lowered(order, conditions, variables, best)
 
 
+def aimed(conditions: Sequence[Expr], variables: Sequence[Variable]) -> Point | None:
+    """Find a point at which all conditions hold among a few that meet the masks of the first; None where it says none."""
+    aim, random = Aim.masked(conditions[0]), Random(0)  # noqa: S311  # a sample, not a secret
+    if not aim.masks:
+        return None
+    every = [ready(condition) for condition in conditions]
+    for point in islice(points(variables), FEW):
+        there = towards(point, [aim], {}, random)
+        with suppress(*UNDEFINED):
+            if all(holds_there(there) for holds_there in every):
+                return there
+    return None
+
+
 def points(variables: Sequence[Variable]) -> Iterator[Point]:
     """Values of these variables to try: ends first, then edges and others; always the same."""
     random = Random(0)  # noqa: S311  # a sample, not a secret
@@ -65,23 +86,72 @@ def points(variables: Sequence[Variable]) -> Iterator[Point]:
         yield {node.name: _pick(node, number, random) for node in nodes}
 
 
-def towards(point: Point, tests: Sequence[Test], kinds: Mapping[str, Scalar], random: Random) -> Point:
-    """The point changed so that tests of one variable, then masks of words, hold, each by itself; the last that changes a variable wins.
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """What a value must be like for a test of one variable, or for masks of words.
+
+    Attributes:
+        box: The variable, and the keys for which the test holds.
+        masks: Of each word its name, the bits that are looked at and their values.
+    """
+
+    box: tuple[str, Box] | None
+    masks: tuple[tuple[str, int, int], ...]
+
+    @classmethod
+    def of(cls, test: Test) -> Self:
+        """The aim of a test; of one across variables there is none."""
+        return cls((str(test.variables[0]), test.box), ()) if test.box else cls.masked(test.condition)
+
+    @classmethod
+    def masked(cls, condition: Expr) -> Self:
+        """The masks that a condition says."""
+        every = filter(None, map(mask_of, conjuncts(condition)))
+        masks = (
+            (str(mask.word.name), mask.care, mask.value) for mask in every if isinstance(mask.word, Read)
+        )
+        return cls(None, tuple(masks))
+
+
+def towards(point: Point, aims: Iterable[Aim], kinds: Mapping[str, Scalar], random: Random) -> Point:
+    """The point changed so that each aim is met by itself, boxes first; the last that changes a variable wins.
 
     A mask comes after: it leaves bits free, so that what was chosen for a range mostly stays in it.
     """
     moved = dict(point)
-    for test in sorted(tests, key=lambda test: not test.box):
-        name = str(test.variables[0]) if test.variables else ""
-        if test.box:
-            first, last = random.choice(test.box)
+    for aim in sorted(aims, key=lambda aim: aim.box is None):
+        if aim.box is not None:
+            name, box = aim.box
+            first, last = random.choice(box)
             moved[name] = value_of_key(kinds[name], random.choice((first, last, random.randint(first, last))))
-        else:
-            for mask in filter(None, map(mask_of, conjuncts(test.condition))):
-                if isinstance(mask.word, Read):
-                    word = str(mask.word.name)
-                    moved[word] = int(moved[word]) & ~mask.care | mask.value
+        for word, care, value in aim.masks:
+            moved[word] = int(moved[word]) & ~care | value
     return moved
+
+
+Ready = Callable[[Mapping[str, Value]], bool]
+
+
+def ready(condition: Expr) -> Ready:
+    """The condition, to be tried at many points: a mask of a word is one comparison there, and no walk over its bits.
+
+    It raises where the interpreter does.
+    """
+    mask = mask_of(condition)
+    if mask is not None and isinstance(mask.word, Read):
+        name, care, value = mask.word.name, mask.care, mask.value
+        return lambda point: int(point[name]) & care == value
+    match condition:
+        case Apply(op=Op.NOT, args=(inner,)):
+            opposite = ready(inner)
+            return lambda point: not opposite(point)
+        case Apply(op=Op.AND, args=(left, right)):
+            first, second = ready(left), ready(right)
+            return lambda point: first(point) and second(point)
+        case Apply(op=Op.OR, args=(left, right)):
+            first, second = ready(left), ready(right)
+            return lambda point: first(point) or second(point)
+    return partial(holds, condition)
 
 
 def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:

@@ -37,7 +37,7 @@ from rcsc.table.certificate import must_cover
 from rcsc.table.findings.groups import grouped, names_of
 from rcsc.table.findings.likely import likely
 from rcsc.table.regions import partition
-from rcsc.table.repair import NewLine, PartingCell, changes_of, left_by, new_line, parting, parting_cells
+from rcsc.table.repair import NewLine, PartingCell, Partings, changes_of, left_by, new_line
 from rcsc.table.verdict import (
     ContradictoryAssumptions,
     DeadLine,
@@ -73,11 +73,12 @@ def diagnostics(
     with smt.together(few, of_all=True):
         verdict = replace(verdict, findings=tuple(likely(program, table, verdict.findings, options)))
     overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
+    partings = Partings(program, table)
     with smt.together(few, of_all=True):
-        shown = [_overlap(program, table, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
+        shown = [_overlap(program, partings, overlap, options) for overlap in overlaps[:MOST_PAIRS]]
         effects = [_effects(program, table, each, options) for each in overlaps[MOST_PAIRS:MOST_COMPARED]]
     shown = grouped(table, overlaps, shown)
-    if shown and not options.brief and (together := _together(program, table, overlaps[:MOST_PAIRS])):
+    if shown and not options.brief and (together := _together(partings, overlaps[:MOST_PAIRS])):
         last = max(
             (at for at, each in enumerate(shown) if not each.told_with), key=lambda at: sort_key(shown[at])
         )
@@ -217,10 +218,11 @@ def _under(table: Table, unproved: Collection[str]) -> tuple[str, ...]:
 # --- overlaps ------------------------------------------------------------------------
 
 
-def _overlap(program: Program, table: Table, overlap: Overlap, options: Options) -> Diagnostic:
+def _overlap(program: Program, partings: Partings, overlap: Overlap, options: Options) -> Diagnostic:
+    table = partings.table
     first, second = table.lines[overlap.first], table.lines[overlap.second]
     column = _column(program, table, overlap.witness, (overlap.first, overlap.second), overlap.region)
-    repair = None if options.brief else parting(program, table, overlap)
+    repair = None if options.brief else partings.best(overlap)
     effects = _effects(program, table, overlap, options)
     proposals = () if options.brief else _proposals(table, (first, second), repair, effects)
     return Diagnostic(
@@ -287,9 +289,10 @@ def _most_overlapping(table: Table, overlaps: Sequence[Overlap]) -> str:
     return f"which lines overlap with the most others: {', '.join(most)}"
 
 
-def _together(program: Program, table: Table, overlaps: Sequence[Overlap]) -> Proposal | None:
+def _together(partings: Partings, overlaps: Sequence[Overlap]) -> Proposal | None:
     """Propose the repairs of several overlaps together, or say what they leave; None for fewer than two."""
-    first = [next(iter(parting_cells(program, table, overlap)), None) for overlap in overlaps]
+    program, table = partings.program, partings.table
+    first = [next(iter(partings.cells(overlap)), None) for overlap in overlaps]
     chosen = [cell for cell in first if cell is not None and not cell.falls]
     if len(chosen) < 2:
         return None

@@ -14,7 +14,7 @@ from itertools import combinations, islice
 from random import Random
 
 from rcsc.lang.expressions.folding import fold
-from rcsc.lang.interpret import UNDEFINED, matching_lines
+from rcsc.lang.interpret import UNDEFINED
 from rcsc.lang.leaves import parts
 from rcsc.lang.model import (
     AssumptionName,
@@ -24,6 +24,7 @@ from rcsc.lang.model import (
     Snapshot,
     Standing,
     Table,
+    Test,
     Value,
     key_of,
     value_of_key,
@@ -197,7 +198,13 @@ class _Decision:
         )
         yield from points[: max(_FEWEST_POINTS, trial.EVALUATIONS // max(1, nodes))]
         kinds = {str(v.name): v.type for v in self.program.variables}
-        tests = [[test for test in line.tests if test is not None] for line in self.table.lines]
+        aims = {
+            id(test): trial.Aim.of(test)
+            for line in self.table.lines
+            for test in line.tests
+            if test is not None
+        }
+        tests = [[aims[id(test)] for test in line.tests if test is not None] for line in self.table.lines]
         for one in tests * _AIMED:
             yield trial.towards(random.choice(points), one, kinds, random)
         for one, other in islice(combinations(tests, 2), _MOST_PAIRS_AIMED):
@@ -216,6 +223,12 @@ class _Decision:
             return frozenset(self.matching(snapshot))
         except UNDEFINED:
             return None
+
+    @cached_property
+    def ready(self) -> dict[int, trial.Ready]:
+        """Each test of the lines, to be tried."""
+        tests = {id(test): test for line in self.table.lines for test in line.tests if test is not None}
+        return {at: trial.ready(test.condition) for at, test in tests.items()}
 
     @cached_property
     def refuted_by_trial(self) -> bool:
@@ -447,9 +460,23 @@ class _Decision:
         return self.holds(*region, smt.negation(smt.any_of(list(map(z3.line, asked.candidates)))))
 
     def matching(self, snapshot: Snapshot) -> list[int]:
-        """Positions of the lines that match."""
-        names = set(matching_lines(self.table, snapshot))
-        return [at for at, line in enumerate(self.table.lines) if line.name in names]
+        """Positions of the lines that match; each test is looked at once.
+
+        Raises:
+            UNDEFINED: A condition that is looked at is not defined.
+        """
+        known: dict[int, bool] = {}
+
+        def so(test: Test) -> bool:
+            if id(test) not in known:
+                known[id(test)] = self.ready[id(test)](snapshot)
+            return known[id(test)]
+
+        return [
+            at
+            for at, line in enumerate(self.table.lines)
+            if all(test is None or so(test) for test in line.tests)
+        ]
 
     def seen(self, snapshot: Snapshot) -> list[int]:
         """Keep an input that the solver gave; return positions of the lines that match."""

@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import cached_property, reduce
 from math import gcd
 
 from rcsc.diagnostics.diagnostic import Change, Place
@@ -105,34 +105,74 @@ class PartingCell:
         return Change(Place.CELL, str(table.lines[self.line].name), self.column, (self.text,))
 
 
-def parting(program: Program, table: Table, overlap: Overlap) -> PartingCell | None:
-    """Return the smallest change of one cell, under a variable or a sum of some, that parts the two lines so."""
-    if words_of(program, table) is None:
-        every = _parting_across(program, table, overlap)
-        return min(every, key=lambda cell: cell.lost, default=None)
-    cell = next(iter(parting_cells(program, table, overlap)), None)
-    return None if cell is None or cell.falls else cell
+class Partings:
+    """The cells of one table that part two of its lines; what all overlaps have in common is made once."""
 
+    def __init__(self, program: Program, table: Table) -> None:
+        self.program, self.table = program, table
 
-def parting_cells(program: Program, table: Table, overlap: Overlap) -> tuple[PartingCell, ...]:
-    """Return each change of one cell that parts the two lines, the smallest first, those that leave inputs to DEFAULT last.
+    @cached_property
+    def _boxes(self) -> boxes.TableBoxes | None:
+        words = words_of(self.program, self.table)
+        return None if words is None else boxes.TableBoxes.of(self.program, self.table, words)
 
-    Narrowing line A on variable v by what line B has there parts the two. What A loses is then matched by B, if on
-    every other variable B has all that A has: that is checked exactly. Else it falls to DEFAULT, if there is one that may be reached.
-    """
-    words = words_of(program, table)
-    if words is None:
-        return ()
-    decided = boxes.TableBoxes.of(program, table, words)
-    kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
-    default = table.default is not None and not table.default.unreachable
-    every = (
-        _narrowed(decided, kinds, table, line, other, name)
-        for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second))
-        for name in decided.names
-    )
-    cells_ = (cell for cell in every if cell is not None and (default or not cell.falls))
-    return tuple(sorted(cells_, key=lambda cell: (cell.falls, cell.lost)))
+    @cached_property
+    def _across(self) -> tuple[Universe, list[Clauses], list[Clauses]]:
+        universe = Universe()
+        return universe, lines_of(universe, self.table), assumptions_of(universe, self.program, self.table)
+
+    def best(self, overlap: Overlap) -> PartingCell | None:
+        """Return the smallest change of one cell, under a variable or a sum of some, that parts the two lines so."""
+        if self._boxes is None:
+            return min(self._sums(overlap), key=lambda cell: cell.lost, default=None)
+        cell = next(iter(self.cells(overlap)), None)
+        return None if cell is None or cell.falls else cell
+
+    def cells(self, overlap: Overlap) -> tuple[PartingCell, ...]:
+        """Return each change of one cell that parts the two lines, the smallest first, those that leave inputs to DEFAULT last.
+
+        Narrowing line A on variable v by what line B has there parts the two. What A loses is then matched by B, if on
+        every other variable B has all that A has: that is checked exactly. Else it falls to DEFAULT, if there is one that may be reached.
+        """
+        decided, table = self._boxes, self.table
+        if decided is None:
+            return ()
+        kinds: dict[str, Scalar] = {v.name: v.type for v in self.program.variables}
+        default = table.default is not None and not table.default.unreachable
+        every = (
+            _narrowed(decided, kinds, table, line, other, name)
+            for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second))
+            for name in decided.names
+        )
+        cells_ = (cell for cell in every if cell is not None and (default or not cell.falls))
+        return tuple(sorted(cells_, key=lambda cell: (cell.falls, cell.lost)))
+
+    def _sums(self, overlap: Overlap) -> Iterator[PartingCell]:
+        """Yield changes of one cell, under a variable or a sum of some, that part two lines and leave every input matched."""
+        table = self.table
+        if len(table.columns) * len(table.lines) > MOST_ASKED:
+            return
+        universe, lines, assumed = self._across
+        for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second)):
+            for at, column in enumerate(_written(table)):
+                test, heading = table.lines[other].tests[at], None
+                if test is not None and column.subject is not None:
+                    heading = _Sum.of(universe, column.subject)
+                theirs = (
+                    None if heading is None or test is None else _box_on(heading.form, universe.of_test(test))
+                )
+                if heading is None or theirs is None:
+                    continue
+                every = ((universe.low[heading.form], universe.high[heading.form]),)
+                own = table.lines[line].tests[at]
+                before = every if own is None else _box_on(heading.form, universe.of_test(own))
+                left = () if before is None else meet(before, complement(theirs, *every[0]))
+                text = heading.cell(universe, left) if left else ""
+                lost = [whole(lines[line]), universe.atom(heading.form, theirs), *map(whole, assumed)]
+                unmatched = [*lost, negated(universe, whole(lines[other]))]
+                if before is not None and text and find(universe, unmatched) is NoWitness.NONE:
+                    less = size(before) - size(left)
+                    yield PartingCell(line, other, at, "", text, left, less, falls=False)
 
 
 def _narrowed(
@@ -492,34 +532,6 @@ def _box_on(form: int, formula: Formula) -> Box | None:
 def _written(table: Table) -> list[Column]:
     """The columns in which cells can be written; they stand before those that `above` adds."""
     return [column for column in table.columns if column.written]
-
-
-def _parting_across(program: Program, table: Table, overlap: Overlap) -> Iterator[PartingCell]:
-    """Yield changes of one cell, under a variable or a sum of some, that part two lines and leave every input matched."""
-    if len(table.columns) * len(table.lines) > MOST_ASKED:
-        return
-    universe = Universe()
-    lines, assumed = lines_of(universe, table), assumptions_of(universe, program, table)
-    for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second)):
-        for at, column in enumerate(_written(table)):
-            test, heading = table.lines[other].tests[at], None
-            if test is not None and column.subject is not None:
-                heading = _Sum.of(universe, column.subject)
-            theirs = (
-                None if heading is None or test is None else _box_on(heading.form, universe.of_test(test))
-            )
-            if heading is None or theirs is None:
-                continue
-            every = ((universe.low[heading.form], universe.high[heading.form]),)
-            own = table.lines[line].tests[at]
-            before = every if own is None else _box_on(heading.form, universe.of_test(own))
-            left = () if before is None else meet(before, complement(theirs, *every[0]))
-            text = heading.cell(universe, left) if left else ""
-            lost = [whole(lines[line]), universe.atom(heading.form, theirs), *map(whole, assumed)]
-            unmatched = [*lost, negated(universe, whole(lines[other]))]
-            if before is not None and text and find(universe, unmatched) is NoWitness.NONE:
-                less = size(before) - size(left)
-                yield PartingCell(line, other, at, "", text, left, less, falls=False)
 
 
 def _line_across(program: Program, table: Table, witness: Witness, region: Region) -> NewLine | None:

@@ -29,7 +29,7 @@ from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import Value, spell, value_of_text
-from rcsc.table.repair import PartingCell, left_by, parting_cells, with_cells
+from rcsc.table.repair import PartingCell, Partings, left_by, with_cells
 from rcsc.table.verdict import Overlap
 from tests.support.programs.systems import SYSTEM, going, lower_level, small_level, small_text
 from tests.support.programs.texts import edit_file
@@ -219,7 +219,7 @@ def cells_of(ts: TransitionSystem, *wanted: tuple[str, str]) -> tuple[PartingCel
     found = []
     for line, other in wanted:
         first, second = sorted((names.index(line), names.index(other)))
-        every = parting_cells(ts.program, table, Overlap(first, second, {}))
+        every = Partings(ts.program, table).cells(Overlap(first, second, {}))
         found.append(next(cell for cell in every if table.lines[cell.line].name == line))
     return tuple(found)
 

@@ -23,7 +23,7 @@ from rcsc.table.decide import prove_table
 from rcsc.table.diagnose import diagnostics
 from rcsc.table.program import prove_program
 from rcsc.table.regions import holes, partition
-from rcsc.table.repair import new_line, parting
+from rcsc.table.repair import Partings, new_line
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench.made import families
 from tests.support.programs.stages import BOXES, drawn_program, program_of, reported
@@ -268,7 +268,7 @@ def test_a_repair_that_is_shown_repairs(text: str) -> None:
     program = program_of(text)
     table, right = program.tables[0], matched(program)
     for found in prove_table(program, table, Options()).findings:
-        if isinstance(found, Overlap) and (cell := parting(program, table, found)):
+        if isinstance(found, Overlap) and (cell := Partings(program, table).best(found)):
             said = re.fullmatch(r"in line `(l\d)` write `(.*)` under `(.)`", cell.write(table))
             assert said is not None, cell
             after = matched(program_of(changed(text, said[1], said[3], said[2])))

@@ -17,7 +17,7 @@ from rcsc.table import boxes
 from rcsc.table.decide import prove_table
 from rcsc.table.program import prove_program
 from rcsc.table.regions.word_bits import Part, words_of
-from rcsc.table.repair import new_line, parting_cells, with_cells
+from rcsc.table.repair import Partings, new_line, with_cells
 from rcsc.table.verdict import DeadLine, Gap, Overlap, Region
 from tests.support.programs.stages import program_of
 
@@ -137,7 +137,7 @@ def test_what_is_proposed_repairs(program: Program) -> None:
                 assert sum(map(bool, after.values())) > sum(map(bool, before.values()))
                 assert all(len(after[point]) == len(lines) for point, lines in before.items() if lines)
         if isinstance(finding, Overlap):
-            for cell in parting_cells(program, table, finding)[:3]:
+            for cell in Partings(program, table).cells(finding)[:3]:
                 changed = with_cells(program, table, (cell,))
                 assert changed is not None
                 pair = {table.lines[finding.first].name, table.lines[finding.second].name}

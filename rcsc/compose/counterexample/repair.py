@@ -27,7 +27,7 @@ from rcsc.symbolic.values import Node
 from rcsc.table import boxes, cells
 from rcsc.table.mending import Outcome
 from rcsc.table.regions.partition import BudgetError, Gaps
-from rcsc.table.repair import NewLine, PartingCell, left_by, new_line, parting_cells
+from rcsc.table.repair import NewLine, PartingCell, Partings, left_by, new_line
 from rcsc.table.verdict import Gap, Overlap, Region
 
 MOST_REGIONS = 3
@@ -88,7 +88,7 @@ def _suggested(ts: TransitionSystem, table: Table, step: CycleRun, texts: Texts)
         return
     matching = [at for at, line in enumerate(table.lines) if line.name in matching_lines(table, seen)]
     if len(matching) > 1:
-        every = parting_cells(ts.program, table, Overlap(matching[0], matching[1], {}))
+        every = Partings(ts.program, table).cells(Overlap(matching[0], matching[1], {}))
         best = _told(ts, table, [cell for cell in every if not cell.falls], texts)
         yield best or f"lines {_names(table, matching)} both match {_while(ts.program, table, matching)}"
     elif not matching:
@@ -224,7 +224,7 @@ class _Trials:
         places = [at for at, line in enumerate(self.table.lines) if line.name in finding.obligation.lines]
         if len(places) != 2:
             return ()
-        every = parting_cells(self.ts.program, self.table, Overlap(places[0], places[1], {}))
+        every = Partings(self.ts.program, self.table).cells(Overlap(places[0], places[1], {}))
         tries = [cell for line in places for cell in [one for one in every if one.line == line][:MOST_TRIED]]
         return tuple(cell for cell in every if cell in tries)
 
