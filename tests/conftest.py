@@ -86,14 +86,17 @@ def _missing(tool: str) -> bool:
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` is asked
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Marks what is quick (`tests.quick`); leaves out what needs a tool that is no Python package and not here, as the run's end says.
+    """Marks what is quick (`tests.quick`) and puts it first; leaves out what needs a tool that is not here, as the run's end says.
 
-    `.ci/run` installs them, and fails where it cannot; what not every release has, it names in its summary.
+    The tools are no Python packages. `.ci/run` installs them, and fails where it cannot; its summary names what not every release has.
     """
     quick_ones = chosen()
     for item in items:
         if quick(item.nodeid.partition("[")[0].removeprefix("tests/"), quick_ones):
             item.add_marker("quick")
+    items.sort(
+        key=lambda item: "quick" not in item.keywords
+    )  # what most changes break shows in the first minute
     left_out = [
         item
         for item in items

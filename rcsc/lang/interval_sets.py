@@ -12,8 +12,18 @@ def meet(left: Box, right: Box) -> Box:
         (a, b), (c, d) = left[0], right[0]
         low, high = (a if a > c else c), (b if b < d else d)  # noqa: FURB136  # as above
         return ((low, high),) if low <= high else ()
-    parts = ((max(a, c), min(b, d)) for a, b in left for c, d in right)
-    return tuple(sorted(part for part in parts if part[0] <= part[1]))
+    parts, at, other = list[tuple[int, int]](), 0, 0
+    while at < len(left) and other < len(
+        right
+    ):  # both are in order, and no two intervals of one have a key in common
+        low, high = max(left[at][0], right[other][0]), min(left[at][1], right[other][1])
+        if low <= high:
+            parts.append((low, high))
+        if left[at][1] < right[other][1]:
+            at += 1
+        else:
+            other += 1
+    return tuple(parts)
 
 
 def joined(intervals: Iterable[tuple[int, int]]) -> Box:

@@ -330,6 +330,12 @@ def _alike(left: Term, right: Term) -> tuple[Any, Any]:
     return _whole(left), _whole(right)
 
 
+def at_point(term: Term, point: Sequence[tuple[Term, Term]]) -> Term:
+    """What is left of a term where constants, each given with a literal of its kind, have these values: mostly true or false."""
+    z3: Any = _z3()
+    return Term(z3.simplify(z3.substitute(term, *(_alike(leaf, value) for leaf, value in point))))
+
+
 def implication(left: Term, right: Term) -> Term:
     """Left implies right."""
     return Term(_z3().Implies(left, right))

@@ -11,9 +11,11 @@ from itertools import islice
 from random import Random
 from typing import Self
 
+from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.words import mask_of
 from rcsc.lang.interpret import UNDEFINED, holds, operated
-from rcsc.lang.leaves import conjuncts
+from rcsc.lang.interval_sets import meet
+from rcsc.lang.leaves import conjuncts, read_by
 from rcsc.lang.model import (
     Apply,
     Bool,
@@ -65,13 +67,12 @@ def witness(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | No
 
 
 def aimed(conditions: Sequence[Expr], variables: Sequence[Variable]) -> Point | None:
-    """Find a point at which all conditions hold among a few that meet the masks of the first; None where it says none."""
-    aim, random = Aim.masked(conditions[0]), Random(0)  # noqa: S311  # a sample, not a secret
-    if not aim.masks:
-        return None
+    """Find a point at which all conditions hold among a few that are as each asks, variable by variable; None where none is found."""
+    aims, random = [Aim.at(condition, variables) for condition in conditions], Random(0)  # noqa: S311  # a sample, not a secret
     every = [ready(condition) for condition in conditions]
+    kinds = {str(variable.name): variable.type for variable in variables}
     for point in islice(points(variables), FEW):
-        there = towards(point, [aim], {}, random)
+        there = towards(point, aims, kinds, random)
         with suppress(*UNDEFINED):
             if all(holds_there(there) for holds_there in every):
                 return there
@@ -88,29 +89,44 @@ def points(variables: Sequence[Variable]) -> Iterator[Point]:
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """What a value must be like for a test of one variable, or for masks of words.
+    """What values must be like for a condition, as far as it speaks of one variable at a time.
 
     Attributes:
-        box: The variable, and the keys for which the test holds.
+        boxes: Variables, and the keys that each may have.
         masks: Of each word its name, the bits that are looked at and their values.
     """
 
-    box: tuple[str, Box] | None
+    boxes: tuple[tuple[str, Box], ...]
     masks: tuple[tuple[str, int, int], ...]
 
     @classmethod
     def of(cls, test: Test) -> Self:
         """The aim of a test; of one across variables there is none."""
-        return cls((str(test.variables[0]), test.box), ()) if test.box else cls.masked(test.condition)
+        if test.box:
+            return cls(((str(test.variables[0]), test.box),), ())
+        return cls((), tuple(_masks(conjuncts(test.condition))))
 
     @classmethod
-    def masked(cls, condition: Expr) -> Self:
-        """The masks that a condition says."""
-        every = filter(None, map(mask_of, conjuncts(condition)))
-        masks = (
-            (str(mask.word.name), mask.care, mask.value) for mask in every if isinstance(mask.word, Read)
-        )
-        return cls(None, tuple(masks))
+    def at(cls, condition: Expr, variables: Sequence[Variable]) -> Self:
+        """The aim of a condition: what its parts say that must all hold."""
+        known = {variable.name: variable for variable in variables}
+        boxes: dict[str, Box] = {}
+        masks: list[tuple[str, int, int]] = []
+        for part in conjuncts(condition):
+            found = list(_masks([part]))
+            read = tuple(dict.fromkeys(read_by(part)))
+            box = box_of(part, known[read[0]]) if not found and len(read) == 1 and read[0] in known else None
+            masks += found
+            if box:
+                name = str(read[0])
+                boxes[name] = (meet(boxes[name], box) or box) if name in boxes else box
+        return cls(tuple(boxes.items()), tuple(masks))
+
+
+def _masks(conditions: Iterable[Expr]) -> Iterator[tuple[str, int, int]]:
+    for mask in filter(None, map(mask_of, conditions)):
+        if isinstance(mask.word, Read):
+            yield str(mask.word.name), mask.care, mask.value
 
 
 def towards(point: Point, aims: Iterable[Aim], kinds: Mapping[str, Scalar], random: Random) -> Point:
@@ -119,9 +135,8 @@ def towards(point: Point, aims: Iterable[Aim], kinds: Mapping[str, Scalar], rand
     A mask comes after: it leaves bits free, so that what was chosen for a range mostly stays in it.
     """
     moved = dict(point)
-    for aim in sorted(aims, key=lambda aim: aim.box is None):
-        if aim.box is not None:
-            name, box = aim.box
+    for aim in sorted(aims, key=lambda aim: not aim.boxes):
+        for name, box in aim.boxes:
             first, last = random.choice(box)
             moved[name] = value_of_key(kinds[name], random.choice((first, last, random.randint(first, last))))
         for word, care, value in aim.masks:

@@ -108,9 +108,9 @@ def confirm(
         steps = WRONG_STEPS // 3 if refutes(table, findings) else _STEPS
         options = replace(options, steps=min(options.steps, steps))
     asked = TableSolver(program, table, options)
-    overlap = _some_overlap(asked)
     gaps = [finding for finding in findings if isinstance(finding, Gap)]
-    gap = _some_gap(asked, gaps) if must_cover(table) or gaps else None
+    gap = _some_gap(asked, gaps) if must_cover(table) or gaps else None  # while the solver knows no line
+    overlap = _some_overlap(asked)
     answers = (
         (overlap, any(isinstance(finding, Overlap) for finding in findings)),
         (gap, bool(gaps)),
@@ -122,14 +122,12 @@ def confirm(
 
 
 def _some_gap(asked: TableSolver, gaps: Sequence[Gap]) -> Answer:
-    """Whether no line matches some input: first at one that was found, which costs little."""
+    """Whether no line matches some input: first at one that was found, which costs little, as values are put in."""
     for witness in (gap.witnesses[0] for gap in gaps if gap.witnesses):
-        here = [
-            smt.equal(asked.frame.leaves[v.name], smt.literal(v.type, witness[v.name]), v.type)
-            for v in shown(asked.program, asked.table)
-            if v.name in witness
-        ]
-        if asked.holds(asked.none(), *here) is Answer.SATISFIABLE:
+        named = [v for v in shown(asked.program, asked.table) if v.name in witness]
+        point = [(asked.frame.leaves[v.name], smt.literal(v.type, witness[v.name])) for v in named]
+        here = [smt.equal(leaf, value, v.type) for v, (leaf, value) in zip(named, point, strict=True)]
+        if asked.holds(smt.at_point(asked.none(), point), *here) is Answer.SATISFIABLE:
             return Answer.SATISFIABLE
     return asked.holds(asked.none())
 

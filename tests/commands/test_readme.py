@@ -45,6 +45,7 @@ TINY = {
     "tests.differential --count 100000": "tests.differential --count 2",
     "--count 10000": "--count 1",
     "tests.claims --count 1000": "tests.claims --count 1",
+    "tests.applied --count 1000": "tests.applied --count 2",
     "--runs 10000": "--runs 3",
     "tests.editor.random_edits --count 1000": "tests.editor.random_edits --count 3",
     "tests.prover_mutants --count 1000": "tests.prover_mutants --help",

@@ -40,6 +40,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.relation.steps import UnansweredError
+from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
 from tests.support.programs.examples import WALKER
@@ -1187,3 +1188,26 @@ def test_what_a_role_or_a_restart_declares_otherwise_is_said(
     said = capsys.readouterr().out
     assert "`now`" in said
     assert "restart" in said
+
+
+def test_what_masks_of_wide_words_change_is_known_in_few_steps() -> None:
+    """Which lines other inputs reach was one question of 20,000,000 steps and a minute, where a mask was sixty remainders."""
+    masks = (
+        "0bx1x0x1x1xx1xxx01xxx1xx0xx1xx1xxxxxx1xxx0x1xx110xxxxx0xx1101xxxxx",
+        "0b0x0xxx0xxx001xx1xx00x0xx1xxx1001xx0xx010x10xxxx00x1xx0xxx01xxx1x",
+    )
+    declared = (
+        "input a : bool\ninput b : int 0 .. 18446744073709551615\nstate p : bool\noutput o : int 0 .. 9\n"
+    )
+    rows = (
+        f"| n0 | {masks[0]} | CELL | false || 1 |\n| n1 | {masks[1]} | | false || 0 |\n"
+        "| n2 | | was a or a | || 1 |\n| n3 | | | true || 0 |\n"
+    )
+    before, after = (
+        f"{declared}table t {{\n| line | b[63..0] | when | a || o |\n{rows.replace('CELL', cell)}}}\n"
+        for cell in ("a", "")
+    )
+    with smt.together(10_000_000) as budget:
+        found = differ(before, after)
+    assert budget.left > 5_000_000
+    assert part(found, "t").changes

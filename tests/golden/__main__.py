@@ -56,6 +56,8 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args()
     chosen = [each for each in subjects() if asked.only in each.name]
+    if not chosen:
+        parser.error(f"no subject's name has {asked.only!r}: {', '.join(each.name for each in subjects())}")
     if asked.list:
         print(*(f"{each.name}: {len(each.steps)} commands" for each in chosen), sep="\n")
         return 0

@@ -160,6 +160,32 @@ def test_what_inputs_that_are_tried_show_is_known_before_a_region_is_asked_about
     assert "RCS401" in {each.code for each in found}
 
 
+def test_a_gap_that_was_found_is_confirmed_with_its_values_put_in() -> None:
+    """That no line matches there was asked over sums of singles, as was whether any two lines meet: 40,000,000 steps, and no answer."""
+    rows = "| n0 | | 0.5 .. 0.5 || 0 |\n| n1 same n0 | not in {1.0, 0.0} | 0.0 .. 0.5 || 2 |\n| rest | DEFAULT | || 1 |\n"
+    declared = "input a : real 0.0 .. 1.0\ninput b : int 1 .. 60_000\noutput o : int 0 .. 9\n"
+    term = "single(b) * 2e38 - single(b) * 2e38"
+    with smt.together(1_000_000_000) as budget:
+        found = reported(f"{declared}table t {{\n| line | {term} | a || o |\n{rows}}}\n")
+    assert budget.left > 995_000_000
+    assert "RCS422" in {each.code for each in found}
+
+
+def test_what_overlaps_have_in_common_is_made_once() -> None:
+    """Fourteen lines of masks in chains of `above`, eighteen overlaps: each had the words taken apart and the lines put together anew."""
+    rng = random.Random(5)  # noqa: S311 - a draw that repeats
+    orders = {2: "n13, n12, n11", 5: "n6, n9, n10", 6: "n12, n10, n13", 11: "n12"}
+    rows = "".join(
+        f"| n{at}{f' above {orders[at]}' if at in orders else ''} | "
+        f"{'' if at in (0, 3, 9, 10, 12) else '0b' + ''.join(rng.choice('xxx01') for _ in range(63))} || {at % 3} |\n"
+        for at in range(14)
+    )
+    declared = "input a : int 0 .. 9223372036854775807\noutput o : int 0 .. 9\n"
+    with counted(13_000_000):
+        found = reported(f"{declared}table t {{\n| line | a || o |\n{rows}}}\n")
+    assert sum(each.code == "RCS402" for each in found) > 10
+
+
 def test_trials_of_helps_are_bounded_outside_the_solver_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """The trial needs no solver: its tree of regions counts, a node as so many steps."""
     rows = "| p | <= 3 | a + b < 10 || 1 |\n| q | >= 3 | a + b < 10 || 2 |\n| r | | a + b >= 10 || 2 |\n"
