@@ -17,7 +17,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, NewType
 
-from rcsc.lang.model import Bool, Int, Real, Scalar, Single, Value
+from rcsc.lang.model import Bool, Real, Scalar, Single, Value
 from rcsc.solvers.options import Limits
 
 Term = NewType("Term", object)
@@ -229,27 +229,20 @@ def _float_sort(kind: Real) -> Any:
     return _z3().Float32() if isinstance(kind, Single) else _z3().Float64()
 
 
-WIDE = 16
-"""Bits of a word above which it is a vector of bits, and no number: masks of many bits are hundreds of times quicker so."""
-
-
 def variable(name: str, kind: Scalar) -> Term:
-    """A fresh constant: Bool, IEEE double or single, or a mathematical integer (also for enumerations).
-
-    A wide word, all whose bits are free, is a vector of them. Where that is calculated with otherwise than with its bits, it is the
-    integer that they are.
-    """
+    """A fresh constant: Bool, IEEE double or single, or a mathematical integer (also for enumerations)."""
     z3 = _z3()
     if isinstance(kind, Bool):
         return Term(z3.Bool(name))
-    if (
-        isinstance(kind, Int)
-        and kind.low == 0
-        and kind.high.bit_length() > WIDE
-        and not kind.high & (kind.high + 1)
-    ):
-        return Term(z3.BitVec(name, kind.high.bit_length()))
     return Term(z3.FP(name, _float_sort(kind)) if isinstance(kind, Real) else z3.Int(name))
+
+
+def word(name: str, bits: int) -> Term:
+    """A fresh constant for a whole number that is its bits: of masks hundreds of times quicker than an integer.
+
+    Where that is calculated with otherwise, it is the integer that they are, which takes longer: `expressions.words.bits_alone`.
+    """
+    return Term(_z3().BitVec(name, bits))
 
 
 def literal(kind: Scalar, value: Value) -> Term:

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 
-from rcsc.lang.expressions.words import mask_of
+from rcsc.lang.expressions.words import bits_alone, mask_of
 from rcsc.lang.model import (
     Among,
     Apply,
@@ -141,12 +141,23 @@ def within(term: Term, kind: Scalar) -> Term:
     return smt.all_of([smt.at_most(least, term, kind), smt.at_most(term, greatest, kind)])
 
 
-def declared(variables: Iterable[Variable]) -> tuple[Frame, list[Term]]:
-    """A frame of fresh constants, one a leaf, and that each is in its range."""
+def declared(variables: Iterable[Variable], conditions: Iterable[Expr] = ()) -> tuple[Frame, list[Term]]:
+    """A frame of fresh constants, one a leaf, and that each is in its range.
+
+    Args:
+        variables: One constant each.
+        conditions: What is to be encoded, where all of it is known: words of which it looks at bits alone are bits.
+    """
     frame = Frame({})
     domain = []
-    for variable in variables:
-        frame.leaves[variable.name] = smt.variable(variable.name, variable.type)
+    every = list(variables)
+    words = bits_alone(conditions, every)
+    for variable in every:
+        name, kind = variable.name, variable.type
+        if isinstance(kind, Int) and name in words:
+            frame.leaves[name] = smt.word(name, kind.high.bit_length())
+        else:
+            frame.leaves[name] = smt.variable(name, kind)
         if not isinstance(variable.type, Bool):
             domain.append(within(frame.leaves[variable.name], variable.type))
     return frame, domain
@@ -158,10 +169,11 @@ def least_where(
     """The least values of the variables shown for which the conditions hold; None where there are none, or none is found."""
     if smt.gives_up("the least input"):
         return None
-    frame, domain = declared(variables)
+    every = list(conditions)
+    frame, domain = declared(variables, every)
     solver = Solver(options.limits)
     try:
-        solver.add(*domain, *(encode(condition, frame) for condition in conditions))
+        solver.add(*domain, *(encode(condition, frame) for condition in every))
         return least_witness(solver, shown, frame)
     except smt.troubles():
         return None

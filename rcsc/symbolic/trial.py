@@ -130,7 +130,7 @@ def _masks(conditions: Iterable[Expr]) -> Iterator[tuple[str, int, int]]:
 
 
 def towards(point: Point, aims: Iterable[Aim], kinds: Mapping[str, Scalar], random: Random) -> Point:
-    """The point changed so that each aim is met by itself, boxes first; the last that changes a variable wins.
+    """The point changed so that each aim is met by itself, where it can be, boxes first; the last that changes a variable wins.
 
     A mask comes after: it leaves bits free, so that what was chosen for a range mostly stays in it.
     """
@@ -140,7 +140,9 @@ def towards(point: Point, aims: Iterable[Aim], kinds: Mapping[str, Scalar], rand
             first, last = random.choice(box)
             moved[name] = value_of_key(kinds[name], random.choice((first, last, random.randint(first, last))))
         for word, care, value in aim.masks:
-            moved[word] = int(moved[word]) & ~care | value
+            masked, (low, high) = int(moved[word]) & ~care | value, key_bounds(kinds[word])
+            if low <= masked <= high:  # of `int 0 .. 60000` not all bits are free
+                moved[word] = masked
     return moved
 
 

@@ -30,11 +30,12 @@ class TableSolver:
     def __init__(self, program: Program, table: Table, options: Options) -> None:
         self.program, self.table = program, table
         # What nothing here reads has some value in its range, whatever the others have.
-        self.frame, domain = declared(shown(program, table))
-        self.solver = Solver(options.limits)
-        self.solver.add(*domain)
         wanted = set(table.assumptions)
-        self.solver.add(*[encode(a.condition, self.frame) for a in program.assumptions if a.name in wanted])
+        assumed = [a.condition for a in program.assumptions if a.name in wanted]
+        tests = {id(test): test.condition for line in table.lines for test in line.tests if test is not None}
+        self.frame, domain = declared(shown(program, table), [*tests.values(), *assumed])
+        self.solver = Solver(options.limits)
+        self.solver.add(*domain, *(encode(condition, self.frame) for condition in assumed))
         self._lines: dict[int, Term] = {}
         self._tests: dict[int, Term] = {}
 

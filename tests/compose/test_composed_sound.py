@@ -575,6 +575,18 @@ def test_a_result_that_is_refused_ends_the_cycle_whatever_its_type(result: str, 
     )  # no C function can give more
 
 
+@pytest.mark.parametrize("result", ["a number", "a truth value"])
+def test_the_replay_that_is_named_beside_a_run_replays_it(
+    result: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the executors that can run it: no C function gives a truth value that is none."""
+    path = solo_system(tmp_path, asks(*RESULTS[result]))
+    assert run(["prove", "--no-cache", "--log", str(tmp_path / "runs"), str(path)]) == 1
+    [command, *_] = re.findall(r"log: rcsc (replay .*)", capsys.readouterr().err)
+    assert ("--executor python" in command) is (result == "a truth value")
+    assert run(command.split()) == 0
+
+
 @pytest.mark.parametrize("where", ["preprocess", "line", "postprocess"])
 def test_a_cycle_ends_where_the_result_is_refused(where: str, tmp_path: Path) -> None:
     """Wherever the procedure is called: and only there does what comes after it not run."""

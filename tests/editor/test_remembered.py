@@ -29,7 +29,7 @@ def written(first: str = "a", second: str = "b", most: int = 12, low: str = "a +
 
 
 @pytest.mark.parametrize(
-    "name", ["gallery/plcopen_safety/guard.rcs", "gallery/etcs_modes/code.rcs", "emove/locate.rcs"]
+    "name", ["gallery/linuxcnc_estop/code.rcs", "examples/approach.rcs", "emove/locate.rcs"]
 )
 def test_a_changed_line_has_only_its_own_questions_asked(name: str) -> None:
     file = str(REPO / "tables" / name)

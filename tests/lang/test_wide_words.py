@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcsc.lang.expressions.words import bits_alone
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.model import Program, Test, Value
 from rcsc.lang.resolve import compile_text
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import trial, values
-from rcsc.symbolic.encode import declared, encode
+from rcsc.symbolic.encode import declared, encode, within
 from rcsc.symbolic.execution import Run
 
 HEAD = """input w : int 0 .. 18446744073709551615
@@ -95,14 +96,16 @@ def holds_so(condition: str, given_points: list[dict[str, Value]]) -> bool:
     if made is None:
         return False
     program, test = made
-    frame, domain = declared(program.variables)
-    term = encode(test.condition, frame)
-    start = {str(each.name): values.variable(str(each.name), each.type) for each in program.variables}
+    frames = [declared(program.variables, [test.condition])[0], declared(program.variables)[0]]
+    for name in ("w", "v"):  # whatever is done with them
+        frames[1].leaves[name] = smt.word(name, WIDTHS[name])
     kinds = {str(each.name): each.type for each in program.variables}
+    start = {name: values.variable(name, kind) for name, kind in kinds.items()}
+    start["w"].term = smt.word("w", WIDTHS["w"])
     node = Run({}, kinds, dict(start)).evaluate(test.condition)
     tried = trial.ready(test.condition)
     ways = [
-        (term, frame.leaves),
+        *((encode(test.condition, frame), frame.leaves) for frame in frames),
         (values.term_of(node), {name: values.term_of(of) for name, of in start.items()}),
     ]
     pinned = [each for each in program.variables if str(each.name) in WIDTHS or each.name in ("k", "s")]
@@ -115,8 +118,8 @@ def holds_so(condition: str, given_points: list[dict[str, Value]]) -> bool:
         assert trial.holds_at(node, point) is expected
         for said, leaves in ways:
             solver = Solver()
-            solver.add(*domain)
             for each in pinned:
+                solver.add(within(leaves[str(each.name)], each.type))
                 given_value = smt.literal(each.type, point[str(each.name)])
                 solver.add(smt.equal(leaves[str(each.name)], given_value, each.type))
             opposite = smt.negation(said)
@@ -159,12 +162,34 @@ def test_each_kind_of_term_meets_each_other(condition: str) -> None:
     assert holds_so(condition, EDGES)
 
 
+@pytest.mark.parametrize(
+    ("condition", "words"),
+    [
+        ("w = 0b" + "x" * 63 + "1", {"w"}),
+        ("w[16..0] = v and v < 7", {"w", "v"}),
+        ("w[7..0] = n", set()),  # a narrow word is a number
+        ("w[7..0] < v[7..0] and v + 1 > 3", set()),  # what is compared with a number is one
+        ("w[63] and v + 1 > 3", {"w"}),
+        ("w[63] and v[16] and max(v, 3) > 4", {"w"}),
+        ("w < 7 and v > 3", set()),  # no bits of any
+        ("w mod 3 = 1 and v[3]", {"v"}),
+        ("w[5] or w in {1, 2}", {"w"}),
+        ("w[5] and (v[3] implies real(w) > 1.0)", {"v"}),
+    ],
+)
+def test_words_of_which_bits_alone_are_looked_at(condition: str, words: set[str]) -> None:
+    made = compiled(condition)
+    assert made is not None
+    program, test = made
+    assert bits_alone([test.condition], program.variables) == words
+
+
 def test_masks_of_many_bits_cost_few_steps() -> None:
     made = compiled(" or ".join(f"w = 0b{'01x' * at}{'x10' * (20 - at)}xx01" for at in range(21)))
     assert made is not None
     program, test = made
     word = program.variables[0]
-    frame, domain = declared(program.variables)
+    frame, domain = declared(program.variables, [test.condition])
     solver = Solver()
     solver.add(*domain, encode(test.condition, frame))
     with smt.together(20_000):

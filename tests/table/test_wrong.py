@@ -160,6 +160,38 @@ def test_what_inputs_that_are_tried_show_is_known_before_a_region_is_asked_about
     assert "RCS401" in {each.code for each in found}
 
 
+BITS_NOT_FREE = "input w : int 0 .. 60000\ninput x : real 0.0 .. 1.0\noutput o : int 0 .. 9\n"
+"""No value has bit 15 and bits 14 to 12."""
+
+
+@pytest.mark.parametrize(
+    ("head", "rows"),
+    [
+        (
+            "w[15] | when",
+            "| a | false | || 1 |\n| b | true | w[14..12] < 7 and x*2.0 < 0.5 || 2 |\n| c | true | w[14..12] < 7 and x*2.0 >= 0.5 || 2 |\n",
+        ),
+        (
+            "w[15] | w[14..12] | when",
+            "| a | true | | || 1 |\n| b | | 7 | || 2 |\n| c | false | < 7 | x*2.0 < 0.5 || 3 |\n| d | false | < 7 | x*2.0 >= 0.5 || 3 |\n",
+        ),
+        ("w[15] | w[14..12]", "| a | true | || 1 |\n| b | | 7 || 2 |\n| c | false | /= 7 || 3 |\n"),
+    ],
+)  # fmt: skip
+def test_an_input_that_is_tried_is_one(head: str, rows: str) -> None:
+    """A point was moved out of the range of its word by a mask, and told as a witness."""
+    found = reported(f"{BITS_NOT_FREE}table t {{\n| line | {head} || o |\n{rows}}}\n")
+    assert {each.code for each in found} <= {"RCS319"}
+
+
+@pytest.mark.parametrize("order", ["above", "same"])
+def test_lines_of_which_masks_have_no_value_in_common_never_meet(order: str) -> None:
+    rows = f"| a {order} b | true | || 1 |\n| b | | 7 || 2 |\n| c | DEFAULT | || 3 |\n"
+    found = reported(f"{BITS_NOT_FREE}table t {{\n| line | w[15] | w[14..12] || o |\n{rows}}}\n")
+    assert "RCS423" in {each.code for each in found}
+    assert "RCS422" not in {each.code for each in found}
+
+
 def test_a_gap_that_was_found_is_confirmed_with_its_values_put_in() -> None:
     """That no line matches there was asked over sums of singles, as was whether any two lines meet: 40,000,000 steps, and no answer."""
     rows = "| n0 | | 0.5 .. 0.5 || 0 |\n| n1 same n0 | not in {1.0, 0.0} | 0.0 .. 0.5 || 2 |\n| rest | DEFAULT | || 1 |\n"

@@ -95,7 +95,8 @@ def _say_logs(explanation: Explanation) -> None:
     log = explanation.log
     if log is None:
         return
-    click.echo(f"  = log: rcsc replay {log} --generated {log.parent / 'generated'}", err=True)
+    executor = "" if explanation.in_c else " --executor python"
+    click.echo(f"  = log: rcsc replay {log} --generated {log.parent / 'generated'}{executor}", err=True)
     click.echo(f"  = picture: rcsc log {log} --report {log.with_suffix('.html')}", err=True)
     if explanation.follows:
         then = log.with_name(f"{log.stem}_then_N{log.suffix}")

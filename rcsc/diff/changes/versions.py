@@ -3,24 +3,28 @@
 In: an `Aligned`. Out: answers that tables, procedures, levels and conditions are compared with.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.diff.changes.align import Aligned
 from rcsc.diff.changes.difference import Where
 from rcsc.diff.changes.value_text import in_words, number
 from rcsc.lang.digest import Digests
+from rcsc.lang.expressions.words import bits_alone
 from rcsc.lang.interpret import initial
+from rcsc.lang.leaves import everything, expressions
 from rcsc.lang.model import (
     COMPARISONS,
     Bool,
     Enum,
+    Expr,
     Int,
     Level,
     Op,
     Program,
     Real,
     Scalar,
+    Statement,
     Table,
     earlier,
     key_bounds,
@@ -45,6 +49,19 @@ COVER_STEPS = 1_000_000
 
 Runner = Callable[[Program, dict[str, Scalars]], None]
 """Runs a version's part on a snapshot, in place."""
+
+
+def _expressions(program: Program) -> Iterator[Expr]:
+    """What a version looks at and calculates."""
+    for stated in (program.assumptions, program.invariants, program.properties):
+        yield from (each.condition for each in stated)
+    bodies: list[Iterable[Statement]] = [procedure.body for procedure in program.procedures]
+    for table in program.tables:
+        yield from {id(test): test.condition for line in table.lines for test in line.tests if test}.values()
+        bodies += [[action.statement for action in line.actions] for line in table.every_line]
+    for body in bodies:
+        for statement in everything(body):
+            yield from expressions(statement)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +107,14 @@ class Versions:
         self.types = {str(v.name): v.type for v in (*aligned.after.variables, *aligned.before.variables)}
         self.kinds = {**self.types, **aligned.leaves}
         self.shared = Shared()
+        words = bits_alone(
+            (each for version in (aligned.before, aligned.after) for each in _expressions(version)),
+            (*aligned.before.variables, *aligned.after.variables),
+        )
         for name, kind in self.kinds.items():
-            self.shared.start[name] = self.shared.canonical(values.variable(name, kind))
+            start = self.shared.start[name] = self.shared.canonical(values.variable(name, kind))
+            if name in words and isinstance(kind, Int) and kind == self.types.get(name):
+                start.term = smt.word(name, kind.high.bit_length())
             before = earlier(name)  # what a property calls it; no run begins with it
             self.shared.start[before] = self.shared.canonical(values.variable(before, kind))
         self.order = {name: at for at, name in enumerate(self.kinds)}

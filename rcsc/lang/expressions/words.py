@@ -7,8 +7,9 @@ test a bit, so that two masks of one word speak of the same things, however thei
 (`field_of`) and masks (`mask_of`) in such arithmetic again, whoever wrote it: proofs count over bits, C tests a mask at once.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from dataclasses import field as field_
 from functools import reduce
 
 from rcsc.diagnostics.codes import Code
@@ -16,8 +17,9 @@ from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, applied, kind_word
 from rcsc.lang.expressions.scope import Scope
-from rcsc.lang.model import Apply, Bool, Expr, Int, Literal, Read, ReadLocal, Select, Value
-from rcsc.lang.operator_table import Arithmetic, Op
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import Among, Apply, Bool, Expr, Int, Literal, Read, ReadLocal, Select, Value, Variable
+from rcsc.lang.operator_table import Arithmetic, Op, is_comparison
 
 MOST_BITS = 64
 NARROWER = "head the column by a part, as `WORD[7..0]`, or write `x` for the other bits"
@@ -97,6 +99,85 @@ def _opposite(mask: Mask | None) -> Mask | None:
     if mask is None or mask.care.bit_count() != 1:
         return None
     return replace(mask, value=mask.value ^ mask.care)
+
+
+WIDE = 16
+"""Bits of a word above which it pays to know it by its bits."""
+
+
+def bits_alone(conditions: Iterable[Expr], variables: Iterable[Variable]) -> frozenset[str]:
+    """Wide words, all whose bits are free, that these conditions look at only as fields, masks and by comparison with such.
+
+    None where no condition looks at bits of any: then integers serve as well.
+    """
+    wide = {str(each.name) for each in variables if _all_free(each.type)}
+    uses, read = _Uses(), set[str]()
+    for condition in conditions if wide else ():
+        uses.see(condition)
+        read.update(map(str, read_by(condition)))
+    if not uses.split & wide:
+        return frozenset()
+    other = uses.calculated | (uses.split | {name for pair in uses.pairs for name in pair}) - wide
+    more = True
+    while more:  # what is compared with a number is one
+        met = {name for pair in uses.pairs if other & set(pair) for name in pair}
+        more = not met <= other
+        other |= met
+    return frozenset(wide & read - other)
+
+
+def _all_free(kind: object) -> bool:
+    return (
+        isinstance(kind, Int)
+        and kind.low == 0
+        and kind.high.bit_length() > WIDE
+        and not kind.high & (kind.high + 1)
+    )
+
+
+@dataclass(slots=True)
+class _Uses:
+    """How conditions look at variables: the words of which a part is looked at, those calculated with, and what is compared."""
+
+    split: set[str] = field_(default_factory=set)
+    calculated: set[str] = field_(default_factory=set)
+    pairs: list[tuple[str, str]] = field_(default_factory=list)
+
+    def see(self, condition: Expr) -> None:
+        """Note a condition's."""
+        match condition:
+            case Apply(op=op, args=(left, right)) if is_comparison(op):
+                names = [self._side(side) for side in (left, right)]
+                if names[0] and names[1]:
+                    self.pairs.append((names[0], names[1]))
+                elif any(
+                    name and not isinstance(side, Literal)
+                    for name, side in zip(names, (right, left), strict=True)
+                ):
+                    self.calculated.update(name for name in names if name)
+            case Among(subject=subject):
+                self._side(subject)
+            case Apply(args=args):
+                for arg in args:
+                    if isinstance(arg.type, Bool):
+                        self.see(arg)
+                    else:
+                        self.calculated.update(map(str, read_by(arg)))
+            case _:
+                self.calculated.update(map(str, read_by(condition)))
+
+    def _side(self, side: Expr) -> str:
+        """The variable of whose bits a side of a comparison is made; none for any other side, whose variables are calculated with."""
+        part = field_of(side)
+        if part is not None and isinstance(part.word, Read):
+            if not isinstance(side, Read):
+                self.split.add(str(part.word.name))
+            return str(part.word.name)
+        if isinstance(side.type, Bool):
+            self.see(side)
+        else:
+            self.calculated.update(map(str, read_by(side)))
+        return ""
 
 
 def field(scope: Scope, word: Typed, ends: tuple[int | None, int | None], span: Span) -> Typed | None:
