@@ -33,8 +33,8 @@ from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.editor.lenses import witness_run
 from rcsc.editor.workspace import Workspace
-from rcsc.lang.interpret import UNDEFINED, matching_lines
-from rcsc.lang.model import Program
+from rcsc.lang.interpret import UNDEFINED, initial, matching_lines
+from rcsc.lang.model import Program, key_bounds, key_of, unspelled
 from rcsc.lang.resolve import compile_text
 from rcsc.lang.written.changes import with_proposal
 from rcsc.solvers.options import Options
@@ -185,14 +185,18 @@ class Draw:
         rng = self.rng
         width = rng.choice((4, 8, 16, 32, 63, 64))
         self.masks |= width > 16
-        self.declared.append(f"{word} {name} : int 0 .. {2**width - 1}")
+        own = random.Random(
+            f"{name} {width} {self.declared}"
+        )  # not from `rng`: the tables of a seed stay what they were
+        left_out = own.choice((0, 0, 0, 2 ** (width - 3), own.randrange(1, 2 ** (width - 1))))
+        self.declared.append(f"{word} {name} : int 0 .. {2**width - 1 - left_out}")
         ways = [
             Heading(name, of_bits(width)),
             Heading(f"{name}[{width - 1}..0]", of_bits(width)),
             Heading(f"{name}[3..0]", of_numbers(["0", "3", "8", "15"])),
             Heading(f"{name}[3..0]", of_bits(4)),
             Heading(f"{name}[{width - 1}]", truths),
-            Heading(name, of_numbers(["0", "1", str(2**width - 1), str(2 ** (width - 1))])),
+            Heading(name, of_numbers(["0", "1", str(2**width - 1 - left_out), str(2 ** (width - 1))])),
         ]
         self.headings += rng.sample(ways, rng.randint(1, 2))
 
@@ -456,6 +460,28 @@ def _wrong(report: Report) -> set[tuple[str, str]]:
     }
 
 
+def _are_so(report: Report, text: str) -> None:
+    """Raise where a witness of an overlap or a gap lies out of range, or is matched by other lines than is said."""
+    program = compile_text(text)
+    assert Code.SOLVERS_DISAGREE not in {each.code for each in report.diagnostics}, text
+    if not isinstance(program, Program):
+        return
+    for finding in report.diagnostics:
+        for witness in finding.witnesses if finding.code in (Code.OVERLAP, Code.GAP) else ():
+            table = next(each for each in program.tables if each.name == witness.table)
+            kinds = {str(each.name): each.type for each in program.variables}
+            given = {
+                name: unspelled(kinds[name], told)
+                for name, told in zip(witness.variables, witness.values, strict=True)
+            }
+            for name, value in given.items():
+                low, high = key_bounds(kinds[name])
+                assert low <= key_of(kinds[name], value) <= high, (name, value, text)
+            found = set(matching_lines(table, initial(program) | given))
+            said = {line.name for line in witness.lines}
+            assert said <= found if finding.code is Code.OVERLAP else not found, (witness, found, text)
+
+
 def held(file: Path, text: str, rng: Rng) -> int:
     """Write out each proposal that is called proved, check the whole anew, and try inputs; how many there were.
 
@@ -464,6 +490,7 @@ def held(file: Path, text: str, rng: Rng) -> int:
     """
     file.write_text(text, encoding="utf-8")
     before = _report(file)
+    _are_so(before, text)
     many = 0
     for finding in before.diagnostics:
         certain = [each for each in finding.proposals if each.certain]
