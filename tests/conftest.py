@@ -94,9 +94,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if quick(item.nodeid.partition("[")[0].removeprefix("tests/"), quick_ones):
             item.add_marker("quick")
-    items.sort(
-        key=lambda item: "quick" not in item.keywords
-    )  # what most changes break shows in the first minute
+    # What most changes break shows in the first minute.
+    items.sort(key=lambda item: "quick" not in item.keywords)
     left_out = [
         item
         for item in items

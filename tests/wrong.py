@@ -185,9 +185,8 @@ class Draw:
         rng = self.rng
         width = rng.choice((4, 8, 16, 32, 63, 64))
         self.masks |= width > 16
-        own = random.Random(
-            f"{name} {width} {self.declared}"
-        )  # not from `rng`: the tables of a seed stay what they were
+        # Not from `rng`: the other draws of a seed stay what they were.
+        own = random.Random(f"{name} {width} {self.declared}")
         left_out = own.choice((0, 0, 0, 2 ** (width - 3), own.randrange(1, 2 ** (width - 1))))
         self.declared.append(f"{word} {name} : int 0 .. {2**width - 1 - left_out}")
         ways = [

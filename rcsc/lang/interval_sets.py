@@ -13,9 +13,8 @@ def meet(left: Box, right: Box) -> Box:
         low, high = (a if a > c else c), (b if b < d else d)  # noqa: FURB136  # as above
         return ((low, high),) if low <= high else ()
     parts, at, other = list[tuple[int, int]](), 0, 0
-    while at < len(left) and other < len(
-        right
-    ):  # both are in order, and no two intervals of one have a key in common
+    # Both are in order, and no two intervals of one have a key in common.
+    while at < len(left) and other < len(right):
         low, high = max(left[at][0], right[other][0]), min(left[at][1], right[other][1])
         if low <= high:
             parts.append((low, high))

@@ -18,6 +18,7 @@ from rcsc.lang.model import (
     Local,
     Op,
     Procedure,
+    Program,
     Read,
     ReadLocal,
     Real,
@@ -153,6 +154,15 @@ def everything(body: Iterable[Statement]) -> Iterator[Statement]:
         yield statement
         for block in blocks(statement):
             yield from everything(block)
+
+
+def every_statement(program: Program) -> Iterator[Statement]:
+    """All statements of the procedures and of the tables' lines, blocks included."""
+    for procedure in program.procedures:
+        yield from everything(procedure.body)
+    for table in program.tables:
+        for line in table.every_line:
+            yield from everything(action.statement for action in line.actions)
 
 
 def may_write(body: Iterable[Statement], procedures: Mapping[str, Procedure]) -> frozenset[VariableName]:

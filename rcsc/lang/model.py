@@ -773,6 +773,12 @@ class Table:
         """The lines, and after them DEFAULT where the table has one."""
         return self.lines if self.default is None else (*self.lines, self.default)
 
+    @property
+    def distinct_tests(self) -> tuple[Test, ...]:
+        """Each test of the lines once, in order of its first line."""
+        every = (test for line in self.lines for test in line.tests if test is not None)
+        return tuple({id(test): test for test in every}.values())
+
     def added(self, line: Line) -> str:
         """What `above` and `same` add to the conditions of one of its lines, in words; empty for nothing."""
         tests = zip(line.tests, self.columns, strict=True)

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from rcsc.diagnostics.diagnostic import Effects
-from rcsc.lang.leaves import parts
-from rcsc.lang.model import Expr, Line, Program, Read, Table, Value, VariableName
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import Expr, Line, Program, Table, Value, VariableName
 from rcsc.solvers import smt
 from rcsc.solvers.options import WRONG_STEPS, Options
 from rcsc.solvers.smt import Answer, Solver
@@ -81,7 +81,7 @@ def meeting(program: Program, table: Table, where: Expr, options: Options) -> Ma
     relied = [each.condition for each in program.assumptions if each.name in table.assumptions]
     seen = trial.aimed([where, *relied], program.variables)
     if seen is not None:
-        read = {str(part.name) for each in (where, *relied) for part in parts(each) if isinstance(part, Read)}
+        read = {str(name) for each in (where, *relied) for name in read_by(each)}
         return {name: value for name, value in seen.items() if name in read}
     try:
         nodes = list(_here(program, table, [where], _starting(program)))

@@ -151,13 +151,10 @@ def declared(variables: Iterable[Variable], conditions: Iterable[Expr] = ()) -> 
     frame = Frame({})
     domain = []
     every = list(variables)
-    words = bits_alone(conditions, every)
+    words = bits_alone(conditions, {str(variable.name): variable.type for variable in every})
     for variable in every:
         name, kind = variable.name, variable.type
-        if isinstance(kind, Int) and name in words:
-            frame.leaves[name] = smt.word(name, kind.high.bit_length())
-        else:
-            frame.leaves[name] = smt.variable(name, kind)
+        frame.leaves[name] = smt.word(name, words[name]) if name in words else smt.variable(name, kind)
         if not isinstance(variable.type, Bool):
             domain.append(within(frame.leaves[variable.name], variable.type))
     return frame, domain

@@ -32,8 +32,8 @@ class TableSolver:
         # What nothing here reads has some value in its range, whatever the others have.
         wanted = set(table.assumptions)
         assumed = [a.condition for a in program.assumptions if a.name in wanted]
-        tests = {id(test): test.condition for line in table.lines for test in line.tests if test is not None}
-        self.frame, domain = declared(shown(program, table), [*tests.values(), *assumed])
+        tests = [test.condition for test in table.distinct_tests]
+        self.frame, domain = declared(shown(program, table), [*tests, *assumed])
         self.solver = Solver(options.limits)
         self.solver.add(*domain, *(encode(condition, self.frame) for condition in assumed))
         self._lines: dict[int, Term] = {}

@@ -198,12 +198,7 @@ class _Decision:
         )
         yield from points[: max(_FEWEST_POINTS, trial.EVALUATIONS // max(1, nodes))]
         kinds = {str(v.name): v.type for v in self.program.variables}
-        aims = {
-            id(test): trial.Aim.of(test)
-            for line in self.table.lines
-            for test in line.tests
-            if test is not None
-        }
+        aims = {id(test): trial.Aim.of(test) for test in self.table.distinct_tests}
         tests = [[aims[id(test)] for test in line.tests if test is not None] for line in self.table.lines]
         for one in tests * _AIMED:
             yield trial.towards(random.choice(points), one, kinds, random)
@@ -227,8 +222,7 @@ class _Decision:
     @cached_property
     def ready(self) -> dict[int, trial.Ready]:
         """Each test of the lines, to be tried."""
-        tests = {id(test): test for line in self.table.lines for test in line.tests if test is not None}
-        return {at: trial.ready(test.condition) for at, test in tests.items()}
+        return {id(test): trial.ready(test.condition) for test in self.table.distinct_tests}
 
     @cached_property
     def refuted_by_trial(self) -> bool:

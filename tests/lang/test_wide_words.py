@@ -181,7 +181,8 @@ def test_words_of_which_bits_alone_are_looked_at(condition: str, words: set[str]
     made = compiled(condition)
     assert made is not None
     program, test = made
-    assert bits_alone([test.condition], program.variables) == words
+    kinds = {str(each.name): each.type for each in program.variables}
+    assert bits_alone([test.condition], kinds) == {name: WIDTHS[name] for name in words}
 
 
 def test_masks_of_many_bits_cost_few_steps() -> None:

@@ -12,7 +12,7 @@ from rcsc.diff.changes.value_text import in_words, number
 from rcsc.lang.digest import Digests
 from rcsc.lang.expressions.words import bits_alone
 from rcsc.lang.interpret import initial
-from rcsc.lang.leaves import everything, expressions
+from rcsc.lang.leaves import every_statement, expressions
 from rcsc.lang.model import (
     COMPARISONS,
     Bool,
@@ -24,7 +24,6 @@ from rcsc.lang.model import (
     Program,
     Real,
     Scalar,
-    Statement,
     Table,
     earlier,
     key_bounds,
@@ -55,13 +54,10 @@ def _expressions(program: Program) -> Iterator[Expr]:
     """What a version looks at and calculates."""
     for stated in (program.assumptions, program.invariants, program.properties):
         yield from (each.condition for each in stated)
-    bodies: list[Iterable[Statement]] = [procedure.body for procedure in program.procedures]
     for table in program.tables:
-        yield from {id(test): test.condition for line in table.lines for test in line.tests if test}.values()
-        bodies += [[action.statement for action in line.actions] for line in table.every_line]
-    for body in bodies:
-        for statement in everything(body):
-            yield from expressions(statement)
+        yield from (test.condition for test in table.distinct_tests)
+    for statement in every_statement(program):
+        yield from expressions(statement)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,14 +103,11 @@ class Versions:
         self.types = {str(v.name): v.type for v in (*aligned.after.variables, *aligned.before.variables)}
         self.kinds = {**self.types, **aligned.leaves}
         self.shared = Shared()
-        words = bits_alone(
-            (each for version in (aligned.before, aligned.after) for each in _expressions(version)),
-            (*aligned.before.variables, *aligned.after.variables),
-        )
+        words = bits_alone((*_expressions(aligned.before), *_expressions(aligned.after)), self.kinds)
         for name, kind in self.kinds.items():
             start = self.shared.start[name] = self.shared.canonical(values.variable(name, kind))
-            if name in words and isinstance(kind, Int) and kind == self.types.get(name):
-                start.term = smt.word(name, kind.high.bit_length())
+            if name in words:
+                start.term = smt.word(name, words[name])
             before = earlier(name)  # what a property calls it; no run begins with it
             self.shared.start[before] = self.shared.canonical(values.variable(before, kind))
         self.order = {name: at for at, name in enumerate(self.kinds)}

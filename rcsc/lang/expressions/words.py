@@ -7,7 +7,7 @@ test a bit, so that two masks of one word speak of the same things, however thei
 (`field_of`) and masks (`mask_of`) in such arithmetic again, whoever wrote it: proofs count over bits, C tests a mask at once.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from dataclasses import field as field_
 from functools import reduce
@@ -18,7 +18,7 @@ from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, applied, kind_word
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.leaves import read_by
-from rcsc.lang.model import Among, Apply, Bool, Expr, Int, Literal, Read, ReadLocal, Select, Value, Variable
+from rcsc.lang.model import Among, Apply, Bool, Expr, Int, Literal, Read, ReadLocal, Scalar, Select, Value
 from rcsc.lang.operator_table import Arithmetic, Op, is_comparison
 
 MOST_BITS = 64
@@ -105,34 +105,34 @@ WIDE = 16
 """Bits of a word above which it pays to know it by its bits."""
 
 
-def bits_alone(conditions: Iterable[Expr], variables: Iterable[Variable]) -> frozenset[str]:
-    """Wide words, all whose bits are free, that these conditions look at only as fields, masks and by comparison with such.
+def bits_alone(conditions: Iterable[Expr], kinds: Mapping[str, Scalar]) -> dict[str, int]:
+    """Wide words, all whose bits are free, that these conditions look at only as fields, masks and by comparison with such; their bits.
 
     None where no condition looks at bits of any: then integers serve as well.
     """
-    wide = {str(each.name) for each in variables if _all_free(each.type)}
+    wide = {
+        name: kind.high.bit_length()
+        for name, kind in kinds.items()
+        if isinstance(kind, Int) and _all_free(kind)
+    }
     uses, read = _Uses(), set[str]()
     for condition in conditions if wide else ():
         uses.see(condition)
         read.update(map(str, read_by(condition)))
-    if not uses.split & wide:
-        return frozenset()
-    other = uses.calculated | (uses.split | {name for pair in uses.pairs for name in pair}) - wide
+    if uses.split.isdisjoint(wide):
+        return {}
+    other = uses.calculated | (uses.split | {name for pair in uses.pairs for name in pair}) - wide.keys()
     more = True
     while more:  # what is compared with a number is one
         met = {name for pair in uses.pairs if other & set(pair) for name in pair}
         more = not met <= other
         other |= met
-    return frozenset(wide & read - other)
+    read -= other
+    return {name: bits for name, bits in wide.items() if name in read}
 
 
-def _all_free(kind: object) -> bool:
-    return (
-        isinstance(kind, Int)
-        and kind.low == 0
-        and kind.high.bit_length() > WIDE
-        and not kind.high & (kind.high + 1)
-    )
+def _all_free(kind: Int) -> bool:
+    return kind.low == 0 and kind.high.bit_length() > WIDE and not kind.high & (kind.high + 1)
 
 
 @dataclass(slots=True)
@@ -150,10 +150,7 @@ class _Uses:
                 names = [self._side(side) for side in (left, right)]
                 if names[0] and names[1]:
                     self.pairs.append((names[0], names[1]))
-                elif any(
-                    name and not isinstance(side, Literal)
-                    for name, side in zip(names, (right, left), strict=True)
-                ):
+                elif not isinstance(left, Literal) and not isinstance(right, Literal):
                     self.calculated.update(name for name in names if name)
             case Among(subject=subject):
                 self._side(subject)

@@ -15,8 +15,8 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.scope import root_of
-from rcsc.lang.leaves import everything, expressions, read_by, written_by
-from rcsc.lang.model import BEFORE, Array, Declared, Enum, Expr, Kind, Program, Record, Statement, Type
+from rcsc.lang.leaves import every_statement, expressions, read_by, written_by
+from rcsc.lang.model import BEFORE, Array, Declared, Enum, Expr, Kind, Program, Record, Type
 from rcsc.lang.restart import After, SameAs
 from rcsc.lang.syntax import tree
 
@@ -95,24 +95,16 @@ def _conditions(program: Program) -> Iterator[Expr]:
         yield from level.selectors
     for table in program.tables:
         yield from (column.subject for column in table.columns if column.subject is not None)
-        yield from {id(test): test.condition for line in table.lines for test in line.tests if test}.values()
+        yield from (test.condition for test in table.distinct_tests)
         yield from (meeting.where for meeting in table.meetings)
-    for statement in _statements(program):
+    for statement in every_statement(program):
         if not written_by(statement):
             yield from expressions(statement)
 
 
-def _statements(program: Program) -> Iterator[Statement]:
-    for procedure in program.procedures:
-        yield from everything(procedure.body)
-    for table in program.tables:
-        for line in table.every_line:
-            yield from everything(action.statement for action in line.actions)
-
-
 def _assigned(program: Program) -> Iterator[tuple[str, str]]:
     """Each variable that an assignment reads, and the one that it is assigned to."""
-    for statement in _statements(program):
+    for statement in every_statement(program):
         for place in written_by(statement)[:1]:
             for expr in expressions(statement):
                 yield from ((root_of(leaf), root_of(place)) for leaf in read_by(expr))
