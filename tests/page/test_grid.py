@@ -214,6 +214,13 @@ def test_a_file_that_others_write_while_it_is_changed_here_is_told_as_the_page_i
         seat.value("dispatchEvent(new Event('focus'))")
         seat.until(".conflict", "was changed on disk, and here")
         assert (lines(seat), file.read_text()) == (many + 1, others)
+        seat.value(f"void (window.take = {seat.button('Take what is on disk')})")
+        seat.click("(" + cell(1, 0) + ")")
+        seat.press("alt+enter")
+        seat.wait(f"document.querySelectorAll('.sheet tr[data-row]').length === {many + 2}")
+        assert seat.value("take.isConnected"), (
+            "a button that is replaced while it is pressed is never clicked"
+        )
         seat.click(seat.button("Take what is on disk"))
         seat.wait(f"document.querySelectorAll('.sheet tr[data-row]').length === {many}")
         seat.wait("!document.querySelector('.conflict').innerText")

@@ -25,6 +25,7 @@ export class Desk {
   #heard = new Set();
   #stop = null;
   #last = null; // what was asked last that may change the text
+  #decided = 0; // how often it was decided here whose text is on disk
   #repairs = new Map(); // by file, version and finding
   #types = new Map(); // heading -> { type, unit }, of the last text that was looked at
 
@@ -87,8 +88,9 @@ export class Desk {
         this.#selected();
         this.tell();
       }
+      const decided = this.#decided;
       const { disk, dirty } = await this.#bus.ask("tables.open", { file });
-      if (file !== this.file) return;
+      if (file !== this.file || decided !== this.#decided) return; // how the disk was before says nothing of how it is
       const before = this.conflict;
       this.conflict = disk === "same" ? "" : disk === "gone" ? `${file} is no longer on disk.` : dirty ? `${file} was changed on disk, and here.` : "";
       if (this.conflict !== before) this.tell();
@@ -148,6 +150,7 @@ export class Desk {
 
   async save(over = false) {
     await this.#ready(); // what was typed before it is written, too
+    this.#decided += 1;
     try {
       const { made } = await this.ask("tables.save", { over });
       this.#bus.say(made ? `${this.file} is written, laid out` : `${this.file} is written as it is: a text that does not parse is not laid out`);
@@ -161,6 +164,7 @@ export class Desk {
   }
 
   async take() {
+    this.#decided += 1;
     this.conflict = "";
     await this.#next("tables.take");
     this.tell();

@@ -80,8 +80,9 @@ export function mount(root, bus) {
     if (!condition && (of !== filters || document.activeElement !== filter)) filter.value = ""; // it says what is hidden, or is being typed
     filters = of;
     filtered.textContent = condition ? `${condition.can.length} of ${shown?.rows.length ?? 0} lines can match${condition.unknown.length ? `, ${condition.unknown.length} not known` : ""}` : "";
-    conflict.replaceChildren(...(desk.conflict ? [desk.conflict, " ", button("Take what is on disk", "It can be undone", () => desk.take()), " ",
+    if (conflict.dataset.of !== desk.conflict) conflict.replaceChildren(...(desk.conflict ? [desk.conflict, " ", button("Take what is on disk", "It can be undone", () => desk.take()), " ",
       button("Write over it", "What others wrote is lost", () => desk.save(true))] : []));
+    conflict.dataset.of = desk.conflict; // the same buttons stay: one that is replaced while it is pressed is never clicked
   });
 
   function told() {
