@@ -504,6 +504,24 @@ def test_facts_that_no_input_satisfies_prove_nothing(facts: tuple[str, ...], che
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(
     ("fact", "status"),
+    [
+        ("x = was x + 12", 1),  # the first cycle takes 12, and the second nothing
+        ("x = was x + 9 or x = 0", 0),
+        ("x + was x = 12", 0),  # 12 and 0 in turn, for ever
+        ("x /= was x and x < 12 and was o = 0", 1),
+    ],
+)
+def test_a_fact_that_holds_in_one_cycle_and_in_none_after_it_proves_nothing(fact: str, status: int) -> None:
+    one_level(
+        f"input x : int 0 .. 19\noutput o : int 0 .. 9\nassume so assumed : {fact}\nproperty few : o <= 2\n",
+        table("t", "line | x || o", "a | < 9 || 1", "b | >= 9 || 2", assuming="so"),
+    )
+    assert prove("--strict") == status
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("fact", "status"),
     [("new_command implies not there", 0), ("command.input_command = pause", 1), ("there and not there", 1)],
 )
 def test_a_fact_below_a_superior_is_believed_only_where_its_commands_leave_a_cycle_for_it(

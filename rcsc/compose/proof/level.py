@@ -323,18 +323,31 @@ def _believed(
 ) -> dict[str, Verdict]:
     """Return the verdict on each table's declared assumptions: nothing may rest on ones that no cycle can fulfil.
 
-    They fail if no later cycle, no first one, or none after a restart can fulfil them; for one table, if no cycle that runs it
-    can, although one would run it without them.
+    They fail if no later cycle, no first one, or none after a restart can fulfil them, or none of these can be followed by a cycle
+    that does; for one table, if no cycle that runs it can, although one would run it without them.
     """
     names = [str(at.table.name) for at in inference.cycle.every]
     if not ts.trusted:
         return dict.fromkeys(names, Verdict.TRUSTED)
     cycles = inference.cycle, *inference.firsts
     taken = [inference.keyed.term(values.negation(each.untaken)) for each in cycles]
-    whole = _of_possible({answer(solver, term) for solver, term in zip(solvers, taken, strict=True)})
+    answers = {answer(solver, term) for solver, term in zip(solvers, taken, strict=True)}
+    answers |= {_followed(ts, inference, clauses, each) for each in cycles}
+    whole = _of_possible(answers)
     if whole is not Verdict.TRUSTED:
         return dict.fromkeys(names, whole)
     return {name: _can_run(inference, clauses, solvers, at) for at, name in enumerate(names)}
+
+
+def _followed(
+    ts: TransitionSystem, inference: Confirmation, clauses: Sequence[Clause], cycle: Cycle
+) -> Answer:
+    """Ask whether another cycle can follow this one; both take their inputs."""
+    then = ts.cycle(cycle.after, " then")
+    refused = values.either(cycle.untaken, then.untaken)
+    both = inference.keyed.term(values.both(then.contract, values.negation(refused)))
+    later = cycle is inference.cycle
+    return answer(inference.known(clauses) if later else inference.beginning(cycle), both)
 
 
 def _of_possible(answers: set[Answer]) -> Verdict:
