@@ -17,7 +17,7 @@ import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
-TARGET = Path(__file__).parents[1] / "rcsc" / "studio" / "page" / "vendor"
+TARGET = Path(__file__).parents[1] / "rcsc" / "desk" / "studio" / "page" / "vendor"
 
 
 @dataclass(frozen=True)

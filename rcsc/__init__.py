@@ -4,8 +4,8 @@ A *table* has lines. In every cycle exactly one line must match the inputs, and 
 for every input in the declared ranges, or shows the least input for which it is false:
 
 >>> from rcsc.lang.resolve import compile_text
->>> from rcsc.solvers.options import Options
->>> from rcsc.table.program import prove_program
+>>> from rcsc.proof.solvers.options import Options
+>>> from rcsc.proof.table.program import prove_program
 >>> program = compile_text('''
 ... input width_mm : int 0 .. 110 [mm]
 ... output order : bool
@@ -18,17 +18,17 @@ for every input in the declared ranges, or shows the least input for which it is
 >>> [one.message for one in prove_program(program, Options()).findings]
 ['no line of table `grip` matches 20 of 111 (18 %) of the inputs']
 
-The rooms, in the order in which data flows; each imports only from those before it:
+The wings, each of which imports only from those before it:
 
-- `diagnostics` says what is wrong, `host` is the machine: files, processes, the cache;
-- `lang` makes a program of text and says what it means; `solvers` and `symbolic` turn that into questions;
-- `procedures` and `table` prove one program; `relation` compares lines and tables; `certify` checks a proof anew,
-  with no code of theirs;
-- `emit` writes C and Python of what is proved; `run` runs them, with logs; `testing` holds them against the tables;
-- `diff` and `graph` show what changed and what leads where; `compose` proves levels together, for any delay;
-- `episodes` are runs of a system in which something goes wrong, a `campaign` is many of them;
-- `driver` is the pipeline on one screen; `shell` and `commands` are what people type, `api` what Python calls:
-  `rcsc.check`, `rcsc.prove` and so on are imported when they are first asked for.
+- `base`: findings, and the machine with its files, processes and cache;
+- `lang` makes a program of text and says what it means;
+- `proof` proves one program, compares lines and tables, and checks a proof anew with code of its own;
+- `code` writes C and Python of what is proved, and holds them against the tables;
+- `run` runs them as a system, with logs, episodes in which something goes wrong, and campaigns of them;
+- `compose` proves levels together, for any delay; `driver` is the pipeline on one screen;
+- `views` show what changed, what leads where, and what a safety case asks; `desk` is where people work: editor, shell, studio;
+- `front` has the doors: `commands` are what people type, `api` what Python calls: `rcsc.check`, `rcsc.prove` and so on are
+  imported when they are first asked for.
 
 Trusted: `lang` for what a text means, `emit` for the executors, and either `certify` or the prover (the README has
 the list with lines). What it costs: tables whose tests look at one variable each are decided without a solver; the
@@ -65,12 +65,12 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """A name of `rcsc.api`, imported now: so that `import rcsc` costs nothing. Their types stand in `__init__.pyi`."""
+    """A name of `rcsc.front.api`, imported now: so that `import rcsc` costs nothing. Their types stand in `__init__.pyi`."""
     if name not in __all__:
         raise AttributeError(f"module `rcsc` has no attribute `{name}`")
     if name == "run":  # a room of that name, which is called as a function
         return importlib.import_module("rcsc.run")
-    globals()[name] = value = getattr(importlib.import_module("rcsc.api"), name)
+    globals()[name] = value = getattr(importlib.import_module("rcsc.front.api"), name)
     return value
 
 

@@ -1,24 +1,24 @@
 # What `import rcsc` gives, for type checkers; at run time each name is imported when it is first asked for.
 
-from rcsc.api import Claim as Claim
-from rcsc.api import CodedError as CodedError
-from rcsc.api import Consequence as Consequence
-from rcsc.api import Diagnostic as Diagnostic
-from rcsc.api import LoadedSystem as LoadedSystem
-from rcsc.api import Position as Position
-from rcsc.api import Proof as Proof
-from rcsc.api import Report as Report
-from rcsc.api import RowOutcome as RowOutcome
-from rcsc.api import Run as Run
-from rcsc.api import Severity as Severity
-from rcsc.api import Span as Span
-from rcsc.api import Unproved as Unproved
-from rcsc.api import Verdict as Verdict
-from rcsc.api import check as check
-from rcsc.api import compile as compile  # noqa: A004  # as the command is called
-from rcsc.api import load_system as load_system
-from rcsc.api import prove as prove
-from rcsc.api import run as run
+from rcsc.front.api import Claim as Claim
+from rcsc.front.api import CodedError as CodedError
+from rcsc.front.api import Consequence as Consequence
+from rcsc.front.api import Diagnostic as Diagnostic
+from rcsc.front.api import LoadedSystem as LoadedSystem
+from rcsc.front.api import Position as Position
+from rcsc.front.api import Proof as Proof
+from rcsc.front.api import Report as Report
+from rcsc.front.api import RowOutcome as RowOutcome
+from rcsc.front.api import Run as Run
+from rcsc.front.api import Severity as Severity
+from rcsc.front.api import Span as Span
+from rcsc.front.api import Unproved as Unproved
+from rcsc.front.api import Verdict as Verdict
+from rcsc.front.api import check as check
+from rcsc.front.api import compile as compile  # noqa: A004  # as the command is called
+from rcsc.front.api import load_system as load_system
+from rcsc.front.api import prove as prove
+from rcsc.front.api import run as run
 
 __version__: str
 __all__ = [

@@ -13,17 +13,17 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
+from rcsc.base.diagnostics.diagnostic import Change, Place, Proposal
+from rcsc.code.testing.inputs.sampling import declarations, snapshot
 from rcsc.compose.counterexample.applied import After, Text, Texts
 from rcsc.compose.proof.system import NoProgramError, transition_systems
-from rcsc.diagnostics.diagnostic import Change, Place, Proposal
 from rcsc.lang.interpret import UNDEFINED, matching_lines
 from rcsc.lang.model import Program
-from rcsc.solvers.options import Options
-from rcsc.table.decide import prove_table
-from rcsc.table.mending import Outcome, written
-from rcsc.table.repair import PartingCell, Partings, new_line
-from rcsc.table.verdict import Gap, Overlap
-from rcsc.testing.inputs.sampling import declarations, snapshot
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.decide import prove_table
+from rcsc.proof.table.mending import Outcome, written
+from rcsc.proof.table.repair import PartingCell, Partings, new_line
+from rcsc.proof.table.verdict import Gap, Overlap
 from tests.support.programs.systems import solo_system
 from tests.wrong import Rng, drawn
 

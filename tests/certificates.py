@@ -17,7 +17,6 @@ from dataclasses import dataclass, field, replace
 from itertools import islice, product
 from typing import Any
 
-from rcsc.certify import certify
 from rcsc.lang.interpret import initial
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import (
@@ -56,8 +55,9 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.operator_table import divide
 from rcsc.lang.resolve import compile_text
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+from rcsc.proof.certify import certify
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
 
 OPTIONS = Options(solver="boxes")
 MOST_STATES = 1_000

@@ -4,7 +4,7 @@
 one system with what breaks it, made small. Exit status 1 where a claim breaks.
 
 Systems are those that `tests.hierarchies` judges by enumeration, small ones and whole ones; those that the compiler refuses are counted,
-and others taken in their place. Episodes have what any system's have (`rcsc.episodes.sampling`): values from outside that move and are
+and others taken in their place. Episodes have what any system's have (`rcsc.run.episodes.sampling`): values from outside that move and are
 refused, orders at any moment, buffers that lose, delay and double, levels that start anew; restarts oftener than there.
 """
 
@@ -23,20 +23,20 @@ from pathlib import Path
 from random import Random
 from types import ModuleType
 
-from rcsc.campaign.shrink import shrink
+from rcsc.base.diagnostics.coded import CodedError
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.system import prove_transition_systems, read_systems
-from rcsc.diagnostics.coded import CodedError
 from rcsc.driver.compile import compile_system
 from rcsc.driver.watched import proved_claims
-from rcsc.episodes.episode import Episode, Restart
-from rcsc.episodes.loop import Loop
-from rcsc.episodes.outcome import EpisodeFinding
-from rcsc.episodes.proved.claims import Claims
-from rcsc.episodes.proved.cycles import EXTERN
-from rcsc.episodes.proved.watch import PROVED, ProvedHolds
-from rcsc.episodes.sampling import draw_on
-from rcsc.episodes.stand import Stand, stand
+from rcsc.run.campaign.shrink import shrink
+from rcsc.run.episodes.episode import Episode, Restart
+from rcsc.run.episodes.loop import Loop
+from rcsc.run.episodes.outcome import EpisodeFinding
+from rcsc.run.episodes.proved.claims import Claims
+from rcsc.run.episodes.proved.cycles import EXTERN
+from rcsc.run.episodes.proved.watch import PROVED, ProvedHolds
+from rcsc.run.episodes.sampling import draw_on
+from rcsc.run.episodes.stand import Stand, stand
 from tests.small_hierarchies.more import furnished
 from tests.small_hierarchies.text import files
 from tests.whole_systems.drawn import drawn

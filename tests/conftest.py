@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from rcsc.commands import run
+from rcsc.front.commands import run
 from tests.quick import chosen, quick
 
 # A shell's `&` begins a command with SIGINT ignored, which all its children inherit; tests send it to them.

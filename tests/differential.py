@@ -34,8 +34,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rcsc.emit import emit_c, emit_python
-from rcsc.emit.lower import lower
+from rcsc.code.emit import emit_c, emit_python
+from rcsc.code.emit.lower import lower
 from rcsc.lang.interpret import cycle, initial
 from rcsc.lang.model import AssumptionName, Program, ProvedProgram, seal_of_proof
 from rcsc.lang.resolve import compile_text

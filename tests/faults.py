@@ -26,19 +26,19 @@ from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 
+from rcsc.base.diagnostics.diagnostic import Severity
+from rcsc.code.emit.generated import write
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import LevelProof, prove_level
 from rcsc.compose.proof.system import NoProgramError, transition_systems
-from rcsc.diagnostics.diagnostic import Severity
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
-from rcsc.emit.generated import write
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
 from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, Restart
 from rcsc_cell.episodes.loop import Loop
 from tests.matrix import ACQUIRE, project
@@ -65,11 +65,11 @@ EPISODES: tuple[Episode, ...] = (
     ),
 )
 """A part is fetched; the same, interrupted, and with levels that begin anew; and none is there to be gripped."""
-PROVER = ("rcsc/solvers", "rcsc/symbolic", "rcsc/procedures", "rcsc/table")
+PROVER = ("rcsc/proof/solvers", "rcsc/proof/symbolic", "rcsc/proof/procedures", "rcsc/proof/table")
 READ_BY: Mapping[str, tuple[str, ...]] = {
     "check": ("rcsc/lang", *PROVER, "rcsc/driver"),
     "compose": ("rcsc/lang", *PROVER, "rcsc/compose"),
-    "campaign": ("rcsc/lang", "rcsc/emit", "rcsc/run", "sim"),
+    "campaign": ("rcsc/lang", "rcsc/code/emit", "rcsc/run", "sim"),
 }
 """Folders of rcsc on which an answer rests, besides the tables."""
 

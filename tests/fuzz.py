@@ -19,15 +19,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.emit.c.c99 import emit_c
-from rcsc.emit.lower import lower
-from rcsc.emit.python import emit_python
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.code.emit.c.c99 import emit_c
+from rcsc.code.emit.lower import lower
+from rcsc.code.emit.python import emit_python
 from rcsc.lang import reserved
 from rcsc.lang.model import Program, ProvedProgram, seal_of_proof
 from rcsc.lang.resolve import compile_text
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
 from tests import differential
 
 REPO = Path(__file__).parents[1]

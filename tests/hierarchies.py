@@ -36,7 +36,7 @@ from rcsc.compose.proof.assume_guarantee import agreements, claims
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.lang.interpret import Fault
-from rcsc.symbolic.values import TRUE
+from rcsc.proof.symbolic.values import TRUE
 from tests.small_hierarchies.endless import edges, endless
 from tests.small_hierarchies.explored import Explored, TooManyError, explored
 from tests.small_hierarchies.level import EARLY, Again, Key, Reading, Role, State

@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rcsc.code.emit import TARGETS
+from rcsc.code.emit.generated import write
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
-from rcsc.emit import TARGETS
-from rcsc.emit.generated import write
-from rcsc.episodes.outcome import EpisodeFinding
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
+from rcsc.run.episodes.outcome import EpisodeFinding
 from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, PartSpec, Restart
 from rcsc_cell.episodes.loop import Loop
 from rcsc_cell.properties import PROPERTIES

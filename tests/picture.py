@@ -16,8 +16,8 @@ from rich.console import Console
 from rich.terminal_theme import MONOKAI
 from rich.text import Text
 
-from rcsc.commands.group import commands
-from rcsc.shell.opening import Opening
+from rcsc.desk.shell.opening import Opening
+from rcsc.front.commands.group import commands
 from tests.studio.driven import seated
 
 REPO = Path(__file__).parents[1]

@@ -8,8 +8,8 @@ function, and prints for each module how many were caught. Every survivor is sho
 mutmut makes the mutants. A test runs once by itself, in a fork, to learn which functions it enters and what it costs. Then each mutant
 takes the place of its function in a fork of its own, in which everything is imported and collected, and its tests run until the first
 that fails: first those that caught most of their like for their cost. A test that takes ten times as long has noticed, too. `--seconds`
-is what a mutant may cost before it counts as a survivor. `--only PATTERN` draws by name (`rcsc.table.boxes.*`), `--tests PATTERN` takes
-some of the test files, `--covering FILE` keeps what is learnt of the tests from run to run.
+is what a mutant may cost before it counts as a survivor. `--only PATTERN` draws by name (`rcsc.proof.table.boxes.*`), `--tests PATTERN`
+takes some of the test files, `--covering FILE` keeps what is learnt of the tests from run to run.
 """
 
 import argparse
@@ -82,7 +82,7 @@ CAUGHT, SURVIVED, UNTESTED = "caught", "survived", "no test"
 Tell = Callable[[Mapping[str, Any]], None]
 """Hands what is known so far from a fork to its parent."""
 Function = str
-"""A function by module and qualified name, `rcsc.table.regions.partition:Gaps.grown`."""
+"""A function by module and qualified name, `rcsc.proof.table.regions.partition:Gaps.grown`."""
 
 
 @dataclass(frozen=True, slots=True)

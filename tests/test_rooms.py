@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands.group import COMMANDS
+from rcsc.front.commands.group import COMMANDS
 
 REPO = Path(__file__).parents[1]
 ROOMS = sorted(
@@ -26,7 +26,7 @@ def test_a_room_teaches_what_is_in_it(room: str) -> None:
     files = {path.stem for path in Path(module.__file__).parent.glob("*.py")} - {"__init__"}
     named = set(re.findall(r"`(?:\w+/)?(\w+)(?:\.py)?`", module.__doc__))
     named |= {
-        name.rpartition(".")[2] for name in COMMANDS if room.startswith("rcsc.commands")
+        name.rpartition(".")[2] for name in COMMANDS if room.startswith("rcsc.front.commands")
     }  # `group` tells of each
     assert not files - named, "modules that the room does not name"
     lines = len(module.__doc__.splitlines())

@@ -25,20 +25,20 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
-from rcsc.commands import run
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Proposal, Severity
-from rcsc.diagnostics.report import Report
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Proposal, Severity
+from rcsc.base.diagnostics.report import Report
+from rcsc.code.testing.inputs.sampling import declarations, snapshot
+from rcsc.desk.editor.lenses import witness_run
+from rcsc.desk.editor.workspace import Workspace
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
-from rcsc.editor.lenses import witness_run
-from rcsc.editor.workspace import Workspace
+from rcsc.front.commands import run
 from rcsc.lang.interpret import UNDEFINED, initial, matching_lines
 from rcsc.lang.model import Program, key_bounds, key_of, unspelled
 from rcsc.lang.resolve import compile_text
 from rcsc.lang.written.changes import with_proposal
-from rcsc.solvers.options import Options
-from rcsc.testing.inputs.sampling import declarations, snapshot
+from rcsc.proof.solvers.options import Options
 
 MOST_CPU_S = 2.0
 """Of one command, on one table."""

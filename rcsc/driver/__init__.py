@@ -12,7 +12,7 @@ it found nothing wrong; nothing is written unless all that was asked for is prov
 >>> from tempfile import TemporaryDirectory
 >>> from rcsc.driver.check import check
 >>> from rcsc.driver.settings import Settings
->>> from rcsc.solvers.options import Options
+>>> from rcsc.proof.solvers.options import Options
 >>> with TemporaryDirectory() as folder:
 ...     _ = Path(folder, "a.rcs").write_text("input a : bool\ntable t {\n| line | a ||\n|------|---||\n| 1 | true ||\n}\n")
 ...     report = check(Settings((folder,), Options(), use_cache=False))
@@ -21,7 +21,7 @@ it found nothing wrong; nothing is written unless all that was asked for is prov
 
 What was proved stays proved while nothing that it depends on changes; an unchanged project is not even parsed again.
 Trusted: that only what was proved is emitted, which the types say (`lower` takes a `ProvedProgram`), and the cache
-(`rcsc.host`).
+(`rcsc.base.host`).
 
 Modules, in the order the data flows: `settings` (what commands are given and hand back), `unchanged` (a whole check
 remembered), `proofs` (of one program), `pipeline` (read, resolve, prove), `outline` and `together` (what earlier proofs of

@@ -5,20 +5,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rcsc import certify as checker
-from rcsc.certify import CaseAnswer, Certified
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
-from rcsc.diagnostics.report import Report
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
+from rcsc.base.diagnostics.report import Report
+from rcsc.base.diagnostics.source import Span
+from rcsc.base.host.files import write_atomically
+from rcsc.base.host.files.read import Malformed, content, json_of
 from rcsc.driver.pipeline import proved, read
 from rcsc.driver.settings import Conclusion, Settings
-from rcsc.host.files import write_atomically
-from rcsc.host.files.read import Malformed, content, json_of
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import Loaded
 from rcsc.lang.resolve import resolve
-from rcsc.solvers.smtlib import cvc5_says
+from rcsc.proof import certify as checker
+from rcsc.proof.certify import CaseAnswer, Certified
+from rcsc.proof.solvers.smtlib import cvc5_says
 
 MOST_PROBLEMS = 10
 

@@ -7,13 +7,13 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.report import Report
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.report import Report
+from rcsc.base.host.cache import Cache, open_cache
+from rcsc.base.host.files.read import Malformed, content
 from rcsc.driver.settings import Settings
 from rcsc.driver.unchanged import recall, remember
-from rcsc.host.cache import Cache, open_cache
-from rcsc.host.files.read import Malformed, content
 from rcsc.lang.project import project_root, systems_above, used_elsewhere
 
 _UNREAD = frozenset((Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER))

@@ -5,20 +5,20 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.base.diagnostics.source import Span
+from rcsc.code.emit import TARGETS, emitted
+from rcsc.code.emit.generated import stale, write
+from rcsc.code.emit.lower import lower
+from rcsc.code.emit.plan import Plan
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Conclusion, Settings
-from rcsc.emit import TARGETS, emitted
-from rcsc.emit.generated import stale, write
-from rcsc.emit.lower import lower
-from rcsc.emit.plan import Plan
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import PROJECT_FILE, prefix, project_root
-from rcsc.link import Linked, emit_system, linked, outward
+from rcsc.proof.solvers.options import Options
 from rcsc.run.description import BadDescription, description, places
-from rcsc.solvers.options import Options
+from rcsc.run.link import Linked, emit_system, linked, outward
 
 DESCRIPTION = "system.toml"
 """What the description of a system is called in its folder."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rcsc.base.host.cache import Cache
 from rcsc.compose.proof.standing import (
     KnownSystem,
     LevelOutline,
@@ -18,7 +19,6 @@ from rcsc.compose.proof.standing import (
     standing,
 )
 from rcsc.driver.unchanged import as_before, digest_at, digests
-from rcsc.host.cache import Cache
 from rcsc.run.description import BadDescription, description, places
 
 if TYPE_CHECKING:

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
-from rcsc.diagnostics.report import Report, merged
+from rcsc.base.diagnostics.diagnostic import Diagnostic, sort_key
+from rcsc.base.diagnostics.report import Report, merged
+from rcsc.base.host.cache import Cache
+from rcsc.base.host.memory import uncollected
 from rcsc.driver.proofs import prove
 from rcsc.driver.settings import Proof, Settings
-from rcsc.host.cache import Cache
-from rcsc.host.memory import uncollected
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import closure, resolve
@@ -33,7 +33,7 @@ class Proved:
 
     def unread(self) -> Iterator[Diagnostic]:
         """Warn of what the programs declare and do not read."""
-        from rcsc.table.findings.unread import unread  # keep lazy: `rcsc check` alone asks
+        from rcsc.proof.table.findings.unread import unread  # keep lazy: `rcsc check` alone asks
 
         for proof in self.proofs:
             if proof.program is not None:

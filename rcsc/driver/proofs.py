@@ -11,20 +11,20 @@ from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
-from rcsc.diagnostics.report import TableReport, Verdict, resting
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
+from rcsc.base.diagnostics.report import TableReport, Verdict, resting
+from rcsc.base.diagnostics.source import Span
+from rcsc.base.host.cache import Cache
 from rcsc.driver.settings import Proof
-from rcsc.host.cache import Cache
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import Program, Table
 from rcsc.lang.project import Loaded
-from rcsc.procedures.invariants import properties_elsewhere
-from rcsc.procedures.obligations import called_by_lines
-from rcsc.solvers.options import Options
-from rcsc.table.mending import mended
-from rcsc.table.program import prove_program
-from rcsc.table.verdict import SolversDisagree, TableVerdict
+from rcsc.proof.procedures.invariants import properties_elsewhere
+from rcsc.proof.procedures.obligations import called_by_lines
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.mending import mended
+from rcsc.proof.table.program import prove_program
+from rcsc.proof.table.verdict import SolversDisagree, TableVerdict
 
 WORTH_A_PROCESS = 20_000
 """Cells of a program's tables from which several processes are quicker than one."""

@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
-from rcsc.diagnostics.printable import escape
-from rcsc.diagnostics.report import Report
-from rcsc.diagnostics.source import Source, Span
-from rcsc.diff.upgrade import Upgraded, upgrade
-from rcsc.host.files import write_atomically
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, sort_key
+from rcsc.base.diagnostics.printable import escape
+from rcsc.base.diagnostics.report import Report
+from rcsc.base.diagnostics.source import Source, Span
+from rcsc.base.host.files import write_atomically
 from rcsc.lang.model import Program
 from rcsc.lang.project import load, project_root
 from rcsc.lang.resolve import resolve
@@ -21,6 +20,7 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.layout import WIDTH
 from rcsc.lang.syntax.parse import parse
+from rcsc.lang.written.upgrade import Upgraded, upgrade
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.report import Report, TableReport
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.report import Report, TableReport
 
 if TYPE_CHECKING:
     from rcsc.lang.model import Program, ProvedProgram
-    from rcsc.solvers.options import Options
+    from rcsc.proof.solvers.options import Options
 
 
 def silent(_doing: str) -> None:

@@ -11,6 +11,20 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
+from rcsc.base.diagnostics.report import (
+    NOT_PROVED,
+    InSystem,
+    Report,
+    SystemReport,
+    TableReport,
+    named,
+    trusting,
+)
+from rcsc.base.diagnostics.source import Source, Span
+from rcsc.base.host.cache import Cache, cache_of
+from rcsc.base.host.files import read
 from rcsc.compose.contract.claims import UNREACHED, Promise
 from rcsc.compose.proof.standing import (
     ASSUMPTION,
@@ -21,13 +35,7 @@ from rcsc.compose.proof.standing import (
     KnownSystem,
     LevelOutline,
 )
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
-from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport, named, trusting
-from rcsc.diagnostics.source import Source, Span
 from rcsc.driver.outline import known
-from rcsc.host.cache import Cache, cache_of
-from rcsc.host.files import read
 from rcsc.lang.project import systems_above
 from rcsc.run.description import BadDescription, description, places
 

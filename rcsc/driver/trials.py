@@ -7,40 +7,40 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rcsc.campaign.choose import plant_name, plant_of
-from rcsc.campaign.counterexamples import folder_word
-from rcsc.campaign.shrink import MOST_TRIES, shrink
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.base.diagnostics.source import Span
+from rcsc.base.host import children
+from rcsc.base.host.files import write_atomically
+from rcsc.code.emit import TARGETS, emitted
+from rcsc.code.emit.generated import write
+from rcsc.code.testing.coverage.document import VectorSet
+from rcsc.code.testing.coverage.vector_set import figure, vector_set, write_vectors
+from rcsc.code.testing.inputs.snapshot import Missing
+from rcsc.code.testing.mutants import Opinion
+from rcsc.code.testing.suite import Proofs, SuiteOptions, run_suite
 from rcsc.driver.compile import Generated, planned, systems_in, tables_in
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import Conclusion, Settings, TestEffort
-from rcsc.emit import TARGETS, emitted
-from rcsc.emit.generated import write
-from rcsc.episodes.episode import Episode
-from rcsc.episodes.outcome import EpisodeFinding
-from rcsc.episodes.search import KINDS, Searched, found_again, search
-from rcsc.episodes.stand import Stand, stand
-from rcsc.host import children
-from rcsc.host.files import write_atomically
 from rcsc.lang.model import Expr, Program, ProvedProgram, Snapshot, Table
-from rcsc.link import Linked, drawing, run_beside, script
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.symbolic.encode import declared, encode
+from rcsc.proof.table.certificate import must_cover
+from rcsc.proof.table.decide import prove_table
+from rcsc.proof.table.verdict import Gap
+from rcsc.run.campaign.choose import plant_name, plant_of
+from rcsc.run.campaign.counterexamples import folder_word
+from rcsc.run.campaign.shrink import MOST_TRIES, shrink
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import BadDescription, description
+from rcsc.run.episodes.episode import Episode
+from rcsc.run.episodes.outcome import EpisodeFinding
+from rcsc.run.episodes.search import KINDS, Searched, found_again, search
+from rcsc.run.episodes.stand import Stand, stand
 from rcsc.run.executors import NotBuilt
+from rcsc.run.link import Linked, drawing, run_beside, script
 from rcsc.run.system import Kind
-from rcsc.solvers.options import Options
-from rcsc.solvers.smt import Answer, Solver
-from rcsc.symbolic.encode import declared, encode
-from rcsc.table.certificate import must_cover
-from rcsc.table.decide import prove_table
-from rcsc.table.verdict import Gap
-from rcsc.testing.coverage.document import VectorSet
-from rcsc.testing.coverage.vector_set import figure, vector_set, write_vectors
-from rcsc.testing.inputs.snapshot import Missing
-from rcsc.testing.mutants import Opinion
-from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
 
 MOST_TICKS_EACH = 5
 """Ticks of a whole system for each example of a table."""

@@ -10,14 +10,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.report import Report, TableReport
-from rcsc.diagnostics.source import Source
-from rcsc.host.cache import Cache
-from rcsc.host.files.read import Malformed, content
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.report import Report, TableReport
+from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.cache import Cache
+from rcsc.base.host.files.read import Malformed, content
 from rcsc.lang.project import MOST_BYTES, Loaded, listed, places
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
 
 _PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE}
 """Findings that may go away though no file that was read changes; as do all of 1xx and 9xx."""

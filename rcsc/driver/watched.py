@@ -7,6 +7,8 @@ made now with the effort that `rcsc prove` takes, and kept.
 from collections.abc import Iterator
 from pathlib import Path
 
+from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import (
     AGAIN,
     CONTRACT,
@@ -28,10 +30,8 @@ from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import lines_write
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, read_systems
-from rcsc.diagnostics.coded import CodedError
-from rcsc.episodes.proved.claims import Claim, Claims, Neighbour, ProvedLevel, Trusted
-from rcsc.host.cache import Cache
 from rcsc.run.description import description
+from rcsc.run.episodes.proved.claims import Claim, Claims, Neighbour, ProvedLevel, Trusted
 
 _TOGETHER = frozenset({RUNS, ENDING, RESTING})
 """Claims that are all of several others, which are watched one by one."""

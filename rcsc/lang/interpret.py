@@ -13,7 +13,7 @@ from enum import IntEnum
 from functools import partial
 from typing import Any, TypeAlias, assert_never
 
-from rcsc.diagnostics.coded import USERS_FAILURES, raised
+from rcsc.base.diagnostics.coded import USERS_FAILURES, raised
 from rcsc.lang.model import (
     Action,
     Admit,

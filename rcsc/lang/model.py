@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NewType, TypeAlias
 
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.operator_table import COMPARISONS as COMPARISONS  # noqa: PLC0414 - part of the model
 from rcsc.lang.operator_table import Op as Op  # noqa: PLC0414 - as above
 from rcsc.lang.operator_table import Operator, single, spell_single
@@ -1034,9 +1034,9 @@ class ProvedProgram:
 
     def __post_init__(self) -> None:
         if self.seal is not _PROOF_SEAL:
-            raise TypeError("a ProvedProgram is constructed only by rcsc.table")
+            raise TypeError("a ProvedProgram is constructed only by rcsc.proof.table")
 
 
 def seal_of_proof() -> object:
-    """Seal a proof; for `rcsc.table` alone, and tests of later stages."""
+    """Seal a proof; for `rcsc.proof.table` alone, and tests of later stages."""
     return _PROOF_SEAL

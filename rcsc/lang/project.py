@@ -11,10 +11,10 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
-from rcsc.diagnostics.source import Source, Span
-from rcsc.host.files.read import MOST_TOML_BYTES, Malformed, TooLarge, content, toml_of
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, sort_key
+from rcsc.base.diagnostics.source import Source, Span
+from rcsc.base.host.files.read import MOST_TOML_BYTES, Malformed, TooLarge, content, toml_of
 
 if TYPE_CHECKING:  # who only looks for the folder of a project, as a running level does, needs no syntax
     from rcsc.lang.syntax import tree

@@ -33,11 +33,11 @@ from typing import Any
 
 
 class _Room(ModuleType):
-    """This room, which is a function as well: `rcsc.run("system.toml")` is that of `rcsc.api`."""
+    """This room, which is a function as well: `rcsc.run("system.toml")` is that of `rcsc.front.api`."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Run a system, as `rcsc.api.run` says."""
-        return import_module("rcsc.api").run(*args, **kwargs)
+        """Run a system, as `rcsc.front.api.run` says."""
+        return import_module("rcsc.front.api").run(*args, **kwargs)
 
 
 sys.modules[__name__].__class__ = _Room

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rcsc.host.described import (
+from rcsc.base.host.described import (
     Anything,
     Document,
     Entries,
@@ -23,7 +23,7 @@ from rcsc.host.described import (
     Word,
     nearest,
 )
-from rcsc.host.files.names import BadName, is_identifier, is_member, within
+from rcsc.base.host.files.names import BadName, is_identifier, is_member, within
 from rcsc.lang.project import project_root
 
 PYTHON: Mapping[str, Kind] = {

@@ -10,9 +10,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Source
-from rcsc.host.described import (
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.described import (
     Anything,
     BadFile,
     Document,
@@ -28,8 +28,8 @@ from rcsc.host.described import (
     nearest,
     read_document,
 )
-from rcsc.host.files.names import BadName, is_member, member, within
-from rcsc.host.files.read import CheckedFields
+from rcsc.base.host.files.names import BadName, is_member, member, within
+from rcsc.base.host.files.read import CheckedFields
 from rcsc.lang.project import Neighbours, neighbours, project_root
 from rcsc.run.declared_plant import PlantSpec, plants
 
@@ -108,7 +108,7 @@ class Description:
         displays: Sets of variables to look at, by the name that a level's `display` gives them.
         document: The file, for the places of what is wrong with it.
         plants: What may stand outside the levels; the first does when nobody says which.
-        data_python: `MODULE:NAME` of who knows the data (`rcsc.pages.data`); empty for nobody.
+        data_python: `MODULE:NAME` of who knows the data (`rcsc.views.pages.data`); empty for nobody.
         script: The orders that are given when nobody says which; None where the description names none.
         within: Cycles without a fault in which every command from outside is to end when the system is tested.
     """

@@ -19,10 +19,10 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Protocol
 
-from rcsc.diagnostics.coded import USERS_FAILURES, CodedError, raised
-from rcsc.host import children
-from rcsc.host.files.names import BadName
-from rcsc.host.files.read import Malformed, content
+from rcsc.base.diagnostics.coded import USERS_FAILURES, CodedError, raised
+from rcsc.base.host import children
+from rcsc.base.host.files.names import BadName
+from rcsc.base.host.files.read import Malformed, content
 from rcsc.run.signature import FORMATS, LevelSign, Signature, Value, Values, sources_of
 
 TYPES = "_types.h"

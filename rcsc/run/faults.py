@@ -6,9 +6,9 @@ In: what stands outside, and a name. Out: the plant that has the fault, with it 
 from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
-from rcsc.diagnostics.coded import CodedError
-from rcsc.diagnostics.codes import Code
-from rcsc.host.described import nearest
+from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.described import nearest
 
 
 @runtime_checkable

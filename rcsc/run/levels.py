@@ -7,8 +7,8 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rcsc.diagnostics.coded import USERS_FAILURES, CodedError, raised
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.coded import USERS_FAILURES, CodedError, raised
+from rcsc.base.diagnostics.codes import Code
 from rcsc.run.buffers import Buffers
 from rcsc.run.description import BadDescription, Description, Feed, LevelSpec
 from rcsc.run.executors import Executor

@@ -8,10 +8,10 @@ by hand there is nothing to compare: that both ends of a buffer have the same fi
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.diagnostics.source import Source
-from rcsc.host.files import read
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.files import read
 from rcsc.lang.model import Link, LinkPart, Program
 from rcsc.run.description import BadDescription, Description
 

@@ -12,8 +12,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias
 
-from rcsc.host.files.names import BadName, identifier, inside, shown
-from rcsc.host.files.read import MIB, CheckedFields, Malformed, json_of, text
+from rcsc.base.host.files.names import BadName, identifier, inside, shown
+from rcsc.base.host.files.read import MIB, CheckedFields, Malformed, json_of, text
 from rcsc.lang.operator_table import single, spell_single
 from rcsc.lang.restart import Adopted, After, Fixed, Part, SameAs, Stands, by_names
 from rcsc.run.description import BadDescription

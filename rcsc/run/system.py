@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
-from rcsc.host.described import Document, KeyPath, nearest
+from rcsc.base.host.described import Document, KeyPath, nearest
 from rcsc.run.adopt import Restarted, restart
 from rcsc.run.buffers import Buffers, CommonMemory
 from rcsc.run.description import BadDescription, Description

@@ -5,9 +5,9 @@ In: a description. Out: the generated files that bear the mark (`host.files.writ
 
 from pathlib import Path
 
-from rcsc.diagnostics.codes import Code
-from rcsc.host.files.read import content
-from rcsc.host.files.write import UNPROVED
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.files.read import content
+from rcsc.base.host.files.write import UNPROVED
 from rcsc.run.description import BadDescription, Description
 from rcsc.run.signature import generated_files
 

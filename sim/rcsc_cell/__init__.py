@@ -19,5 +19,5 @@ that slips, a joint at its limit, a report that is not true.
 Rooms, in the order the data flows: `database` (places, routes, parts), `workstation` (scripts, interlocks), `vision`
 (pictures and what is made of them), `cell` (arm, fixtures, mechanism), `properties` (what is to hold), `pictures`,
 `pages` and `live` (what people look at), `bound` (any model for MuJoCo as a plant), `episodes` (one run with whatever
-goes wrong in it; `rcsc.campaign` plays many).
+goes wrong in it; `rcsc.run.campaign` plays many).
 """

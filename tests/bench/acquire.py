@@ -10,8 +10,8 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from rcsc.evidence.processors.boards import BOARDS, Board, harness, link, run_image
-from rcsc.host.tools import BuildFailed, run_command
+from rcsc.base.host.tools import BuildFailed, run_command
+from rcsc.views.evidence.processors.boards import BOARDS, Board, harness, link, run_image
 
 REPO = Path(__file__).parents[2]
 CASES = 3000

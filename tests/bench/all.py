@@ -21,13 +21,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from rcsc.emit import emit_c
-from rcsc.emit.lower import lower
+from rcsc.code.emit import emit_c
+from rcsc.code.emit.lower import lower
 from rcsc.lang.model import ProvedProgram, seal_of_proof
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
-from rcsc.solvers.options import Options
-from rcsc.table.decide import prove_table
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.decide import prove_table
 from tests.bench import drawn, executors, loop
 from tests.bench.made import families
 from tests.bench.made.families import Fault

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcsc.host.files import write_atomically
+from rcsc.base.host.files import write_atomically
 from rcsc.lang.model import Program, Table
-from rcsc.solvers.options import Options
-from rcsc.table.decide import prove_table
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.decide import prove_table
 from tests.bench import executors
 from tests.bench.made import families
 from tests.bench.made.peers import installed

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 
-from rcsc.editor.server.serve import at_rest
-from rcsc.editor.server.session import Session
-from rcsc.editor.values import Answer
+from rcsc.desk.editor.server.serve import at_rest
+from rcsc.desk.editor.server.session import Session
+from rcsc.desk.editor.values import Answer
 from rcsc.lang.written.tables import cells_of, dashes, tables_of
 
 TABLES = Path(__file__).parents[2] / "tables"

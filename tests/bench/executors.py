@@ -17,16 +17,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rcsc.emit import emit_c, emit_python
-from rcsc.emit.c.ctext import CText
-from rcsc.emit.code_tree import IN_C
-from rcsc.emit.identifiers import names_of
-from rcsc.emit.lower import lower
+from rcsc.code.emit import emit_c, emit_python
+from rcsc.code.emit.c.ctext import CText
+from rcsc.code.emit.code_tree import IN_C
+from rcsc.code.emit.identifiers import names_of
+from rcsc.code.emit.lower import lower
 from rcsc.lang.model import Box, Program, ProvedProgram, Value, key_bounds, seal_of_proof, value_of_key
 from rcsc.lang.project import load
 from rcsc.lang.resolve import compile_text, resolve
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
 from tests.bench.made import families
 
 INPUTS = 512

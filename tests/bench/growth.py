@@ -20,8 +20,8 @@ from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import prove_level
 from rcsc.compose.proof.system import transition_systems
-from rcsc.solvers.sat import Sat
-from rcsc.solvers.smt import Solver
+from rcsc.proof.solvers.sat import Sat
+from rcsc.proof.solvers.smt import Solver
 from tests.small_hierarchies.made import BOTTOM, RIGHT, Hierarchy, Line, MadeLevel, MadeTable
 from tests.small_hierarchies.text import written
 

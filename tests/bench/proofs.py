@@ -10,14 +10,14 @@ import resource
 import time
 from collections.abc import Callable
 
-from rcsc.certify import check_certificate
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.source import Source
 from rcsc.lang.model import Program
 from rcsc.lang.resolve import compile_text
 from rcsc.lang.syntax.parse import parse
-from rcsc.solvers.options import Options
-from rcsc.table.certificate import program_certificate
-from rcsc.table.decide import prove_table
+from rcsc.proof.certify import check_certificate
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.certificate import program_certificate
+from rcsc.proof.table.decide import prove_table
 from tests.bench.made import families
 from tests.bench.made.families import Fault
 from tests.bench.made.peers import installed

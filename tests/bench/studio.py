@@ -14,8 +14,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from rcsc.commands import run as rcsc
-from rcsc.shell.opening import Opening
+from rcsc.desk.shell.opening import Opening
+from rcsc.front.commands import run as rcsc
 from tests.studio.driven import Seat, scrubbed, seated
 
 SYSTEM = Path(__file__).parents[2] / "tables" / "system.toml"

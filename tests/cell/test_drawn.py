@@ -12,22 +12,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import rcsc.pages.finding_page
-from rcsc.commands import run
+import rcsc.views.pages.finding_page
+from rcsc.base.host.files.names import BadName
 from rcsc.compose.contract.obligations import ObligationKey, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.rerun import _begun, part_of, record
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
-from rcsc.host.files.names import BadName
-from rcsc.pages.frame import quoted
+from rcsc.front.commands import run
 from rcsc.run.description import description
 from rcsc.run.log.finding import LoggedCycle, LoggedFinding, finding_facts, finding_of
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.recorder import Recorder
 from rcsc.run.log.ticks import LoggedTick, frames
 from rcsc.run.system import signatures
+from rcsc.views.pages.frame import quoted
 from rcsc_cell.cell.arm import skeleton, solve
 from rcsc_cell.cell.reach import home
 from rcsc_cell.database.ask import Database
@@ -435,7 +435,7 @@ def test_a_level_that_does_not_run_says_nothing(last_echo: Path) -> None:
     ]  # fmt: skip
     assert log.finding is not None
     assert "does not run in this cycle" in Page(
-        rcsc.pages.finding_page.page(without, log.finding, None)
+        rcsc.views.pages.finding_page.page(without, log.finding, None)
     ).words(2)
 
 
@@ -446,11 +446,13 @@ def test_the_page_is_the_same_again_and_escaped(published: Path) -> None:
     log = read(published / "task_acquire_one_line_10_and_14.mcap")
     assert log.finding is not None
     with pytest.raises(BadName):
-        rcsc.pages.finding_page.page(replace(log, facts={**log.facts, "name": "<b>&"}), log.finding, None)
-    text = rcsc.pages.finding_page.page(
+        rcsc.views.pages.finding_page.page(
+            replace(log, facts={**log.facts, "name": "<b>&"}), log.finding, None
+        )
+    text = rcsc.views.pages.finding_page.page(
         log, replace(log.finding, obligation="<i> `a<b`"), None, "for <u> reasons."
     )
-    assert text == rcsc.pages.finding_page.page(
+    assert text == rcsc.views.pages.finding_page.page(
         log, replace(log.finding, obligation="<i> `a<b`"), None, "for <u> reasons."
     )
     for said in ("&lt;i&gt; <code>a&lt;b</code>", "for &lt;u&gt; reasons."):
@@ -469,8 +471,8 @@ def test_the_page_is_the_same_again_and_escaped(published: Path) -> None:
 def test_what_holds_of_the_whole_run_is_said(published: Path, change: dict[str, Any], said: str) -> None:
     log = read(published / "task_acquire_one_line_10_and_14.mcap")
     assert log.finding is not None
-    assert said not in rcsc.pages.finding_page.page(log, log.finding, None)
-    assert said in rcsc.pages.finding_page.page(log, replace(log.finding, **change), None)
+    assert said not in rcsc.views.pages.finding_page.page(log, log.finding, None)
+    assert said in rcsc.views.pages.finding_page.page(log, replace(log.finding, **change), None)
 
 
 def test_parts_and_marks_are_where_they_are() -> None:

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 import pytest
 
-from rcsc.host.files.plain import Kept, plain, read
+from rcsc.base.host.files.plain import Kept, plain, read
 from rcsc.run.signature import Values
 from rcsc_cell.cell.fixture import (
     IN_MM,

@@ -15,8 +15,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.pages.report import CellPicture, Figure, Matched, Placement, ReportRow, Story, page, report
 from rcsc.run.plant.models.solid import OVERVIEW, View, solid
+from rcsc.views.pages.report import CellPicture, Figure, Matched, Placement, ReportRow, Story, page, report
 from rcsc_cell.cell.arm import LIMITS_DEG, plate, skeleton
 from rcsc_cell.database.pose import nine
 from rcsc_cell.pictures.stick import Scene, pads, stick

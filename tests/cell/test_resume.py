@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
+from rcsc.front.commands import run
 from rcsc.run.description import description
 from rcsc.run.orders.operator import ScriptedRun
 from rcsc.run.orders.stopped import NotResumed, StoppedRuns, stopped_path
@@ -110,7 +110,7 @@ def _stopped(made: ScriptDraft) -> StoppedRuns:
 
 def rcsc(*args: str) -> "subprocess.CompletedProcess[str]":
     """A process of its own."""
-    command = [sys.executable, "-c", "from rcsc.commands import main; main()", *args]
+    command = [sys.executable, "-c", "from rcsc.front.commands import main; main()", *args]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 

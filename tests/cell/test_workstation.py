@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
+from rcsc.front.commands import run
 from rcsc.run.orders.script import BadScript
 from rcsc.run.system import System
 from rcsc_cell.cell import reach

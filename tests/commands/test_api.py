@@ -14,7 +14,7 @@ from typing import Literal
 import pytest
 
 import rcsc
-from rcsc.commands import run as command
+from rcsc.front.commands import run as command
 from rcsc.run.log.export import rows
 from rcsc.run.log.read import read
 from tests.support.programs.systems import SYSTEM, small_system, small_text
@@ -53,9 +53,9 @@ def test_importing_rcsc_imports_nothing_else() -> None:
 def test_types_names_and_what_is_there_are_the_same() -> None:
     stub = ast.parse((REPO / "rcsc" / "__init__.pyi").read_text(encoding="utf-8"))
     typed = {alias.asname for node in stub.body if isinstance(node, ast.ImportFrom) for alias in node.names}
-    import rcsc.api
+    import rcsc.front.api
 
-    assert typed | {"__version__"} == set(rcsc.__all__) == {*rcsc.api.__all__, "__version__"}
+    assert typed | {"__version__"} == set(rcsc.__all__) == {*rcsc.front.api.__all__, "__version__"}
     assert dir(rcsc) == sorted(rcsc.__all__)
     for name in rcsc.__all__:
         assert getattr(rcsc, name).__doc__
@@ -236,6 +236,6 @@ def test_a_row_that_fails_ends_the_run_with_its_reason(dock: Path) -> None:
 
 def test_the_room_and_the_function_have_one_name() -> None:
     """Whichever is imported first."""
-    for first in ("rcsc.run.system", "rcsc.api", "rcsc"):
+    for first in ("rcsc.run.system", "rcsc.front.api", "rcsc"):
         script = f"import {first}, rcsc; f = rcsc.run; import rcsc.run.system; assert f is rcsc.run and callable(f); rcsc.run.system.System"
         subprocess.run([sys.executable, "-c", script], check=True)

@@ -15,9 +15,9 @@ from urllib.parse import unquote_to_bytes
 import jsonschema
 import pytest
 
-from rcsc import commands
-from rcsc.commands import run
 from rcsc.driver import together
+from rcsc.front import commands
+from rcsc.front.commands import run
 from rcsc.run.description import Description, description
 from tests.support.programs.texts import edited
 
@@ -74,7 +74,7 @@ def rcsc(capfd: pytest.CaptureFixture[str]) -> Rcsc:
 
 def process(*args: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", "from rcsc.commands import main; main()", *args],
+        [sys.executable, "-c", "from rcsc.front.commands import main; main()", *args],
         capture_output=True, text=True, check=False, env={**os.environ, **environment},
     )  # fmt: skip
 
@@ -136,7 +136,7 @@ def test_3_a_bug_is_reported_short_and_with_a_trace_on_request(
     def broken(_settings: object) -> None:
         raise ValueError("bad \x1b[31m things")
 
-    monkeypatch.setattr("rcsc.commands.tables.check.check", broken)
+    monkeypatch.setattr("rcsc.front.commands.tables.check.check", broken)
     ran = rcsc("check")
     assert ran.status == 3
     assert ran.err.startswith("error[RCS902]: a bug in rcsc")
@@ -151,7 +151,7 @@ def test_130_interrupted(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(_settings: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("rcsc.commands.tables.check.check", interrupted)
+    monkeypatch.setattr("rcsc.front.commands.tables.check.check", interrupted)
     ran = rcsc("check")
     assert ran.status == 130
     assert "interrupted" in ran.err
@@ -160,7 +160,7 @@ def test_130_interrupted(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_ctrl_c_ends_a_long_run_and_leaves_nothing(folder: Path) -> None:
     write("slow.rcs")
     script = (
-        "import time, rcsc.driver.pipeline as d, rcsc.commands as c, sys\n"
+        "import time, rcsc.driver.pipeline as d, rcsc.front.commands as c, sys\n"
         "def slow(*a, **k):\n    print('ready', flush=True); time.sleep(60)\n"
         "d.read = slow\nsys.exit(c.run(['compile', 'slow.rcs']))"
     )
@@ -179,7 +179,7 @@ def test_ctrl_c_ends_a_long_run_and_leaves_nothing(folder: Path) -> None:
 @pytest.mark.usefixtures("folder")
 def test_who_is_interrupted_does_not_wait_for_the_interpreter() -> None:
     script = (
-        "import atexit, rcsc.driver.pipeline as d, rcsc.commands as c, sys\n"
+        "import atexit, rcsc.driver.pipeline as d, rcsc.front.commands as c, sys\n"
         "atexit.register(print, 'cleared up')\n"
         "def interrupted(*a, **k):\n    print('begun'); raise KeyboardInterrupt\n"
         "d.read = interrupted\nsys.argv[1:] = ['compile', 'slow.rcs']\nc.main()"
@@ -260,7 +260,7 @@ def test_a_folder_with_nothing_to_check_does_not_pass(rcsc: Rcsc) -> None:
 def test_forms(rcsc: Rcsc) -> None:
     write("grip.rcs", GAP)
     form = json.loads(rcsc("check", "--json").out)
-    schema = json.loads((REPO / "rcsc/diagnostics/schema/report.schema.json").read_text())
+    schema = json.loads((REPO / "rcsc/base/diagnostics/schema/report.schema.json").read_text())
     jsonschema.validate(form, schema, jsonschema.Draft202012Validator)
     assert [one["code"] for one in form["diagnostics"]] == ["RCS401"]
     assert form["tables"][0]["verdict"] == "refuted"
@@ -308,7 +308,7 @@ def test_a_full_disk_is_a_coded_error(rcsc: Rcsc) -> None:
     )
     with open("/dev/full", "w", encoding="utf-8") as full:
         ran = subprocess.run(
-            [sys.executable, "-c", "from rcsc.commands import main; main()", "check"],
+            [sys.executable, "-c", "from rcsc.front.commands import main; main()", "check"],
             stdout=full, stderr=subprocess.PIPE, text=True, check=False,
         )  # fmt: skip
     assert ran.returncode == 1
@@ -324,7 +324,7 @@ def test_colour_when_asked_for_and_not_else(rcsc: Rcsc, monkeypatch: pytest.Monk
 
 def test_a_reader_that_goes_away_is_no_bug() -> None:
     write("grip.rcs", GAP)
-    command = f"{sys.executable} -c 'from rcsc.commands import main; main()' check --no-cache"
+    command = f"{sys.executable} -c 'from rcsc.front.commands import main; main()' check --no-cache"
     script = f"{command} | true; echo ${{PIPESTATUS[0]}}"
     ran = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False)
     assert ran.stdout in {"1\n", "141\n"}
@@ -345,7 +345,7 @@ HEAVY = {
     "lark", "z3", "jinja2", "numpy", "rich", "hypothesis", "cvc5", "pysat", "pytest", "subprocess",
     "rcsc.lang.model", "rcsc.lang.syntax.tree",
 }  # fmt: skip
-LOADED = "import sys\nfrom rcsc.commands import run\nstatus = run(sys.argv[1:])\nprint(status, *sorted(sys.modules))"
+LOADED = "import sys\nfrom rcsc.front.commands import run\nstatus = run(sys.argv[1:])\nprint(status, *sorted(sys.modules))"
 
 
 def loaded(*args: str) -> tuple[str, set[str]]:
@@ -367,7 +367,7 @@ def test_a_second_check_imports_nothing_heavy() -> None:
     write("alone/grip.rcs", RIGHT)
     loaded("check", "alone")
     _, of_no_system = loaded("check", "alone")
-    assert not of_no_system & {*HEAVY, "rcsc.driver.together", "rcsc.host.described", "rcsc.compose"}
+    assert not of_no_system & {*HEAVY, "rcsc.driver.together", "rcsc.base.host.described", "rcsc.compose"}
 
 
 def test_a_system_is_read_once_for_all_its_tables(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -699,7 +699,7 @@ table t assuming small {
 
 @pytest.mark.usefixtures("folder")
 def test_certify_of_a_system_drops_no_option(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rcsc.commands.systems.prove import command as prove
+    from rcsc.front.commands.systems.prove import command as prove
 
     given: dict[str, object] = {}
 

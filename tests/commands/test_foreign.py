@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc import commands
+from rcsc.front import commands
 from rcsc.run.adopt import adopt
 from rcsc.run.description import description
 from rcsc.run.system import assemble

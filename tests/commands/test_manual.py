@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from _pytest.mark import ParameterSet
 
+from rcsc.base.diagnostics import report
+from rcsc.base.diagnostics.diagnostic import Severity
+from rcsc.base.diagnostics.source import Source
 from rcsc.compose.contract import claims
 from rcsc.compose.proof.standing import Known
-from rcsc.diagnostics import report
-from rcsc.diagnostics.diagnostic import Severity
-from rcsc.diagnostics.source import Source
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
 from tests.support.programs.stages import reported
 
 REPO = Path(__file__).parents[2]

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import rcsc
-from rcsc.commands import run
-from rcsc.commands.new import NEXT
+from rcsc.front.commands import run
+from rcsc.front.commands.new import NEXT
 from rcsc.run.description import description
 
 REPO = Path(__file__).parents[2]

@@ -14,12 +14,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from rcsc.commands import run
-from rcsc.commands.group import commands
-from rcsc.commands.shared.extras import EXTRAS
+from rcsc.front.commands import run
+from rcsc.front.commands.group import commands
+from rcsc.front.commands.shared.extras import EXTRAS
 
 REPO = Path(__file__).parents[2]
-TEMPLATES = REPO / "rcsc" / "commands" / "templates"
+TEMPLATES = REPO / "rcsc" / "front" / "commands" / "templates"
 README = (REPO / "README.md").read_text(encoding="utf-8")
 
 HIDDEN = """
@@ -30,9 +30,9 @@ def refuse(event, args):
 sys.addaudithook(refuse)
 sys.path[:] = [entry for entry in sys.path if os.path.realpath(entry or ".") != {repo!r}]
 sys.path.insert(0, {site!r})
-import rcsc, rcsc.commands
+import rcsc, rcsc.front.commands
 assert rcsc.__file__.startswith({site!r}), rcsc.__file__
-sys.exit(rcsc.commands.run(sys.argv[1:]))
+sys.exit(rcsc.front.commands.run(sys.argv[1:]))
 """
 
 
@@ -53,9 +53,11 @@ def test_the_wheel_has_the_grammar_the_types_and_all_data(wheel: Path) -> None:
         names = set(archive.namelist())
         metadata = archive.read(next(name for name in names if name.endswith("METADATA"))).decode()
     assert {"rcsc/_data/grammar/rcs.lark", "rcsc/_data/grammar/rcs.tables.json"} <= set(names)
-    assert {"rcsc/py.typed", "rcsc/diagnostics/schema/report.schema.json"} <= names
-    templates = {path.name for path in (REPO / "rcsc" / "emit" / "templates").iterdir()}
-    assert {name.rsplit("/", 1)[1] for name in names if name.startswith("rcsc/emit/templates/")} == templates
+    assert {"rcsc/py.typed", "rcsc/base/diagnostics/schema/report.schema.json"} <= names
+    templates = {path.name for path in (REPO / "rcsc" / "code" / "emit" / "templates").iterdir()}
+    assert {
+        name.rsplit("/", 1)[1] for name in names if name.startswith("rcsc/code/emit/templates/")
+    } == templates
     templates_ = {
         path.relative_to(REPO).as_posix()
         for path in TEMPLATES.rglob("*")
@@ -160,8 +162,8 @@ WITHOUT = """
 import json, sys
 for package in {missing!r}:
     sys.modules[package] = None
-import rcsc.commands
-statuses = [rcsc.commands.run(args) for args in {commands!r}]
+import rcsc.front.commands
+statuses = [rcsc.front.commands.run(args) for args in {commands!r}]
 print(json.dumps([statuses, sorted(name for name in sys.modules if sys.modules[name])]))
 """
 
@@ -226,7 +228,7 @@ def test_the_core_proves_levels_certifies_and_says_what_the_rest_needs(tmp_path:
 
 def test_live_is_refused_before_anything_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "aiohttp", None)
-    monkeypatch.setattr("rcsc.commands.systems.run.made", lambda *_, **__: pytest.fail("it compiled"))
+    monkeypatch.setattr("rcsc.front.commands.systems.run.made", lambda *_, **__: pytest.fail("it compiled"))
     ran = CliRunner().invoke(
         commands, ["run", "make_boxt", "--live", "--system", str(REPO / "tables/system.toml")]
     )
@@ -239,6 +241,6 @@ def test_a_package_that_no_extra_brings_is_a_bug(
     def broken(*_: object) -> None:
         raise ModuleNotFoundError("No module named 'elsewhere'", name="elsewhere")
 
-    monkeypatch.setattr("rcsc.commands.tables.check.check", broken)
+    monkeypatch.setattr("rcsc.front.commands.tables.check.check", broken)
     assert run(["check", str(REPO / "tables" / "examples" / "approach.rcs")]) == 3
     assert "error[RCS902]" in capsys.readouterr().err

@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 import pytest
 
-from rcsc.commands.group import imported
+from rcsc.front.commands.group import imported
 
 REPO = Path(__file__).parents[2]
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.commands.group import commands
+from rcsc.front.commands import run
+from rcsc.front.commands.group import commands
 from tests.picture import CHECK, PICTURE_OF, PICTURES, RUN, masked, printed
 
 REPO = Path(__file__).parents[2]
@@ -212,7 +212,7 @@ def test_what_is_trusted_is_about_as_long_as_it_says() -> None:
         r"^\| (`.*?) \| ([\d,]+) \|", text_of("README.md").split("## 5. Trust")[1], re.MULTILINE
     )
     assert len(rows) == 4
-    assert any("rcsc/certify" in paths for paths, _ in rows)
+    assert any("rcsc/proof/certify" in paths for paths, _ in rows)
     for paths, written in rows:
         count = sum(lines_of(REPO / path) for path in re.findall(r"`([^`]+)`", paths))
         assert abs(int(written.replace(",", "")) - count) <= count * 0.15, f"{paths}: {count:,} lines"

@@ -16,16 +16,16 @@ from urllib.request import urlopen
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.commands.shared.systems import tables_meant
-from rcsc.host.trust import Agreement
-from rcsc.shell.opening import Opening
-from rcsc.studio.build import NO_SYSTEM
-from rcsc.studio.server import Server
+from rcsc.base.host.trust import Agreement
+from rcsc.desk.shell.opening import Opening
+from rcsc.desk.studio.build import NO_SYSTEM
+from rcsc.desk.studio.server import Server
+from rcsc.front.commands import run
+from rcsc.front.commands.shared.systems import tables_meant
 from tests.studio.served import Page, Refused, page, page_at, serving, until
 
 DOCK = Path(__file__).parents[1] / "data" / "dock"
-COMMAND = (sys.executable, "-c", "from rcsc.commands import main; main()", "studio", "--trust")
+COMMAND = (sys.executable, "-c", "from rcsc.front.commands import main; main()", "studio", "--trust")
 
 
 NO_REQUESTS = (

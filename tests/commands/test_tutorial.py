@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
+from rcsc.front.commands import run
 
 PAGE = Path(__file__).parents[2] / "tables" / "tutorial.md"
 FENCE = re.compile(r"^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)

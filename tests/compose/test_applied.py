@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.applied import Texts
@@ -12,8 +11,9 @@ from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.repair import helps, repairs
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
-from rcsc.solvers import smt
-from rcsc.table.mending import Outcome
+from rcsc.front.commands import run
+from rcsc.proof.solvers import smt
+from rcsc.proof.table.mending import Outcome
 from tests.applied import campaign
 from tests.support.programs.systems import solo_system
 from tests.support.programs.texts import edit_file

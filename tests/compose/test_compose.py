@@ -9,7 +9,6 @@ from random import Random
 
 import pytest
 
-from rcsc.commands import run
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.predicates import point
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
@@ -22,13 +21,14 @@ from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
 from rcsc.compose.proof.system import NoProgramError, SystemProof, transition_systems, transition_systems_of
+from rcsc.front.commands import run
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Kind, Real
+from rcsc.proof.solvers.smtlib import cvc5_refutes
+from rcsc.proof.symbolic import values
 from rcsc.run.adopt import adopt
 from rcsc.run.description import BadDescription, description
 from rcsc.run.system import signatures
-from rcsc.solvers.smtlib import cvc5_refutes
-from rcsc.symbolic import values
 from tests.support.programs.systems import LITTLE, SYSTEM, small_level, small_system, small_text
 from tests.support.programs.texts import edit_file, without_row
 from tests.support.proved import obligation_of, prove_system, shortest, time_line
@@ -372,7 +372,8 @@ def test_rcsc_prove_certify_asks_cvc5(
     assert said[1] == said[2]
     assert int(said[1]) > 10
     monkeypatch.setattr(
-        "rcsc.commands.shared.proved.cvc5_refutes", lambda text, **_: "step" not in text and len(text) < 3000
+        "rcsc.front.commands.shared.proved.cvc5_refutes",
+        lambda text, **_: "step" not in text and len(text) < 3000,
     )
     assert run(asked) == 3
     assert "error[RCS901]: level `lower`: cvc5 does not confirm" in capsys.readouterr().err

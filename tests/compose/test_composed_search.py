@@ -17,7 +17,8 @@ import z3
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.commands import run
+from rcsc.base.host import children
+from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.obligations import Obligation, obligations
 from rcsc.compose.contract.predicates import Predicate
@@ -38,20 +39,19 @@ from rcsc.compose.proof.system import (
     transition_systems,
 )
 from rcsc.compose.proof.termination import Phase, longest
-from rcsc.host import children
-from rcsc.host.cache import Cache
+from rcsc.front.commands import run
 from rcsc.lang.model import Bool, Enum, Int, Op, Real, Scalar, real_key
 from rcsc.lang.operator_table import Arithmetic, divide
-from rcsc.solvers import smt
-from rcsc.solvers.options import Limits
-from rcsc.solvers.sat import Sat
-from rcsc.solvers.smt import Answer, Solver
-from rcsc.symbolic import values
-from rcsc.symbolic.bits import Bits, few, key_of_bits
-from rcsc.symbolic.encode import at_most_key
-from rcsc.symbolic.keyed import Keyed
-from rcsc.symbolic.trial import holds_at
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Limits
+from rcsc.proof.solvers.sat import Sat
+from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.bits import Bits, few, key_of_bits
+from rcsc.proof.symbolic.encode import at_most_key
+from rcsc.proof.symbolic.keyed import Keyed
+from rcsc.proof.symbolic.trial import holds_at
+from rcsc.proof.symbolic.values import Node
 from tests.support.programs.systems import (
     LITTLE,
     ORDER_AFTER_ORDER,
@@ -821,7 +821,7 @@ def test_what_is_known_is_said_again_while_nothing_changes(
     asked = ["prove", str(path), "--trace", "0"]
     assert run(asked) == 0
     first = re.sub(r"[\d.]+ s\b", "", capsys.readouterr().out)
-    monkeypatch.setattr("rcsc.commands.systems.proving.proved", lambda *_: 7)
+    monkeypatch.setattr("rcsc.front.commands.systems.proving.proved", lambda *_: 7)
     assert run(asked) == 0
     again = re.sub(r"[\d.]+ s\b", "", capsys.readouterr().out)
     assert again.replace(", by an earlier run", "") == first

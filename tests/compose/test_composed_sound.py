@@ -8,7 +8,6 @@ from random import Random
 
 import pytest
 
-from rcsc.commands import run
 from rcsc.compose.contract.claims import ACCEPTED, CONTRACT, ENDING, RUNS, SAFE, Claim, Key, Need, closed
 from rcsc.compose.contract.environment import links
 from rcsc.compose.contract.obligations import Sort, unstated
@@ -25,13 +24,14 @@ from rcsc.compose.proof.context import of_lines
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.system import NoProgramError, loaded_program, transition_systems
 from rcsc.compose.proof.termination import Ending
+from rcsc.front.commands import run
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Value, VariableName
 from rcsc.lang.restart import Stands
+from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.keyed import Keyed
 from rcsc.run.description import BadDescription, description
-from rcsc.solvers.smt import Answer, Solver
-from rcsc.symbolic import values
-from rcsc.symbolic.keyed import Keyed
 from tests.small_hierarchies.explored import adopted
 from tests.small_hierarchies.level import Reading, Role
 from tests.support.programs.systems import (

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 import rcsc
-from rcsc.commands import run
 from rcsc.compose.contract.beginning import BadStartError, starts
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
@@ -27,10 +26,11 @@ from rcsc.compose.counterexample.pair import followed_together
 from rcsc.compose.counterexample.repair import Repairs, repairs, tried
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
+from rcsc.front.commands import run
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import Value, spell, value_of_text
-from rcsc.table.repair import PartingCell, Partings, left_by, with_cells
-from rcsc.table.verdict import Overlap
+from rcsc.proof.table.repair import PartingCell, Partings, left_by, with_cells
+from rcsc.proof.table.verdict import Overlap
 from tests.support.programs.systems import SYSTEM, going, lower_level, small_level, small_text
 from tests.support.programs.texts import edit_file
 from tests.support.proved import obligation_of, ran

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from rcsc.commands import run
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch
@@ -20,14 +19,15 @@ from rcsc.compose.proof.level import certificate, prove_level
 from rcsc.compose.proof.ranking import RisingLine, fewest, inputs, least_power, parts
 from rcsc.compose.proof.system import transition_systems
 from rcsc.compose.proof.termination import Ending, longest
+from rcsc.front.commands import run
 from rcsc.lang.model import Int, Op, Real
 from rcsc.lang.operator_table import Arithmetic
-from rcsc.solvers import smt
-from rcsc.solvers.smt import Answer, Solver
-from rcsc.solvers.smtlib import cvc5_refutes
-from rcsc.symbolic import values
-from rcsc.symbolic.measured import Measured
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.solvers.smtlib import cvc5_refutes
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.measured import Measured
+from rcsc.proof.symbolic.values import Node
 from tests.small_hierarchies.endless import Edge, edges, endless
 from tests.small_hierarchies.explored import explored
 from tests.small_hierarchies.level import Role, State

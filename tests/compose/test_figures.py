@@ -29,11 +29,11 @@ from rcsc.compose.proof.termination import Ending, Flow
 from rcsc.lang.leaves import parts
 from rcsc.lang.meaning import spelled as spelled_expression
 from rcsc.lang.model import Bool, Int, OneTable, TableName, VariableName
+from rcsc.proof.solvers.options import Limits
+from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.keyed import Keyed
 from rcsc.run.description import BadDescription, Description, Wire, description
-from rcsc.solvers.options import Limits
-from rcsc.solvers.smt import Answer, Solver
-from rcsc.symbolic import values
-from rcsc.symbolic.keyed import Keyed
 from tests.support.programs.systems import (
     SYSTEM,
     alone,

@@ -16,8 +16,7 @@ import rcsc.compose.counterexample.cycle_run
 import rcsc.compose.counterexample.explain
 import rcsc.compose.counterexample.trace
 import rcsc.lang.interpret
-from rcsc.commands import run
-from rcsc.commands.shared.proved import pauses
+from rcsc.base.host.files.write import UNPROVED
 from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.obligations import ObligationKey, Sort, may_meet
 from rcsc.compose.contract.transition import TransitionSystem
@@ -30,16 +29,17 @@ from rcsc.compose.counterexample.repair import helps, weakest_condition
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, record
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceResult, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
-from rcsc.host.files.write import UNPROVED
+from rcsc.front.commands import run
+from rcsc.front.commands.shared.proved import pauses
 from rcsc.lang.interpret import Fault, holds, initial, matching_lines
 from rcsc.lang.model import LineName, Program, Table, Value, VariableName, key_bounds, spell, value_of_key
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.decide import prove_table
 from rcsc.run.description import Description, description
 from rcsc.run.log.read import read
 from rcsc.run.log.replay import Replay
 from rcsc.run.system import assemble
 from rcsc.run.unproved import UnprovedExecutors, marked
-from rcsc.solvers.options import Options
-from rcsc.table.decide import prove_table
 from tests.support.programs.stages import shipped
 from tests.support.programs.systems import SYSTEM, alone, small_level, small_system, small_text
 from tests.support.programs.texts import edit_file, edited, without_row
@@ -896,7 +896,7 @@ def test_a_case_that_breaks_again_fails(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_every_rule_that_can_be_off_has_an_option() -> None:
-    from rcsc.commands.group import imported
+    from rcsc.front.commands.group import imported
 
     options = {name for param in imported("prove").params for name in param.opts}
     assert {f"--{name}" for name in VARIANTS} <= options

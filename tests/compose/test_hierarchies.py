@@ -15,8 +15,8 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.walk import Walk
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace
 from rcsc.compose.proof.system import transition_systems
-from rcsc.symbolic import values
-from rcsc.symbolic.execution import Run
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.execution import Run
 from tests import hierarchies
 from tests.bench.growth import chain, costs
 from tests.hierarchies import Judged, forget, judged

@@ -11,7 +11,10 @@ from random import Random
 
 import pytest
 
-from rcsc.commands import run
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Severity
+from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.cache import open_cache
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.predicates import CLOSELY, Predicate
 from rcsc.compose.contract.properties import every_predicate, property_kept
@@ -24,18 +27,15 @@ from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
 from rcsc.compose.proof.system import transition_systems
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Severity
-from rcsc.diagnostics.source import Source
-from rcsc.host.cache import open_cache
+from rcsc.front.commands import run
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Enum, Kind, Value, key_bounds, value_of_key
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
-from rcsc.solvers.options import Options
-from rcsc.solvers.smtlib import cvc5_refutes
-from rcsc.table.program import prove_program
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smtlib import cvc5_refutes
+from rcsc.proof.table.program import prove_program
 from tests.support.programs.stages import emitted, program_of, refused
 from tests.support.programs.systems import alone, small_level, small_text
 from tests.support.programs.texts import edit_file, edited, one_row_a_line
@@ -197,7 +197,7 @@ def test_a_cached_proof_says_so_too(
     before = json.loads(capsys.readouterr().out)
     path.write_text(GRIP + FALSE + "# a comment\n", encoding="utf-8")
     monkeypatch.setattr(
-        "rcsc.table.program.prove_program", lambda *_args, **_more: pytest.fail("proved again")
+        "rcsc.proof.table.program.prove_program", lambda *_args, **_more: pytest.fail("proved again")
     )
     assert run(["check", str(path), "--json"]) == 0
     again = json.loads(capsys.readouterr().out)

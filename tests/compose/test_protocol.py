@@ -9,7 +9,7 @@ from random import Random
 
 import pytest
 
-from rcsc.commands import run
+from rcsc.code.emit import TARGETS
 from rcsc.compose.contract.claims import Verdict
 from rcsc.compose.contract.obligations import Sort, obligations, unstated
 from rcsc.compose.contract.transition import GHOST
@@ -19,14 +19,14 @@ from rcsc.compose.proof.level import prove_level
 from rcsc.compose.proof.system import prove_transition_systems, transition_systems
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
-from rcsc.emit import TARGETS
+from rcsc.front.commands import run
 from rcsc.lang.model import key_bounds, value_of_key
 from rcsc.lang.protocol import Party, written
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.run.adopt import adopt
 from rcsc.run.description import description
 from rcsc.run.system import signatures
-from rcsc.solvers.options import Options
-from rcsc.solvers.sat import GaveUpError
 from tests.support.programs.texts import edit_file
 
 DOCK = Path(__file__).parents[1] / "data" / "protocol"

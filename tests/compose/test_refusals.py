@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 import rcsc
-from rcsc.commands import run
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.proof.system import SystemProof, transition_systems
+from rcsc.front.commands import run
 from tests.support.programs.systems import LITTLE, solo_system
 from tests.support.proved import prove_system
 

@@ -11,11 +11,11 @@ from typing import Any
 import jsonschema
 import pytest
 
-from rcsc.commands import run
+from rcsc.base.host.cache import FOLDER, Cache
+from rcsc.base.host.files.plain import plain, read
 from rcsc.compose.proof.standing import Known, KnownSystem, SystemOutline, standing
 from rcsc.driver import outline
-from rcsc.host.cache import FOLDER, Cache
-from rcsc.host.files.plain import plain, read
+from rcsc.front.commands import run
 from rcsc.lang.interpret import initial, run_table
 from tests.support.programs.stages import program_of
 from tests.support.programs.systems import HOPED, small_system, small_text, solo_system
@@ -331,7 +331,9 @@ def test_what_was_not_looked_at_is_named(check: Said) -> None:
     assert DECIDES not in said
     form = check("--json", "upper.rcs")
     assert missing in json.loads(form)["systems"][0]["missing"]
-    schema = json.loads(resources.files("rcsc.diagnostics").joinpath("schema/report.schema.json").read_text())
+    schema = json.loads(
+        resources.files("rcsc.base.diagnostics").joinpath("schema/report.schema.json").read_text()
+    )
     jsonschema.validate(json.loads(form), schema, jsonschema.Draft202012Validator)
 
 

@@ -8,20 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.diagnostics.diagnostic import Effects
+from rcsc.base.diagnostics.diagnostic import Effects
+from rcsc.front.commands import run
 from rcsc.lang.interpret import execute, matching_lines
 from rcsc.lang.meaning import relying
 from rcsc.lang.model import Backing, Program, Value
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
-from rcsc.solvers import smt
-from rcsc.solvers.options import Options
-from rcsc.symbolic.alike import alike
-from rcsc.symbolic.effect import CALLS, RUN
-from rcsc.table.diagnose import diagnostics
-from rcsc.table.program import prove_program
-from rcsc.table.verdict import Overlap, TableVerdict
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.symbolic.alike import alike
+from rcsc.proof.symbolic.effect import CALLS, RUN
+from rcsc.proof.table.diagnose import diagnostics
+from rcsc.proof.table.program import prove_program
+from rcsc.proof.table.verdict import Overlap, TableVerdict
 from tests.bench.editor import keys
 from tests.support.programs.stages import program_of
 

@@ -3,10 +3,10 @@
 import pytest
 from click.testing import CliRunner
 
-from rcsc.commands.group import commands
-from rcsc.diagnostics.codes import FAMILIES, Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Severity
-from rcsc.solvers.options import Options
+from rcsc.base.diagnostics.codes import FAMILIES, Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.front.commands.group import commands
+from rcsc.proof.solvers.options import Options
 from tests.support.programs.stages import reported, unread_in
 
 NOTES = {Code.DEFAULT_COVERS, Code.GIVES_WAY, Code.PROPERTY_ELSEWHERE}

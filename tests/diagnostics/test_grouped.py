@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
-from rcsc.commands import run
-from rcsc.diagnostics.render import full, plain
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.render import full, plain
+from rcsc.base.diagnostics.source import Source
+from rcsc.front.commands import run
 from tests.support.programs.stages import reported
 
-SCHEMA = Path(__file__).parents[2] / "rcsc" / "diagnostics" / "schema" / "report.schema.json"
+SCHEMA = Path(__file__).parents[2] / "rcsc" / "base" / "diagnostics" / "schema" / "report.schema.json"
 STATES = """
 enum state { a, b, c, d }
 input now : state

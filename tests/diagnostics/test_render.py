@@ -12,17 +12,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
-from rcsc.diagnostics.github import annotation
-from rcsc.diagnostics.jsonform import report_to_json
-from rcsc.diagnostics.printable import clip, escape, width
-from rcsc.diagnostics.render import full, one_line, paint, plain
-from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
-from rcsc.diagnostics.sarif import fingerprint, sarif, uri
-from rcsc.diagnostics.source import Source, Span
-from rcsc.host.files.plain import plain as as_plain
-from rcsc.host.files.plain import read
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
+from rcsc.base.diagnostics.github import annotation
+from rcsc.base.diagnostics.jsonform import report_to_json
+from rcsc.base.diagnostics.printable import clip, escape, width
+from rcsc.base.diagnostics.render import full, one_line, paint, plain
+from rcsc.base.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
+from rcsc.base.diagnostics.sarif import fingerprint, sarif, uri
+from rcsc.base.diagnostics.source import Source, Span
+from rcsc.base.host.files.plain import plain as as_plain
+from rcsc.base.host.files.plain import read
 
 HERE = Path(__file__).parents[1]
 TEXT = """\
@@ -200,7 +200,7 @@ def schema(name: str) -> Any:
 
 
 def test_json_is_of_the_published_form() -> None:
-    published = schema("../rcsc/diagnostics/schema/report.schema.json")
+    published = schema("../rcsc/base/diagnostics/schema/report.schema.json")
     jsonschema.Draft202012Validator.check_schema(published)
     form = json.loads(json.dumps(report_to_json(REPORT, "check")))
     jsonschema.validate(form, published, jsonschema.Draft202012Validator)

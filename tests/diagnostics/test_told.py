@@ -4,22 +4,22 @@ from typing import Any
 
 import pytest
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.render import full, plain
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.render import full, plain
+from rcsc.base.diagnostics.source import Source
 from rcsc.lang.model import Backing
-from rcsc.procedures.discharge import Asker, Discharge
-from rcsc.solvers import smt
-from rcsc.solvers.options import Options
-from rcsc.symbolic.execution import Run
-from rcsc.table import relational
-from rcsc.table.confirm import Agreement, confirm
-from rcsc.table.decide import prove_table
-from rcsc.table.program import prove_program
-from rcsc.table.regions import splitting
-from rcsc.table.regions.splitting import Tree
-from rcsc.table.verdict import Overlap, TableVerdict, Undecided
+from rcsc.proof.procedures.discharge import Asker, Discharge
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.symbolic.execution import Run
+from rcsc.proof.table import relational
+from rcsc.proof.table.confirm import Agreement, confirm
+from rcsc.proof.table.decide import prove_table
+from rcsc.proof.table.program import prove_program
+from rcsc.proof.table.regions import splitting
+from rcsc.proof.table.regions.splitting import Tree
+from rcsc.proof.table.verdict import Overlap, TableVerdict, Undecided
 from tests.support.programs.stages import program_of, reported
 
 FAULTY = """\

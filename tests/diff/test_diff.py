@@ -13,12 +13,8 @@ from random import Random
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.diagnostics.render import plain
-from rcsc.diff.changes.difference import Basis, Change, ComparedPart, Difference, PartSort, ProgramDifference
-from rcsc.diff.compare import compare
-from rcsc.diff.present import knows, within_reach
-from rcsc.diff.rows import rows
+from rcsc.base.diagnostics.render import plain
+from rcsc.front.commands import run
 from rcsc.lang.interpret import cycle, evaluate, execute, initial, matching_lines
 from rcsc.lang.model import (
     Bool,
@@ -39,10 +35,21 @@ from rcsc.lang.model import (
     spell,
     value_of_key,
 )
-from rcsc.relation.steps import UnansweredError
-from rcsc.solvers import smt
-from rcsc.solvers.options import Options
-from rcsc.solvers.smt import Answer, Solver
+from rcsc.proof.relation.steps import UnansweredError
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.views.diff.changes.difference import (
+    Basis,
+    Change,
+    ComparedPart,
+    Difference,
+    PartSort,
+    ProgramDifference,
+)
+from rcsc.views.diff.compare import compare
+from rcsc.views.diff.present import knows, within_reach
+from rcsc.views.diff.rows import rows
 from tests.support.programs.examples import WALKER
 from tests.support.programs.stages import program_of, shipped
 from tests.support.programs.texts import edit_file, edited, one_row_a_line
@@ -846,7 +853,7 @@ def test_a_question_without_an_answer_leaves_the_steps_open(monkeypatch: pytest.
     def unanswered(*_: object) -> None:
         raise UnansweredError
 
-    monkeypatch.setattr("rcsc.diff.changes.follows.following", unanswered)
+    monkeypatch.setattr("rcsc.views.diff.changes.follows.following", unanswered)
     found = compare(
         "case",
         program_of(LEVEL),

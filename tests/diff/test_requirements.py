@@ -2,15 +2,15 @@
 
 import re
 
-from rcsc.diagnostics.render import plain
-from rcsc.diff.changes.difference import Difference, ProgramDifference
-from rcsc.diff.compare import compare
-from rcsc.diff.jsonform import to_json
-from rcsc.diff.rows import markdown, rows
-from rcsc.emit import emitted
-from rcsc.emit.lower import lower_by_force
+from rcsc.base.diagnostics.render import plain
+from rcsc.code.emit import emitted
+from rcsc.code.emit.lower import lower_by_force
 from rcsc.lang.meaning import digest
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
+from rcsc.views.diff.changes.difference import Difference, ProgramDifference
+from rcsc.views.diff.compare import compare
+from rcsc.views.diff.jsonform import to_json
+from rcsc.views.diff.rows import markdown, rows
 from tests.support.programs.stages import program_of
 
 TEXT = """input ready : bool

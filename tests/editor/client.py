@@ -37,7 +37,7 @@ class Client:
         self._arrived = threading.Condition()
         self._next = 0
         self._versions: dict[str, int] = {}
-        code = "from rcsc.commands import main; main()"
+        code = "from rcsc.front.commands import main; main()"
         self.process = subprocess.Popen(
             [sys.executable, "-c", code, "lsp", "--stdio"],
             stdin=subprocess.PIPE,
@@ -187,7 +187,7 @@ class Client:
 
 def applied(text: str, edits: list[dict[str, Any]]) -> str:
     """A text with edits made that count as a client does that has said nothing: in UTF-16."""
-    from rcsc.editor.places import Lines, Place, Units
+    from rcsc.desk.editor.places import Lines, Place, Units
 
     lines = Lines(text)
 

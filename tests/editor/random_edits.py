@@ -15,13 +15,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rcsc.diagnostics.jsonform import report_to_json
-from rcsc.diagnostics.report import Report
+from rcsc.base.diagnostics.jsonform import report_to_json
+from rcsc.base.diagnostics.report import Report
+from rcsc.desk.editor import Workspace
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
-from rcsc.editor import Workspace
-from rcsc.solvers.options import Options
-from rcsc.table.findings.unread import TOLD
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.findings.unread import TOLD
 
 TABLES = Path(__file__).parents[2] / "tables"
 PIECES = (

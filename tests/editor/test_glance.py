@@ -10,15 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.editor import Workspace
-from rcsc.editor.memo import OutdatedError
-from rcsc.editor.values import Answer, State
-from rcsc.editor.workspace import GLANCE_S, Reading
+from rcsc.desk.editor import Workspace
+from rcsc.desk.editor.memo import OutdatedError
+from rcsc.desk.editor.values import Answer, State
+from rcsc.desk.editor.workspace import GLANCE_S, Reading
 from rcsc.lang.model import Bool, Int
-from rcsc.solvers import smt
-from rcsc.solvers.options import Limits
-from rcsc.solvers.smt import Answer as Solved
-from rcsc.solvers.smt import Solver
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Limits
+from rcsc.proof.solvers.smt import Answer as Solved
+from rcsc.proof.solvers.smt import Solver
 from tests.bench.editor import keys
 
 REPO = Path(__file__).parents[2]
@@ -49,8 +49,8 @@ def _one_less(questions: list[int]) -> bool:
 
 def no_time(patch: pytest.MonkeyPatch) -> None:
     """Let a glance be over as it begins."""
-    patch.setattr("rcsc.editor.workspace.GLANCE_S", 0.0)
-    patch.setattr("rcsc.editor.workspace.LEAST_S", 0.0)
+    patch.setattr("rcsc.desk.editor.workspace.GLANCE_S", 0.0)
+    patch.setattr("rcsc.desk.editor.workspace.LEAST_S", 0.0)
 
 
 def said(answer: Answer) -> set[tuple[str, str]]:
@@ -96,7 +96,9 @@ def test_a_glance_that_ends_anywhere_tells_what_it_has_found(
     regions: list[bool] = []
     for most in range(1, 600, 29):
         left = list(range(most))
-        monkeypatch.setattr("rcsc.editor.workspace._spent", lambda _, left=left: lambda: not _one_less(left))
+        monkeypatch.setattr(
+            "rcsc.desk.editor.workspace._spent", lambda _, left=left: lambda: not _one_less(left)
+        )
         workspace = Workspace()
         workspace.open(file, text)
         glance = workspace.glance(file)
@@ -144,7 +146,7 @@ def test_what_it_takes_to_read_a_text_is_time_of_the_glance(monkeypatch: pytest.
 
     with monkeypatch.context() as patch:
         patch.setattr(Workspace, "reading", lambda _, path: slowly(path))
-        patch.setattr("rcsc.table.program.prove_table", None)  # nor is a table begun
+        patch.setattr("rcsc.proof.table.program.prove_table", None)  # nor is a table begun
         glance = workspace.glance(file)
     assert not glance.final
     assert {table.standing.state for table in glance.tables} == {State.STALE}
@@ -154,9 +156,9 @@ def test_what_it_takes_to_read_a_text_is_time_of_the_glance(monkeypatch: pytest.
 def test_a_glance_that_other_work_holds_up_ends_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """Who has waited long is answered with what a moment's work has found; so much is done however long he has waited."""
     file = str(REPO / "tables/task/acquire.rcs")
-    monkeypatch.setattr("rcsc.editor.workspace.GLANCE_S", 1800.0)
+    monkeypatch.setattr("rcsc.desk.editor.workspace.GLANCE_S", 1800.0)
     for waited_s, least_s, ends in ((3600.0, 0.0, True), (3600.0, 3600.0, False), (0.0, 0.0, False)):
-        monkeypatch.setattr("rcsc.editor.workspace.LEAST_S", least_s)
+        monkeypatch.setattr("rcsc.desk.editor.workspace.LEAST_S", least_s)
         glance = Workspace().glance(file, since_s=time.monotonic() - waited_s)
         assert glance.final is not ends, (waited_s, least_s)
         assert ({table.standing.state for table in glance.tables} == {State.STALE}) is ends
@@ -319,10 +321,10 @@ def test_a_question_that_ended_as_it_was_broken_off_leaves_the_solver_as_it_was(
 
 THROWN_AWAY = """
 import gc, sys, threading
-from rcsc.editor.workspace import Workspace
+from rcsc.desk.editor.workspace import Workspace
 from rcsc.lang.model import Int
-from rcsc.solvers import smt
-from rcsc.solvers.options import Limits
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Limits
 
 Workspace()
 gc.disable()

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.diagnostics.source import Source
-from rcsc.editor import keys
-from rcsc.editor.places import Lines, Place, Units, difference
+from rcsc.base.diagnostics.source import Source
+from rcsc.desk.editor import keys
+from rcsc.desk.editor.places import Lines, Place, Units, difference
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.tree import File, TableDecl
 from rcsc.lang.written.changes import spliced

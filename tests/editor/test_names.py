@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.editor.names.find import Names
-from rcsc.editor.names.index import Occurrence, Space, occurrences
-from rcsc.editor.names.rename import RefusedError, renamed
+from rcsc.desk.editor.names.find import Names
+from rcsc.desk.editor.names.index import Occurrence, Space, occurrences
+from rcsc.desk.editor.names.rename import RefusedError, renamed
 from rcsc.lang.digest import Digests
 from rcsc.lang.model import Program
 from rcsc.lang.project import load

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.editor import Workspace
+from rcsc.desk.editor import Workspace
 from rcsc.lang.model import Bool, Int, Op, Real
-from rcsc.solvers import smt
-from rcsc.symbolic import values
-from rcsc.symbolic.remembered import Answers, answered, remembering
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers import smt
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.remembered import Answers, answered, remembering
+from rcsc.proof.symbolic.values import Node
 
 REPO = Path(__file__).parents[2]
 FAILS = """input {first} : int 0 .. 9

@@ -5,17 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.source import Source
+from rcsc.desk.editor import Workspace
+from rcsc.desk.editor.places import Lines
+from rcsc.desk.editor.values import Finding, Repair
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
-from rcsc.editor import Workspace
-from rcsc.editor.places import Lines
-from rcsc.editor.values import Finding, Repair
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.tree import File
-from rcsc.solvers.options import Options
-from rcsc.table.findings.unread import TOLD
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.findings.unread import TOLD
 
 REPO = Path(__file__).parents[2]
 PUBLISHED = [
@@ -176,7 +176,7 @@ def _laid_out(written: str) -> bool:
 
 def test_a_repair_that_does_not_mend_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the text is that is made of a proposal: it is checked."""
-    from rcsc.editor import workspace as module
+    from rcsc.desk.editor import workspace as module
 
     written = text_of(WRONG["an overlap"])
     assert mended(Workspace(), "/nowhere/a.rcs", written)
@@ -218,7 +218,7 @@ def test_what_is_only_checked_says_nothing_that_was_to_be_proved(
     written = text_of(WRONG["an overlap of lines that do the same"])
     known = [repair for _, repair, _ in mended(Workspace(), str(tmp_path / "a.rcs"), written)]
     assert all(repair.certain and repair.proved for repair in known)
-    monkeypatch.setattr("rcsc.table.mending.MOST_TRIED", 0)
+    monkeypatch.setattr("rcsc.proof.table.mending.MOST_TRIED", 0)
     checked = [repair for _, repair, _ in mended(Workspace(), str(tmp_path / "a.rcs"), written)]
     assert [repair.title for repair in checked] == [repair.title for repair in known]
     assert not any(repair.certain or repair.proved for repair in checked)

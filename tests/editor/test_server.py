@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from rcsc.diagnostics.jsonform import report_to_json
+from rcsc.base.diagnostics.jsonform import report_to_json
+from rcsc.desk.editor.values import State
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
-from rcsc.editor.values import State
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
 from tests.editor.client import PUSHED, WHOLE, Client, RefusedError, applied
 
 REPO = Path(__file__).parents[2]

@@ -11,11 +11,11 @@ import pytest
 from lsprotocol import types
 from pygls.exceptions import JsonRpcContentModified
 
-from rcsc.editor.memo import OutdatedError
-from rcsc.editor.server.serve import Server
-from rcsc.editor.server.session import Session
-from rcsc.editor.values import Answer, State
-from rcsc.solvers.options import Options
+from rcsc.desk.editor.memo import OutdatedError
+from rcsc.desk.editor.server.serve import Server
+from rcsc.desk.editor.server.session import Session
+from rcsc.desk.editor.values import Answer, State
+from rcsc.proof.solvers.options import Options
 
 TABLE = """input now : bool
 input w : int 0 .. 9
@@ -201,7 +201,7 @@ def test_a_key_is_looked_at_at_once_and_keys_that_come_faster_when_they_rest(
 ) -> None:
     """With a rest of an hour the first answer comes all the same; what is typed meanwhile has the last text alone looked at."""
     path = tmp_path / "t.rcs"
-    monkeypatch.setattr("rcsc.editor.server.session.RESTS_S", 3600.0)
+    monkeypatch.setattr("rcsc.desk.editor.server.session.RESTS_S", 3600.0)
     heard: asyncio.Queue[Answer] = asyncio.Queue()
     glanced: list[str] = []
 
@@ -218,7 +218,7 @@ def test_a_key_is_looked_at_at_once_and_keys_that_come_faster_when_they_rest(
             session.open(path.as_uri(), f"{TABLE}# {version}\n", version)
             answer = await asyncio.wait_for(heard.get(), 60)
             assert answer.texts == {str(path): f"{TABLE}# {version}\n"}
-        monkeypatch.setattr("rcsc.editor.server.session.RESTS_S", 0.2)
+        monkeypatch.setattr("rcsc.desk.editor.server.session.RESTS_S", 0.2)
         for version in range(4, 40):
             session.open(path.as_uri(), f"{TABLE}# {version}\n", version)
         assert session._waiting is not None

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.diagnostics.report import TableReport, Verdict
+from rcsc.base.diagnostics.report import TableReport, Verdict
+from rcsc.desk.editor import Workspace
+from rcsc.desk.editor.memo import OutdatedError
+from rcsc.desk.editor.standing import standing
+from rcsc.desk.editor.values import Answer, State
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
-from rcsc.editor import Workspace
-from rcsc.editor.memo import OutdatedError
-from rcsc.editor.standing import standing
-from rcsc.editor.values import Answer, State
 from rcsc.lang.written.tables import cells_of, tables_of
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
 from tests.editor.random_edits import compared
 
 REPO = Path(__file__).parents[2]
@@ -210,7 +210,7 @@ def test_texts_that_only_an_editor_has_are_in_their_folder(tmp_path: Path) -> No
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_areas_are_where_the_text_is(end: str) -> None:
     """Each cell's area holds its text, whatever lines end with."""
-    from rcsc.editor.places import Lines
+    from rcsc.desk.editor.places import Lines
 
     written = (REPO / "tables/emove/locate.rcs").read_text().replace("\n", end)
     workspace = Workspace()

@@ -14,24 +14,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rcsc.emit.generated import write
-from rcsc.host.tools import Absent, BuildFailed, c_compiler
+from rcsc.base.host.tools import Absent, BuildFailed, c_compiler
+from rcsc.code.emit.generated import write
+from rcsc.code.testing.agree import AgreementCount, Disagreement, Executors, run_init, run_sanitized
+from rcsc.code.testing.differential_search import search_lines, search_sessions
+from rcsc.code.testing.esbmc import EsbmcAnswer, prove_function
+from rcsc.code.testing.executors.equality import same_value
+from rcsc.code.testing.executors.externs import python_stand_ins, with_c_stand_ins
+from rcsc.code.testing.executors.native import Native, build
+from rcsc.code.testing.executors.python import python_executor
+from rcsc.code.testing.executors.sessions import Seen
+from rcsc.code.testing.executors.symbols import symbols_of
+from rcsc.code.testing.executors.targets import is_matcher, targets
+from rcsc.code.testing.suite import SuiteOptions, run_suite
 from rcsc.lang.interpret import Fault, admit, call, initial, run_table, settle, unfit
 from rcsc.lang.model import Admit, Kind, Program, Real, Snapshot, Value, Variable, key_bounds
 from rcsc.run.executors import CExecutor, PythonExecutor
 from rcsc.run.executors import build as build_executors
 from rcsc.run.signature import signature
-from rcsc.testing.agree import AgreementCount, Disagreement, Executors, run_init, run_sanitized
-from rcsc.testing.differential_search import search_lines, search_sessions
-from rcsc.testing.esbmc import EsbmcAnswer, prove_function
-from rcsc.testing.executors.equality import same_value
-from rcsc.testing.executors.externs import python_stand_ins, with_c_stand_ins
-from rcsc.testing.executors.native import Native, build
-from rcsc.testing.executors.python import python_executor
-from rcsc.testing.executors.sessions import Seen
-from rcsc.testing.executors.symbols import symbols_of
-from rcsc.testing.executors.targets import is_matcher, targets
-from rcsc.testing.suite import SuiteOptions, run_suite
 from tests.support.programs.examples import (
     EXTERN,
     FAULTED,

@@ -12,19 +12,15 @@ from random import Random
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.driver.trials import proofs
-from rcsc.emit import emitted as emitted_of
-from rcsc.emit.lower import lower
-from rcsc.emit.plan import Plan
-from rcsc.host.tools import c_compiler, write_c
-from rcsc.lang.model import Program, ProvedProgram, Value, seal_of_proof
-from rcsc.solvers.options import Options
-from rcsc.testing.code_mutants import CodeMutant, code_mutants, variants
-from rcsc.testing.coverage import directed
-from rcsc.testing.coverage.case import MODES, Case, Entry, entries, expected
-from rcsc.testing.coverage.choose import Choice, chosen
-from rcsc.testing.coverage.document import (
+from rcsc.base.host.tools import c_compiler, write_c
+from rcsc.code.emit import emitted as emitted_of
+from rcsc.code.emit.lower import lower
+from rcsc.code.emit.plan import Plan
+from rcsc.code.testing.code_mutants import CodeMutant, code_mutants, variants
+from rcsc.code.testing.coverage import directed
+from rcsc.code.testing.coverage.case import MODES, Case, Entry, entries, expected
+from rcsc.code.testing.coverage.choose import Choice, chosen
+from rcsc.code.testing.coverage.document import (
     VectorSet,
     as_json,
     sessions_csv,
@@ -32,14 +28,18 @@ from rcsc.testing.coverage.document import (
     vectors_csv,
     vectors_document,
 )
-from rcsc.testing.coverage.goals import Reached, decides
-from rcsc.testing.coverage.harness import vectors_c
-from rcsc.testing.coverage.lines import taken
-from rcsc.testing.coverage.marks import marked, ways_of
-from rcsc.testing.coverage.vector_set import vector_set, write_vectors
-from rcsc.testing.executors.symbols import symbols_of
-from rcsc.testing.inputs.snapshot import search_in
-from rcsc.testing.inputs.vectors import vectors_of
+from rcsc.code.testing.coverage.goals import Reached, decides
+from rcsc.code.testing.coverage.harness import vectors_c
+from rcsc.code.testing.coverage.lines import taken
+from rcsc.code.testing.coverage.marks import marked, ways_of
+from rcsc.code.testing.coverage.vector_set import vector_set, write_vectors
+from rcsc.code.testing.executors.symbols import symbols_of
+from rcsc.code.testing.inputs.snapshot import search_in
+from rcsc.code.testing.inputs.vectors import vectors_of
+from rcsc.driver.trials import proofs
+from rcsc.front.commands import run
+from rcsc.lang.model import Program, ProvedProgram, Value, seal_of_proof
+from rcsc.proof.solvers.options import Options
 from tests.evidence.subjects import EVERYTHING, subject_of
 from tests.support.programs.examples import EXTERN, LASTING, STOPS
 from tests.support.programs.stages import emitted, program_of, proved_of

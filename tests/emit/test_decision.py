@@ -9,16 +9,16 @@ from random import Random
 
 import pytest
 
-from rcsc.emit import decision as decisions
-from rcsc.emit import lower as lower_module
-from rcsc.emit.decision import Cut, decision, depth, ends
-from rcsc.emit.lower import lower
-from rcsc.host.tools import Absent, c_compiler
+from rcsc.base.host.tools import Absent, c_compiler
+from rcsc.code.emit import decision as decisions
+from rcsc.code.emit import lower as lower_module
+from rcsc.code.emit.decision import Cut, decision, depth, ends
+from rcsc.code.emit.lower import lower
+from rcsc.code.testing.agree import NONE, SEVERAL, AgreementCount, line_number, run_lines
+from rcsc.code.testing.executors.symbols import symbols_of
+from rcsc.code.testing.matchers.matcher import Checked, check_matcher
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Program, ProvedProgram, Snapshot, key_bounds, seal_of_proof, value_of_key
-from rcsc.testing.agree import NONE, SEVERAL, AgreementCount, line_number, run_lines
-from rcsc.testing.executors.symbols import symbols_of
-from rcsc.testing.matchers.matcher import Checked, check_matcher
 from tests.bench.executors import c_counts
 from tests.bench.made.families import Fault, box, linear
 from tests.emit.test_agreement import executors_of

@@ -22,20 +22,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.diagnostics.codes import Code
-from rcsc.emit.generated import write
-from rcsc.emit.identifiers import C_WORDS, PYTHON_WORDS, comment
-from rcsc.emit.rendering import environment
-from rcsc.host.files.read import CheckedFields, json_of
-from rcsc.host.tools import Absent
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.files.read import CheckedFields, json_of
+from rcsc.base.host.tools import Absent
+from rcsc.code.emit.generated import write
+from rcsc.code.emit.identifiers import C_WORDS, PYTHON_WORDS, comment
+from rcsc.code.emit.rendering import environment
+from rcsc.code.testing.cortex import CortexRun, run_cortex
+from rcsc.code.testing.executors.externs import python_stand_ins
+from rcsc.code.testing.executors.symbols import symbols_of
 from rcsc.lang import reserved
 from rcsc.lang.interpret import Fault, initial, run_table
 from rcsc.lang.operator_table import single
 from rcsc.lang.resolve import compile_text
 from rcsc.run.signature import generated_files, signature_of
-from rcsc.testing.cortex import CortexRun, run_cortex
-from rcsc.testing.executors.externs import python_stand_ins
-from rcsc.testing.executors.symbols import symbols_of
 from tests.support.programs.examples import EXTERN, RICH
 from tests.support.programs.stages import emitted, program_of
 from tests.support.programs.texts import edited, table

@@ -10,20 +10,20 @@ from random import Random
 
 import pytest
 
-from rcsc.commands import run
+from rcsc.code.testing import suite
+from rcsc.code.testing.code_mutants import Decider, Judge, Noticed, code_mutants, decider, source_of, variants
+from rcsc.code.testing.esbmc import EsbmcAnswer, EsbmcVerdict
+from rcsc.code.testing.executors.symbols import symbols_of
+from rcsc.code.testing.figures import SuiteResult
+from rcsc.code.testing.inputs.snapshot import Missing, search_in
+from rcsc.code.testing.matchers.matcher import Checked, Compared, check_matcher
+from rcsc.code.testing.mutants import Caught, Opinion, difference, judge_table, narrower, table_mutants, wider
+from rcsc.code.testing.suite import SuiteOptions, run_suite
 from rcsc.driver.trials import proofs
+from rcsc.front.commands import run
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Program, Table, key_bounds, value_of_key
-from rcsc.solvers.options import Options
-from rcsc.testing import suite
-from rcsc.testing.code_mutants import Decider, Judge, Noticed, code_mutants, decider, source_of, variants
-from rcsc.testing.esbmc import EsbmcAnswer, EsbmcVerdict
-from rcsc.testing.executors.symbols import symbols_of
-from rcsc.testing.figures import SuiteResult
-from rcsc.testing.inputs.snapshot import Missing, search_in
-from rcsc.testing.matchers.matcher import Checked, Compared, check_matcher
-from rcsc.testing.mutants import Caught, Opinion, difference, judge_table, narrower, table_mutants, wider
-from rcsc.testing.suite import SuiteOptions, run_suite
+from rcsc.proof.solvers.options import Options
 from tests.support.programs.stages import emitted, program_of, shipped
 
 BOXES = proofs(Options(solver="boxes"))
@@ -340,6 +340,6 @@ table t assuming some {
         "2",
         str(tmp_path / "quotient.rcs"),
     ]
-    start = "import sys; from rcsc.commands import run; sys.exit(run(sys.argv[1:]))"
+    start = "import sys; from rcsc.front.commands import run; sys.exit(run(sys.argv[1:]))"
     ran = subprocess.run([sys.executable, "-c", start, "test", *asked], capture_output=True, check=False)
     assert ran.returncode == 0, ran.stderr

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.emit.ranges import Ranges, at_procedures
+from rcsc.code.emit.ranges import Ranges, at_procedures
 from rcsc.lang.interpret import evaluate
 from rcsc.lang.model import Assign, If, Local
 from tests.support.programs.stages import drawn_program, emitted, program_of

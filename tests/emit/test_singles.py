@@ -9,18 +9,18 @@ from typing import Any
 
 import pytest
 
-from rcsc.certify import certify
-from rcsc.diagnostics.codes import Code
-from rcsc.emit.generated import write
-from rcsc.host.tools import c_compiler
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.tools import c_compiler
+from rcsc.code.emit.generated import write
+from rcsc.code.testing.suite import SuiteOptions, run_suite
 from rcsc.lang.interpret import Fault, initial, run_table, unfit
 from rcsc.lang.operator_table import single
+from rcsc.proof.certify import certify
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
 from rcsc.run.executors import CExecutor, PythonExecutor
 from rcsc.run.executors import build as build_executors
 from rcsc.run.signature import signature
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
-from rcsc.testing.suite import SuiteOptions, run_suite
 from tests.support.programs.stages import codes, emitted, program_of, refused, verdict_of
 from tests.support.programs.texts import edited
 

@@ -4,7 +4,7 @@ import operator
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from rcsc.emit.code_tree import (
+from rcsc.code.emit.code_tree import (
     IN_C,
     IN_PYTHON,
     Choice,

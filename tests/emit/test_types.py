@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
+from rcsc.code.emit import TARGETS
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Conclusion, Settings
-from rcsc.emit import TARGETS
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
 from tests.support.programs.stages import emitted, program_of
 
 STRICT = (

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.code.testing.inputs.snapshot import Missing, box_of, search_in
+from rcsc.code.testing.inputs.vectors import Vectors, atoms, vectors_of
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.interval_sets import complement, meet
 from rcsc.lang.model import Program, key_bounds
-from rcsc.testing.inputs.snapshot import Missing, box_of, search_in
-from rcsc.testing.inputs.vectors import Vectors, atoms, vectors_of
 from tests.support.programs.stages import program_of, shipped
 from tests.support.programs.texts import edited
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run as rcsc
-from rcsc.episodes.episode import Episode, FieldValue, OrderSpec, Reading, Switch
-from rcsc.episodes.loop import run
-from rcsc.episodes.properties import numbered
-from rcsc.episodes.sampling import draw, fault_names
-from rcsc.episodes.stand import stand
+from rcsc.front.commands import run as rcsc
+from rcsc.run.episodes.episode import Episode, FieldValue, OrderSpec, Reading, Switch
+from rcsc.run.episodes.loop import run
+from rcsc.run.episodes.properties import numbered
+from rcsc.run.episodes.sampling import draw, fault_names
+from rcsc.run.episodes.stand import stand
 from rcsc.run.orders.roles import field_of
 from tests.support.programs.texts import edit_file
 

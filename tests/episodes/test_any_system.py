@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 
-from rcsc.campaign.shrink import shrink
-from rcsc.commands import run as rcsc
 from rcsc.compose.contract.obligations import Sort
-from rcsc.episodes.cycle import Broken
-from rcsc.episodes.episode import (
+from rcsc.front.commands import run as rcsc
+from rcsc.run.campaign.shrink import shrink
+from rcsc.run.episodes.cycle import Broken
+from rcsc.run.episodes.episode import (
     BufferFault,
     Episode,
     FieldValue,
@@ -20,13 +20,13 @@ from rcsc.episodes.episode import (
     Restart,
     Switch,
 )
-from rcsc.episodes.explain import Explanations
-from rcsc.episodes.harm import HarmedMemory, Held
-from rcsc.episodes.loop import Loop, check, run
-from rcsc.episodes.outcome import EpisodeOutcome
-from rcsc.episodes.sampling import draw, fault_classes, fault_names
-from rcsc.episodes.search import episodes, found_again, search
-from rcsc.episodes.stand import stand
+from rcsc.run.episodes.explain import Explanations
+from rcsc.run.episodes.harm import HarmedMemory, Held
+from rcsc.run.episodes.loop import Loop, check, run
+from rcsc.run.episodes.outcome import EpisodeOutcome
+from rcsc.run.episodes.sampling import draw, fault_classes, fault_names
+from rcsc.run.episodes.search import episodes, found_again, search
+from rcsc.run.episodes.stand import stand
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Value
 from tests.support.programs.texts import edit_file

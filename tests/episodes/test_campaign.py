@@ -19,9 +19,10 @@ from click.testing import CliRunner, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc import commands as cli
-from rcsc.campaign import worker_pool as crew_module
-from rcsc.campaign.counterexamples import (
+from rcsc.front import commands as cli
+from rcsc.front.commands.group import commands
+from rcsc.run.campaign import worker_pool as crew_module
+from rcsc.run.campaign.counterexamples import (
     BadEpisode,
     Choice,
     again,
@@ -31,15 +32,14 @@ from rcsc.campaign.counterexamples import (
     save,
     saved_episode,
 )
-from rcsc.campaign.journal import BadJournal, EpisodeRecord, Journal, header, journal_path
-from rcsc.campaign.rig import Rig, digest, episode_seed, known_lines, mask
-from rcsc.campaign.runner import campaign
-from rcsc.campaign.shrink import shrink
-from rcsc.campaign.summary import as_json, as_text, summary
-from rcsc.campaign.work import OtherTables, play
-from rcsc.campaign.worker_pool import WorkerPool, WorkersGone, pool_of, processes
-from rcsc.commands.group import commands
-from rcsc.episodes.outcome import EpisodeFinding
+from rcsc.run.campaign.journal import BadJournal, EpisodeRecord, Journal, header, journal_path
+from rcsc.run.campaign.rig import Rig, digest, episode_seed, known_lines, mask
+from rcsc.run.campaign.runner import campaign
+from rcsc.run.campaign.shrink import shrink
+from rcsc.run.campaign.summary import as_json, as_text, summary
+from rcsc.run.campaign.work import OtherTables, play
+from rcsc.run.campaign.worker_pool import WorkerPool, WorkersGone, pool_of, processes
+from rcsc.run.episodes.outcome import EpisodeFinding
 from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,

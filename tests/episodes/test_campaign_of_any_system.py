@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from rcsc import commands
-from rcsc.campaign.any_system import ANY
-from rcsc.campaign.counterexamples import BadEpisode, again, saved_episode
-from rcsc.campaign.journal import Journal, header
-from rcsc.campaign.rig import EpisodeKind, Rig, digest
-from rcsc.campaign.runner import campaign
-from rcsc.campaign.shrink import shrink
-from rcsc.campaign.work import NotDrawn, _OutOfTime, play, within
-from rcsc.campaign.worker_pool import processes
-from rcsc.episodes.episode import Episode, FieldValue, OrderSpec, Switch
+from rcsc.front import commands
+from rcsc.run.campaign.any_system import ANY
+from rcsc.run.campaign.counterexamples import BadEpisode, again, saved_episode
+from rcsc.run.campaign.journal import Journal, header
+from rcsc.run.campaign.rig import EpisodeKind, Rig, digest
+from rcsc.run.campaign.runner import campaign
+from rcsc.run.campaign.shrink import shrink
+from rcsc.run.campaign.work import NotDrawn, _OutOfTime, play, within
+from rcsc.run.campaign.worker_pool import processes
+from rcsc.run.episodes.episode import Episode, FieldValue, OrderSpec, Switch
 from rcsc.run.plant.bind import BadPlant
 
 HALL = '''
@@ -234,7 +234,7 @@ def test_an_episode_imports_no_file_that_it_names(dock: Path, tmp_path: Path) ->
 
 KIND = """
 import dataclasses
-from rcsc.campaign.any_system import ANY
+from rcsc.run.campaign.any_system import ANY
 
 NONE = 3
 
@@ -264,7 +264,7 @@ def test_a_plant_may_name_a_kind_of_episodes_of_its_own(
     assert names("calm_episodes:CALM") == 2
     assert "take none" in capsys.readouterr().err
     for kind, why in (
-        ("calm_episodes:NONE", "`calm_episodes:NONE` is no `rcsc.campaign.rig.EpisodeKind`"),
+        ("calm_episodes:NONE", "`calm_episodes:NONE` is no `rcsc.run.campaign.rig.EpisodeKind`"),
         ("calm_episodes:CLAM", "`calm_episodes:CLAM` cannot be imported"),
         ("no_episodes:CALM", "`no_episodes:CALM` cannot be imported"),
     ):

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.campaign.summary import watched, watched_text
-from rcsc.commands import run as rcsc
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.trusts import Trust, trust_of
-from rcsc.episodes.episode import BufferFault, Episode, OrderSpec, Reading, Restart
-from rcsc.episodes.loop import Loop
-from rcsc.episodes.proved.checks import WATCHED
-from rcsc.episodes.proved.claims import Claim, Claims, Neighbour, ProvedLevel, Trusted
-from rcsc.episodes.proved.watch import PROVED
-from rcsc.episodes.sampling import draw_on
-from rcsc.episodes.stand import Stand, stand
+from rcsc.front.commands import run as rcsc
+from rcsc.run.campaign.summary import watched, watched_text
+from rcsc.run.episodes.episode import BufferFault, Episode, OrderSpec, Reading, Restart
+from rcsc.run.episodes.loop import Loop
+from rcsc.run.episodes.proved.checks import WATCHED
+from rcsc.run.episodes.proved.claims import Claim, Claims, Neighbour, ProvedLevel, Trusted
+from rcsc.run.episodes.proved.watch import PROVED
+from rcsc.run.episodes.sampling import draw_on
+from rcsc.run.episodes.stand import Stand, stand
 from tests.claims import WITHIN, drawn_episode, played, proved_claims_of
 from tests.small_hierarchies.made import Hierarchy, hierarchy
 from tests.small_hierarchies.text import files

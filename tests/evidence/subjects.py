@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
+from rcsc.code.emit import emitted
 from rcsc.driver.compile import planned
-from rcsc.emit import emitted
-from rcsc.evidence.kind import Subject
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
+from rcsc.views.evidence.kind import Subject
 from tests.support.programs.stages import BOXES, program_of
 
 EVERYTHING = """

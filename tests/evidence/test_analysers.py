@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.evidence import analysers
+from rcsc.views.evidence import analysers
 from tests.evidence.subjects import EVERYTHING, subject_of
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.evidence import coverage, llvm
-from rcsc.evidence.kind import Subject
-from rcsc.host.tools import Absent
-from rcsc.testing.coverage.directed import Director
+from rcsc.base.host.tools import Absent
+from rcsc.code.testing.coverage.directed import Director
+from rcsc.front.commands import run
+from rcsc.views.evidence import coverage, llvm
+from rcsc.views.evidence.kind import Subject
 from tests.evidence.subjects import EVERYTHING, subject_of
 from tests.support.programs.examples import EXTERN, LASTING, RELATED, STOPS
 

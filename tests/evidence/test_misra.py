@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.evidence.misra.compliance import Compliance, Summary, collect, main, summary
-from rcsc.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, HELD, Checked, Finding, check
-from rcsc.evidence.misra.deviations import explained, own_findings
-from rcsc.evidence.misra.guidelines import Category, guidelines
-from rcsc.evidence.misra.words import RULES
+from rcsc.views.evidence.misra.compliance import Compliance, Summary, collect, main, summary
+from rcsc.views.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, HELD, Checked, Finding, check
+from rcsc.views.evidence.misra.deviations import explained, own_findings
+from rcsc.views.evidence.misra.guidelines import Category, guidelines
+from rcsc.views.evidence.misra.words import RULES
 from tests.evidence.subjects import EVERYTHING, subject_of
 
 REPO = Path(__file__).parents[2]
@@ -156,6 +156,6 @@ def test_the_integration_examples_say_at_each_place_where_they_deviate(example: 
 
 def test_a_failure_of_the_checker_is_no_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
     broken = Summary(Checked("cppcheck", {}, (), "it crashed"), (), plain=True)
-    monkeypatch.setattr("rcsc.evidence.misra.compliance.summary", lambda _: broken)
+    monkeypatch.setattr("rcsc.views.evidence.misra.compliance.summary", lambda _: broken)
     assert main(str(REPO / "generated" / "c")) == 1
     assert check({}).rules["17.3"]

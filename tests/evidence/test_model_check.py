@@ -2,11 +2,11 @@
 
 import pytest
 
-from rcsc.evidence import model_check
-from rcsc.evidence.kind import Subject
-from rcsc.testing.esbmc import EsbmcAnswer, EsbmcVerdict, case_harness, prove_function, step_parts
-from rcsc.testing.executors.symbols import symbols_of
-from rcsc.testing.executors.targets import ComparedFunction, targets
+from rcsc.code.testing.esbmc import EsbmcAnswer, EsbmcVerdict, case_harness, prove_function, step_parts
+from rcsc.code.testing.executors.symbols import symbols_of
+from rcsc.code.testing.executors.targets import ComparedFunction, targets
+from rcsc.views.evidence import model_check
+from rcsc.views.evidence.kind import Subject
 from tests.evidence.subjects import EVERYTHING, subject_of
 
 COUNTS = """

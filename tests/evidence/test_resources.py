@@ -8,16 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.emit import emitted
-from rcsc.emit.lower import lower_by_force
-from rcsc.evidence import resources
-from rcsc.evidence.processors import boards
-from rcsc.evidence.processors.assembly import Bounds, UnboundedError, of_compiler, of_disassembly
-from rcsc.evidence.processors.boards import BOARDS, Board
-from rcsc.evidence.resources import Need, measure
+from rcsc.code.emit import emitted
+from rcsc.code.emit.lower import lower_by_force
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
+from rcsc.views.evidence import resources
+from rcsc.views.evidence.processors import boards
+from rcsc.views.evidence.processors.assembly import Bounds, UnboundedError, of_compiler, of_disassembly
+from rcsc.views.evidence.processors.boards import BOARDS, Board
+from rcsc.views.evidence.resources import Need, measure
 from tests.evidence.subjects import EVERYTHING, subject_of
 
 ALL = {board.name: board for board in BOARDS}

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.emit.c.helpers import HELD
-from rcsc.evidence import runtime
-from rcsc.evidence.kind import Evidence
-from rcsc.evidence.runtime import line_of
+from rcsc.code.emit.c.helpers import HELD
+from rcsc.views.evidence import runtime
+from rcsc.views.evidence.kind import Evidence
+from rcsc.views.evidence.runtime import line_of
 from tests.evidence.subjects import EVERYTHING, subject_of
 from tests.support.programs.examples import RELATED, WIDE
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.evidence import analysers, coverage, llvm, resources, runtime
-from rcsc.evidence.kind import Evidence
-from rcsc.evidence.misra import compliance, cppcheck
-from rcsc.evidence.processors.boards import BOARDS
-from rcsc.host.tools import BuildFailed
+from rcsc.base.host.tools import BuildFailed
+from rcsc.views.evidence import analysers, coverage, llvm, resources, runtime
+from rcsc.views.evidence.kind import Evidence
+from rcsc.views.evidence.misra import compliance, cppcheck
+from rcsc.views.evidence.processors.boards import BOARDS
 from tests.evidence.subjects import EVERYTHING, subject_of
 
 WAYS = {

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
 from rcsc.driver.compile import Generated, tables_in
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Settings
-from rcsc.evidence import analysers, runtime
-from rcsc.evidence import collect as collecting
-from rcsc.evidence.kind import Evidence, Kind
-from rcsc.evidence.whole import kinds
-from rcsc.evidence.whole.kinds import Whole
-from rcsc.solvers.options import Options
+from rcsc.front.commands import run
+from rcsc.proof.solvers.options import Options
+from rcsc.views.evidence import analysers, runtime
+from rcsc.views.evidence import collect as collecting
+from rcsc.views.evidence.kind import Evidence, Kind
+from rcsc.views.evidence.whole import kinds
+from rcsc.views.evidence.whole.kinds import Whole
 
 REPO = Path(__file__).parents[2]
 DOCK, PAPER = REPO / "tests/data/dock/system.toml", REPO / "tables/system.toml"

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from rcsc.commands.group import commands
-from rcsc.diagnostics.diagnostic import Severity
+from rcsc.base.diagnostics.diagnostic import Severity
+from rcsc.front.commands.group import commands
 from tests.support.programs.stages import unread_in
 
 WORKS = """

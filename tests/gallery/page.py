@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from rcsc import check
-from rcsc.diagnostics.diagnostic import Severity
+from rcsc.base.diagnostics.diagnostic import Severity
 from tests.support.programs.stages import shipped
 
 REPO = Path(__file__).parents[2]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
+from rcsc.front.commands import run
 from tests.gallery.page import ENTRIES, GALLERY, PAGE, REPO, page
 from tests.support.programs.stages import shipped
 

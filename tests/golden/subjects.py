@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from shutil import copytree, ignore_patterns
 
-from rcsc.commands import group
+from rcsc.front.commands import group
 
 ROOT = Path(__file__).parents[2]
 _LEFT_OUT = ignore_patterns(".rcsc-cache", "__pycache__", "generated", "kept")

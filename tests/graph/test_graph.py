@@ -11,29 +11,29 @@ from xml.etree import ElementTree as ET
 import pytest
 from click.testing import CliRunner
 
-from rcsc.commands import run as rcsc
-from rcsc.commands.group import commands
-from rcsc.commands.shared.graphs import WrongError, found_tables
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.source import Source
-from rcsc.graph.derive import Derived, derive
-from rcsc.graph.drawing import plain, svg
-from rcsc.graph.find import FoundTable, NotFound, tables
-from rcsc.graph.formats.choice import FORMS, form_of
-from rcsc.graph.formats.reading import UnreadableError, diagnosed
-from rcsc.graph.formats.state_graph import ANY, StateGraph
-from rcsc.graph.lines import derive_lines
-from rcsc.graph.round_trip import Against, against, in_place
-from rcsc.graph.to_table import tabled
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.source import Source
+from rcsc.front.commands import run as rcsc
+from rcsc.front.commands.group import commands
+from rcsc.front.commands.shared.graphs import WrongError, found_tables
 from rcsc.lang.interpret import cycle, holds, initial, run_table
 from rcsc.lang.model import Enum, Program, Snapshot, Table, Value, key_bounds, value_of_key
 from rcsc.lang.project import load
-from rcsc.relation.follow import following
-from rcsc.relation.same import Differs, Same, compare
-from rcsc.relation.steps import Steps
-from rcsc.solvers.options import Options
-from rcsc.solvers.smt import Answer, Solver, Term
+from rcsc.proof.relation.follow import following
+from rcsc.proof.relation.same import Differs, Same, compare
+from rcsc.proof.relation.steps import Steps
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smt import Answer, Solver, Term
+from rcsc.views.graph.derive import Derived, derive
+from rcsc.views.graph.drawing import plain, svg
+from rcsc.views.graph.find import FoundTable, NotFound, tables
+from rcsc.views.graph.formats.choice import FORMS, form_of
+from rcsc.views.graph.formats.reading import UnreadableError, diagnosed
+from rcsc.views.graph.formats.state_graph import ANY, StateGraph
+from rcsc.views.graph.lines import derive_lines
+from rcsc.views.graph.round_trip import Against, against, in_place
+from rcsc.views.graph.to_table import tabled
 from tests.support.programs.stages import program_of
 from tests.support.programs.texts import edit_file, edited
 
@@ -150,7 +150,9 @@ def test_a_name_of_several_tables_means_that_of_the_system_here(
     for alone in ("tables/task/acquire.rcs:acquire", "goto"):
         assert found_tables(alone)
         assert not capsys.readouterr().err
-    monkeypatch.setattr("rcsc.commands.shared.systems.PLACES", ("tables/examples/later/last_echo.toml",))
+    monkeypatch.setattr(
+        "rcsc.front.commands.shared.systems.PLACES", ("tables/examples/later/last_echo.toml",)
+    )
     with pytest.raises(WrongError):
         found_tables("acquire")  # of a system that has no such table
 
@@ -560,7 +562,7 @@ def test_of_several_the_state_is_what_the_lines_write(name: str, state: str) -> 
 
 
 def test_a_solver_without_time_draws_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rcsc.solvers.smt import Answer, Solver
+    from rcsc.proof.solvers.smt import Answer, Solver
 
     entry = found_in(DOOR, tmp_path)
     table = tabled(graph_of(entry).graph)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from rcsc import commands
-from rcsc.host import cache as cache_module
-from rcsc.host.cache import Cache, digest_of_tool, open_cache
-from rcsc.host.files import write_atomically
+from rcsc.base.host import cache as cache_module
+from rcsc.base.host.cache import Cache, digest_of_tool, open_cache
+from rcsc.base.host.files import write_atomically
+from rcsc.front import commands
 
 
 @dataclass(frozen=True)
@@ -125,9 +125,9 @@ def test_the_secret_is_the_users_own_and_stays(tmp_path: Path, monkeypatch: pyte
 
 def test_the_tools_digest_changes_with_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "rcsc"
-    (package / "host").mkdir(parents=True)
-    (package / "host" / "cache.py").write_text("old")
-    monkeypatch.setattr(cache_module, "__file__", str(package / "host" / "cache.py"))
+    (package / "base" / "host").mkdir(parents=True)
+    (package / "base" / "host" / "cache.py").write_text("old")
+    monkeypatch.setattr(cache_module, "__file__", str(package / "base" / "host" / "cache.py"))
     before = digest_of_tool()
     assert digest_of_tool() == before
     (package / "prove.py").write_text("new")
@@ -173,7 +173,7 @@ def test_a_symbolic_link_stays_a_link(tmp_path: Path) -> None:
 def test_the_tools_digest_is_of_contents_not_of_times(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    package = tmp_path / "rcsc" / "host"
+    package = tmp_path / "rcsc" / "base" / "host"
     package.mkdir(parents=True)
     part = package / "cache.py"
     part.write_text("old")

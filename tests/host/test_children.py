@@ -20,10 +20,10 @@ from typing import Any
 
 import pytest
 
-from rcsc import commands
-from rcsc.host import children
+from rcsc.base.host import children
+from rcsc.front import commands
+from rcsc.proof.solvers import smt
 from rcsc.run.processes.block import FOLDER
-from rcsc.solvers import smt
 
 IN_PROCESS = {
     "Z3": """
@@ -38,7 +38,7 @@ def work(fifo):
     "a SAT solver": """
 def work(fifo):
     import itertools
-    from rcsc.solvers.sat import Sat
+    from rcsc.proof.solvers.sat import Sat
     holes = 14
     at = lambda i, j: i * holes + j + 1
     clauses = [[at(i, j) for j in range(holes)] for i in range(holes + 1)]
@@ -52,7 +52,7 @@ def work(fifo):
 """,
     "cvc5": """
 def work(fifo):
-    from rcsc.solvers.smtlib import cvc5_refutes
+    from rcsc.proof.solvers.smtlib import cvc5_refutes
     import cvc5
     tell(fifo)
     cubes = "(+ (* x x x) (* y y y) (* z z z))"
@@ -61,7 +61,7 @@ def work(fifo):
 """,
     "a compiler below its driver": """
 def work(fifo):
-    from rcsc.host.children import run
+    from rcsc.base.host.children import run
     run(["sh", "-c", f"mktemp -t cc.XXXXXX; exec 9>{fifo}; echo ready >&9; sleep 100000 & sleep 100000"])
 """,
 }
@@ -78,7 +78,7 @@ HEAD = """
 import os, sys, threading, signal
 from pathlib import Path
 
-from rcsc.host import children
+from rcsc.base.host import children
 from rcsc.run.processes.block import Block
 
 HELD = []
@@ -352,7 +352,7 @@ def test_a_worker_that_ends_without_an_answer_is_status_3(
     (tmp_path / "two.rcs").write_text(TWO, encoding="utf-8")
     monkeypatch.setattr("rcsc.driver.proofs.WORTH_A_PROCESS", 0)
     with monkeypatch.context() as patched:
-        patched.setattr("rcsc.table.program._verdict", die)
+        patched.setattr("rcsc.proof.table.program._verdict", die)
         assert commands.run(["check", "--jobs", "2", "two.rcs"]) == 3
     assert "error[RCS904]: a worker process ended without an answer" in capsys.readouterr().err
     assert commands.run(["check", "--jobs", "2", "two.rcs"]) == 0
@@ -381,13 +381,13 @@ ALLOWED = {
     ("rcsc/run/processes/supervisor.py", "multiprocessing"),  # a type
     ("rcsc/run/processes/serve.py", "multiprocessing"),  # likewise
     (
-        "rcsc/campaign/worker_pool.py",
+        "rcsc/run/campaign/worker_pool.py",
         "concurrent.futures",
     ),  # the classes of executors and what they raise
-    ("rcsc/campaign/runner.py", "concurrent.futures"),
-    ("rcsc/campaign/counterexamples.py", "concurrent.futures"),
-    ("rcsc/studio/build.py", "concurrent.futures"),  # what it raises
-    ("rcsc/editor/server/session.py", "concurrent.futures"),  # threads
+    ("rcsc/run/campaign/runner.py", "concurrent.futures"),
+    ("rcsc/run/campaign/counterexamples.py", "concurrent.futures"),
+    ("rcsc/desk/studio/build.py", "concurrent.futures"),  # what it raises
+    ("rcsc/desk/editor/server/session.py", "concurrent.futures"),  # threads
 }
 
 
@@ -409,5 +409,5 @@ def test_processes_and_temporary_folders_begin_in_one_place(repo: Path) -> None:
         text = path.read_text(encoding="utf-8")
         found |= {(name, one) for one in imported(ast.parse(text))}
         words = ("os.fork", "os.spawn", "os.posix_spawn", "os.system", "os.popen", "ProcessPoolExecutor(")
-        assert name == "rcsc/host/children.py" or not any(word in text for word in words), name
-    assert {one for one in found if one[0] != "rcsc/host/children.py"} <= ALLOWED
+        assert name == "rcsc/base/host/children.py" or not any(word in text for word in words), name
+    assert {one for one in found if one[0] != "rcsc/base/host/children.py"} <= ALLOWED

@@ -14,10 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc import commands
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Source
-from rcsc.host.described import (
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.described import (
     MOST_FAULTS,
     BadFile,
     Document,
@@ -34,8 +33,9 @@ from rcsc.host.described import (
     _Scan,
     read_document,
 )
-from rcsc.host.files.names import MOST_FILE_CHARACTERS
-from rcsc.host.files.read import MOST_TOML_BYTES
+from rcsc.base.host.files.names import MOST_FILE_CHARACTERS
+from rcsc.base.host.files.read import MOST_TOML_BYTES
+from rcsc.front import commands
 from rcsc.run.declared_plant import ACTUATOR, FAULT, MODEL, PYTHON, SENSOR
 from rcsc.run.description import FEED, LEVEL, SYSTEM, BadDescription, description, needs_data
 from rcsc.run.orders.script import OWN

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.base.host.memory import last_work, uncollected
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Settings
-from rcsc.host.memory import last_work, uncollected
-from rcsc.table.decide import prove_table
+from rcsc.proof.table.decide import prove_table
 from tests.bench.made import families
 from tests.support.programs.stages import BOXES, program_of
 

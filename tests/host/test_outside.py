@@ -21,23 +21,23 @@ import pytest
 import zstandard
 from mcap.writer import Writer
 
-from rcsc.commands import run
+from rcsc.base.host.files import csv_text
+from rcsc.base.host.files.names import BadName, identifier, inside, within
+from rcsc.base.host.files.read import CheckedFields, Malformed, content, json_of, lines_of, toml_of, xml_of
+from rcsc.code.emit.generated import write
 from rcsc.compose.counterexample.frozen import BadCaseError, read_case
-from rcsc.diff import rows as forms
-from rcsc.emit.generated import write
-from rcsc.graph.drawing import svg
-from rcsc.graph.formats.state_graph import Edge, StateGraph
-from rcsc.host.files import csv_text
-from rcsc.host.files.names import BadName, identifier, inside, within
-from rcsc.host.files.read import CheckedFields, Malformed, content, json_of, lines_of, toml_of, xml_of
-from rcsc.pages.frame import quoted
+from rcsc.desk.shell.typed_names import kind_of
+from rcsc.front.commands import run
 from rcsc.run.description import BadDescription, description
 from rcsc.run.log.read import UnreadableLog, read
 from rcsc.run.log.recorder import Recorder
 from rcsc.run.log.records import MOST_CHUNK, ChainCheck, Seal, records
 from rcsc.run.signature import signature
 from rcsc.run.system import System, assemble
-from rcsc.shell.typed_names import kind_of
+from rcsc.views.diff import rows as forms
+from rcsc.views.graph.drawing import svg
+from rcsc.views.graph.formats.state_graph import Edge, StateGraph
+from rcsc.views.pages.frame import quoted
 from tests.support.programs.stages import emitted, shipped
 from tests.support.programs.texts import system
 
@@ -53,12 +53,12 @@ PARSERS = {
 }  # fmt: skip
 """What makes values of text or bytes."""
 FORMATS_OF_OURS = {
-    "rcsc/lang/model.py", "rcsc/solvers/smt.py", "rcsc/solvers/smtlib.py", "rcsc/testing/executors/native.py",
-    "rcsc/testing/executors/externs.py", "rcsc/testing/coverage/harness.py", "rcsc/lang/operator_table.py",  # reals as bits
+    "rcsc/lang/model.py", "rcsc/proof/solvers/smt.py", "rcsc/proof/solvers/smtlib.py", "rcsc/code/testing/executors/native.py",
+    "rcsc/code/testing/executors/externs.py", "rcsc/code/testing/coverage/harness.py", "rcsc/lang/operator_table.py",  # reals as bits
     "rcsc/run/signature.py", "rcsc/run/executors.py", "rcsc/run/log/read.py", "rcsc/run/log/recorder.py",  # `FORMATS` by checked types
     "rcsc/run/log/records.py", "rcsc/run/log/replay.py", "rcsc/run/processes/memory.py", "rcsc/run/processes/block.py",
-    "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py", "rcsc/link/beside.py",
-    "rcsc/run/orders/stopped.py", "rcsc/certify", "sim/rcsc_cell/episodes/loop.py", "rcsc/campaign/work.py",
+    "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py", "rcsc/run/link/beside.py",
+    "rcsc/run/orders/stopped.py", "rcsc/proof/certify", "sim/rcsc_cell/episodes/loop.py", "rcsc/run/campaign/work.py",
 }  # fmt: skip
 """Who may name `struct`: their formats are written in them, or taken from `FORMATS` for a type that was checked."""
 
@@ -87,20 +87,20 @@ def _is_stream(node: ast.AST) -> TypeGuard[ast.Attribute]:
 
 READS = {"open", "fdopen", "read_text", "read_bytes", "memmap", "fromfile"}
 READERS_OF_FILES: Mapping[str, str] = {
-    "rcsc/host/files/": "reads within bounds",
-    "rcsc/host/children.py": "a lock on what this process made",
-    "rcsc/host/cache.py": "rcsc's own files, for their digest",
-    "rcsc/host/keeper.py": "what its own parent says; imports nothing of rcsc",
-    "rcsc/host/tools.py": "the pinned ESBMC, for its digest",
+    "rcsc/base/host/files/": "reads within bounds",
+    "rcsc/base/host/children.py": "a lock on what this process made",
+    "rcsc/base/host/cache.py": "rcsc's own files, for their digest",
+    "rcsc/base/host/keeper.py": "what its own parent says; imports nothing of rcsc",
+    "rcsc/base/host/tools.py": "the pinned ESBMC, for its digest",
     "rcsc/run/processes/supervisor.py": "/proc",
     "rcsc/run/processes/block.py": "shared memory of its own",
-    "rcsc/campaign/journal.py": "is added to and read in one opening, regular and bounded by itself",
-    "rcsc/shell/terminal.py": "is added to",
+    "rcsc/run/campaign/journal.py": "is added to and read in one opening, regular and bounded by itself",
+    "rcsc/desk/shell/terminal.py": "is added to",
     "rcsc/run/log/recorder.py": "is written",
     "rcsc/lang/syntax/parse.py": "comes with the compiler",
-    "rcsc/studio/server.py": "comes with the compiler",
-    "rcsc/studio/share/document.py": "comes with the compiler",
-    "rcsc/commands/new.py": "comes with the compiler",
+    "rcsc/desk/studio/server.py": "comes with the compiler",
+    "rcsc/desk/studio/share/document.py": "comes with the compiler",
+    "rcsc/front/commands/new.py": "comes with the compiler",
     "sim/rcsc_cell/cell/reach.py": "comes with the cell",
 }
 """Who may open something, and what."""
@@ -150,9 +150,9 @@ def _word(node: ast.expr) -> str:
 
 
 READERS = (
-    "rcsc/host/files/read.py:",
-    "rcsc/testing/executors/python.py:",
-    "rcsc/testing/executors/externs.py:",
+    "rcsc/base/host/files/read.py:",
+    "rcsc/code/testing/executors/python.py:",
+    "rcsc/code/testing/executors/externs.py:",
     "rcsc/lang/syntax/lalr.py:",
 )
 """Who parses; a tested executor, and what stands in for its externs, are texts that were generated just now, and the tables of the
@@ -167,7 +167,7 @@ def test_only_the_bounded_readers_parse_text_from_outside() -> None:
     imported = [
         f"{name}:{node.lineno}: {one}"
         for name, nodes in sources()
-        if not name.startswith("rcsc/host/files/")
+        if not name.startswith("rcsc/base/host/files/")
         for node in nodes
         if isinstance(node, ast.Import | ast.ImportFrom)
         for one in _imported(node)
@@ -806,18 +806,18 @@ def test_a_field_is_matched_to_its_end() -> None:
 # --- written whole or not at all -----------------------------------------------------------------
 
 SCRATCH = (
-    "rcsc/compose/counterexample/rerun.py", "rcsc/shell/reload/sources.py", "rcsc/run/executors.py",
-    "rcsc/diff/revision.py", "rcsc/testing/executors/native.py", "rcsc/testing/cortex.py", "rcsc/testing/esbmc.py",
-    "rcsc/testing/matchers/matcher.py", "rcsc/host/tools.py", "rcsc/testing/code_mutants.py", "rcsc/run/orders/together.py",
-    "rcsc/link/beside.py", "rcsc/evidence/analysers.py", "rcsc/evidence/llvm.py", "rcsc/evidence/runtime.py",
-    "rcsc/evidence/processors/boards.py", "sim/rcsc_cell/episodes/setting.py",
+    "rcsc/compose/counterexample/rerun.py", "rcsc/desk/shell/reload/sources.py", "rcsc/run/executors.py",
+    "rcsc/views/diff/revision.py", "rcsc/code/testing/executors/native.py", "rcsc/code/testing/cortex.py", "rcsc/code/testing/esbmc.py",
+    "rcsc/code/testing/matchers/matcher.py", "rcsc/base/host/tools.py", "rcsc/code/testing/code_mutants.py", "rcsc/run/orders/together.py",
+    "rcsc/run/link/beside.py", "rcsc/views/evidence/analysers.py", "rcsc/views/evidence/llvm.py", "rcsc/views/evidence/runtime.py",
+    "rcsc/views/evidence/processors/boards.py", "sim/rcsc_cell/episodes/setting.py",
 )  # fmt: skip
 """Who writes into temporary folders that end with the process."""
 STREAMS = (
-    "rcsc/host/files/write.py",
+    "rcsc/base/host/files/write.py",
     "rcsc/run/log/recorder.py",
-    "rcsc/campaign/journal.py",
-    "rcsc/shell/terminal.py",
+    "rcsc/run/campaign/journal.py",
+    "rcsc/desk/shell/terminal.py",
     "rcsc/run/processes/block.py",
 )
 """The writer itself, what is added to at its end and read as far as it goes, and what is no file of the disk's."""
@@ -855,7 +855,7 @@ def test_files_are_written_by_the_one_writer() -> None:
 
 FULL = """
 import resource, sys
-from rcsc.commands import main
+from rcsc.front.commands import main
 resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))
 sys.argv = ["rcsc", *sys.argv[1:]]
 main()
@@ -936,7 +936,7 @@ def test_a_full_standard_output_is_said(project: Path) -> None:
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", ">&- 2>&- <&-", "<&- | head -c 1"])
 def test_streams_that_are_closed_are_no_bug(closed: str, project: Path) -> None:
-    command = f"{sys.executable} -c 'from rcsc.commands import main; main()' explain RCS401 {closed}"
+    command = f"{sys.executable} -c 'from rcsc.front.commands import main; main()' explain RCS401 {closed}"
     ended = subprocess.run(["sh", "-c", command], cwd=project, capture_output=True, text=True, check=False,
                            env=os.environ | {"PYTHONPATH": str(REPO)})  # fmt: skip
     assert (ended.returncode, ended.stderr) == (0, "")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.host.trust import Agreement
+from rcsc.base.host.trust import Agreement
 
 
 @pytest.fixture

@@ -4,16 +4,16 @@ from random import Random
 
 import pytest
 
+from rcsc.base.diagnostics.source import Source
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces, usual_length
 from rcsc.compose.proof.level import Verdict, prove_level
-from rcsc.diagnostics.source import Source
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Value
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
 from tests.support.programs.examples import LASTING
 from tests.support.programs.stages import codes, program_of, refused, reported
 from tests.support.programs.systems import LITTLE, alone

@@ -8,13 +8,13 @@ import pytest
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.properties import properties
 from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
-from rcsc.episodes.episode import FAULTS, MADE
 from rcsc.lang.interpret import Fault, answering, cycle, initial
 from rcsc.lang.model import Kind, Value, key_bounds
 from rcsc.lang.protocol.environment import EARLY, ENVIRONMENT, Event, Kept, refusable, unadmitted
 from rcsc.lang.restart import NUMBERED, After, Fixed, SameAs
+from rcsc.proof.symbolic import values
+from rcsc.run.episodes.episode import FAULTS, MADE
 from rcsc.run.signature import FAULTS as FAULT_NAMES
-from rcsc.symbolic import values
 from tests.support.programs.stages import program_of
 
 MANUAL = Path(__file__).parents[2] / "grammar" / "manual.md"

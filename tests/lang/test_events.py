@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from rcsc.base.diagnostics.source import Source
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import Verdict, prove_level
-from rcsc.diagnostics.source import Source
 from rcsc.lang.interpret import Fault, Outcome, cycle, evaluate, initial, run_table
 from rcsc.lang.model import Program, Value
 from rcsc.lang.restart import Fixed, SameAs

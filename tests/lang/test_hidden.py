@@ -4,12 +4,12 @@ from itertools import product
 
 import pytest
 
-from rcsc.diff.compare import compare as versions
 from rcsc.lang.hidden import fed_with, matched
 from rcsc.lang.model import Program
-from rcsc.relation.same import Same, compare
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+from rcsc.proof.relation.same import Same, compare
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
+from rcsc.views.diff.compare import compare as versions
 from tests.support.programs.stages import BOXES, program_of
 
 TEXT = """\

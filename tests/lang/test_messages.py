@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.lang.syntax.expected import ELSEWHERE, operator_meant, word_meant
 from tests.support.programs.stages import program_of, refused
 from tests.support.programs.texts import table

@@ -15,9 +15,9 @@ import pytest
 
 from rcsc.lang.model import Bool, Int, Op, Real, Scalar
 from rcsc.lang.operator_table import Comparison
-from rcsc.symbolic import values
-from rcsc.symbolic.evaluation import Evaluation
-from rcsc.symbolic.values import Fact, Node
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.evaluation import Evaluation
+from rcsc.proof.symbolic.values import Fact, Node
 
 NAN, INF = math.nan, math.inf
 COMPARE: dict[Comparison, Callable[[float, float], bool]] = {

@@ -10,15 +10,15 @@ import z3
 
 from rcsc.lang.model import Among, Bool, Enum, Int, Kind, Read, Real, Scalar, Variable, VariableName
 from rcsc.lang.operator_table import Op
-from rcsc.procedures.discharge import MOST_CHOICES, fewest
-from rcsc.solvers import smt
-from rcsc.solvers.options import Limits
-from rcsc.solvers.smt import Answer, Solver
-from rcsc.symbolic import trial, values
-from rcsc.symbolic.encode import declared, encode
-from rcsc.symbolic.keyed import KEY
-from rcsc.symbolic.measured import Measured
-from rcsc.symbolic.values import FALSE, TRUE, Fact, Node
+from rcsc.proof.procedures.discharge import MOST_CHOICES, fewest
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Limits
+from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.symbolic import trial, values
+from rcsc.proof.symbolic.encode import declared, encode
+from rcsc.proof.symbolic.keyed import KEY
+from rcsc.proof.symbolic.measured import Measured
+from rcsc.proof.symbolic.values import FALSE, TRUE, Fact, Node
 
 SPANS = list(combinations_with_replacement(range(-2, 4), 2))
 TRUTHS = (0, 1)

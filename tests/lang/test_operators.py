@@ -16,17 +16,17 @@ from typing import Any
 import pytest
 import z3
 
-from rcsc.certify.execution import Run, Start
-from rcsc.certify.settle import script, values_in
-from rcsc.certify.values import Term, Terms, sort_of
-from rcsc.diagnostics.codes import Code
-from rcsc.diff.changes.value_text import in_words
-from rcsc.emit.c.ctext import CText, wide_type
-from rcsc.emit.c.helpers import helper
-from rcsc.emit.code_tree import IN_C, IN_PYTHON, Invoke, read
-from rcsc.emit.identifiers import names_of
-from rcsc.emit.translate import PyText
-from rcsc.host.tools import c_compiler, run_command
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.tools import c_compiler, run_command
+from rcsc.code.emit.c.ctext import CText, wide_type
+from rcsc.code.emit.c.helpers import helper
+from rcsc.code.emit.code_tree import IN_C, IN_PYTHON, Invoke, read
+from rcsc.code.emit.identifiers import names_of
+from rcsc.code.emit.translate import PyText
+from rcsc.code.testing.executors.reference import Writer, c_type
+from rcsc.code.testing.executors.reference_file import EXTREMES
+from rcsc.code.testing.executors.reference_file import PRELUDE as C_PRELUDE
+from rcsc.code.testing.executors.symbols import symbols_of
 from rcsc.lang.expressions import intervals
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interpret import evaluate, matching_lines
@@ -52,24 +52,24 @@ from rcsc.lang.model import (
     single_of_key,
 )
 from rcsc.lang.operator_table import LOGIC, Arithmetic, Comparison, Core, is_comparison, single, spell_single
-from rcsc.solvers import smt
-from rcsc.solvers.options import Options
-from rcsc.solvers.sat import Sat
-from rcsc.solvers.smtlib import cvc5_refutes
-from rcsc.symbolic import values
-from rcsc.symbolic.bits import Bits, key_of_bits
-from rcsc.symbolic.encode import Frame, encode
-from rcsc.symbolic.evaluation import Evaluation
-from rcsc.symbolic.keyed import Keyed
-from rcsc.symbolic.measured import Measured
-from rcsc.symbolic.values import Node
-from rcsc.table.decide import prove_table
-from rcsc.table.program import prove_program
-from rcsc.table.verdict import Gap, Overlap
-from rcsc.testing.executors.reference import Writer, c_type
-from rcsc.testing.executors.reference_file import EXTREMES
-from rcsc.testing.executors.reference_file import PRELUDE as C_PRELUDE
-from rcsc.testing.executors.symbols import symbols_of
+from rcsc.proof.certify.execution import Run, Start
+from rcsc.proof.certify.settle import script, values_in
+from rcsc.proof.certify.values import Term, Terms, sort_of
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.sat import Sat
+from rcsc.proof.solvers.smtlib import cvc5_refutes
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.bits import Bits, key_of_bits
+from rcsc.proof.symbolic.encode import Frame, encode
+from rcsc.proof.symbolic.evaluation import Evaluation
+from rcsc.proof.symbolic.keyed import Keyed
+from rcsc.proof.symbolic.measured import Measured
+from rcsc.proof.symbolic.values import Node
+from rcsc.proof.table.decide import prove_table
+from rcsc.proof.table.program import prove_program
+from rcsc.proof.table.verdict import Gap, Overlap
+from rcsc.views.diff.changes.value_text import in_words
 from tests.support.programs.stages import emitted, program_of
 
 NAN, INF, GREATEST = math.nan, math.inf, 1.7976931348623157e308

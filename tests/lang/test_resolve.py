@@ -6,8 +6,8 @@ from itertools import product
 
 import pytest
 
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.source import Source
 from rcsc.lang.interpret import call, evaluate, holds
 from rcsc.lang.model import (
     Assign,
@@ -279,7 +279,7 @@ def test_each_error_is_reported_once_on_its_smallest_span(name: str) -> None:
 
 
 def test_every_code_of_names_kinds_and_ranges_has_a_case() -> None:
-    from rcsc.diagnostics.codes import Code
+    from rcsc.base.diagnostics.codes import Code
 
     cased = {code for _, expected in CASES.values() for _, code, _ in expected}
     elsewhere = {

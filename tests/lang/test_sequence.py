@@ -2,7 +2,7 @@
 
 import pytest
 
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.interpret import initial, run_table
 from tests.support.programs.stages import program_of, refused
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Severity
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Severity
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import Program
 from rcsc.lang.resolve import compile_text

@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Source, Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Source, Span
 from rcsc.lang.digest import Digests
 from rcsc.lang.syntax import parse as parsing
 from rcsc.lang.syntax import tree
@@ -24,7 +24,7 @@ from rcsc.lang.syntax.lalr import ParseNode, Tables, grammar_of_json
 from rcsc.lang.syntax.parse import MOST_ERRORS, made_tables, parse
 from rcsc.lang.syntax.rows import PIECES, Side
 from rcsc.lang.syntax.spell import spell_expr
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
 from tests.bench.made import families
 from tests.support.programs.arbitrary import expressions, files, tables
 from tests.support.programs.stages import program_of, reported, shipped
@@ -468,7 +468,7 @@ def test_the_kept_tables_are_what_lark_makes_of_the_grammar() -> None:
 
 LARK_COUNTED = """
 import lark
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.source import Source
 from rcsc.lang.syntax import parse as module
 made, whole = [], lark.Lark
 lark.Lark = lambda *args, **options: made.append(args) or whole(*args, **options)

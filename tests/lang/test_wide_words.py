@@ -12,11 +12,11 @@ from rcsc.lang.expressions.words import bits_alone
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.model import Program, Test, Value
 from rcsc.lang.resolve import compile_text
-from rcsc.solvers import smt
-from rcsc.solvers.smt import Answer, Solver
-from rcsc.symbolic import trial, values
-from rcsc.symbolic.encode import declared, encode, within
-from rcsc.symbolic.execution import Run
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.symbolic import trial, values
+from rcsc.proof.symbolic.encode import declared, encode, within
+from rcsc.proof.symbolic.execution import Run
 
 HEAD = """input w : int 0 .. 18446744073709551615
 input v : int 0 .. 131071

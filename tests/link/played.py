@@ -14,9 +14,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
 
-from rcsc.link.drawn_script import Published, Tick
 from rcsc.run.description import Description
 from rcsc.run.levels import BadState, Query, StateTableError
+from rcsc.run.link.drawn_script import Published, Tick
 from rcsc.run.signature import FORMATS, Signature, Values
 from rcsc.run.system import System, assemble
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
 from rcsc.driver import compile as compiling
 from rcsc.driver import settings, trials
 from rcsc.driver.compile import tables_in
 from rcsc.driver.pipeline import proved
-from rcsc.link import Linked, emit_system
-from rcsc.solvers.options import Options
+from rcsc.front.commands import run
+from rcsc.proof.solvers.options import Options
+from rcsc.run.link import Linked, emit_system
 from tests.link.test_compile_system import BUFFERS, written
 from tests.support.programs.texts import edit_file, edited
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.testing.cortex import FLAGS, LINK, LINKER, MACHINE, STARTUP
+from rcsc.code.testing.cortex import FLAGS, LINK, LINKER, MACHINE, STARTUP
 
 GUIDE = Path(__file__).parents[2] / "tables/README.md"
 STRICT = "-std=c99 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wpedantic -Werror".split()

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.link.drawn_script import drawing, script
+from rcsc.front.commands import run
 from rcsc.run.description import description
+from rcsc.run.link.drawn_script import drawing, script
 from rcsc.run.system import signatures
 from tests.link.played import CSystem, by_python, first_difference
 from tests.support.programs.texts import edit_file, system

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from rcsc.driver.compile import compile_system
-from rcsc.link.drawn_script import Tick, drawing, script
 from rcsc.run.description import description
 from rcsc.run.levels import RunningLevel
+from rcsc.run.link.drawn_script import Tick, drawing, script
 from rcsc.run.log.schema import outside_wires
 from rcsc.run.system import System, signatures
 from rcsc_cell.cell.ready import plant

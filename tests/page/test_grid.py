@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from aiohttp import web
 
-from rcsc.commands import run as rcsc
-from rcsc.shell.opening import Opening
-from rcsc.studio.hub import PROVER
-from rcsc.studio.server import Server
+from rcsc.desk.shell.opening import Opening
+from rcsc.desk.studio.hub import PROVER
+from rcsc.desk.studio.server import Server
+from rcsc.front.commands import run as rcsc
 from tests.studio.driven import HIGH, WIDE, Seat, dock, seated
 from tests.studio.served import page, serving
 
@@ -359,7 +359,7 @@ def test_what_is_typed_without_a_connection_is_kept_and_sent(
             sockets.append(self)
             return await super().prepare(request)
 
-    monkeypatch.setattr("rcsc.studio.server.web.WebSocketResponse", Socket)
+    monkeypatch.setattr("rcsc.desk.studio.server.web.WebSocketResponse", Socket)
     with serving(Opening(drive.parent / "system.toml")) as server, Seat(WIDE, HIGH) as seat:
         loop = server._loop
         assert loop is not None
@@ -377,7 +377,7 @@ def test_what_is_typed_without_a_connection_is_kept_and_sent(
         seat.value(f"({EDITOR}.focus(), {EDITOR}.go([0, 0]))")
         seat.write("# one")
         with monkeypatch.context() as patch:
-            patch.setattr("rcsc.studio.server.MOST_PAGES", 0)
+            patch.setattr("rcsc.desk.studio.server.MOST_PAGES", 0)
             cut()
             seat.write(" two")
             seat.until("#said", "what is typed stays here")
@@ -387,7 +387,7 @@ def test_what_is_typed_without_a_connection_is_kept_and_sent(
         with PROVER:  # edits are taken, and their answers wait
             seat.write(" four")
             with monkeypatch.context() as patch:
-                patch.setattr("rcsc.studio.server.MOST_PAGES", 0)
+                patch.setattr("rcsc.desk.studio.server.MOST_PAGES", 0)
                 cut()
                 seat.write(" five")
         seat.until("#state", "paused at cycle 0")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run as rcsc
-from rcsc.shell.opening import Opening
+from rcsc.desk.shell.opening import Opening
+from rcsc.front.commands import run as rcsc
 from tests.studio.driven import HIGH, WIDE, Seat, dock, scrubbed, seated
 
 pytestmark = pytest.mark.needs("chromium")

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run as rcsc
-from rcsc.pages.frame import hashed
+from rcsc.desk.studio.share.document import bundled, player
+from rcsc.front.commands import run as rcsc
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.states import line_of
-from rcsc.studio.share.document import bundled, player
+from rcsc.views.pages.frame import hashed
 from tests.page.test_looks import LOOK
 from tests.studio.driven import HIGH, WIDE, Seat, dock
 

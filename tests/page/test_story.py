@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run as rcsc
-from rcsc.commands.shared.cells import Drawn
-from rcsc.shell.opening import Opening
+from rcsc.desk.shell.opening import Opening
+from rcsc.front.commands import run as rcsc
+from rcsc.front.commands.shared.cells import Drawn
 from tests.studio.driven import HIGH, WIDE, Seat, dock, seated
 from tests.studio.served import page, serving
 
@@ -121,7 +121,7 @@ def never(_: Path) -> None:
 def test_what_takes_long_says_so_and_is_cancelled_by_a_key(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rcsc.studio.build.proved_together", never)
+    monkeypatch.setattr("rcsc.desk.studio.build.proved_together", never)
     with seated(Opening(dock(tmp_path / "dock"))) as seat:
         seat.until("#state", "paused at cycle 0")
         seat.press("c")

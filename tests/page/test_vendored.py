@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-VENDOR = Path(__file__).parents[2] / "rcsc" / "studio" / "page" / "vendor"
+VENDOR = Path(__file__).parents[2] / "rcsc" / "desk" / "studio" / "page" / "vendor"
 PARTS = json.loads((VENDOR / "digests.json").read_text(encoding="utf-8"))
 PAGE = VENDOR.parent
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.base.diagnostics.codes import Code
 from rcsc.compose.proof.system import transition_systems
-from rcsc.diagnostics.codes import Code
 from rcsc.run.description import BadDescription, description
 from tests.support.programs.texts import edit_file
 

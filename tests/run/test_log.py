@@ -17,7 +17,7 @@ from click.testing import CliRunner, Result
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from rcsc.commands.group import commands
+from rcsc.front.commands.group import commands
 from rcsc.run.adopt import Begun
 from rcsc.run.description import BadDescription, Description, LevelSpec, Wire, description
 from rcsc.run.levels import Query

@@ -6,7 +6,7 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from rcsc.commands import run
+from rcsc.front.commands import run
 from rcsc.run.description import BadDescription, description
 from rcsc.run.plant.bind import BadPlant, BoundPlant, Buffer, PlantFailed, plant_page
 from rcsc.run.plant.load import load

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
+from rcsc.front.commands import run
 from rcsc.run.description import BadDescription, description
 from rcsc.run.levels import misfit
 from rcsc.run.plant import Range, fields

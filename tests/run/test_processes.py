@@ -340,10 +340,10 @@ def answered_once(path: Path, count: int, first: int) -> None:
 
 COMPILER = {
     "rcsc.lang.model",
-    "rcsc.emit.plan",
-    "rcsc.solvers",
-    "rcsc.symbolic",
-    "rcsc.table",
+    "rcsc.code.emit.plan",
+    "rcsc.proof.solvers",
+    "rcsc.proof.symbolic",
+    "rcsc.proof.table",
     "rcsc.lang.resolve",
     "rcsc.lang.syntax.tree",
 }
@@ -354,7 +354,7 @@ COMPILER = {
     [
         ("rcsc.run.processes.serve, rcsc.run.plant.staging", COMPILER | {"numpy", "mujoco"}),  # a level
         ("rcsc_cell.episodes.stage", COMPILER | {"numpy", "mujoco"}),  # what answers its feeds in the cell
-        ("rcsc.campaign.work, rcsc_cell.episodes.kind", COMPILER | {"mujoco"}),  # episodes by kinematics
+        ("rcsc.run.campaign.work, rcsc_cell.episodes.kind", COMPILER | {"mujoco"}),  # episodes by kinematics
     ],
 )
 def test_a_process_loads_only_what_it_needs(loads: str, never: set[str]) -> None:

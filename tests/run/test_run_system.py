@@ -14,15 +14,15 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.pages.report import page
-from rcsc.pages.witness import RunWitness
+from rcsc.front.commands import run
 from rcsc.run.description import description
 from rcsc.run.orders.operator import RowResult, ScriptedRun, ScriptOperator
 from rcsc.run.orders.roles import served
 from rcsc.run.orders.script import BadScript, read_script, script_path
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.system import System, assemble, signatures
+from rcsc.views.pages.report import page
+from rcsc.views.pages.witness import RunWitness
 from tests.support.films import film_of
 from tests.support.programs.texts import edit_file, edited
 

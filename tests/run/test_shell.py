@@ -12,15 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diff.changes.difference import ProgramDifference
-from rcsc.diff.compare import compare
+from rcsc.base.diagnostics.codes import Code
+from rcsc.desk.shell.commands import HELP, Commands
+from rcsc.desk.shell.reload.reload import Origin
+from rcsc.desk.shell.reload.sources import kept, laid_out
+from rcsc.desk.shell.session import Session
 from rcsc.run.description import description
 from rcsc.run.system import Kind, assemble, signatures
-from rcsc.shell.commands import HELP, Commands
-from rcsc.shell.reload.reload import Origin
-from rcsc.shell.reload.sources import kept, laid_out
-from rcsc.shell.session import Session
+from rcsc.views.diff.changes.difference import ProgramDifference
+from rcsc.views.diff.compare import compare
 from rcsc_cell.cell.ready import plant
 from rcsc_cell.workstation.prepared import database_of
 from tests.support.programs.examples import WALKER
@@ -31,7 +31,7 @@ from tests.support.shells import alone, do, refused, state
 REPO = Path(__file__).parents[2]
 SYSTEM = REPO / "tables" / "system.toml"
 GRIPPER = "gripper/gripper.rcs"
-RCSC = [sys.executable, "-c", "from rcsc.commands import main; main()", "shell"]
+RCSC = [sys.executable, "-c", "from rcsc.front.commands import main; main()", "shell"]
 MOVE = ["workstation.inc_command = 1", "workstation.input_command = move", "workstation.dest_locpt = 3"]
 DONE = "run until task.to_workstation.inc_command_echo = 1 and task.to_workstation.status_report = done"
 
@@ -808,12 +808,12 @@ def test_what_cannot_be_compared_is_taken_only_if_that_is_said(
     assert "nothing changed" not in do(commands, "reload anyway")[-1]
     write(walker)
     monkeypatch.setattr(
-        "rcsc.shell.reload.gate.compare",
+        "rcsc.desk.shell.reload.gate.compare",
         lambda *args, **more: replace(compare(*args, **more), undecided=("table `walk`",)),
     )
     error = refused(commands, "reload")
     assert (error.code, "the solver gave up on table `walk`" in str(error)) == (Code.SHELL_OTHERWISE, True)
-    monkeypatch.setattr("rcsc.shell.reload.gate.compare", lambda name, *_, **__: ProgramDifference(name))
+    monkeypatch.setattr("rcsc.desk.shell.reload.gate.compare", lambda name, *_, **__: ProgramDifference(name))
     do(commands, "at = middle", "at.next = middle", "go = true")
     with pytest.raises(RuntimeError, match="nothing is said to differ"):
         do(commands, "reload")

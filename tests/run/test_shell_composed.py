@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.diagnostics.codes import Code
-from rcsc.shell.commands import HELP
-from rcsc.shell.reload import composed
+from rcsc.base.diagnostics.codes import Code
+from rcsc.desk.shell.commands import HELP
+from rcsc.desk.shell.reload import composed
+from rcsc.front.commands import run
 from tests.support.programs.stages import compile_beside
 from tests.support.programs.systems import HOPED, ORDER_AFTER_ORDER, SMALL, small_system
 from tests.support.programs.texts import edit_file

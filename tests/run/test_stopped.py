@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from rcsc.commands import run
+from rcsc.front.commands import run
 from rcsc.run.description import description
 from rcsc.run.levels import StateTableError
 from rcsc.run.orders.operator import ScriptedRun

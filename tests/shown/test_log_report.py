@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.pages.log_page import MOST_PICTURES, story_of
-from rcsc.pages.report import Story, page
+from rcsc.front.commands import run
 from rcsc.run.description import description
 from rcsc.run.log.export import coverage
 from rcsc.run.log.read import read
@@ -15,6 +13,8 @@ from rcsc.run.log.recorder import Recorder
 from rcsc.run.orders.operator import RowResult, ScriptedRun
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.system import assemble, signatures
+from rcsc.views.pages.log_page import MOST_PICTURES, story_of
+from rcsc.views.pages.report import Story, page
 from tests.run.test_log import record
 from tests.support.cells import SYSTEM
 from tests.support.films import film_of, unset_in

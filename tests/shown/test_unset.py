@@ -11,12 +11,10 @@ from typing import Any
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.commands.shared.played import with_ticks
-from rcsc.host.files.names import BadName
-from rcsc.host.files.read import CheckedFields, Malformed, json_of
-from rcsc.pages.report import page
-from rcsc.pages.witness import RunWitness
+from rcsc.base.host.files.names import BadName
+from rcsc.base.host.files.read import CheckedFields, Malformed, json_of
+from rcsc.front.commands import run
+from rcsc.front.commands.shared.played import with_ticks
 from rcsc.run.adopt import Begun
 from rcsc.run.description import Description, LevelSpec, Wire
 from rcsc.run.executors import PythonExecutor
@@ -28,6 +26,8 @@ from rcsc.run.log.schema import signature_from, signature_text
 from rcsc.run.orders.operator import ScriptedRun
 from rcsc.run.signature import Leaf, signature_of
 from rcsc.run.system import System, assemble
+from rcsc.views.pages.report import page
+from rcsc.views.pages.witness import RunWitness
 from tests.run.test_log import REPO, restarted, system
 from tests.support.films import film_of, unset_in
 from tests.support.programs.stages import emitted, program_of

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from rcsc.commands.group import commands as of_rcsc
-from rcsc.diagnostics.render import with_witness
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.render import with_witness
+from rcsc.base.diagnostics.source import Source
+from rcsc.front.commands.group import commands as of_rcsc
 from rcsc.run.description import Description, LevelSpec, Wire
 from rcsc.run.log.recorder import Recorder
 from rcsc.run.system import StateTableError, System, assemble

@@ -7,11 +7,11 @@ from random import Random
 
 import pytest
 
-from rcsc.host.tools import c_compiler
+from rcsc.base.host.tools import c_compiler
+from rcsc.code.testing.agree import AgreementCount, run_session
+from rcsc.code.testing.executors.sessions import Stimuli
 from rcsc.lang.interpret import Fault, cycle, initial, run_table
 from rcsc.lang.model import Enum, Kind, Program, Value
-from rcsc.testing.agree import AgreementCount, run_session
-from rcsc.testing.executors.sessions import Stimuli
 from tests.emit.test_agreement import executors_of, found_of
 from tests.stages.test_proof import drawn
 from tests.support.programs.stages import errors, program_of, proved_of, refused, verdict_of

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import rcsc
-from rcsc.commands import run
-from rcsc.host.tools import c_compiler
+from rcsc.base.host.tools import c_compiler
+from rcsc.front.commands import run
 from tests.stages.test_cycle import CHOICE, REACTOR
 from tests.support.programs.systems import solo_system
 from tests.support.programs.texts import edited

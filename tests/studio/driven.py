@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rcsc.shell.opening import Opening
+from rcsc.desk.shell.opening import Opening
 from tests.studio.served import serving
 from tests.support.browser import Browser
 

@@ -10,14 +10,14 @@ from typing import Any, Self
 
 import aiohttp
 
-from rcsc.host.trust import Agreement
+from rcsc.base.host.trust import Agreement
+from rcsc.desk.shell.opening import Opening
+from rcsc.desk.studio.hub import Concern
+from rcsc.desk.studio.project import concerns
+from rcsc.desk.studio.runs.live import Pace
+from rcsc.desk.studio.scene import Drawer
+from rcsc.desk.studio.server import Server
 from rcsc.lang.project import project_root
-from rcsc.shell.opening import Opening
-from rcsc.studio.hub import Concern
-from rcsc.studio.project import concerns
-from rcsc.studio.runs.live import Pace
-from rcsc.studio.scene import Drawer
-from rcsc.studio.server import Server
 
 PATIENCE_S = 120.0
 """After that something is broken; a machine under load needs some seconds."""

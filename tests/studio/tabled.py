@@ -3,12 +3,12 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcsc.host.files.read import CheckedFields
-from rcsc.studio.hub import Ask
-from rcsc.studio.tables.desk import Desk
-from rcsc.studio.tables.editing import Tables
-from rcsc.studio.tables.proving import Graphs, Proof
-from rcsc.studio.tables.writing import Writing
+from rcsc.base.host.files.read import CheckedFields
+from rcsc.desk.studio.hub import Ask
+from rcsc.desk.studio.tables.desk import Desk
+from rcsc.desk.studio.tables.editing import Tables
+from rcsc.desk.studio.tables.proving import Graphs, Proof
+from rcsc.desk.studio.tables.writing import Writing
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,15 +11,15 @@ from typing import Any
 
 import pytest
 
-from rcsc.diagnostics.source import Source
-from rcsc.host.files.read import Malformed
-from rcsc.host.trust import Agreement
+from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.files.read import Malformed
+from rcsc.base.host.trust import Agreement
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.desk.studio.hub import MOST_OPEN, MOST_UNREAD, Client, Hub
+from rcsc.desk.studio.tables import desk
+from rcsc.desk.studio.tables.document import MOST_BYTES, MOST_KEPT, Document
 from rcsc.lang.project import listed
 from rcsc.lang.written.changes import formatted
-from rcsc.shell.reload.refusal import Refused
-from rcsc.studio.hub import MOST_OPEN, MOST_UNREAD, Client, Hub
-from rcsc.studio.tables import desk
-from rcsc.studio.tables.document import MOST_BYTES, MOST_KEPT, Document
 from tests.studio.driven import dock
 from tests.studio.served import page_at
 from tests.studio.tabled import Bench, rows
@@ -346,7 +346,7 @@ def test_what_nobody_saved_is_kept_when_the_studio_ends(how: str, tmp_path: Path
     order = [
         sys.executable,
         "-c",
-        "import rcsc.commands; rcsc.commands.main()",
+        "import rcsc.front.commands; rcsc.front.commands.main()",
         "studio",
         str(system),
         "--alone",
@@ -376,7 +376,7 @@ def test_a_run_that_is_watched_runs_in_the_studio_until_it_is_ended(tmp_path: Pa
     order = [
         sys.executable,
         "-c",
-        "import rcsc.commands; rcsc.commands.main()",
+        "import rcsc.front.commands; rcsc.front.commands.main()",
         "run",
         str(system),
         "--live",

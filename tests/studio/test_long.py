@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from rcsc.commands import run as rcsc
+from rcsc.desk.shell.opening import Opening
+from rcsc.desk.studio import plots
+from rcsc.desk.studio.runs.lines import MOST_RECORDS
+from rcsc.front.commands import run as rcsc
 from rcsc.run.log.export import csv_text
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.states import line_of
-from rcsc.shell.opening import Opening
-from rcsc.studio import plots
-from rcsc.studio.runs.lines import MOST_RECORDS
 from tests.studio.driven import dock
 from tests.studio.served import Page, page, serving, until
 

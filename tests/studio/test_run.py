@@ -13,20 +13,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc.commands import run as rcsc
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
+from rcsc.desk.shell.commands import Commands
+from rcsc.desk.shell.opening import Opening, opened
+from rcsc.desk.shell.reload.refusal import Refused as Refusal
+from rcsc.desk.studio.runs.history import History
+from rcsc.desk.studio.runs.live import Live
+from rcsc.desk.studio.runs.shown import moment
+from rcsc.desk.studio.runs.why import why
+from rcsc.front.commands import run as rcsc
 from rcsc.lang.interpret import initial
+from rcsc.proof.solvers.smt import Answer, Solver, Term
 from rcsc.run.log.read import read
 from rcsc.run.log.ticks import frames
 from rcsc.run.system import System
-from rcsc.shell.commands import Commands
-from rcsc.shell.opening import Opening, opened
-from rcsc.shell.reload.refusal import Refused as Refusal
-from rcsc.solvers.smt import Answer, Solver, Term
-from rcsc.studio.runs.history import History
-from rcsc.studio.runs.live import Live
-from rcsc.studio.runs.shown import moment
-from rcsc.studio.runs.why import why
 from tests.studio.served import Page, Refused, page, serving, until
 from tests.support.programs.examples import EXTERN
 from tests.support.programs.stages import program_of
@@ -138,7 +138,7 @@ step 999999999999
 
 def test_every_command_answers_as_the_shell_does(dock: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "rcsc.shell.commands.MOST_CYCLES", 500
+        "rcsc.desk.shell.commands.MOST_CYCLES", 500
     )  # else one of them runs for an hour of control time
     commands = opened(Opening(dock))
 
@@ -244,9 +244,9 @@ def test_a_system_that_a_bug_keeps_from_being_opened_says_so(
 
     monkeypatch.setattr(
         *(
-            ("rcsc.studio.build.executor", fails)
+            ("rcsc.desk.studio.build.executor", fails)
             if where == "compile"
-            else ("rcsc.studio.runs.live.opened", fails)
+            else ("rcsc.desk.studio.runs.live.opened", fails)
         )
     )
 

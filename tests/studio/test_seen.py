@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.commands import run as rcsc
-from rcsc.commands.shared.cells import Drawn
+from rcsc.desk.shell.opening import Opening, opened
+from rcsc.desk.studio.runs import history
+from rcsc.desk.studio.scene import Poses
+from rcsc.front.commands import run as rcsc
+from rcsc.front.commands.shared.cells import Drawn
 from rcsc.run.description import description
 from rcsc.run.log.export import valued
 from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import read
 from rcsc.run.plant.space import FIXED, space_of
-from rcsc.shell.opening import Opening, opened
-from rcsc.studio.runs import history
-from rcsc.studio.scene import Poses
 from rcsc_cell.cell.arm import skeleton
 from rcsc_cell.cell.kinematic import Kinematic
 from rcsc_cell.cell.ready import plant

@@ -15,12 +15,12 @@ from urllib.parse import urlsplit
 import aiohttp
 import pytest
 
-from rcsc.commands import run as rcsc
-from rcsc.diagnostics.codes import Code
-from rcsc.host.guard import MOST_CONNECTIONS, door
-from rcsc.shell.reload.refusal import Refused as Refusal
-from rcsc.studio.hub import MOST_OPEN, Ask, Client, Hub, message
-from rcsc.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.guard import MOST_CONNECTIONS, door
+from rcsc.desk.shell.reload.refusal import Refused as Refusal
+from rcsc.desk.studio.hub import MOST_OPEN, Ask, Client, Hub, message
+from rcsc.desk.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
+from rcsc.front.commands import run as rcsc
 from tests.studio.driven import DOCK, Seat
 from tests.studio.served import PATIENCE_S, Page, Refused, page, page_at, serving, until
 from tests.support.strangers import STRANGERS, held_beside

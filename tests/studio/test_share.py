@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from rcsc.commands import run as rcsc
-from rcsc.pages.frame import hashed
-from rcsc.shell.opening import Opening
-from rcsc.studio.share.document import of_film, player
+from rcsc.desk.shell.opening import Opening
+from rcsc.desk.studio.share.document import of_film, player
+from rcsc.front.commands import run as rcsc
+from rcsc.views.pages.frame import hashed
 from tests.studio.driven import HIGH, WIDE, Seat, dock
 from tests.studio.served import Page, Refused, page, serving
 from tests.support.films import film_of, standing, values_at

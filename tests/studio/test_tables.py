@@ -10,24 +10,24 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from rcsc.commands.group import commands
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.files.read import Malformed
+from rcsc.desk.editor.places import Lines, difference
+from rcsc.desk.shell.opening import Opening
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.desk.studio.tables import cells
+from rcsc.desk.studio.tables.document import MOST_BYTES
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
-from rcsc.editor.places import Lines, difference
-from rcsc.graph.derive import Derived, derive
-from rcsc.host.files.read import Malformed
+from rcsc.front.commands.group import commands
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.model import Program, key_bounds, value_of_key
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.lang.written.tables import tables_of
-from rcsc.shell.opening import Opening
-from rcsc.shell.reload.refusal import Refused
-from rcsc.solvers.options import Options
-from rcsc.studio.tables import cells
-from rcsc.studio.tables.document import MOST_BYTES
-from rcsc.table.findings.unread import TOLD
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.findings.unread import TOLD
+from rcsc.views.graph.derive import Derived, derive
 from tests.studio.served import page, serving
 from tests.studio.tabled import Bench, rows
 

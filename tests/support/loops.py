@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import ClassVar
 
-from rcsc.episodes.outcome import EpisodeOutcome
+from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc_cell.episodes.episode import SYSTEM, Episode, PartSpec, script
 from rcsc_cell.episodes.loop import Loop, run
 from rcsc_cell.properties.cycle import CycleState

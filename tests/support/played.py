@@ -13,8 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 
-from rcsc.campaign.rig import known_lines
-from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome, RowEnd
+from rcsc.run.campaign.rig import known_lines
+from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, RowEnd
 from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, PartSpec
 from rcsc_cell.episodes.loop import run as run_in_cell
 

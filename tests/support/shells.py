@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.desk.shell.commands import Commands
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.desk.shell.reload.reload import Origin
+from rcsc.desk.shell.session import Session, silent_queries
 from rcsc.run.description import description
 from rcsc.run.system import Kind, assemble, signatures
-from rcsc.shell.commands import Commands
-from rcsc.shell.reload.refusal import Refused
-from rcsc.shell.reload.reload import Origin
-from rcsc.shell.session import Session, silent_queries
 from tests.support.cells import SYSTEM
 
 

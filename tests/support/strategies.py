@@ -7,8 +7,8 @@ from random import Random
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from rcsc.code.testing.inputs.sampling import declarations, snapshot
 from rcsc.lang.model import Program, Snapshot
-from rcsc.testing.inputs.sampling import declarations, snapshot
 
 __all__ = ["INTS", "REALS", "conditions", "integers_over", "reals_over", "snapshots_of"]
 

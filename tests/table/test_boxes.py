@@ -9,22 +9,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import holds, joined, meet
 from rcsc.lang.model import Box, Program, Scalar, key_bounds, key_of, value_of_key
-from rcsc.solvers import smt
-from rcsc.solvers.options import Options
-from rcsc.solvers.search import furthest, halved
-from rcsc.table import boxes
-from rcsc.table.confirm import Agreement, confirm
-from rcsc.table.decide import prove_table
-from rcsc.table.diagnose import diagnostics
-from rcsc.table.program import prove_program
-from rcsc.table.regions import holes, partition
-from rcsc.table.repair import Partings, new_line
-from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.search import furthest, halved
+from rcsc.proof.table import boxes
+from rcsc.proof.table.confirm import Agreement, confirm
+from rcsc.proof.table.decide import prove_table
+from rcsc.proof.table.diagnose import diagnostics
+from rcsc.proof.table.program import prove_program
+from rcsc.proof.table.regions import holes, partition
+from rcsc.proof.table.repair import Partings, new_line
+from rcsc.proof.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench.made import families
 from tests.support.programs.stages import BOXES, drawn_program, program_of, reported
 from tests.support.programs.texts import table as table_text
@@ -334,7 +334,7 @@ def test_a_table_with_as_many_pairs_as_nobody_looks_at_gets_no_line(monkeypatch:
     line = new_line(program, program.tables[0], gap)
     assert line is not None
     assert line.told == "a line `| new | >= m || ... |` closes the gap and overlaps no other"
-    monkeypatch.setattr("rcsc.table.repair.MOST_ASKED", 0)
+    monkeypatch.setattr("rcsc.proof.table.repair.MOST_ASKED", 0)
     assert new_line(program, program.tables[0], gap) is None
 
 
@@ -423,8 +423,8 @@ def test_a_verdict_that_z3_disagrees_with_is_told_as_a_fault_of_rcsc(
 ) -> None:
     other, program = ANSWERED[claimed], ANSWERED[asked]
     claim = prove_table(other, other.tables[0], BOXES).findings
-    monkeypatch.setattr("rcsc.table.decide._by_boxes", lambda *_: claim)
-    monkeypatch.setattr("rcsc.table.decide.box_certificate", lambda *_: {})
+    monkeypatch.setattr("rcsc.proof.table.decide._by_boxes", lambda *_: claim)
+    monkeypatch.setattr("rcsc.proof.table.decide.box_certificate", lambda *_: {})
     verdict = prove_program(program, Options())
     assert verdict.proved is None
     assert not verdict.tables[0].backing.confirmed_by_z3
@@ -438,7 +438,7 @@ def test_z3_is_asked_as_the_options_say(
     monkeypatch: pytest.MonkeyPatch, solver: Literal["auto", "both", "boxes"], spare: int, asked: bool
 ) -> None:
     program = ANSWERED["right"]
-    monkeypatch.setattr("rcsc.table.confirm._COSTLY", 2 * 2 + spare)  # two conditions, two lines
+    monkeypatch.setattr("rcsc.proof.table.confirm._COSTLY", 2 * 2 + spare)  # two conditions, two lines
     options = Options(solver=solver)
     agreed = confirm(program, program.tables[0], (), options)
     assert agreed is (Agreement.AGREES if asked else Agreement.NOT_ASKED)

@@ -16,20 +16,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.certify import CaseAnswer, certify, check_certificate
-from rcsc.certify.execution import Run, Start
-from rcsc.certify.known import Known
-from rcsc.certify.settle import script, values_in
-from rcsc.certify.table import TableChecker
-from rcsc.certify.values import INT, Term, Terms, parts_first, spanned
-from rcsc.host.files.read import Malformed, json_of
+from rcsc.base.host.files.read import Malformed, json_of
 from rcsc.lang.interpret import call, evaluate, holds, initial, matching_lines
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import AssumptionName, Program, Read, Table, Value, key_bounds, key_of, value_of_key
 from rcsc.lang.resolve import compile_text
-from rcsc.solvers.options import Options
-from rcsc.solvers.smtlib import cvc5_says
-from rcsc.table.program import prove_program
+from rcsc.proof.certify import CaseAnswer, certify, check_certificate
+from rcsc.proof.certify.execution import Run, Start
+from rcsc.proof.certify.known import Known
+from rcsc.proof.certify.settle import script, values_in
+from rcsc.proof.certify.table import TableChecker
+from rcsc.proof.certify.values import INT, Term, Terms, parts_first, spanned
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smtlib import cvc5_says
+from rcsc.proof.table.program import prove_program
 from tests.bench.made import families
 from tests.certificates import Attack, signed, wrong_with
 from tests.support.programs.examples import EXTERN, RICH
@@ -196,7 +196,7 @@ def test_a_certificate_is_made_only_where_it_is_asked_for(monkeypatch: pytest.Mo
     def unasked(*_: object) -> dict[str, object]:
         raise LookupError
 
-    monkeypatch.setattr("rcsc.table.program.program_certificate", unasked)
+    monkeypatch.setattr("rcsc.proof.table.program.program_certificate", unasked)
     verdict = prove_program(program_of(BOXES), Options())
     assert verdict.proved is not None
     with pytest.raises(LookupError):
@@ -260,15 +260,18 @@ def every_input(program: Program) -> list[dict[str, Any]]:
 
 def test_the_checker_imports_nothing_of_the_prover(repo: Path) -> None:
     trees = [
-        ast.parse(path.read_text(encoding="utf-8")) for path in sorted((repo / "rcsc/certify").glob("*.py"))
+        ast.parse(path.read_text(encoding="utf-8"))
+        for path in sorted((repo / "rcsc/proof/certify").glob("*.py"))
     ]
     froms = {node.module for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     ours = {
-        name for name in froms if name and name.startswith("rcsc") and not name.startswith("rcsc.certify")
+        name
+        for name in froms
+        if name and name.startswith("rcsc") and not name.startswith("rcsc.proof.certify")
     }
     assert ours == {
         "rcsc.lang.meaning", "rcsc.lang.model", "rcsc.lang.leaves", "rcsc.lang.operator_table", "rcsc.lang.restart",
-        "rcsc.diagnostics.source",
+        "rcsc.base.diagnostics.source",
     }  # fmt: skip
     nodes = [node for tree in trees for node in ast.walk(tree)]
     names = {
@@ -913,7 +916,7 @@ def test_work_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
     program = with_steps(30, "if s > a { s := s / 2 + a }")
     certificate = certificate_of(program)
     assert certify(program, certificate).whole
-    monkeypatch.setattr("rcsc.certify.MOST_WORK", 2_000)
+    monkeypatch.setattr("rcsc.proof.certify.MOST_WORK", 2_000)
     cut = certify(program, certificate)
     assert cut.problems == ()
     assert cut.unchecked

@@ -8,15 +8,26 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rcsc.certify import certify
-from rcsc.certify.execution import Start
-from rcsc.certify.known import Known
-from rcsc.certify.owed import Debts
-from rcsc.certify.settle import CaseAnswer, Fails, Left, Settler, Shown, script, values_in
-from rcsc.certify.values import BOOL, FREE, INT, REAL, TRUTHS, Term, Terms, parts_first, spanned, truncated
 from rcsc.lang.model import Bool, Int, Program, Real
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+from rcsc.proof.certify import certify
+from rcsc.proof.certify.execution import Start
+from rcsc.proof.certify.known import Known
+from rcsc.proof.certify.owed import Debts
+from rcsc.proof.certify.settle import CaseAnswer, Fails, Left, Settler, Shown, script, values_in
+from rcsc.proof.certify.values import (
+    BOOL,
+    FREE,
+    INT,
+    REAL,
+    TRUTHS,
+    Term,
+    Terms,
+    parts_first,
+    spanned,
+    truncated,
+)
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
 from tests.diagnostics.test_told import FAULTY
 from tests.support.programs.stages import program_of
 
@@ -505,7 +516,7 @@ def test_what_is_too_long_to_follow_is_named_and_placed(monkeypatch: pytest.Monk
     program = program_of(LONG)
     verdict = prove_program(program, Options())
     assert verdict.certificate is not None
-    monkeypatch.setattr("rcsc.certify.execution.MOST_STEPS", 2)
+    monkeypatch.setattr("rcsc.proof.certify.execution.MOST_STEPS", 2)
     found = certify(program, json.loads(json.dumps(verdict.certificate)))
     assert found.problems == ()
     written = [(one.name, LONG[one.written.start : one.written.end], one.question) for one in found.unchecked]

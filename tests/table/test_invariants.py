@@ -2,11 +2,11 @@
 
 import pytest
 
-from rcsc.certify import certify
-from rcsc.diagnostics.codes import Code
-from rcsc.procedures.invariants import assumptions_satisfiable, at_first
-from rcsc.solvers.smt import Answer
-from rcsc.table.program import prove_program
+from rcsc.base.diagnostics.codes import Code
+from rcsc.proof.certify import certify
+from rcsc.proof.procedures.invariants import assumptions_satisfiable, at_first
+from rcsc.proof.solvers.smt import Answer
+from rcsc.proof.table.program import prove_program
 from tests.support.programs.stages import BOXES, errors, program_of, verdict_of
 from tests.support.programs.texts import edited
 

@@ -8,19 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc.commands import run
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.source import Source, Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.source import Source, Span
+from rcsc.front.commands import run
 from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.model import Int
-from rcsc.procedures.obligations import Obligations
-from rcsc.solvers import smt
-from rcsc.solvers.options import TOGETHER, Limits, Options
-from rcsc.solvers.smt import Answer, Solver, Term
-from rcsc.symbolic.encode import within
-from rcsc.symbolic.execution import Run
-from rcsc.table.program import prove_program
+from rcsc.proof.procedures.obligations import Obligations
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import TOGETHER, Limits, Options
+from rcsc.proof.solvers.smt import Answer, Solver, Term
+from rcsc.proof.symbolic.encode import within
+from rcsc.proof.symbolic.execution import Run
+from rcsc.proof.table.program import prove_program
 from tests.support.programs.stages import BOXES, codes, drawn_program, program_of, verdict_of
 from tests.support.programs.texts import edited
 from tests.support.strategies import INTS, REALS, Names, integers_over, reals_over
@@ -465,7 +465,7 @@ LEVEL = (
 def test_runs_that_are_too_long_to_follow_are_undecided(
     monkeypatch: pytest.MonkeyPatch, text: str, place: str, what: str
 ) -> None:
-    monkeypatch.setattr("rcsc.symbolic.evaluation.MOST_STEPS", 50)
+    monkeypatch.setattr("rcsc.proof.symbolic.evaluation.MOST_STEPS", 50)
     found = verdict_of(VARIABLES + text)
     assert found.proved is None
     [finding] = found.findings
@@ -547,7 +547,7 @@ def test_no_question_is_asked_past_what_all_of_them_may_cost(
 ) -> None:
     text = PAIR + OWED[place]
     assert verdict_of(text).proved is not None
-    monkeypatch.setattr("rcsc.solvers.options.TOGETHER", 0)
+    monkeypatch.setattr("rcsc.proof.solvers.options.TOGETHER", 0)
     found = verdict_of(text)
     assert found.proved is None
     assert set(codes(found.findings)) == {"RCS409"}
@@ -560,7 +560,7 @@ def test_questions_that_are_decided_one_by_one_may_be_too_many_together(
     text = PAIR + OWED["a table"]
     assert verdict_of(text, options).proved is not None
     spent: list[int] = []
-    monkeypatch.setattr("rcsc.solvers.options.TOGETHER", 1)
+    monkeypatch.setattr("rcsc.proof.solvers.options.TOGETHER", 1)
     for steps in (20_000, 400):
         found = [verdict_of(text, replace(options, steps=steps)) for _ in range(2)]
         assert found[0].findings == found[1].findings

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.base.host.cache import Cache
 from rcsc.driver.proofs import prove
 from rcsc.driver.settings import Proof
-from rcsc.host.cache import Cache
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
-from rcsc.solvers.options import Options
-from rcsc.table import program as proving
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table import program as proving
 from tests.support.programs.stages import codes, errors, verdict_of
 from tests.support.programs.texts import edited, table
 

@@ -45,16 +45,16 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
-from rcsc.table import relational
-from rcsc.table.confirm import TableSolver
-from rcsc.table.decide import prove_table
-from rcsc.table.regions import splitting
-from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
-from rcsc.table.regions.ends import Ends
-from rcsc.table.regions.least import find, least, negated, never, whole, widest
-from rcsc.table.regions.linear import Simplex, integer_point, least_point
-from rcsc.table.regions.points import projected
-from rcsc.table.regions.region import (
+from rcsc.proof.table import relational
+from rcsc.proof.table.confirm import TableSolver
+from rcsc.proof.table.decide import prove_table
+from rcsc.proof.table.regions import splitting
+from rcsc.proof.table.regions.atoms import Universe, assumptions_of, lines_of
+from rcsc.proof.table.regions.ends import Ends
+from rcsc.proof.table.regions.least import find, least, negated, never, whole, widest
+from rcsc.proof.table.regions.linear import Simplex, integer_point, least_point
+from rcsc.proof.table.regions.points import projected
+from rcsc.proof.table.regions.region import (
     Bounds,
     Counted,
     Empty,
@@ -66,8 +66,8 @@ from rcsc.table.regions.region import (
     Search,
     Split,
 )
-from rcsc.table.regions.splitting import Tree
-from rcsc.table.verdict import Gap, Overlap
+from rcsc.proof.table.regions.splitting import Tree
+from rcsc.proof.table.verdict import Gap, Overlap
 from tests.bench.made import families
 from tests.support.programs.stages import BOXES, verdict_of
 from tests.support.programs.stages import program_of as compiled

@@ -11,29 +11,29 @@ from random import Random
 
 import pytest
 
-from rcsc.commands.shared.show import backing
+from rcsc.base.diagnostics.jsonform import table_to_json
+from rcsc.base.diagnostics.report import TableReport
+from rcsc.base.host.files.plain import plain, read
+from rcsc.code.emit import TARGETS, emit_c, emit_python
+from rcsc.code.emit.generated import write
+from rcsc.code.emit.lower import lower
+from rcsc.code.testing.executors.equality import same_value
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.diagnostics.jsonform import table_to_json
-from rcsc.diagnostics.report import TableReport
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
-from rcsc.emit import TARGETS, emit_c, emit_python
-from rcsc.emit.generated import write
-from rcsc.emit.lower import lower
-from rcsc.host.files.plain import plain, read
+from rcsc.front.commands.shared.show import backing
 from rcsc.lang.interpret import Fault, cycle, evaluate, initial, run_table, unfit
 from rcsc.lang.meaning import with_stops
 from rcsc.lang.model import Bool, Int, Kind, Program, Snapshot, Value
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.symbolic.values import TRUE, constant
+from rcsc.proof.table.program import prove_program
 from rcsc.run.adopt import restart
 from rcsc.run.buffers import CommonMemory
 from rcsc.run.executors import CExecutor, PythonExecutor, build
 from rcsc.run.levels import BadState, RunningLevel
 from rcsc.run.signature import signature
-from rcsc.solvers.options import Options
-from rcsc.symbolic.values import TRUE, constant
-from rcsc.table.program import prove_program
-from rcsc.testing.executors.equality import same_value
 from tests.support.programs.examples import STOPS
 from tests.support.programs.stages import BOXES, codes, program_of, proved_of, verdict_of
 

@@ -9,18 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Severity
-from rcsc.diagnostics.jsonform import report_to_json
-from rcsc.diagnostics.report import NOT_PROVED, Report, TableReport, Verdict, merged, resting
-from rcsc.diagnostics.sarif import sarif
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Severity
+from rcsc.base.diagnostics.jsonform import report_to_json
+from rcsc.base.diagnostics.report import NOT_PROVED, Report, TableReport, Verdict, merged, resting
+from rcsc.base.diagnostics.sarif import sarif
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.model import Program, Value
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
-from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
+from rcsc.proof.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
 from tests.support.programs.stages import drawn_program, program_of, reported, verdict_of
 from tests.support.programs.texts import table
 

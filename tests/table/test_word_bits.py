@@ -6,19 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.certify import check_certificate
-from rcsc.emit.c.c99 import emit_c
-from rcsc.emit.lower import lower
+from rcsc.code.emit.c.c99 import emit_c
+from rcsc.code.emit.lower import lower
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import holds
 from rcsc.lang.model import Program, key_of
-from rcsc.solvers.options import Options
-from rcsc.table import boxes
-from rcsc.table.decide import prove_table
-from rcsc.table.program import prove_program
-from rcsc.table.regions.word_bits import Part, words_of
-from rcsc.table.repair import Partings, new_line, with_cells
-from rcsc.table.verdict import DeadLine, Gap, Overlap, Region
+from rcsc.proof.certify import check_certificate
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table import boxes
+from rcsc.proof.table.decide import prove_table
+from rcsc.proof.table.program import prove_program
+from rcsc.proof.table.regions.word_bits import Part, words_of
+from rcsc.proof.table.repair import Partings, new_line, with_cells
+from rcsc.proof.table.verdict import DeadLine, Gap, Overlap, Region
 from tests.support.programs.stages import program_of
 
 ALONE = Options(solver="boxes")

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.solvers import smt
-from rcsc.solvers.smt import Answer
-from rcsc.symbolic.alike import meeting
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.smt import Answer
+from rcsc.proof.symbolic.alike import meeting
 from tests import wrong
 from tests.support.programs.stages import reported
 from tests.support.steps import counted
@@ -42,7 +42,7 @@ def test_a_help_that_another_line_makes_wrong_is_not_offered() -> None:
 
 
 def test_a_help_past_the_budget_is_said_to_be_not_proved(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rcsc.table.mending.MOST_TRIED", 0)
+    monkeypatch.setattr("rcsc.proof.table.mending.MOST_TRIED", 0)
     rows = "| p | <= 2 || 1 |\n| q | >= 2 || 2 |\n"
     [found] = reported(
         f"input a : int 0 .. 3\noutput o : int 0 .. 9\ntable t {{\n| line | a || o |\n{rows}}}\n"
@@ -106,7 +106,7 @@ def test_an_input_for_which_lines_differ_is_known_before_the_least_is_sought(
     with smt.together(1_000_000_000) as budget:
         [found] = (each for each in reported(text) if each.code == "RCS422")
     assert budget.left > 993_000_000
-    monkeypatch.setattr("rcsc.symbolic.alike.WRONG_STEPS", 1)  # any input does
+    monkeypatch.setattr("rcsc.proof.symbolic.alike.WRONG_STEPS", 1)  # any input does
     [soon] = (each for each in reported(text) if each.code == "RCS422")
     assert found.witnesses
     assert soon.witnesses
@@ -227,7 +227,7 @@ def test_trials_of_helps_are_bounded_outside_the_solver_too(monkeypatch: pytest.
     text = f"{declared}table t {{\n| line | a | when || o |\n{rows}}}\n"
     begins = "in line `q` write `>= 4` under `a`: "
     assert reported(text)[0].help[0].startswith(f"{begins}proved")
-    monkeypatch.setattr("rcsc.table.mending.WRONG_STEPS", 100)
+    monkeypatch.setattr("rcsc.proof.table.mending.WRONG_STEPS", 100)
     assert reported(text)[0].help[0].startswith(f"{begins}not proved")
 
 
@@ -245,7 +245,7 @@ def test_a_repair_is_proved_only_where_it_is_known_that_an_order_still_applies(
         answers.append(Answer.UNKNOWN if answers else meeting(*asked))
         return answers[-1]
 
-    monkeypatch.setattr("rcsc.procedures.meetings.meeting", once)
+    monkeypatch.setattr("rcsc.proof.procedures.meetings.meeting", once)
     assert _overlap_of(text).help[0].startswith(f"{begins}not proved")
     assert len(answers) > 1
 

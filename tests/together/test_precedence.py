@@ -9,10 +9,10 @@ from typing import TypeAlias
 
 import pytest
 
-from rcsc.commands import run
-from rcsc.diagnostics.diagnostic import Severity
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.diagnostic import Severity
+from rcsc.base.diagnostics.source import Source
 from rcsc.driver.reformat import expand
+from rcsc.front.commands import run
 from rcsc.lang.interpret import evaluate, matching_lines
 from rcsc.lang.model import Bool, Enum, Int, Program, Value, key_bounds
 from rcsc.lang.resolve import compile_text
@@ -21,9 +21,9 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import MARKS
-from rcsc.table import relational
-from rcsc.table.regions.region import NoWitness, Question
-from rcsc.table.regions.splitting import FEWEST_NODES, MOST_PAST, NODES_OF_A_LINE
+from rcsc.proof.table import relational
+from rcsc.proof.table.regions.region import NoWitness, Question
+from rcsc.proof.table.regions.splitting import FEWEST_NODES, MOST_PAST, NODES_OF_A_LINE
 from tests.support.programs.stages import BOXES, codes, program_of, refused, reported, verdict_of
 from tests.support.programs.texts import edited
 

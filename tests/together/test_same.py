@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.certify import certify
-from rcsc.commands import run
-from rcsc.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.front.commands import run
 from rcsc.lang.interpret import Fault, initial, run_table
 from rcsc.lang.model import Program
-from rcsc.procedures.meetings import Met
-from rcsc.solvers.options import Options
-from rcsc.table import program as proving
-from rcsc.table.program import prove_program
+from rcsc.proof.certify import certify
+from rcsc.proof.procedures.meetings import Met
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table import program as proving
+from rcsc.proof.table.program import prove_program
 from tests.support.programs.stages import program_of, reported, verdict_of
 from tests.support.programs.texts import edited
 

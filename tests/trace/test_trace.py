@@ -8,20 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
+from rcsc.code.emit import emitted
+from rcsc.code.emit.lower import lower
+from rcsc.code.emit.plan import Plan
 from rcsc.driver.compile import planned
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Settings
-from rcsc.emit import emitted
-from rcsc.emit.lower import lower
-from rcsc.emit.plan import Plan
+from rcsc.front.commands import run
 from rcsc.lang.model import ProvedProgram, seal_of_proof
-from rcsc.solvers.options import Options
-from rcsc.trace.c_code import c_names, c_pieces
-from rcsc.trace.chunks import chunks
-from rcsc.trace.matrix import Known, matrix, untraced
-from rcsc.trace.origin import Origin, Sort
-from rcsc.trace.page import page
+from rcsc.proof.solvers.options import Options
+from rcsc.views.trace.c_code import c_names, c_pieces
+from rcsc.views.trace.chunks import chunks
+from rcsc.views.trace.matrix import Known, matrix, untraced
+from rcsc.views.trace.origin import Origin, Sort
+from rcsc.views.trace.page import page
 from tests.support.browser import Browser
 from tests.support.programs.examples import EVERYTHING
 from tests.support.programs.stages import program_of

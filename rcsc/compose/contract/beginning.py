@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from typing import TypeAlias
 
+from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.diagnostics.codes import Code
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.diagnostics.coded import CodedError
-from rcsc.diagnostics.codes import Code
 from rcsc.lang.interpret import initial, unfit
 from rcsc.lang.model import Bool, Enum, Int, Real, Scalar, Value, pending, spell, value_of_text
 

@@ -18,9 +18,9 @@ from rcsc.lang.interval_sets import meet
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Bool, Enum, Kind, Line, OneTable, Program, Table, pending
 from rcsc.lang.restart import After, Stands
-from rcsc.symbolic import values
-from rcsc.symbolic.values import Node
-from rcsc.table import boxes
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.values import Node
+from rcsc.proof.table import boxes
 
 FLAG = "new_command"
 """True until the level's own answer to a new command is echoed (sections 8.3 and 9)."""

@@ -42,9 +42,9 @@ from rcsc.lang.model import (  # fmt: skip
     pending,
     spell,
 )
-from rcsc.symbolic import values
-from rcsc.symbolic.execution import Run
-from rcsc.symbolic.values import Node
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.execution import Run
+from rcsc.proof.symbolic.values import Node
 
 CLOSELY = 1
 """The highest `closely`: each step retries what is not proved with more predicates."""

@@ -43,9 +43,9 @@ from rcsc.lang.model import (
     VariableName,
     earlier,
 )
-from rcsc.symbolic import values
-from rcsc.symbolic.execution import Run
-from rcsc.symbolic.values import FALSE, Node
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.execution import Run
+from rcsc.proof.symbolic.values import FALSE, Node
 
 # --- as conditions on a cycle ----------------------------------------------------------------
 

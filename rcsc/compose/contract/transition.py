@@ -37,10 +37,10 @@ from rcsc.lang.model import (  # fmt: skip
 from rcsc.lang.protocol.environment import EARLY as EARLY  # noqa: PLC0414  # of a cycle as nodes, too
 from rcsc.lang.protocol.environment import refusable, unadmitted
 from rcsc.lang.restart import After, Fixed, SameAs, Stands
-from rcsc.symbolic import values
-from rcsc.symbolic.evaluation import ExternResults, State
-from rcsc.symbolic.execution import Run
-from rcsc.symbolic.values import FALSE, TRUE, Node
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.evaluation import ExternResults, State
+from rcsc.proof.symbolic.execution import Run
+from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 
 GHOST = "asked "
 """Prefix of ghosts, which the proof remembers and the level does not: that the database was asked, and for which keys."""

@@ -14,24 +14,24 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Change, Place, Proposal
+from rcsc.base.diagnostics.source import Source
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Change, Place, Proposal
-from rcsc.diagnostics.source import Source
 from rcsc.lang.interpret import UNDEFINED, matching_lines
 from rcsc.lang.model import AssumptionName, Program, Scalar, Snapshot, Table
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import resolve
 from rcsc.lang.written.changes import spliced
 from rcsc.lang.written.tables import table_of
-from rcsc.solvers import smt
-from rcsc.solvers.options import WRONG_STEPS, Options
-from rcsc.table.mending import STEPS_OF_A_CELL, Outcome, Silent, Wrong, key, of_text, serious, written
-from rcsc.table.program import ProgramVerdict, prove_program
-from rcsc.table.regions.atoms import Every, Universe, assumptions_of, lines_of
-from rcsc.table.regions.least import find, negated, whole
-from rcsc.table.regions.region import NoWitness
-from rcsc.table.repair import NewLine, PartingCell, changes_of
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import WRONG_STEPS, Options
+from rcsc.proof.table.mending import STEPS_OF_A_CELL, Outcome, Silent, Wrong, key, of_text, serious, written
+from rcsc.proof.table.program import ProgramVerdict, prove_program
+from rcsc.proof.table.regions.atoms import Every, Universe, assumptions_of, lines_of
+from rcsc.proof.table.regions.least import find, negated, whole
+from rcsc.proof.table.regions.region import NoWitness
+from rcsc.proof.table.repair import NewLine, PartingCell, changes_of
 
 MOST_STEPS = 20 * WRONG_STEPS
 """Steps of Z3 for all changes of all tables that runs break, together."""

@@ -26,9 +26,9 @@ from rcsc.compose.counterexample.lasso import comes_round, lasso_of
 from rcsc.compose.counterexample.trace import TraceSearch, Unrolled, wrong_in
 from rcsc.lang.interpret import UNDEFINED, initial
 from rcsc.lang.model import Bool, Enum, Snapshot, Value, spell
-from rcsc.solvers.sat import GaveUpError
-from rcsc.symbolic import values
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers.sat import GaveUpError
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.values import Node
 
 MOST = 6
 """Consequences of one finding that are shown."""

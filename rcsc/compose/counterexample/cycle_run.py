@@ -28,8 +28,8 @@ from rcsc.lang.interpret import (
     settle,
 )
 from rcsc.lang.model import Default, Line, Snapshot, Statement, Table, Value
-from rcsc.symbolic import values
-from rcsc.symbolic.values import Node
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.values import Node
 
 
 @dataclass(frozen=True, slots=True)

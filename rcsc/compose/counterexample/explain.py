@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.children import scratch
 from rcsc.compose.contract.beginning import Starts
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, counts_on, pairs
 from rcsc.compose.contract.properties import invariant_kept
@@ -22,9 +24,7 @@ from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_i
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, stopping, traces
 from rcsc.compose.proof.level import LevelProof, Verdict
 from rcsc.compose.proof.system import SystemProof
-from rcsc.diagnostics.codes import Code
-from rcsc.host.children import scratch
-from rcsc.procedures.invariants import at_first
+from rcsc.proof.procedures.invariants import at_first
 from rcsc.run.description import Description
 
 

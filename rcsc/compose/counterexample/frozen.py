@@ -15,6 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.files.names import shown
+from rcsc.base.host.files.read import content, json_of
 from rcsc.compose.contract.given import ExternAnswer
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
@@ -24,15 +28,11 @@ from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.lasso import lasso_of
 from rcsc.compose.counterexample.pair import exchange
 from rcsc.compose.proof.system import NoProgramError, transition_systems
-from rcsc.diagnostics.coded import CodedError
-from rcsc.diagnostics.codes import Code
-from rcsc.host.files.names import shown
-from rcsc.host.files.read import content, json_of
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import Program, Scalar, Value, spell, value_of_text
 from rcsc.lang.project import project_root
+from rcsc.proof.symbolic import values
 from rcsc.run.description import BadDescription
-from rcsc.symbolic import values
 
 FORMAT = 1
 

@@ -15,9 +15,9 @@ from rcsc.compose.counterexample.cycle_run import CycleRun, as_cycle, as_declare
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceSearch, Unrolled
 from rcsc.compose.proof.termination import answered, unanswered
 from rcsc.lang.interpret import UNDEFINED, Fault
-from rcsc.solvers.sat import GaveUpError
-from rcsc.symbolic import values
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers.sat import GaveUpError
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.values import Node
 
 
 @dataclass(frozen=True, slots=True)

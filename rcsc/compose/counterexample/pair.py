@@ -24,9 +24,9 @@ from rcsc.compose.counterexample.simplest import Bounded, Simplest
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch, in_order
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import Bool, Value
-from rcsc.solvers.sat import GaveUpError
-from rcsc.symbolic import values
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers.sat import GaveUpError
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.values import Node
 
 
 @dataclass(slots=True)

@@ -21,14 +21,14 @@ from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, Unrolled, traces
 from rcsc.lang.interpret import UNDEFINED, matching_lines
 from rcsc.lang.model import Box, Enum, Program, Scalar, Snapshot, Table, key_of, spell
-from rcsc.solvers.sat import GaveUpError
-from rcsc.symbolic import values
-from rcsc.symbolic.values import Node
-from rcsc.table import boxes, cells
-from rcsc.table.mending import Outcome
-from rcsc.table.regions.partition import BudgetError, Gaps
-from rcsc.table.repair import NewLine, PartingCell, Partings, left_by, new_line
-from rcsc.table.verdict import Gap, Overlap, Region
+from rcsc.proof.solvers.sat import GaveUpError
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.values import Node
+from rcsc.proof.table import boxes, cells
+from rcsc.proof.table.mending import Outcome
+from rcsc.proof.table.regions.partition import BudgetError, Gaps
+from rcsc.proof.table.repair import NewLine, PartingCell, Partings, left_by, new_line
+from rcsc.proof.table.verdict import Gap, Overlap, Region
 
 MOST_REGIONS = 3
 """Regions that a condition may exclude and still be small."""

@@ -12,17 +12,19 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from rcsc.code.emit import emitted
+from rcsc.code.emit.c.ctext import c_type, wide_type
+from rcsc.code.emit.lower import lower, lower_by_force
 from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun
 from rcsc.compose.counterexample.finding import Finding, rows
-from rcsc.emit import emitted
-from rcsc.emit.c.ctext import c_type, wide_type
-from rcsc.emit.lower import lower, lower_by_force
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Kind as VariableKind
 from rcsc.lang.model import Program, spell
 from rcsc.lang.project import project_root
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.program import prove_program
 from rcsc.run import answers
 from rcsc.run.buffers import CommonMemory
 from rcsc.run.description import Description, LevelSpec, Wire
@@ -30,8 +32,6 @@ from rcsc.run.levels import RunningLevel, running_level
 from rcsc.run.log.finding import LoggedCycle, LoggedFinding
 from rcsc.run.signature import Values
 from rcsc.run.system import Kind, System, executors, signatures
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
 
 KINDS: tuple[Kind, ...] = ("python", "c")
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from rcsc.compose.contract.given import ExternAnswer, least, refused
 from rcsc.compose.contract.transition import Cycle
 from rcsc.lang.model import Bool, Op, Program, Scalar, Value, key_bounds, key_of, value_of_key
-from rcsc.solvers.sat import Sat
-from rcsc.solvers.search import halved, lowest
-from rcsc.symbolic import values
-from rcsc.symbolic.bits import Bits, Literal, key_of_bits
-from rcsc.symbolic.evaluation import ExternResults
-from rcsc.symbolic.keyed import Keyed
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers.sat import Sat
+from rcsc.proof.solvers.search import halved, lowest
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.bits import Bits, Literal, key_of_bits
+from rcsc.proof.symbolic.evaluation import ExternResults
+from rcsc.proof.symbolic.keyed import Keyed
+from rcsc.proof.symbolic.values import Node
 
 
 class _Bits(Bits):

@@ -31,9 +31,9 @@ from rcsc.lang.model import (
     spell,
     value_of_key,
 )
-from rcsc.solvers.sat import GaveUpError
-from rcsc.symbolic import values
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers.sat import GaveUpError
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.values import Node
 
 
 class NotReproducedError(Exception):

@@ -11,12 +11,12 @@ from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.model import Bool
-from rcsc.solvers import smt
-from rcsc.solvers.options import Limits
-from rcsc.solvers.smt import Answer, Solver, Term
-from rcsc.symbolic import values
-from rcsc.symbolic.keyed import Keyed
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Limits
+from rcsc.proof.solvers.smt import Answer, Solver, Term
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.keyed import Keyed
+from rcsc.proof.symbolic.values import Node
 
 
 @dataclass(slots=True)

@@ -24,9 +24,9 @@ from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle
 from rcsc.compose.invariant.cubes import Cube, Masks, Pair, Reached, Valuation, Way, Ways
 from rcsc.lang.model import Bool
-from rcsc.solvers.sat import Sat
-from rcsc.symbolic.bits import Bits, Literal, Word, key_of_bits
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers.sat import Sat
+from rcsc.proof.symbolic.bits import Bits, Literal, Word, key_of_bits
+from rcsc.proof.symbolic.values import Node
 
 Clause = Cube
 """A cube that never holds."""

@@ -15,8 +15,8 @@ from rcsc.compose.contract.walk import Walk
 from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.invariant.pdr import PDR, Clause, Posed
 from rcsc.lang.model import Value
-from rcsc.solvers.options import Limits
-from rcsc.symbolic.values import TRUE, Node
+from rcsc.proof.solvers.options import Limits
+from rcsc.proof.symbolic.values import TRUE, Node
 
 LIMITS = Limits.of(80_000_000)
 """Larger than for a table: a question about a cycle is harder."""

@@ -34,8 +34,8 @@ from rcsc.compose.contract.obligations import Obligation, Sort, asks, resting_ta
 from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.termination import Ending
-from rcsc.symbolic import values
-from rcsc.symbolic.execution import Run
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.execution import Run
 
 
 def agreements(systems: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Promise]:

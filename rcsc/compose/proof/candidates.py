@@ -9,9 +9,9 @@ import hashlib
 import os
 from dataclasses import dataclass, replace
 
+from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.invariant.search import FoundInvariant, NamedClause
-from rcsc.host.cache import Cache
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,11 +21,11 @@ from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.leaves import everything, written_by
 from rcsc.lang.model import Bool, Call, Default, Kind, Statement
-from rcsc.solvers import smt
-from rcsc.solvers.search import halved
-from rcsc.solvers.smt import Answer, Solver, Term
-from rcsc.symbolic import values
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.search import halved
+from rcsc.proof.solvers.smt import Answer, Solver, Term
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.values import Node
 
 
 @dataclass(frozen=True, slots=True)

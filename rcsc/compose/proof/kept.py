@@ -1,13 +1,14 @@
 """Proofs of levels that an earlier run made, taken from the cache.
 
 In: a transition system, an effort, a cache. Out: the same `LevelProof`, or nothing. The key is all that a proof depends on: the program as
-resolved, the level, its links, the effort; and rcsc itself with its solvers (`rcsc.host.cache`). A proof with anything undecided is not
+resolved, the level, its links, the effort; and rcsc itself with its solvers (`base.host.cache`). A proof with anything undecided is not
 kept: another run may decide it. The verdicts are kept once more, without effort and invariant (`standing`).
 """
 
 import hashlib
 from dataclasses import dataclass
 
+from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import Key
 from rcsc.compose.contract.obligations import Obligation, Unstated, obligations
 from rcsc.compose.contract.predicates import CLOSELY
@@ -21,7 +22,6 @@ from rcsc.compose.proof.context import Context
 from rcsc.compose.proof.level import LevelProof, Verdict, joined
 from rcsc.compose.proof.standing import Verdicts, keep_verdicts
 from rcsc.compose.proof.termination import Ending
-from rcsc.host.cache import Cache
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import ACCEPTED, Key
 from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of an obligation, too
 from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations, unstated
@@ -21,14 +22,13 @@ from rcsc.compose.invariant.search import LIMITS, Effort, FoundInvariant, search
 from rcsc.compose.proof.candidates import Candidates, candidates, content, keep_candidates
 from rcsc.compose.proof.context import Context, context, never_run
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
-from rcsc.host.cache import Cache
-from rcsc.solvers import smt
-from rcsc.solvers.options import Limits
-from rcsc.solvers.sat import GaveUpError
-from rcsc.solvers.smt import Answer, Solver
-from rcsc.symbolic import values
-from rcsc.symbolic.keyed import Keyed
-from rcsc.symbolic.values import TRUE
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Limits
+from rcsc.proof.solvers.sat import GaveUpError
+from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.keyed import Keyed
+from rcsc.proof.symbolic.values import TRUE
 
 TOGETHER = 50
 """All questions about a level together may take the steps of so many; later ones are not decided."""

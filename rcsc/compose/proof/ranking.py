@@ -19,13 +19,13 @@ from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.confirm import answer as answered
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.model import Bool, Int, Kind, Program, Real, Scalar, pending
-from rcsc.solvers import smt
-from rcsc.solvers.search import furthest
-from rcsc.solvers.smt import Answer, Term
-from rcsc.symbolic import values
-from rcsc.symbolic.keyed import KEY, sort
-from rcsc.symbolic.measured import Measured
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.search import furthest
+from rcsc.proof.solvers.smt import Answer, Term
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.keyed import KEY, sort
+from rcsc.proof.symbolic.measured import Measured
+from rcsc.proof.symbolic.values import Node
 
 SMALLEST = 24
 """A real counter rises each time by its range divided by at most two to this power."""

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import (
     ACCEPTED,
     RUNS,
@@ -24,7 +25,6 @@ from rcsc.compose.contract.claims import (
     spelled,
 )
 from rcsc.compose.contract.claims import UNKNOWN as UNLOOKED_AT
-from rcsc.host.cache import Cache
 
 ASSUMPTION, PROPERTY = "assumption", "property"
 SOME_LINE, ONE_LINE = "some line matches", "no two lines match"

@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.lang.model import OneTable, Read
-from rcsc.symbolic import values
-from rcsc.symbolic.keyed import Keyed
-from rcsc.symbolic.values import Node
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.keyed import Keyed
+from rcsc.proof.symbolic.values import Node
 
 
 def while_it_stays(ts: TransitionSystem, asked: Confirmation, table: str) -> Confirmation:

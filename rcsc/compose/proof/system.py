@@ -10,6 +10,11 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
+from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.host import children
+from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, Need, Promise, closed, of_refusals
 from rcsc.compose.contract.environment import Links, check_ends, links
 from rcsc.compose.contract.facts import with_facts
@@ -19,11 +24,6 @@ from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements, claims, other_end
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level, without_nodes
-from rcsc.diagnostics.coded import CodedError
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.host import children
-from rcsc.host.cache import Cache
 from rcsc.lang.meaning import with_stops
 from rcsc.lang.model import AssumptionName, Program
 from rcsc.lang.project import Loaded, load
@@ -172,8 +172,8 @@ def checked(path: Path, name: str) -> tuple[Program, Safety, Loaded]:
     Raises:
         NoProgramError: The program is missing, does not resolve, or may leave a range or do an undefined operation.
     """
-    from rcsc.procedures.obligations import Obligations
-    from rcsc.solvers.options import Options
+    from rcsc.proof.procedures.obligations import Obligations
+    from rcsc.proof.solvers.options import Options
 
     program, loaded = loaded_program(path, name)
     owed = Obligations(program, Options())
@@ -188,8 +188,8 @@ def _safety(
     program: Program, stops: Mapping[str, tuple[AssumptionName, ...]], diagnostics: Sequence[Diagnostic]
 ) -> Safety:
     """Decide whether safety needs the invariants: not if it is shown without them, and under no other stopping assumptions."""
-    from rcsc.procedures.obligations import Obligations
-    from rcsc.solvers.options import Options
+    from rcsc.proof.procedures.obligations import Obligations
+    from rcsc.proof.solvers.options import Options
 
     if not program.invariants:
         return Safety()

@@ -48,11 +48,11 @@ from rcsc.compose.proof.context import gives_an_order, of_lines, orders_to
 from rcsc.compose.proof.ranking import RisingLine, Turn, lines_that_stop, parts
 from rcsc.compose.proof.staying import in_a_row, while_it_stays
 from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending, spell
-from rcsc.solvers import smt
-from rcsc.solvers.smt import Answer
-from rcsc.symbolic import values
-from rcsc.symbolic.keyed import sort
-from rcsc.symbolic.values import Node
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.smt import Answer
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.keyed import sort
+from rcsc.proof.symbolic.values import Node
 
 MOST_STEPS = 400
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side

@@ -3,9 +3,9 @@
 import math
 from fractions import Fraction
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Label
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Label
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.operators import Typed
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.model import U64_MAX, Int, Literal, Real, Scalar, Single

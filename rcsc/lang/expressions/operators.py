@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass, replace
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions import intervals
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.scope import Scope, normal, spell_unit

@@ -11,8 +11,8 @@ as far as any `for` of this condition needs, and back to 0 with each other one.
 from dataclasses import replace
 from fractions import Fraction
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.scope import MOST_LEAVES, Held, Scope
 from rcsc.lang.leaves import one_earlier, parts, read_by, renamed

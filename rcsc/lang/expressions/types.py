@@ -3,8 +3,8 @@
 import math
 from dataclasses import replace
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.literals import as_single
 from rcsc.lang.expressions.operators import Typed, conversion, kind_word, same_kind

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from dataclasses import field as field_
 from functools import reduce
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, applied, kind_word
 from rcsc.lang.expressions.scope import Scope

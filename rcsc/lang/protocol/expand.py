@@ -6,7 +6,7 @@ from functools import lru_cache
 from itertools import chain
 from typing import Any, TypeVar
 
-from rcsc.diagnostics.source import Source, Span
+from rcsc.base.diagnostics.source import Source, Span
 from rcsc.lang.protocol import written
 from rcsc.lang.protocol.roles import Parties
 from rcsc.lang.syntax import tree

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.literals import number_of
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.syntax import tree

@@ -5,8 +5,8 @@ Constants and types may be declared in any order: one that is asked for before i
 
 from collections.abc import Iterable
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Label
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Label
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.model import Enum
 from rcsc.lang.resolve import variables

@@ -27,9 +27,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Label
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Label
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.previous import fresh
 from rcsc.lang.expressions.scope import Body, Scope, spell_number
 from rcsc.lang.expressions.typed import typed

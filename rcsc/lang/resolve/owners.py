@@ -1,7 +1,7 @@
 """Executing owners: what they run, in order."""
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Label
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Label
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.model import Owner
 from rcsc.lang.syntax import tree

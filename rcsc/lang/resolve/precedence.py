@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import TypeAlias
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Label
-from rcsc.diagnostics.source import Source, Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Label
+from rcsc.base.diagnostics.source import Source, Span
 from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.expressions.words import Mask, mask_of

@@ -3,10 +3,10 @@
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
-from rcsc.diagnostics.source import Span
-from rcsc.host.memory import uncollected
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, sort_key
+from rcsc.base.diagnostics.source import Span
+from rcsc.base.host.memory import uncollected
 from rcsc.lang.expressions.previous import keeping, with_keeping
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean, without_before

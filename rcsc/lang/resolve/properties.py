@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean, without_before
 from rcsc.lang.leaves import one_earlier, read_by

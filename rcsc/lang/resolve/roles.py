@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from rcsc.diagnostics.codes import Code
+from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.expressions.previous import adopted_before
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean, typed

@@ -11,9 +11,9 @@ changes nothing.
 
 from collections.abc import Iterable, Mapping
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Label
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Label
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.leaves import expressions, may_write, parts
 from rcsc.lang.model import (

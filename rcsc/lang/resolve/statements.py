@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field, replace
 from typing import assert_never
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.operators import Typed, common_unit, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.scope import Body, Scope, root_of, spell_number
 from rcsc.lang.expressions.typed import Path, boolean, path_of, typed

@@ -1,7 +1,7 @@
 """Tables: columns, lines, tests and actions."""
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Label
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Label
 from rcsc.lang.expressions.conditions import Tests
 from rcsc.lang.expressions.operators import Typed
 from rcsc.lang.expressions.placing import placed, placed_statement

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, common_unit, kind_word, same_kind
 from rcsc.lang.expressions.scope import MOST_LEAVES, Body, Constant, Scope, SetMember

@@ -3,7 +3,7 @@ r"""Text to tree, and back.
 A *tree* says what was written, with a span for each node and nothing resolved. Laying a tree out and reading it again
 gives the same tree:
 
->>> from rcsc.diagnostics.source import Source
+>>> from rcsc.base.diagnostics.source import Source
 >>> from rcsc.lang.syntax.format import format_file
 >>> from rcsc.lang.syntax.parse import parse
 >>> tree = parse(Source("a.rcs", "const   most = 3\n\n\nconst least =  1 \n"))

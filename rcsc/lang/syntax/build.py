@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any, Protocol
 
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.operator_table import LOGIC
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.comments import Comments, split, words

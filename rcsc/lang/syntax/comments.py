@@ -6,7 +6,7 @@ Each is handed out once; what nobody takes is the file's.
 
 import re
 
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.source import Source
 
 _TOKEN = re.compile(r'"[^"\\\n]*"|#[^\r\n]*')
 

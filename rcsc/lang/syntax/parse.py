@@ -12,10 +12,10 @@ from typing import Any, cast
 
 import lark
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.diagnostics.source import Source, Span
-from rcsc.host.files import write_atomically
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.base.diagnostics.source import Source, Span
+from rcsc.base.host.files import write_atomically
 from rcsc.lang.syntax import screen, tree
 from rcsc.lang.syntax.build import Build
 from rcsc.lang.syntax.comments import Comments, words

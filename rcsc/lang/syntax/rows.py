@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Generic, TypeVar, overload
 
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.source import Span
 
 ACTION_WORDS = frozenset({"procedures", "command_out", "status_out"})
 REQUIREMENTS = "req"

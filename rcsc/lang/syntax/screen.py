@@ -7,10 +7,10 @@ a reader sees, or with a name that nobody can read.
 import re
 import unicodedata
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.diagnostics.source import Source, Span
-from rcsc.host.files.read import UNPRINTED
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.base.diagnostics.source import Source, Span
+from rcsc.base.host.files.read import UNPRINTED
 
 MOST_CHARACTERS = 16 * 1024 * 1024
 DEEPEST = 100

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import TypeAlias
 
-from rcsc.diagnostics.source import Span
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.syntax.rows import Cell
 
 NOWHERE = Span("", 0, 0)

@@ -6,8 +6,8 @@ In: a text and a proposal. Out: the text with it. Nothing is trusted of what com
 import re
 from collections.abc import Sequence
 
-from rcsc.diagnostics.diagnostic import Change, Diagnostic, Place, Proposal
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.diagnostic import Change, Diagnostic, Place, Proposal
+from rcsc.base.diagnostics.source import Source
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse

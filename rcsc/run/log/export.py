@@ -12,8 +12,8 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from rcsc.host.files import csv_text as csv_lines
-from rcsc.host.files import written_whole
+from rcsc.base.host.files import csv_text as csv_lines
+from rcsc.base.host.files import written_whole
 from rcsc.run.adopt import Begun
 from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import Log, LoggedLevel

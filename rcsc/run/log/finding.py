@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rcsc.host.files.read import json_of
+from rcsc.base.host.files.read import json_of
 from rcsc.run.signature import Value
 
 FINDING = "rcsc.finding"

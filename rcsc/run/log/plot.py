@@ -11,7 +11,7 @@ from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rcsc.host.files import written_whole
+from rcsc.base.host.files import written_whole
 from rcsc.run.log.export import valued
 from rcsc.run.log.queries import named_columns, nearest
 from rcsc.run.log.read import Log

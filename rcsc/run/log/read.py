@@ -12,7 +12,7 @@ from pathlib import Path
 
 from mcap.records import Channel, McapRecord, Message, Metadata
 
-from rcsc.host.files.names import identifier, shown
+from rcsc.base.host.files.names import identifier, shown
 from rcsc.run.adopt import Begun
 from rcsc.run.description import Description, wire_of
 from rcsc.run.log import cadence

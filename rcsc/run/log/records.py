@@ -27,7 +27,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata
 from zstandard import ZstdDecompressor, ZstdError, frame_content_size
 
-from rcsc.host.files.read import opened
+from rcsc.base.host.files.read import opened
 
 CHAIN, SEAL, DIGEST = "rcsc.chain", "rcsc.seal", "sha256"
 """Names of the metadata records, and of what they hold."""

@@ -12,8 +12,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from rcsc.host.files.names import file_name
-from rcsc.host.files.read import CheckedFields, content, json_of
+from rcsc.base.host.files.names import file_name
+from rcsc.base.host.files.read import CheckedFields, content, json_of
 from rcsc.run.adopt import Begun
 from rcsc.run.description import LONGEST_MS, MOST_LEVELS, Description, Wire, level_of, wire_of
 from rcsc.run.signature import FORMATS, Leaf, Signature, generated_files, restart_written, signature_of

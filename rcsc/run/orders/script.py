@@ -19,10 +19,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rcsc.diagnostics.coded import CodedError
-from rcsc.diagnostics.codes import Code
-from rcsc.host.described import nearest
-from rcsc.host.files.read import MIB, Malformed, table_of, text, toml_of
+from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.described import nearest
+from rcsc.base.host.files.read import MIB, Malformed, table_of, text, toml_of
 from rcsc.run.description import Description
 from rcsc.run.faults import UnknownFault
 from rcsc.run.orders.roles import DONE, PROTOCOL, Served, field_of, served

@@ -13,12 +13,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Protocol, cast, runtime_checkable
 
-from rcsc.diagnostics.coded import CodedError
-from rcsc.diagnostics.codes import Code
-from rcsc.host.files import write_atomically
-from rcsc.host.files.names import shown
-from rcsc.host.files.plain import read
-from rcsc.host.files.read import content, json_of
+from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.files import write_atomically
+from rcsc.base.host.files.names import shown
+from rcsc.base.host.files.plain import read
+from rcsc.base.host.files.read import content, json_of
 from rcsc.run.description import Description
 from rcsc.run.levels import BadState, RunningLevel
 from rcsc.run.orders.operator import Row, ScriptedRun

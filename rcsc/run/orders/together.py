@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rcsc.host.files.names import shown
-from rcsc.host.files.plain import read
+from rcsc.base.host.files.names import shown
+from rcsc.base.host.files.plain import read
 from rcsc.run.faults import faults_of, switch
 from rcsc.run.orders.numbered import Latest
 from rcsc.run.orders.operator import Operator, ScriptOperator

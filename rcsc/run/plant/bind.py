@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rcsc.diagnostics.codes import Code
-from rcsc.host.described import BadFile, Document, KeyPath, nearest
-from rcsc.host.files.read import xml_of
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.described import BadFile, Document, KeyPath, nearest
+from rcsc.base.host.files.read import xml_of
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description, Wire
 from rcsc.run.levels import StateTableError

@@ -10,8 +10,8 @@ import enum
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from rcsc.host.files.names import shown
-from rcsc.host.files.plain import PLAIN, finite
+from rcsc.base.host.files.names import shown
+from rcsc.base.host.files.plain import PLAIN, finite
 from rcsc.run.orders.stopped import NotKept
 
 _NEW: Any = vars(copyreg)["__newobj__"]

@@ -14,8 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rcsc.host.described import BadFile, Document, KeyPath, nearest
-from rcsc.host.files.names import BadName, within
+from rcsc.base.host.described import BadFile, Document, KeyPath, nearest
+from rcsc.base.host.files.names import BadName, within
 from rcsc.lang.project import project_root
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import Description

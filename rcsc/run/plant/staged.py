@@ -46,7 +46,7 @@ class Staged:
         queries: The answers to what feeds ask.
         operator: Who gives the orders of the script, where the plant reads scripts of its own.
         pictures: How it looks now: an SVG document by the kind of picture, each drawn when it is called.
-        witness: Makes what watches a run in the plant's own way (`rcsc.pages.witness`).
+        witness: Makes what watches a run in the plant's own way (`rcsc.views.pages.witness`).
         resume: Keeps a stopped run; None where the plant cannot be put back.
     """
 

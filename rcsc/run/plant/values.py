@@ -15,7 +15,7 @@ from fractions import Fraction
 from itertools import islice
 from typing import Any, Protocol
 
-from rcsc.host.described import nearest
+from rcsc.base.host.described import nearest
 from rcsc.run.plant import fields
 from rcsc.run.plant.units import Factor, factor
 from rcsc.run.signature import REALS, Leaf, Value, number_word

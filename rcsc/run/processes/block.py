@@ -16,7 +16,7 @@ from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 from typing import Self
 
-from rcsc.host import children
+from rcsc.base.host import children
 
 PREFIX = "rcsc-"
 FOLDER = Path("/dev/shm")  # noqa: S108  # where Linux keeps them

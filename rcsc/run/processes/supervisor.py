@@ -19,7 +19,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
-from rcsc.host import children
+from rcsc.base.host import children
 from rcsc.run.description import Description
 from rcsc.run.processes.clocks import Clocks
 from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout

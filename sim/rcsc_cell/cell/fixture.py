@@ -8,7 +8,7 @@ position is in mm from where it touches a part: open is positive. The jaws are o
 from dataclasses import dataclass, field
 from math import isfinite
 
-from rcsc.host.files.plain import Kept
+from rcsc.base.host.files.plain import Kept
 from rcsc.run.signature import Values
 from rcsc_cell.workstation.orders import CLOSED_MM, DONE, EXECUTING, FAILED, OPEN_MM
 

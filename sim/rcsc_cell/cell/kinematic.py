@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from rcsc.host.files.plain import finite, plain, read
+from rcsc.base.host.files.plain import finite, plain, read
 from rcsc_cell.cell.arm import Joints, plate
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.mujoco_model import GAIN_N_M, OPEN_MM, Body

@@ -12,7 +12,7 @@ from typing import Any, cast
 import mujoco
 import numpy as np
 
-from rcsc.host.files.plain import finite, plain, read
+from rcsc.base.host.files.plain import finite, plain, read
 from rcsc.run.plant.models.space import ModelSpace
 from rcsc_cell.cell.arm import Joints
 from rcsc_cell.cell.faults import Faults

@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol, get_type_hints
 
 import numpy as np
 
-from rcsc.host.files.plain import alike, plain, read
+from rcsc.base.host.files.plain import alike, plain, read
 from rcsc.run.plant.space import Space
 from rcsc.run.signature import Value, Values
 from rcsc_cell.cell.arm import Joints, plate

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from rcsc.host.cache import Cache
+from rcsc.base.host.cache import Cache
 from rcsc_cell.cell.arm import Joints, solve
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import BadData

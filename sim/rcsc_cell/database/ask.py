@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.printable import escape
-from rcsc.diagnostics.source import Source
-from rcsc.host.described import Document, Kind, Record, fits
-from rcsc.host.files.names import shown
-from rcsc.host.files.read import MOST_BYTES, Malformed, json_of, opened, plain
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.printable import escape
+from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.described import Document, Kind, Record, fits
+from rcsc.base.host.files.names import shown
+from rcsc.base.host.files.read import MOST_BYTES, Malformed, json_of, opened, plain
 from rcsc.run.signature import Values
 from rcsc_cell.database.build import COLUMNS, SCHEMA, VBLOCK, VISE, BadData
 from rcsc_cell.database.pose import Pose, Vector, about_z, pose_of

@@ -12,10 +12,10 @@ from math import hypot
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.source import Source
-from rcsc.host.described import (
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.described import (
     BadFile,
     Document,
     Either,
@@ -30,8 +30,8 @@ from rcsc.host.described import (
     nearest,
     read_document,
 )
-from rcsc.host.files import written_whole
-from rcsc.host.files.read import content
+from rcsc.base.host.files import written_whole
+from rcsc.base.host.files.read import content
 from rcsc_cell.database.pose import DOWN, Pose, Rotation, about_y, about_z, nine, product
 
 SCHEMA = """

@@ -6,8 +6,8 @@ In: the tables of `ask.tables_of`. Out: rows of text. The file itself has every 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from rcsc.diagnostics.printable import escape, pad, width
-from rcsc.host.files.read import json_of
+from rcsc.base.diagnostics.printable import escape, pad, width
+from rcsc.base.host.files.read import json_of
 from rcsc_cell.database.ask import Listed
 
 MOST_SHOWN = 100

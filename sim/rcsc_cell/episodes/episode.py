@@ -11,9 +11,9 @@ from itertools import chain
 from pathlib import Path
 from typing import ClassVar, Literal, get_args
 
-from rcsc.host.files.names import shown
-from rcsc.host.files.plain import plain, read
-from rcsc.host.files.read import json_of
+from rcsc.base.host.files.names import shown
+from rcsc.base.host.files.plain import plain, read
+from rcsc.base.host.files.read import json_of
 from rcsc.run.system import Kind
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.ready import Backend

@@ -1,15 +1,15 @@
 """The cell's episodes as campaigns take them: what `[plant.mujoco]` and `[plant.kinematic]` of `tables/system.toml` name.
 
-In: what `rcsc.campaign` asks of a kind of episodes. Out: `CELL`. The plant's name is the episode's backend.
+In: what `rcsc.run.campaign` asks of a kind of episodes. Out: `CELL`. The plant's name is the episode's backend.
 """
 
 from pathlib import Path
 from typing import get_args
 
-from rcsc.campaign.rig import EpisodeKind, NamedFile, run_sources, sources
-from rcsc.episodes.outcome import EpisodeOutcome
-from rcsc.host.files.names import shown
+from rcsc.base.host.files.names import shown
+from rcsc.run.campaign.rig import EpisodeKind, NamedFile, run_sources, sources
 from rcsc.run.description import BadDescription, description
+from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.executors import NotBuilt
 from rcsc_cell.cell.ready import Backend
 from rcsc_cell.database.build import BadData

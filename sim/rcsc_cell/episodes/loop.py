@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
-from rcsc.episodes.outcome import EpisodeFinding, EpisodeOutcome
+from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
 from rcsc.run.levels import RunningLevel, running_level
 from rcsc.run.log.recorder import Recorder
 from rcsc.run.orders.script import BadScript

@@ -7,7 +7,7 @@ that is changed is not taken up again: the script goes on with the next row when
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from rcsc.episodes.outcome import RowEnd
+from rcsc.run.episodes.outcome import RowEnd
 from rcsc.run.orders.numbered import NUMBERS, Latest
 from rcsc.run.signature import Leaf, Value, Values
 from rcsc_cell.workstation.interlocks import CellState, after

@@ -5,7 +5,7 @@ In: an episode. Out: names of `rcsc_cell.episodes.episode.FAULTS` that are about
 
 from collections.abc import Iterator, Sequence
 
-from rcsc.host.files.read import rows_of
+from rcsc.base.host.files.read import rows_of
 from rcsc_cell.episodes.episode import COLUMNS, FAULTS, Episode, PartSpec
 from rcsc_cell.workstation.script import PARTS
 

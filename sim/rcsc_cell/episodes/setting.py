@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
-from rcsc.host.children import scratch
+from rcsc.base.host.children import scratch
 from rcsc.run.description import Description, description
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Signature

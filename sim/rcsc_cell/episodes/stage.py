@@ -6,7 +6,7 @@ watches the run, and what keeps one that was stopped.
 
 from typing import TYPE_CHECKING
 
-from rcsc.host.cache import open_cache
+from rcsc.base.host.cache import open_cache
 from rcsc.run.orders.stopped import StoppedRuns
 from rcsc.run.plant.staged import Setup, Staged
 from rcsc_cell.workstation.orders import KINDS

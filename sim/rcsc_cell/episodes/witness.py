@@ -7,12 +7,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from rcsc.pages.report import Figure, Placement, Story
-from rcsc.pages.witness import RunWitness
 from rcsc.run.plant.models.solid import solid
 from rcsc.run.plant.space import Space as SpaceOfPlant
 from rcsc.run.signature import Values
 from rcsc.run.system import System
+from rcsc.views.pages.report import Figure, Placement, Story
+from rcsc.views.pages.witness import RunWitness
 from rcsc_cell.cell.arm import margins_deg, solve
 from rcsc_cell.cell.physical import Physical
 from rcsc_cell.cell.plant import Latest, Plant

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from rcsc.host.cache import open_cache
-from rcsc.host.children import scratch
+from rcsc.base.host.cache import open_cache
+from rcsc.base.host.children import scratch
 from rcsc.run.description import Description
 from rcsc.run.log.read import Log
 from rcsc.run.signature import Signature
@@ -18,7 +18,7 @@ from rcsc_cell.workstation.prepared import database_of, database_path, limits_of
 
 
 class CellData:
-    """As `rcsc.pages.data.Data`."""
+    """As `rcsc.views.pages.data.Data`."""
 
     def build(
         self, system: Description, signs: Mapping[str, Signature], output: Path | None, *, writes: bool

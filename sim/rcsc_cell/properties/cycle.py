@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
-from rcsc.episodes.outcome import RowEnd
+from rcsc.run.episodes.outcome import RowEnd
 from rcsc.run.executors import Executor
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Value, Values

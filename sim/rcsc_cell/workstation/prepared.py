@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-from rcsc.host.described import Document
+from rcsc.base.host.described import Document
 from rcsc.run.description import BadDescription, Description, description, needs_data
 from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
 from rcsc.run.signature import Leaf, Signature

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rcsc.host.files.read import MIB, Malformed, rows_of, text
+from rcsc.base.host.files.read import MIB, Malformed, rows_of, text
 from rcsc.run.orders.script import BadScript
 
 COLUMNS = ("command", "part", "source", "dest", "end_at")

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, cast
 
-from rcsc.host.files.plain import plain, read
+from rcsc.base.host.files.plain import plain, read
 from rcsc.run.orders.numbered import Latest, Orders
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Leaf, Signature, Value, Values

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rcsc.lang.model import Int, Read, VariableName
-from rcsc.table.regions.atoms import Universe
-from rcsc.table.regions.points import within
-from rcsc.table.regions.region import NoWitness
+from rcsc.proof.table.regions.atoms import Universe
+from rcsc.proof.table.regions.points import within
+from rcsc.proof.table.regions.region import NoWitness
 
 Fault = Literal["ok", "overlap", "gap"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.commands import run
+from rcsc.front.commands import run
 from tests.emit.c.test_layout import BELT, OTHER, edited
 
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wpedantic", "-Werror")

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rcsc.code.emit import TARGETS
+from rcsc.code.emit.c.layout import Digest, digest
+from rcsc.code.emit.identifiers import names_of
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
-from rcsc.emit import TARGETS
-from rcsc.emit.c.layout import Digest, digest
-from rcsc.emit.identifiers import names_of
-from rcsc.solvers.options import Options
+from rcsc.proof.solvers.options import Options
 from tests.support.programs.examples import EVERYTHING
 from tests.support.programs.stages import drawn_program, emitted, program_of
 

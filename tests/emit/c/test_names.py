@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.commands import run
-from rcsc.emit.c.c99 import emit_c
-from rcsc.emit.lower import lower_by_force
-from rcsc.emit.scope import SIGNIFICANT, abbreviated, c_scope
+from rcsc.code.emit.c.c99 import emit_c
+from rcsc.code.emit.lower import lower_by_force
+from rcsc.code.emit.scope import SIGNIFICANT, abbreviated, c_scope
+from rcsc.front.commands import run
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve

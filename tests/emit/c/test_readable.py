@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.emit import emitted
-from rcsc.emit.generated import write
-from rcsc.emit.lower import lower, lower_by_force
-from rcsc.emit.rendering import WIDTH, folded
+from rcsc.code.emit import emitted
+from rcsc.code.emit.generated import write
+from rcsc.code.emit.lower import lower, lower_by_force
+from rcsc.code.emit.rendering import WIDTH, folded
 from tests.support.programs.stages import verdict_of
 
 GENERATED = Path(__file__).parents[3] / "generated/c"

@@ -5,20 +5,20 @@ from pathlib import Path
 
 from hypothesis import reject
 
-from rcsc.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.code.emit import TARGETS
+from rcsc.code.emit.c.c99 import emit_c
+from rcsc.code.emit.lower import lower
+from rcsc.code.emit.python import emit_python
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
-from rcsc.emit import TARGETS
-from rcsc.emit.c.c99 import emit_c
-from rcsc.emit.lower import lower
-from rcsc.emit.python import emit_python
 from rcsc.lang.model import Program, ProvedProgram, seal_of_proof
 from rcsc.lang.project import load
 from rcsc.lang.resolve import compile_text, resolve
-from rcsc.solvers.options import Options
-from rcsc.table.findings.unread import unread
-from rcsc.table.mending import mended
-from rcsc.table.program import ProgramVerdict, prove_program
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.findings.unread import unread
+from rcsc.proof.table.mending import mended
+from rcsc.proof.table.program import ProgramVerdict, prove_program
 
 BOXES = Options(solver="boxes")
 """Decides tables by boxes where it can: the quickest."""

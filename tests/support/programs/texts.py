@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from random import Random
 
-from rcsc.diagnostics.source import Source
+from rcsc.base.diagnostics.source import Source
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse

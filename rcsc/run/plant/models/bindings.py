@@ -11,7 +11,7 @@ from typing import Any
 
 import mujoco
 
-from rcsc.host.described import Document, KeyPath, nearest
+from rcsc.base.host.described import Document, KeyPath, nearest
 from rcsc.run.plant import fields
 from rcsc.run.plant.bind import Buffer
 from rcsc.run.plant.models.model_units import driven_in, sensed_in

@@ -13,8 +13,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from rcsc.host.described import Document
-from rcsc.host.files.plain import finite
+from rcsc.base.host.described import Document
+from rcsc.base.host.files.plain import finite
 from rcsc.run.plant.bind import BadPlant, PlantFailed, buffers_of, parties_of, plant_page
 from rcsc.run.plant.models.bindings import ActuatorBinding, Binder, FaultBinding, SensorBinding, ends
 from rcsc.run.plant.models.solid import View, solid

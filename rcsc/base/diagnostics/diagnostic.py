@@ -1,0 +1,210 @@
+"""`Diagnostic` and `Label`: what is wrong, as data; `render` turns it into text."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Span
+
+
+class Severity(StrEnum):
+    """How much it matters: only errors make `rcsc` exit with 1."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A place and what is said about it."""
+
+    span: Span
+    message: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MatchedLine:
+    """A table line shown beside a witness: its name and its cells, one a variable."""
+
+    name: str
+    cells: tuple[str, ...]
+    span: Span | None = None
+
+
+class Place(StrEnum):
+    """What of a table a change writes."""
+
+    CELL = "cell"  # a condition of a line
+    SAME = "same"  # after the name of a line: that it does the same as others
+    LINE = "line"  # a line more
+    NO_LINE = "no line"  # a line less
+    UNREACHABLE = "unreachable"  # DEFAULT, declared so
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One change of a table's text, by names, so that it is true wherever the table stands.
+
+    Attributes:
+        line: The line that is changed; empty for a new one.
+        column: Position of the cell among the conditions as written.
+        texts: Of a cell its text, of a new line the text of each condition, of `same` the other lines.
+    """
+
+    place: Place
+    line: str = ""
+    column: int = 0
+    texts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """What would mend a finding: `help` says it for people, or a note.
+
+    Attributes:
+        title: What to do, in the imperative.
+        proved: What is to be proved of it.
+        changes: To be made together.
+        told: What is said of it, in two pieces between which stands whether it is proved; in one where that is not said.
+        whole: Whether it is to mend all that was found of this kind: every overlap of the table, not these two lines alone.
+        certain: Whether it is proved: of the text that it makes (`table.mending`).
+    """
+
+    title: str
+    table: str
+    proved: str
+    changes: tuple[Change, ...]
+    told: tuple[str, ...] = ()
+    whole: bool = True
+    certain: bool = False
+
+    @property
+    def said(self) -> str:
+        """What is said of it; empty where a help says it in general."""
+        return ("proved" if self.certain else "not proved").join(self.told)
+
+
+MOST_SHOWN = 3
+"""Witnesses of one finding in a text."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effects:
+    """What two lines that overlap do where both match.
+
+    Attributes:
+        same: Whether both do the same for every such input; None where nobody could tell.
+        differ_in: What some such input leaves different: variables in declared order, after what else the actions do.
+    """
+
+    same: bool | None
+    differ_in: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        if self.same is None:
+            return "whether both do the same where both match could not be decided"
+        return (
+            "both do the same where both match"
+            if self.same
+            else f"they differ in: {', '.join(_with_ranges(self.differ_in))}"
+        )
+
+
+def _with_ranges(names: Sequence[str]) -> list[str]:
+    """Names of variables; elements of an array that follow each other are one name.
+
+    >>> _with_ranges(["n", "at[0].x", "at[1].x", "at[2].x", "at[2].y", "at[4].y"])
+    ['n', 'at[0 .. 2].x', 'at[2].y', 'at[4].y']
+    """
+    told: list[str] = []
+    last: tuple[str, int, int, str] | None = None
+    for name in names:
+        parts = _ELEMENT.fullmatch(name)
+        if parts is None:
+            last = None
+            told.append(name)
+            continue
+        before, at, after = parts[1], int(parts[2]), parts[3]
+        follows = last is not None and (before, at - 1, after) == (last[0], last[2], last[3])
+        first = last[1] if last is not None and follows else at
+        last = (before, first, at, after)
+        told[-1 if follows else len(told) :] = [name if first == at else f"{before}[{first} .. {at}]{after}"]
+    return told
+
+
+_ELEMENT = re.compile(r"(.*)\[(\d+)\]([^\[\]]*)")
+"""A name that ends in an element of an array, or in a field of one: its last index is the one that counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class WitnessColumn:
+    """A witness as a column of the table, with the lines that match it.
+
+    Attributes:
+        table: Name of the table.
+        variables: The variables, in declared order.
+        values: The witness's value of each variable, in the table's words.
+        lines: The lines that match the witness; none for a gap.
+        region: The maximal region around the witness, one condition a variable in the
+            table's words; variables left out are free (`any other`).
+        inputs: How many inputs the region has; None where nobody counted.
+        effects: Of two lines that overlap and have no diagnostic of their own; None for any other, and where nobody looked.
+    """
+
+    table: str
+    variables: tuple[str, ...]
+    values: tuple[str, ...]
+    lines: tuple[MatchedLine, ...] = ()
+    region: tuple[str, ...] = ()
+    inputs: int | None = None
+    effects: Effects | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One problem, stated once; rendering lives in `render`.
+
+    The message stands alone, starts in lower case, quotes names in backticks, ends without
+    a full stop and never says how to fix: `help` does.
+    """
+
+    code: Code
+    message: str
+    primary: Label
+    related: tuple[Label, ...] = ()
+    notes: tuple[str, ...] = ()
+    help: tuple[str, ...] = ()
+    witnesses: tuple[WitnessColumn, ...] = ()
+    more: int = 0  # witnesses of the same cause that are not shown
+    severity: Severity = Severity.ERROR
+    effects: Effects | None = None  # of an overlap; `notes` say it, too
+    only_listed: bool = False  # witnesses stand in the JSON form alone
+    told_with: bool = False  # a note of another one tells it in a text
+    proposals: tuple[Proposal, ...] = ()  # `help` says them, too
+
+    @property
+    def shown(self) -> tuple[WitnessColumn, ...]:
+        """The witnesses that a text shows; the JSON form has all."""
+        return () if self.only_listed else self.witnesses[:MOST_SHOWN]
+
+    @property
+    def left_out(self) -> str:
+        """What a text says of those that it does not show; empty for none."""
+        left = () if self.only_listed else self.witnesses[MOST_SHOWN:]
+        inputs = self.more + sum(witness.inputs or 1 for witness in left)
+        words = f"{inputs} more input{'' if inputs == 1 else 's'}" if inputs else ""
+        if not left:
+            return words
+        regions = f"{len(left)} more region{'' if len(left) == 1 else 's'}"
+        return (
+            f"{words}; --json lists {regions}" if self.more else f"{words} in {regions}, which --json lists"
+        )
+
+
+def sort_key(diagnostic: Diagnostic) -> tuple[str, int, int, str, str]:
+    """Position first, so that output is stable."""
+    span = diagnostic.primary.span
+    return (span.file, span.start, span.end, diagnostic.code.value, diagnostic.message)

@@ -1,0 +1,258 @@
+"""Diagnostics as text: the full form with the source and the witness, and the one-line form.
+
+In: diagnostics and the sources they point into. Out: lines of styled pieces, or plain text; colour is
+added by `paint`, the only importer of rich, and only when it is wanted.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import groupby
+
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity, WitnessColumn
+from rcsc.base.diagnostics.printable import clip, escape, pad, width
+from rcsc.base.diagnostics.source import Source, Sources
+
+WIDEST_LINE = 110
+"""Cells shown of a source line where the terminal's width is not known: as wide as `rcsc fmt` makes tables."""
+
+
+class Style(StrEnum):
+    """What a piece of text is; `paint` gives it a colour."""
+
+    PLAIN = ""
+    STRONG = "bold"
+    GUTTER = "bold blue"
+    ERROR = "bold red"
+    WARNING = "bold yellow"
+    NOTE = "bold cyan"
+    RELATED = "bold blue"
+    HELP = "bold green"
+    WITNESS = "bold magenta"
+
+
+OF_SEVERITY = {Severity.ERROR: Style.ERROR, Severity.WARNING: Style.WARNING, Severity.NOTE: Style.NOTE}
+
+
+@dataclass(frozen=True, slots=True)
+class TextPiece:
+    """A run of text in one style."""
+
+    text: str
+    style: Style = Style.PLAIN
+
+
+Row = tuple[TextPiece, ...]
+
+
+def full(diagnostic: Diagnostic, sources: Sources, columns: int = WIDEST_LINE) -> tuple[Row, ...]:
+    """The diagnostic with its source, witnesses, notes and help, at most about `columns` wide."""
+    style = OF_SEVERITY[diagnostic.severity]
+    rows: list[Row] = [
+        (
+            TextPiece(f"{diagnostic.severity.value}[{diagnostic.code.value}]", style),
+            TextPiece(f": {escape(diagnostic.message)}", Style.STRONG),
+        )
+    ]
+    labels = (diagnostic.primary, *diagnostic.related)
+    gutter = max(len(str(_line_number(label, sources))) for label in labels)
+    rows += _snippets(diagnostic, sources, gutter, columns, style)
+    for witness in diagnostic.shown:
+        whole = diagnostic.severity is not Severity.NOTE or not witness.region
+        rows += _witness(witness, gutter) if whole else (_region(witness, gutter),)
+    if diagnostic.left_out:
+        rows.append(_attached(gutter, "more", f"and {diagnostic.left_out}", Style.NOTE))
+    rows += [_attached(gutter, "note", note, Style.NOTE) for note in diagnostic.notes]
+    rows += [_attached(gutter, "help", text, Style.HELP) for text in diagnostic.help]
+    return tuple(rows)
+
+
+def one_line(diagnostic: Diagnostic, sources: Sources) -> str:
+    """`file:line:column: error[RCS401]: message`, for grep and editors."""
+    place = _place(diagnostic.primary, sources)
+    message = escape(diagnostic.message)
+    return f"{place}: {diagnostic.severity.value}[{diagnostic.code.value}]: {message}"
+
+
+def with_witness(diagnostic: Diagnostic, sources: Sources) -> str:
+    """The one line, and below it each witness that a text shows: its values, its region, how many more there are."""
+    lines = [one_line(diagnostic, sources)]
+    for witness in diagnostic.shown:
+        values = (f"{name} = {value}" for name, value in zip(witness.variables, witness.values, strict=True))
+        lines.append(f"  witness: {escape(', '.join(values))}")
+        if witness.region:
+            lines.append(f"  region: {escape(region(witness))}")
+    if diagnostic.left_out:
+        lines.append(f"  and {diagnostic.left_out}")
+    return "\n".join(lines)
+
+
+def plain(rows: Iterable[Row]) -> str:
+    """The rows' text alone, each ended by a newline."""
+    return "".join("".join(piece.text for piece in row).rstrip() + "\n" for row in rows)
+
+
+def paint(rows: Iterable[Row]) -> str:
+    """The rows with ANSI colours, each ended by a newline."""
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(force_terminal=True, color_system="standard", width=100_000, highlight=False)
+    with console.capture() as captured:
+        for row in rows:
+            text = Text(no_wrap=True, end="\n")
+            for piece in row:
+                text.append(piece.text, piece.style.value or None)
+            text.rstrip()
+            console.print(text, soft_wrap=True)
+    return captured.get()
+
+
+# --- places in the source ------------------------------------------------------------
+
+
+def _line_number(label: Label, sources: Sources) -> int:
+    source = sources.get(label.span.file)
+    return source.position(label.span.start).line if source else 1
+
+
+def _place(label: Label, sources: Sources) -> str:
+    source, name = sources.get(label.span.file), escape(label.span.file)
+    if source is None:
+        return name or "rcsc"
+    position = source.position(label.span.start)
+    return f"{name}:{position.line}:{position.column}"
+
+
+def _snippets(
+    diagnostic: Diagnostic, sources: Sources, gutter: int, columns: int, style: Style
+) -> Iterator[Row]:
+    """The primary place's file first, then each other file that is pointed into."""
+    primary = diagnostic.primary
+    here = [label for label in diagnostic.related if label.span.file == primary.span.file]
+    others = [label for label in diagnostic.related if label.span.file != primary.span.file]
+    groups: list[tuple[Label, tuple[Label, ...]]] = [(primary, (primary, *here))]
+    for _, same in groupby(sorted(others, key=lambda label: label.span), key=lambda label: label.span.file):
+        group = tuple(same)
+        groups.append((group[0], group))
+    for index, (first, labels) in enumerate(groups):
+        arrow = "-->" if index == 0 else ":::"
+        yield (TextPiece(f"{' ' * gutter}{arrow} ", Style.GUTTER), TextPiece(_place(first, sources)))
+        source = sources.get(first.span.file)
+        if source is not None and (source.text or any(label.message for label in labels)):
+            marked = [(label, style if label is primary else Style.RELATED) for label in labels]
+            yield from _snippet(source, marked, gutter, columns)
+
+
+def _snippet(source: Source, marked: list[tuple[Label, Style]], gutter: int, columns: int) -> Iterator[Row]:
+    """The lines that the labels point into, each followed by its marks."""
+    edge = TextPiece(f"{' ' * gutter} | ", Style.GUTTER)
+    yield (TextPiece(f"{' ' * gutter} |", Style.GUTTER),)
+    numbered = sorted(
+        ((source.position(label.span.start).line, label, style) for label, style in marked),
+        key=lambda item: (item[0], item[1].span),
+    )
+    before = 0
+    for number, group in groupby(numbered, key=lambda item: item[0]):
+        if before and number > before + 1:
+            yield (TextPiece("...", Style.GUTTER),)
+        before = number
+        text, room = escape(source.line(number)), max(20, columns - gutter - 4)
+        for shift, labels in _windows(source, number, [(label, style) for _, label, style in group], room):
+            shown = clip(text, shift, room) + ("…" if width(text) > shift + room else "")
+            yield (TextPiece(f"{number:>{gutter}} | ", Style.GUTTER), TextPiece(shown))
+            for label, style in labels:
+                yield (edge, *_marks(source, number, label, style, shift, room))
+
+
+def _windows(
+    source: Source, number: int, labels: list[tuple[Label, Style]], room: int
+) -> Iterator[tuple[int, list[tuple[Label, Style]]]]:
+    """Where each excerpt of a line begins, and the labels in it: one where all fit, else as many as show each label."""
+    long = width(escape(source.line(number)))
+    left = sorted(labels, key=lambda item: item[0].span)
+    while left:
+        start = _cells_of(source, number, left[0][0])[0]
+        shift = 0 if long <= room else max(0, min(start - room // 4, long - room))
+        inside = [label for label in left if sum(_cells_of(source, number, label[0])) <= shift + room]
+        shown = inside or left[:1]
+        yield shift, shown
+        left = [label for label in left if label not in shown]
+
+
+def _cells_of(source: Source, number: int, label: Label) -> tuple[int, int]:
+    """First cell and count of cells that `label` covers on line `number`."""
+    line = source.line(number)
+    start = source.position(label.span.start).column - 1
+    end = max(start, min(len(line), start + label.span.end - label.span.start))
+    return width(escape(line[:start])), max(1, width(escape(line[start:end])))
+
+
+def _marks(
+    source: Source, number: int, label: Label, style: Style, shift: int, room: int
+) -> tuple[TextPiece, ...]:
+    first, count = _cells_of(source, number, label)
+    char = "-" if style is Style.RELATED else "^"
+    at = max(0, first - shift)
+    count = max(1, min(count, room - at))
+    message = f" {escape(label.message)}" if label.message else ""
+    return (TextPiece(" " * at), TextPiece(char * count + message, style))
+
+
+# --- what is attached ----------------------------------------------------------------
+
+
+def _attached(gutter: int, word: str, text: str, style: Style) -> Row:
+    return (
+        TextPiece(f"{' ' * gutter} = ", Style.GUTTER),
+        TextPiece(word, style),
+        TextPiece(f": {_hanging(text, gutter + len(word) + 5)}"),
+    )
+
+
+def _hanging(text: str, indent: int) -> str:
+    """Escaped text; its own line ends are kept and what follows them is indented."""
+    return f"\n{' ' * indent}".join(escape(line) for line in text.splitlines())
+
+
+def _witness(witness: WitnessColumn, gutter: int) -> Iterator[Row]:
+    """A small table: a variable a row; the witness beside the lines that match it."""
+    heads = ("input", "witness", *(f"line {line.name}" for line in witness.lines))
+    columns = [heads] + [
+        (name, value, *(_cell(line.cells, row) for line in witness.lines))
+        for row, (name, value) in enumerate(zip(witness.variables, witness.values, strict=True))
+    ]
+    cells = [tuple(escape(cell) for cell in row) for row in columns]
+    widths = [max(width(row[column]) for row in cells) for column in range(len(heads))]
+    edge = TextPiece(f"{' ' * gutter} | ", Style.GUTTER)
+    yield (TextPiece(f"{' ' * gutter} |", Style.GUTTER),)
+    yield (edge, TextPiece(_joined(cells[0], widths), Style.STRONG))
+    yield (edge, TextPiece("|" + "|".join("-" * (cells_ + 2) for cells_ in widths) + "|"))
+    for row in cells[1:]:
+        yield (
+            edge,
+            TextPiece(f"| {pad(row[0], widths[0])} | "),
+            TextPiece(pad(row[1], widths[1]), Style.WITNESS),
+            TextPiece(" " + _joined(row[2:], widths[2:]) if row[2:] else " |"),
+        )
+    yield (TextPiece(f"{' ' * gutter} |", Style.GUTTER),)
+    if witness.region:
+        yield _region(witness, gutter)
+
+
+def _region(witness: WitnessColumn, gutter: int) -> Row:
+    return _attached(gutter, "region", region(witness), Style.WITNESS)
+
+
+def region(witness: WitnessColumn) -> str:
+    """The maximal region around the witness, in the table's words."""
+    free = len(witness.variables) > len(witness.region)
+    return ", ".join((*witness.region, "any other") if free else witness.region)
+
+
+def _cell(cells: tuple[str, ...], row: int) -> str:
+    return cells[row] if row < len(cells) else ""
+
+
+def _joined(cells: Iterable[str], widths: Iterable[int]) -> str:
+    return "| " + " | ".join(pad(cell, cells_) for cell, cells_ in zip(cells, widths, strict=True)) + " |"

@@ -1,0 +1,173 @@
+"""What a command found and what backs it: the one value that every output form shows."""
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.base.diagnostics.source import Source
+
+
+class Verdict(StrEnum):
+    """What is known of a table, best first; anything but `proved` makes `rcsc` exit with 1."""
+
+    PROVED = "proved"
+    CONDITIONAL = "conditional"  # proved from something that is not proved itself
+    UNDECIDED = "undecided"
+    REFUTED = "refuted"
+
+
+NOT_PROVED = "not proved"
+"""The standing of an invariant, or of an assumption declared `proved`, that this run does not prove."""
+
+
+@dataclass(frozen=True, slots=True)
+class InSystem:
+    """What is known of a table from the proof of the levels together.
+
+    Attributes:
+        system: The system's description.
+        proved: Assumptions that the levels keep, all of this content; `trusts`, what that and `unreached` take for granted,
+            as tables declare it.
+        conditional: Assumptions that they keep if what that rests on is so; `rests`, what of it is not proved, in words.
+        not_proved: Assumptions that an earlier run could not show to be kept.
+        unreached: Lines that no reachable cycle of this system runs, DEFAULT too.
+    """
+
+    system: str
+    proved: tuple[str, ...] = ()
+    not_proved: tuple[str, ...] = ()
+    unreached: tuple[str, ...] = ()
+    conditional: tuple[str, ...] = ()
+    rests: tuple[str, ...] = ()
+    trusts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SystemReport:
+    """What is known of a system that checked tables belong to.
+
+    Attributes:
+        system: Its description.
+        standing: `proved`, `proved as far as it was looked at`, `conditional`, `not proved` or `unknown`.
+        wanted: Whether `rcsc prove` would say something of these tables that is not known.
+        missing: Why it is not wholly proved though nothing is found wrong, level by level.
+    """
+
+    system: str
+    standing: str
+    wanted: bool = False
+    missing: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TableReport:
+    """One table's verdict and what it rests on.
+
+    Attributes:
+        table: Its name.
+        file: Where it stands.
+        lines: How many lines it has, DEFAULT not counted.
+        method: `boxes`, `tree` or `z3`; empty where nothing was decided.
+        confirmed_by_z3: Whether Z3 was asked the same and agreed.
+        assumptions: Each assumption and invariant that the proof used, and its standing.
+        proof_ms: What the proof took when it was made.
+        cached: Whether it was made by an earlier run.
+        together: What the levels together make of it; None where nobody knows.
+        stops: Assumptions on which safety rests: the executors end the cycle where one fails.
+        tells: Monitored assumptions whose failure is only reported.
+    """
+
+    table: str
+    file: str
+    verdict: Verdict
+    lines: int
+    method: str = ""
+    confirmed_by_z3: bool = False
+    assumptions: tuple[tuple[str, str], ...] = ()
+    proof_ms: float = 0.0
+    cached: bool = False
+    together: InSystem | None = None
+    stops: tuple[str, ...] = ()
+    tells: tuple[str, ...] = ()
+
+
+MOST_NAMED = 3
+"""Claims named of those that a verdict rests on; the others are counted."""
+
+
+def named(words: Collection[str]) -> str:
+    """Name what a verdict rests on, up to a limit."""
+    more = f" and {len(words) - MOST_NAMED} more" if len(words) > MOST_NAMED else ""
+    return "; ".join(list(words)[:MOST_NAMED]) + more
+
+
+def trusting(words: Collection[str]) -> str:
+    """Text, put after a verdict, of what it takes for granted; may be empty."""
+    return f", trusting {', '.join(words)}" if words else ""
+
+
+def resting(table: TableReport, unproved: Collection[str], unsafe: Collection[str] = ()) -> TableReport:
+    """The report where these invariants and assumptions are not proved, and lines of these tables can go wrong.
+
+    What rests on one of them is conditional: exactly one line matches, as long as all goes well.
+    """
+    assumptions = tuple((name, NOT_PROVED if name in unproved else was) for name, was in table.assumptions)
+    shaken = table.table in unsafe or any(standing == NOT_PROVED for _, standing in assumptions)
+    if table.verdict is Verdict.PROVED and shaken:
+        return replace(table, verdict=Verdict.CONDITIONAL, assumptions=assumptions)
+    return replace(table, assumptions=assumptions)
+
+
+def merged(tables: Iterable[TableReport]) -> tuple[TableReport, ...]:
+    """One report a table, in the order in which they are met: the worst of what several programs make of it.
+
+    A table is part of every program that uses its file, and may rely on other invariants in each. Where all
+    prove it, what it rests on in any of them is listed.
+    """
+    worst: dict[tuple[str, str], TableReport] = {}
+    for table in tables:
+        key = (table.file, table.table)
+        worst[key] = _worse(worst[key], table) if key in worst else table
+    return tuple(worst.values())
+
+
+def _worse(first: TableReport, second: TableReport) -> TableReport:
+    order = list(Verdict)
+    kept = second if order.index(second.verdict) > order.index(first.verdict) else first
+    other = first if kept is second else second
+    if other.verdict is not kept.verdict:
+        return kept
+    known = dict(kept.assumptions)
+    more = tuple((name, standing) for name, standing in other.assumptions if name not in known)
+    stops = tuple(dict.fromkeys((*kept.stops, *other.stops)))
+    tells = tuple(name for name in dict.fromkeys((*kept.tells, *other.tells)) if name not in stops)
+    return replace(kept, assumptions=(*kept.assumptions, *more), stops=stops, tells=tells)
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The outcome of a command.
+
+    Attributes:
+        diagnostics: Sorted, each once.
+        tables: In order of file and place.
+        sources: Every text that a diagnostic points into.
+        systems: Those that the tables belong to, as far as they were looked at.
+    """
+
+    diagnostics: tuple[Diagnostic, ...]
+    tables: tuple[TableReport, ...] = ()
+    sources: Mapping[str, Source] = field(default_factory=dict)
+    systems: tuple[SystemReport, ...] = ()
+
+    def count(self, severity: Severity) -> int:
+        """Count the diagnostics of this severity."""
+        return sum(diagnostic.severity is severity for diagnostic in self.diagnostics)
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is an error, or a table that is not proved."""
+        return self.count(Severity.ERROR) > 0 or any(
+            table.verdict is not Verdict.PROVED for table in self.tables
+        )

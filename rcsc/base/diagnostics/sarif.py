@@ -1,0 +1,138 @@
+"""A report as SARIF 2.1.0, for code-scanning services.
+
+Source: OASIS Standard "Static Analysis Results Interchange Format (SARIF) Version 2.1.0", 27 March 2020.
+"""
+
+import hashlib
+from pathlib import PurePath
+from typing import Any
+from urllib.parse import quote
+
+from rcsc import __version__
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.base.diagnostics.jsonform import table_to_json
+from rcsc.base.diagnostics.render import region
+from rcsc.base.diagnostics.report import Report
+from rcsc.base.diagnostics.source import Source, Sources, Span
+
+SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+
+Json = dict[str, Any]
+
+
+def sarif(report: Report) -> Json:
+    """One run with a result for each diagnostic; table verdicts are properties of the run."""
+    codes = sorted({diagnostic.code for diagnostic in report.diagnostics})
+    index = {code: number for number, code in enumerate(codes)}
+    return {
+        "$schema": SCHEMA,
+        "version": "2.1.0",
+        "runs": [
+            {
+                "tool": {
+                    "driver": {
+                        "name": "rcsc",
+                        "version": __version__,
+                        "semanticVersion": __version__,
+                        "rules": [_rule(code) for code in codes],
+                    }
+                },
+                "columnKind": "unicodeCodePoints",
+                "results": [
+                    _result(diagnostic, index[diagnostic.code], report.sources)
+                    for diagnostic in report.diagnostics
+                ],
+                "properties": {"tables": [table_to_json(table) for table in report.tables]},
+            }
+        ],
+    }
+
+
+def _rule(code: Code) -> Json:
+    explanation = code.explanation
+    return {
+        "id": code.value,
+        "name": "".join(word.capitalize() for word in code.name.split("_")),
+        "shortDescription": {"text": f"{explanation.title[0].upper()}{explanation.title[1:]}."},
+        "fullDescription": {"text": explanation.text},
+        "help": {"text": f"Run `rcsc explain {code.value}` for an example."},
+    }
+
+
+def _result(diagnostic: Diagnostic, rule: int, sources: Sources) -> Json:
+    result: Json = {
+        "ruleId": diagnostic.code.value,
+        "ruleIndex": rule,
+        "level": diagnostic.severity.value,
+        "message": {"text": _message(diagnostic)},
+        "partialFingerprints": {"rcscTableAndLine/v1": fingerprint(diagnostic)},
+    }
+    if diagnostic.primary.span.file:
+        result["locations"] = [_location(diagnostic.primary, sources)]
+    related = [label for label in diagnostic.related if label.span.file]
+    if related:
+        result["relatedLocations"] = [
+            {"id": number, **_location(label, sources)} for number, label in enumerate(related, start=1)
+        ]
+    if diagnostic.witnesses:
+        result["properties"] = {"witnesses": _witnesses(diagnostic), "more": diagnostic.more}
+    return result
+
+
+def fingerprint(diagnostic: Diagnostic) -> str:
+    """Stays the same when lines above are added or cells realigned: code, file, table, lines, message."""
+    tables = [(witness.table, [line.name for line in witness.lines]) for witness in diagnostic.witnesses]
+    stable = (diagnostic.code.value, diagnostic.primary.span.file, tables, diagnostic.message)
+    return hashlib.sha256(repr(stable).encode()).hexdigest()[:32]
+
+
+def _message(diagnostic: Diagnostic) -> str:
+    lines = [f"{diagnostic.message[:1].upper()}{diagnostic.message[1:]}."]
+    lines += [f"Note: {note}" for note in diagnostic.notes]
+    lines += [f"Help: {text}" for text in diagnostic.help]
+    return "\n".join(lines)
+
+
+def _witnesses(diagnostic: Diagnostic) -> list[Json]:
+    return [
+        {
+            "table": witness.table,
+            "input": dict(zip(witness.variables, witness.values, strict=True)),
+            "lines": [line.name for line in witness.lines],
+            "region": region(witness),
+        }
+        for witness in diagnostic.witnesses
+    ]
+
+
+def _location(label: Label, sources: Sources) -> Json:
+    location: Json = {
+        "physicalLocation": {
+            "artifactLocation": {"uri": uri(label.span.file)},
+            "region": _region(label.span, sources.get(label.span.file)),
+        }
+    }
+    if label.message:
+        location["message"] = {"text": label.message}
+    return location
+
+
+def _region(span: Span, source: Source | None) -> Json:
+    if source is None:
+        return {"startLine": 1}
+    start, end = source.position(span.start), source.position(max(span.start, span.end))
+    return {
+        "startLine": start.line,
+        "startColumn": start.column,
+        "endLine": end.line,
+        "endColumn": end.column,
+        "charOffset": span.start,
+        "charLength": max(0, span.end - span.start),
+    }
+
+
+def uri(file: str) -> str:
+    """A relative reference for a relative path, a `file:` URI for an absolute one."""
+    path = PurePath(file)
+    return path.as_uri() if path.is_absolute() else quote(path.as_posix(), errors="surrogateescape")

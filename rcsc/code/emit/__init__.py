@@ -1,0 +1,74 @@
+"""A proved program to files in each target's language.
+
+A *plan* is the shape of the executors in no language. Each leaf that a table tests has *classes*: values that no line
+tells apart. A *mask* has one bit a line; each class of each leaf has one. C joins one mask a leaf by AND, and
+the one bit left is the line, so that it costs the same whatever the input. Python asks by nested ifs for what parts the
+lines, which reads fewer leaves, and knows at each end which lines are left. That exactly one is left is proved,
+and still told in every cycle: masks and ifs are made of the table alone, and take nothing from its proof.
+
+>>> from rcsc.code.emit.lower import lower
+>>> from rcsc.lang.resolve import compile_text
+>>> from rcsc.proof.solvers.options import Options
+>>> from rcsc.proof.table.program import prove_program
+>>> program = compile_text('''
+... input wide : bool
+... output order : bool
+... table grip {
+...   | line | wide  || order |
+...   |------|-------||-------|
+...   | held | false || true  |
+...   | over | true  || false |
+... }''')
+>>> plan = lower(prove_program(program, Options()).proved)
+>>> [probe.masks for group in plan.tables[0].matcher.groups for probe in group]
+[(1, 2)]
+
+Nothing is emitted that was not proved: `lower` takes what only the prover makes. The same program gives the same
+bytes on every machine: no time, version or absolute path is in them. Trusted: all of it, for what the executors do;
+`rcsc test` compares them with the interpreter, and with `--deep` has the C proved.
+
+Modules, in the order the data flows: `lower` makes a `plan`; `decision` parts its lines by cuts; `identifiers` spells
+every name, free in its `scope`; `code_tree` is a small tree of code, which C and Python share, and its spelling in
+each; `translate` makes it of expressions and statements, the room `c` and `python` of whole files, by the templates
+of `rendering`; `ranges` says what an analyser sees that keeps ranges alone: where that is too little, the C says what
+was proved. `generated` writes the files or says whether they are fresh. `TARGETS` names the languages: a new one is a
+module and its line here.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from rcsc.code.emit.c.c99 import emit_c, outward
+from rcsc.code.emit.plan import Plan
+from rcsc.code.emit.python import emit_python
+
+__all__ = ["TARGETS", "Target", "emit_c", "emit_python", "emitted"]
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A language that executors are written in.
+
+    Attributes:
+        title: What it is called in messages.
+        emit: The files of a plan, by path below the generated folder.
+        outward: Each name that programs share which are linked together, and what it is.
+    """
+
+    title: str
+    emit: Callable[[Plan], dict[str, str]]
+    outward: Callable[[Plan], Iterable[tuple[str, str]]] = lambda _: ()
+
+
+TARGETS: Mapping[str, Target] = MappingProxyType(
+    {"python": Target("Python", emit_python), "c": Target("C", emit_c, outward)}
+)
+"""By the name that `--target` takes."""
+
+
+def emitted(plan: Plan, targets: Collection[str] = TARGETS.keys()) -> dict[str, str]:
+    """The files of a plan in some languages, by path below the generated folder."""
+    return {
+        path: text for name in TARGETS if name in targets for path, text in TARGETS[name].emit(plan).items()
+    }

@@ -1,0 +1,226 @@
+"""What others see of a program's C: types, constants, the state, and the functions that the user writes."""
+
+from collections.abc import Iterable, Iterator
+from typing import TypeAlias
+
+from rcsc.code.emit.c.cprogram import CProgram
+from rcsc.code.emit.c.ctext import c_type, declared, wide_type
+from rcsc.code.emit.c.layout import record_size, sizes
+from rcsc.code.emit.identifiers import DIGEST, comment, parameter_word, types_guard, types_header
+from rcsc.code.emit.plan import table_position
+from rcsc.code.emit.rendering import render
+from rcsc.code.emit.scope import c_scope
+from rcsc.lang import model
+from rcsc.lang.model import Enum, Int, Procedure, Real, Variable, pending, spell, unit_text
+
+Fields: TypeAlias = tuple[tuple[str, str], ...]
+"""Members of a struct, or constants of an enumeration: the declaration of each, and its doc."""
+FAULT_DOCS = (
+    "",
+    "an input was refused: `fault_at` is its position",
+    "no line matched, which was proved impossible",
+    "several lines matched, which was proved impossible",
+    "a result of a function of yours was refused: `fault_at` is the position of its variable",
+    "an assumption failed that the table's safety rests on: `fault_at` is its position",
+    "of `rcsc compile --defensive`: the state was refused; `fault_at` is what `check` says of it",
+    "this machine, or its compiler, computes reals otherwise",
+)
+
+
+def type_headers(c: CProgram) -> dict[str, str]:
+    """A header for each file that declares types: all programs that use it share them."""
+    headers = {}
+    for unit in dict.fromkeys(c.names.units.values()):
+        files = [file for file, word in c.names.units.items() if word == unit]
+        enums = [enum for enum in c.program.enums if enum.file in files]
+        records = [record for record in c.program.records if record.file in files]
+        needed = {c.names.units[part.file] for record in records for part in _parts(record)}
+        view = {
+            "source": comment(_source(c, files[0])),
+            "mark": c.plan.mark,
+            "guard": types_guard(unit),
+            "includes": sorted(types_header(other) for other in needed - {unit}),
+            "enums": [_enum(c, enum) for enum in enums],
+            "structs": [_record(c, record) for record in records],
+        }
+        headers[f"c/{types_header(unit)}"] = render("types.h.jinja", view)
+    return headers
+
+
+def _source(c: CProgram, file: str) -> str:
+    """A file that declares types, as the first line of its header names it."""
+    own = file in {"", c.program.file}
+    return c.plan.source if own else f"{c.plan.places.get(file, file)}.rcs"
+
+
+def shared(c: CProgram) -> dict[str, list[str]]:
+    """Names that the header of each unit declares."""
+    names = {unit: [types_header(unit), types_guard(unit)] for unit in c.names.units.values()}
+    for kind in c.program.types:
+        names[c.names.units[kind.file]].append(c.names.types[kind.name])
+    for enum in c.program.enums:
+        names[c.names.units[enum.file]] += c.names.constants[enum.name]
+    return names
+
+
+def _parts(record: model.Record) -> Iterator[Enum | model.Record]:
+    """The declared types of a record's own fields."""
+    for part in record.fields:
+        kind = part.type
+        while isinstance(kind, model.Array):
+            kind = kind.element
+        if isinstance(kind, Enum | model.Record):
+            yield kind
+
+
+def _enum(c: CProgram, enum: Enum) -> tuple[str, str, str, Fields]:
+    return (
+        c.names.types[enum.name],
+        c_type(enum),
+        comment(enum.name),
+        _numbered(c.names.constants[enum.name], enum.members),
+    )
+
+
+def _numbered(names: Iterable[str], docs: Iterable[str]) -> Fields:
+    """Constants from 0 on."""
+    pairs = zip(names, docs, strict=True)
+    return tuple((f"{name} = {at}", comment(doc)) for at, (name, doc) in enumerate(pairs))
+
+
+def _record(c: CProgram, record: model.Record) -> tuple[str, str, Fields]:
+    names = c.names.members[record.name]
+    docs = ("; ".join(word for word in (range_text(f.type), comment(f.doc)) if word) for f in record.fields)
+    fields = tuple(
+        (declared(c.names, names[f.name], f.type, defensive=c.plan.defensive), doc)
+        for f, doc in zip(record.fields, docs, strict=True)
+    )
+    size = record_size(record)
+    return (
+        c.names.types[record.name],
+        f"record {comment(record.name)}, {size} byte{'s' if size > 1 else ''}",
+        fields,
+    )
+
+
+def positions(c: CProgram) -> Iterator[tuple[str, Fields]]:
+    """Constants for what the trace tells by its position, each kind with what is said of it."""
+    for table in c.plan.tables:
+        names = c.names.lines[table.table.name]
+        docs = (  # where the constant does not say it
+            "" if name.endswith(f"_{line.name.upper()}") else line.name
+            for name, line in zip(names, table.lines, strict=True)
+        )
+        doc = f"`line`, where table {table.table.name} ran; -1 for none"
+        yield comment(doc), _numbered(names, docs)
+    if c.names.assumptions:
+        doc = "Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed"
+        yield doc, _numbered(c.names.assumptions, c.plan.checked)
+    positions = (f"{name} = {at}" for at, name in enumerate((*c.names.leaves.values(), *c.names.invariants)))
+    doc = "`fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants"
+    yield doc, tuple((position, "") for position in positions)
+    ok, foreign = c.names.checks
+    checks = (
+        (f"{ok} = -1", "the state may be gone on from"),
+        (
+            f"{foreign} = {c.foreign}",
+            f"its `{DIGEST}` is not {c.names.digest}: other tables made it, or an older version of these",
+        ),
+    )
+    yield "What else `check` gives", checks
+    if c.names.places:
+        doc = "`fault_at` where a table that others follow in a cycle has no line, or several"
+        numbered = ((name, table_position(c.program, table)) for table, name in c.names.places.items())
+        yield doc, tuple((f"{name} = {number}", "") for name, number in numbered)
+    yield "`fault`, and what a cycle returns", _numbered(c.names.faults, FAULT_DOCS)
+
+
+def fields(c: CProgram) -> Iterator[tuple[str, str]]:
+    """Give the members of the state: the declaration of each, and its doc."""
+    variables = {v.name: v for v in c.program.variables}
+    position = {v.name: at for at, v in enumerate(c.program.variables)}
+    for variable in c.program.declared:
+        root = c.names.roots[variable.name]
+        first, last = position[variable.leaves[0]], position[variable.leaves[-1]]
+        where = f"{first}" if first == last else f"{first} to {last}"
+        words = [
+            f"{where}: {variable.kind.value}",
+            range_text(variable.type),
+            _safe_text(variables[variable.leaves[0]]),
+            comment(variable.doc),
+        ]
+        yield (
+            declared(c.names, root, variable.type, defensive=c.plan.defensive),
+            "; ".join(word for word in words if word),
+        )
+        later = pending(variable.name)
+        if later in variables:
+            doc = f"{position[later]}: state; the deferred next value of {root}"
+            yield (
+                declared(
+                    c.names, "".join(c.names.paths[later]), variables[later].type, defensive=c.plan.defensive
+                ),
+                doc,
+            )
+
+
+def size_text(c: CProgram) -> str:
+    """The bytes of the state, on each kind of target."""
+    most, *others = dict.fromkeys(sizes(c.program, c.names))
+    return f"{most} bytes" + (
+        f", or {', '.join(map(str, others))} where members are aligned to less than their size"
+        if others
+        else ""
+    )
+
+
+def layout_condition(c: CProgram) -> str:
+    """A C condition that the state has one of the sizes that are expected."""
+    held = dict.fromkeys(sizes(c.program, c.names))
+    tests = [f"(sizeof({c.p}_t) == {size}u)" for size in held]
+    return " || ".join(tests)
+
+
+def user_functions(c: CProgram) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Each user function, and the types of its parameters; a pointer's ends in a star."""
+    for procedure in c.program.procedures:
+        if procedure.extern is not None:
+            yield (
+                procedure.extern.c,
+                tuple(kind.replace(" ", "") for kind, _ in _parameters(c, procedure)),
+            )
+
+
+def externs(c: CProgram) -> Iterator[str]:
+    """Declare each user function once."""
+    declared = (
+        f"extern void {procedure.extern.c}({', '.join(map(''.join, _parameters(c, procedure))) or 'void'});"
+        for procedure in c.program.procedures
+        if procedure.extern is not None
+    )
+    yield from dict.fromkeys(declared)
+
+
+def _parameters(c: CProgram, extern: Procedure) -> Iterator[tuple[str, str]]:
+    """Types, up to the name, and names."""
+    kinds = {v.name: v.type for v in c.program.variables}
+    word = c_scope().fresh
+    yield from ((f"{c_type(kinds[name])} ", word(parameter_word(name))) for name in extern.reads)
+    yield from ((f"{wide_type(param.type)} ", word(parameter_word(param.name))) for param in extern.params)
+    yield from ((f"{c_type(kinds[name])} *", word(f"{parameter_word(name)}_out")) for name in extern.writes)
+
+
+def range_text(kind: model.Type) -> str:
+    """The range of a number, with its unit; empty for what has none."""
+    match kind:
+        case Int(low, high, unit) | Real(low, high, unit):
+            units = unit_text(unit)
+            return f"{spell(kind, low)} .. {spell(kind, high)}" + (f" {units}" if units else "")
+        case model.Array(element=element):
+            return range_text(element)
+        case _:
+            return ""
+
+
+def _safe_text(variable: Variable) -> str:
+    return "" if variable.safe is None else f"safe {spell(variable.type, variable.safe)}"

@@ -1,0 +1,294 @@
+"""The shape of the executors, in no language: what `lower` makes and `emit` spells.
+
+A matcher is a conjunction of look-ups: each *probe* finds the class of one leaf (or the truth of one test, or both of
+several leaves together), and the class's mask has a bit for each line that it does not exclude.
+"""
+
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from math import prod
+from typing import TypeAlias
+
+from rcsc.base.host.files.write import UNPROVED
+from rcsc.code.emit.decision import Cut, Decision, cuts, ends
+from rcsc.lang.model import Action, Expr, LineName, Procedure, Program, Scalar, Table, TableName, VariableName
+
+WORD = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Direct:
+    """The class of a leaf is its key less `low`; one class a key."""
+
+    leaf: VariableName
+    type: Scalar
+    low: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cuts:
+    """The class of a leaf is how many of `cuts` (values, ascending) are at most its value."""
+
+    leaf: VariableName
+    type: Scalar
+    cuts: tuple[int | float, ...]
+
+    @property
+    def count(self) -> int:
+        """How many classes there are."""
+        return len(self.cuts) + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Coded:
+    """The class of a leaf is looked up by its key less `low`."""
+
+    leaf: VariableName
+    type: Scalar
+    low: int
+    classes: tuple[int, ...]
+
+    @property
+    def count(self) -> int:
+        """How many classes there are."""
+        return max(self.classes) + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """The class is 1 where the condition holds, else 0."""
+
+    condition: Expr
+    text: str
+    count: int = 2
+
+
+Index: TypeAlias = Direct | Coded | Cuts | Truth
+
+
+def first_value(index: Direct | Coded | Cuts, number: int) -> int | float:
+    """The least value of a leaf whose class is at least `number`, which is not 0; of no real, its key."""
+    match index:
+        case Cuts(cuts=cuts):
+            return cuts[number - 1]
+        case Coded(low=low, classes=classes):
+            return low + bisect_left(classes, number)
+        case Direct(low=low):
+            return low + number
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """A class and what it leaves.
+
+    Attributes:
+        masks: For each class a mask: bit k is set where line k does not exclude it.
+    """
+
+    index: Index
+    masks: tuple[int, ...]
+
+
+Group: TypeAlias = tuple[Probe, ...]
+"""Probes that share a table: their classes are taken together, in mixed radix, the last one fastest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Windows:
+    """What parts a table of many lines into windows of at most one word; masks tell which line of a window it is.
+
+    Attributes:
+        probes: What `decided` asks for.
+        decided: Where an input belongs: each end is a window, which has every line that may match there.
+        apart: Whether the masks' words are kept once each, and the tables keep their places.
+    """
+
+    probes: tuple[Probe, ...]
+    decided: Decision
+    apart: bool
+
+    @property
+    def cuts(self) -> tuple[Cut, ...]:
+        """The questions, each after those that are asked after it."""
+        return tuple(cuts(self.decided))
+
+    @property
+    def lines(self) -> tuple[tuple[int, ...], ...]:
+        """For each window its lines, from the lowest bit."""
+        return tuple(tuple(members(end.lines)) for end in ends(self.decided))
+
+
+@dataclass(frozen=True, slots=True)
+class Matcher:
+    """The matcher of one table.
+
+    Attributes:
+        lines: How many lines, DEFAULT left out.
+        default: Whether there is a DEFAULT line: it is taken where no other matches.
+        windows: Where C looks for the line, if not at all lines.
+    """
+
+    lines: int
+    default: bool
+    groups: tuple[Group, ...]
+    windows: Windows | None = None
+
+    @property
+    def words(self) -> int:
+        """Machine words of 64 lines in a mask."""
+        return (self.lines + WORD - 1) // WORD
+
+
+def members(mask: int) -> Iterator[int]:
+    """The lines of a mask, in order."""
+    while mask:
+        yield (mask & -mask).bit_length() - 1
+        mask &= mask - 1
+
+
+def joined(group: Group) -> tuple[int, ...]:
+    """The masks of a group: one for each combination of classes."""
+    masks = group[0].masks
+    for probe in group[1:]:
+        masks = tuple(mask & two for mask in masks for two in probe.masks)
+    return masks
+
+
+def grouped(probes: Iterable[Probe], most: int, *, shifted: bool = False) -> tuple[Group, ...]:
+    """Probes joined while their classes together are at most `most`: fewer masks to load, larger tables.
+
+    Args:
+        probes: One for each leaf or test.
+        most: Combinations of classes in a group; a probe with more stands alone.
+        shifted: Whether the classes of all but the first of a group must be a power of two, so that an index is shifted, never
+            multiplied.
+    """
+    bins: list[list[Probe]] = []
+    for probe in sorted(probes, key=lambda probe: -len(probe.masks)):
+        joins = not shifted or len(probe.masks).bit_count() == 1
+        for group in bins if joins else ():
+            if prod(len(other.masks) for other in group) * len(probe.masks) <= most:
+                group.append(probe)
+                break
+        else:
+            bins.append([probe])
+    return tuple(tuple(group) for group in bins)
+
+
+def table_position(program: Program, table: str) -> int:
+    """The position of a table, by which a fault names one before the last of a cycle."""
+    return [candidate.name for candidate in program.tables].index(TableName(table))
+
+
+@dataclass(frozen=True, slots=True)
+class PlanLine:
+    """A line and what it does, for DEFAULT too.
+
+    Attributes:
+        source: The file, and the line's name; its table's, too, where the file has several.
+        conditions: What it states, heading by heading.
+        requirements: Names of those that it answers.
+    """
+
+    name: LineName
+    actions: tuple[Action, ...]
+    source: str
+    conditions: tuple[str, ...] = ()
+    requirements: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """Where it stands, and what for: `task/release.rcs line 4 [SR-12]`."""
+        return f"{self.source}{answering(self.requirements)}"
+
+    @property
+    def told(self) -> str:
+        """Where it stands, what for, and when it runs, in words."""
+        return f"{self.place}: {'; '.join(self.conditions)}" if self.conditions else self.place
+
+
+def answering(requirements: Iterable[str]) -> str:
+    """Names of requirements, in brackets after a blank; empty for none."""
+    names = ", ".join(requirements)
+    return f" [{names}]" if names else ""
+
+
+def stated(procedure: Procedure, files: Mapping[str, str]) -> str:
+    """Where a procedure stands, what for, and what it is, in words; the protocol's own stand in no file.
+
+    Args:
+        procedure: The procedure.
+        files: `Plan.files`.
+    """
+    words = f"{files.get(procedure.span.file, '')} procedure {procedure.name}{answering(procedure.requirements)}".lstrip()
+    return f"{words}: {procedure.doc}" if procedure.doc else words
+
+
+@dataclass(frozen=True, slots=True)
+class PlanTable:
+    """A table to be emitted.
+
+    Attributes:
+        source: Its file, relative, and its name where the file has several.
+        monitored: Positions in `Plan.monitored` of the assumptions that it checks.
+        stops: Those of them that end the cycle where they fail.
+    """
+
+    table: Table
+    source: str
+    matcher: Matcher
+    lines: tuple[PlanLine, ...]
+    monitored: tuple[int, ...]
+    stops: tuple[int, ...] = ()
+
+    @property
+    def where(self) -> str:
+        """What must hold where the table is matched by itself, in words; empty for nothing."""
+        names = " and ".join(self.table.stops)
+        return f" where {names} {'holds' if len(self.stops) == 1 else 'hold'}" if names else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A program, ready to be spelled.
+
+    Attributes:
+        source: The root file, relative, with `/`.
+        monitored: Positions in `program.assumptions` of those that the executors check: monitored ones, and those that stop some table.
+        places: For each file that declares a type, its place in the project, relative, with `/` and without its ending.
+        files: For each file that declares a procedure or an assumption, its name, relative, with `/`.
+        prefix: What names of files, and in C, begin with.
+        proved: Whether it is proved; otherwise every file is marked (`UNPROVED`).
+        defensive: Whether every cycle begins with a check of the state.
+    """
+
+    program: Program
+    source: str
+    tables: tuple[PlanTable, ...]
+    monitored: tuple[int, ...]
+    proved: bool = True
+    defensive: bool = False
+    places: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+    prefix: str = ""
+
+    @property
+    def checked(self) -> tuple[str, ...]:
+        """What each assumption that is checked does where it fails, in words: `seen: ends the cycle in tally; told in count`."""
+        return tuple(self._checked(place, at) for place, at in enumerate(self.monitored))
+
+    def _checked(self, place: int, at: int) -> str:
+        stops = [table.table.name for table in self.tables if place in table.stops]
+        told = [
+            table.table.name for table in self.tables if place in table.monitored and place not in table.stops
+        ]
+        parts = [(f"ends the cycle in {', '.join(stops)}", stops), (f"only told in {', '.join(told)}", told)]
+        does = "; ".join(words for words, tables in parts if tables) or "no table relies on it"
+        return f"{self.program.assumptions[at].name}: {does}"
+
+    @property
+    def mark(self) -> str:
+        """The mark of what is not proved; empty for what is."""
+        return "" if self.proved else UNPROVED

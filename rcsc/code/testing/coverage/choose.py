@@ -1,0 +1,139 @@
+"""The cases that are kept: each hits something that none before it does, and none can be spared.
+
+In: cases. Out: vectors, with what each must give, and the sessions that were drawn on the way.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from rcsc.code.emit.plan import Plan
+from rcsc.code.testing.coverage.candidates import (
+    Session,
+    always,
+    drawn,
+    of_masks,
+    of_tables,
+    of_truths,
+    refusals,
+)
+from rcsc.code.testing.coverage.case import Case, Entry, Expected, entries, expected
+from rcsc.code.testing.coverage.goals import Hit, Reached
+from rcsc.code.testing.coverage.marks import marked
+from rcsc.code.testing.executors.symbols import Symbols
+from rcsc.code.testing.inputs.snapshot import InputSearch
+from rcsc.code.testing.inputs.vectors import Vectors
+from rcsc.lang.model import Program
+
+LEAVE_AFTER = 60
+"""Sessions of one function in which nothing new is hit, after which no more are drawn."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """A vector.
+
+    Attributes:
+        hits: Everything that it hits.
+    """
+
+    case: Case
+    expected: Expected
+    hits: frozenset[Hit]
+
+
+@dataclass(slots=True)
+class Choice:
+    """Collects vectors of one program.
+
+    Attributes:
+        sessions: Drawn sessions, in full.
+    """
+
+    program: Program
+    reached: Reached
+    kept: list[Kept] = field(default_factory=list)
+    sessions: list[Session] = field(default_factory=list)
+
+    def offer(self, case: Case, right: Expected | None = None) -> bool:
+        """Keep a case if it hits something new."""
+        right = right or expected(self.program, case)
+        if right is None:
+            return False
+        hits = self.reached.of(case, right)
+        if hits <= self.reached.hits:
+            return False
+        self.reached.keep(hits)
+        self.kept.append(Kept(case, right, frozenset(hits)))
+        return True
+
+    def draw(self, entry: Entry, examples: int, most: int) -> None:
+        """Draw sessions of a function, and keep what is new in them."""
+        idle = 0
+        for session in drawn(self.program, entry, examples, most):
+            pairs = zip(session.cases, session.expected, strict=True)
+            new = [self.offer(case, right) for case, right in pairs]
+            self.sessions.append(session)
+            idle = 0 if any(new) else idle + 1
+            if idle > LEAVE_AFTER:
+                return
+
+    def spare(self) -> None:
+        """Drop every vector whose hits the others have; the last first, which were the hardest to come by and hit most."""
+        counts: dict[Hit, int] = {}
+        for kept in self.kept:
+            for hit in kept.hits:
+                counts[hit] = counts.get(hit, 0) + 1
+        left = []
+        for kept in self.kept:
+            if all(counts[hit] > 1 for hit in kept.hits):
+                for hit in kept.hits:
+                    counts[hit] -= 1
+            else:
+                left.append(kept)
+        self.kept = left
+
+
+def chosen(
+    search: InputSearch,
+    plan: Plan,
+    symbols: Symbols,
+    tables: Sequence[Vectors],
+    sessions: int,
+    progress: Callable[[str], None],
+    *,
+    reals: bool = False,
+) -> Choice:
+    """Vectors of a program, as far as no solver is needed for its procedures.
+
+    Args:
+        search: Over a proved program; with a solver where relations between leaves are to be met.
+        plan: Of its C.
+        symbols: Of its C.
+        tables: MC/DC vectors of each table.
+        sessions: How many are drawn of each step and cycle, at most.
+        progress: Told what is being done.
+        reals: Whether the C looks how the machine computes reals.
+    """
+    program = search.program
+    choice = Choice(program, Reached(program, plan, marked(program)))
+    for case in (
+        *always(program, symbols, reals=reals),
+        *of_tables(search, plan, tables),
+        *of_truths(search, plan),
+    ):
+        choice.offer(case)
+    for case, bits in of_masks(plan, tables):
+        if not choice.reached.hits.issuperset(bits):
+            choice.offer(case)
+    for entry in entries(program):
+        if entry.kind in ("step", "cycle"):
+            progress(f"drawing sessions of {entry.kind} {entry.name}")
+            choice.draw(entry, sessions, MOST_CYCLES)
+    for kept in [kept for kept in choice.kept if kept.case.answers]:
+        for case in refusals(program, symbols, kept.case):
+            choice.offer(case)
+    return choice
+
+
+MOST_CYCLES = 8
+"""Of a drawn session."""

@@ -1,0 +1,153 @@
+"""What the emitted executors call things, read from the symbol file that is emitted beside them.
+
+In: the text of `<program>.json`. Out: names of files, functions and leaves, in C and in Python.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from rcsc.base.host.files.read import json_of
+from rcsc.lang.model import I64_MAX, Bool, Int, Program, Real, Scalar, Single
+
+
+@dataclass(frozen=True, slots=True)
+class LeafSymbol:
+    """A leaf in the executors.
+
+    Attributes:
+        path: Its place in the C struct, `emove_status.echo`.
+        c_type: Its C type, `uint8_t`.
+        attribute: Its attribute in the Python class.
+    """
+
+    path: str
+    c_type: str
+    attribute: str
+
+
+@dataclass(frozen=True, slots=True)
+class TracePlaces:
+    """The places of the trace in the struct; `who` is a C expression of the struct."""
+
+    line_path: str = "line"
+    fault_at_path: str = "fault_at"
+    failed_paths: tuple[str, ...] = ("assumptions_failed",)
+
+    def line(self, who: str) -> str:
+        """The line taken."""
+        return f"{who}.{self.line_path}"
+
+    def fault_at(self, who: str) -> str:
+        """The leaf that was refused."""
+        return f"{who}.{self.fault_at_path}"
+
+    def clear(self, who: str) -> str:
+        """Statements that make the trace what it is before a cycle."""
+        zeros = "".join(f" {who}.{path} = 0;" for path in self.failed_paths)
+        return f"{self.line(who)} = -1; {who}.fault = 0; {self.fault_at(who)} = -1;{zeros}"
+
+    def failed(self, who: str, number: int) -> str:
+        """Whether monitored assumption `number` failed."""
+        return f"((({who}.{self.failed_paths[number // 64]}) >> {number % 64}) & 1u)"
+
+
+@dataclass(frozen=True, slots=True)
+class Symbols:
+    """Every name that the suite uses.
+
+    Attributes:
+        leaves: By name of the leaf, in declared order.
+        lines: By table: function that says which line matches.
+        steps: By table: function of one step.
+        batches: By table: function for many inputs.
+        cycles: By level: function of one cycle.
+        positions: Of each leaf; what `fault_at` says when it is refused.
+        module: File name of the Python executor.
+        digest: What a state of these tables has as its `digest`.
+        check: Function that says whether a state may be gone on from.
+        state_class: Its class.
+    """
+
+    program: str
+    struct: str
+    header: str
+    source: str
+    init: str
+    leaves: Mapping[str, LeafSymbol]
+    lines: Mapping[str, str]
+    steps: Mapping[str, str]
+    batches: Mapping[str, str]
+    cycles: Mapping[str, str]
+    positions: Mapping[str, int] = field(default_factory=dict)
+    trace: TracePlaces = TracePlaces()
+    module: str = ""
+    state_class: str = ""
+    check: str = ""
+    digest: int = 0
+
+    def path(self, name: str) -> str:
+        """Place of a leaf in the struct."""
+        return self.leaves[name].path
+
+    def c_type(self, name: str) -> str:
+        """C type of a leaf."""
+        return self.leaves[name].c_type
+
+    def fault_at(self, name: str) -> int:
+        """What `fault_at` says when this leaf is refused."""
+        return self.positions[name]
+
+    def value_type(self, kind: Scalar) -> str:
+        """C type of a parameter of this kind."""
+        if isinstance(kind, Single):
+            return "float"
+        if isinstance(kind, Bool | Real):
+            return "bool" if isinstance(kind, Bool) else "double"
+        wide = isinstance(kind, Int) and kind.low >= 0 and kind.high > I64_MAX
+        return "uint64_t" if wide else "int64_t"
+
+    def leaf_at(self, number: int) -> str:
+        """The leaf that `fault_at` means."""
+        return next((name for name, at in self.positions.items() if at == number), f"leaf {number}")
+
+
+def symbols_of(program: Program, files: Mapping[str, str]) -> Symbols:
+    """The names in the symbol file of a program.
+
+    Args:
+        program: The program.
+        files: Its generated files, text by path.
+
+    Raises:
+        KeyError: The symbol file is missing, or is another program's.
+    """
+    documents = [json_of(text) for path, text in files.items() if path.endswith(".json")]
+    names = [str(v.name) for v in program.variables]
+    for document in documents:
+        if [leaf["name"] for leaf in document["leaves"]] == names:
+            return _symbols(document)
+    raise KeyError(program.name)
+
+
+def _symbols(document: Mapping[str, Any]) -> Symbols:
+    leaves = {x["name"]: LeafSymbol(x["path"], x["c_type"], x["attribute"]) for x in document["leaves"]}
+    tables = document["tables"]
+    return Symbols(
+        program=document["program"],
+        struct=document["struct"],
+        header=document["header"],
+        source=document["source"],
+        init=document["init"],
+        leaves=leaves,
+        lines={x["name"]: x["line"] for x in tables},
+        steps={x["name"]: x["step"] for x in tables},
+        batches={x["name"]: x["lines_of_many"] for x in tables},
+        cycles={x["name"]: x["cycle"] for x in document["levels"]},
+        positions={name: at for at, name in enumerate(leaves)},
+        module=document["python"]["module"],
+        state_class=document["python"]["class"],
+        check=document["check"],
+        digest=document["digest"]["state"],
+        trace=TracePlaces(failed_paths=tuple(document.get("failed", TracePlaces().failed_paths))),
+    )

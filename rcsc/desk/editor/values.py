@@ -1,0 +1,195 @@
+"""What an editor is answered: plain frozen values, with places as lines and columns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.desk.editor.places import Area, Edit
+
+
+class State(StrEnum):
+    """What is known of a table, in the words that every view shows."""
+
+    PROVED = "proved"
+    ASSUMED = "rests on an assumption"
+    STALE = "stale"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """The state of a table, and why; the one value that gutter, lens, status line and studio show.
+
+    Attributes:
+        why: Of `proved` how, of the others the reason; one sentence without a full stop.
+    """
+
+    state: State
+    why: str
+
+    def __str__(self) -> str:
+        """State and reason."""
+        return f"{self.state.value}: {self.why}" if self.why else self.state.value
+
+
+@dataclass(frozen=True, slots=True)
+class WitnessLine:
+    """A line that matches a witness: its name, where it stands, and its cell for each variable of the witness."""
+
+    name: str
+    cells: tuple[str, ...]
+    area: Area | None
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """An input that shows a finding.
+
+    Attributes:
+        values: Name and text of each variable, in declared order.
+        region: The conditions for which all inputs do the same; empty where nobody grew one.
+        inputs: How many inputs that are; None where nobody counted.
+    """
+
+    table: str
+    values: tuple[tuple[str, str], ...]
+    lines: tuple[WitnessLine, ...]
+    region: tuple[str, ...]
+    inputs: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One finding.
+
+    Attributes:
+        code: `RCS401`.
+        severity: `error`, `warning` or `note`.
+        related: Other places, and what is said of each.
+        table: The table in which it is; empty for none.
+        more: Inputs that have no witness here.
+        meanwhile: Whether it was found with what is broken in the text left out; `rcsc check` does not say it, as yet.
+        mendable: Whether `Workspace.repairs` may have something for it.
+        told: The finding as `rcsc check` has it.
+    """
+
+    code: str
+    severity: str
+    message: str
+    area: Area
+    related: tuple[tuple[Area, str], ...]
+    notes: tuple[str, ...]
+    help: tuple[str, ...]
+    witnesses: tuple[Witness, ...]
+    table: str
+    more: int
+    meanwhile: bool
+    mendable: bool
+    told: Diagnostic = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Repair:
+    """A change of texts that mends a finding; it was made and checked before it is offered.
+
+    Attributes:
+        title: What it does, in the imperative.
+        proved: What is proved of the text with it, in words; empty where it is only checked.
+        edits: To be made together.
+        clears: Whether nothing is then wrong with the table.
+        certain: Whether it was proved, not only checked that the finding goes: a likely spelling is not.
+    """
+
+    title: str
+    proved: str
+    edits: tuple[Edit, ...]
+    clears: bool
+    certain: bool
+
+
+@dataclass(frozen=True, slots=True)
+class GridColumn:
+    """A column of a table.
+
+    Attributes:
+        heading: As written, pieces joined.
+        kind: `condition`, `output`, `procedures` or `requirements`.
+        type: In words, as it would be declared; empty where it is not known.
+        unit: `mm/s`; empty for none.
+        areas: Where it stands, a piece a row.
+    """
+
+    heading: str
+    kind: str
+    type: str
+    unit: str
+    areas: tuple[Area, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GridCell:
+    """A cell: its text, pieces joined, and where each piece stands; an empty one has an empty area where it would be written."""
+
+    text: str
+    areas: tuple[Area, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GridRow:
+    """A line.
+
+    Attributes:
+        name: Of the line; `marks`, what stands after it: `above ...`, `same ...`.
+        cells: One a column.
+        default: Whether it is the DEFAULT line; it then has no conditions.
+        share: How many of the inputs in the declared ranges it matches, and of how many; None where nobody counted.
+        area: Its rows of the first part of the table.
+    """
+
+    name: str
+    marks: str
+    cells: tuple[GridCell, ...]
+    default: bool
+    share: tuple[int, int] | None
+    area: Area
+    stub: GridCell
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A table as data.
+
+    Attributes:
+        name: What it is called; `area` is where that stands.
+        whole: From the word `table` to its brace.
+        covered: Whether lines have shares that add up: no two overlap.
+    """
+
+    name: str
+    area: Area
+    whole: Area
+    columns: tuple[GridColumn, ...]
+    rows: tuple[GridRow, ...]
+    standing: Standing
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What is known of a file and of all that it uses, as the texts are.
+
+    Attributes:
+        file: The absolute path.
+        findings: In order of file and place; those of used files, too.
+        tables: Those that the file itself declares, in order.
+        whole: Whether the text is in order, so that `rcsc check` comes to verdicts.
+        final: Whether nothing is left open that takes longer; what is, is not told as yet, and its table is stale.
+        texts: The texts that it points into, by path: what stands at a place now may be another's.
+    """
+
+    file: str
+    findings: tuple[Finding, ...]
+    tables: tuple[Grid, ...]
+    whole: bool
+    final: bool = True
+    texts: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)

@@ -1,0 +1,505 @@
+"""Control a system by hand: cycles, single levels, parts of levels, variables, breakpoints and undo.
+
+In: a system ready for its first tick. Out: a `Session`; each of its methods does one thing and returns what it did. Nothing is read or
+printed here.
+"""
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.described import nearest
+from rcsc.desk.shell import history, typed_names
+from rcsc.desk.shell.part_runs import run_part
+from rcsc.desk.shell.queries import StateQuery, question
+from rcsc.desk.shell.reload.composed import held_by, together
+from rcsc.desk.shell.reload.gate import Judged, Running, judge
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.desk.shell.reload.reload import Origin, Reloaded, program_of, reload
+from rcsc.desk.shell.stops import Stops, reached, stands
+from rcsc.desk.shell.typed_names import NamedLine
+from rcsc.lang.model import Program
+from rcsc.proof.solvers.smt import spent
+from rcsc.run.description import BadDescription, Description, LevelSpec
+from rcsc.run.faults import UnknownFault, switch
+from rcsc.run.levels import Fill, Query, RunningLevel
+from rcsc.run.log.schema import fingerprints
+from rcsc.run.log.states import begun_in_words
+from rcsc.run.orders.operator import line_to
+from rcsc.run.orders.roles import Served
+from rcsc.run.signature import Signature, Value, Values
+from rcsc.run.system import StateTableError, System
+
+if TYPE_CHECKING:
+    from rcsc.desk.shell.reload.sources import KeptSources
+
+MOST_CYCLES = 100_000
+"""After which `run` gives up: more than an hour of control time."""
+
+
+class Session:
+    """A system and what is done with it.
+
+    Attributes:
+        chosen: Name of the level whose parts and variables are meant where none is named.
+        stops: Breakpoints.
+        interrupted: Set, and cleared again, from outside: cycles end after the present one.
+        faults: Of the plants, that are on by hand.
+        changes: How often something was done that `undo` takes back, and was not taken back.
+    """
+
+    def __init__(self, system: System, plant: Origin) -> None:
+        self.system, self.plant = system, plant
+        buffers = {wire.source: system.buffers.latest(wire.source) for wire in system.description.wires}
+        self.memory = history.Memory({name: held for name, held in buffers.items() if held is not None})
+        system.buffers = self.memory
+        self.chosen = system.levels[0].name
+        self.stops = Stops()
+        self.interrupted = False
+        self.faults: frozenset[str] = frozenset()
+        self.changes = 0
+        self._past: deque[history.KeptMoment] = deque(maxlen=history.MOST)
+        self._answers: dict[tuple[object, ...], Values] = {}
+        # By identity, as after a reload another level has the name; the level is kept, so that its number stays its own.
+        self._programs: dict[int, tuple[RunningLevel, Program]] = {}
+        # What runs is known by its executors' digest, and what it means by its sources, from before anybody edits them.
+        digests = fingerprints(system.description)
+        self._builds: dict[int, tuple[RunningLevel, str, KeptSources | None]] = {
+            id(level): (level, digests[spec.program], held_by(self.plant, spec))
+            for level in system.levels
+            for spec in (self.spec(level.name),)
+        }
+        for level in system.levels:
+            self._answer_by_hand(level)
+
+    # --- names ---
+
+    @property
+    def levels(self) -> tuple[RunningLevel, ...]:
+        """From the top down."""
+        return self.system.levels
+
+    @property
+    def level(self) -> RunningLevel:
+        """The level chosen."""
+        return self.system.level(self.chosen)
+
+    def spec(self, name: str) -> LevelSpec:
+        """What the description says of a level."""
+        return next(level for level in self.system.description.levels if level.name == name)
+
+    def question(self, text: str) -> StateQuery:
+        """What a condition asks.
+
+        Raises:
+            Refused: It is none.
+        """
+        return question(text, self.levels, self.level)
+
+    def program(self, level: RunningLevel) -> Program:
+        """What a level's tables mean.
+
+        Raises:
+            Refused: The sources are not those of the executors.
+        """
+        key = id(level)
+        if key not in self._programs:
+            self._programs[key] = level, program_of(self.plant, self.spec(level.name), self._builds[key][2])
+        return self._programs[key][1]
+
+    def digest(self, level: RunningLevel) -> str:
+        """The digest of the executors that a level runs, as logs keep it."""
+        return self._builds[id(level)][1]
+
+    # --- cycles ---
+
+    def cycle(self) -> None:
+        """One cycle of everything.
+
+        Raises:
+            Refused: A level was refused an input, or no line or several matched.
+        """
+        for level in self.levels:
+            _fit(level)
+        self._keep()
+        try:
+            self.system.step()
+        except StateTableError as error:
+            raise Refused(Code.STATE_TABLE_ERROR, str(error), "`undo` takes the cycle back") from error
+
+    def cycle_alone(self, level: RunningLevel) -> None:
+        """One cycle of one level: it takes its buffers as they are, runs, and gives.
+
+        Raises:
+            Refused: It was refused an input, no line or several matched, or an extern procedure failed.
+        """
+        _fit(level)
+        self._keep()
+        try:
+            level.take(self.memory)
+            fault = level.run()
+        except StateTableError as error:
+            raise Refused(Code.STATE_TABLE_ERROR, str(error), "`undo` takes the cycle back") from error
+        level.give(self.memory)
+        if fault:
+            raise Refused(Code.STATE_TABLE_ERROR, _fault(level), "`undo` takes the cycle back")
+
+    def part(self, level: RunningLevel, name: str, args: Sequence[str]) -> list[str]:
+        """Run a part of a level on its present values; return what it did.
+
+        Raises:
+            Refused: There is none of that name, or it met what cannot be.
+        """
+        ran = run_part(level, self.program(level), name, args)
+        self._keep()
+        level.executor.put(0, ran.values[: len(level.sign.leaves)])
+        level.values = _spoken(level, ran.values)
+        return [f"{level.name}: {ran.text}", *self.changed()]
+
+    def run(self, most: int, until: StateQuery | NamedLine | None = None) -> str:
+        """Run cycles until the condition holds, a breakpoint is met, or `most` are done; return why it ended.
+
+        Raises:
+            Refused: As `cycle`.
+        """
+        if until is not None and self.holds(until):
+            return f"cycle {self.system.tick}: {reached(until)}"
+        ended = next((why for why in islice(self.cycles(until), most) if why), "")
+        return ended or self.not_met(most, until)
+
+    def cycles(self, until: StateQuery | NamedLine | None = None) -> Iterator[str]:
+        """Run cycle after cycle; say after each why a run is to end there, and nothing where it is not.
+
+        Raises:
+            Refused: As `cycle`.
+        """
+        self.stops.look(self.levels)
+        while True:
+            self.cycle()
+            yield self._ended(until)
+
+    def cycles_alone(self, level: RunningLevel) -> Iterator[str]:
+        """Run cycle after cycle of one level; nothing ends it but an interrupt.
+
+        Raises:
+            Refused: As `cycle_alone`.
+        """
+        while True:
+            self.cycle_alone(level)
+            yield "interrupted" if self.interrupted else ""
+
+    def _ended(self, until: StateQuery | NamedLine | None) -> str:
+        """Say why a run ends after this cycle; empty where it does not."""
+        if until is not None and stands(until, self.levels):
+            return f"cycle {self.system.tick}: {reached(until)}"
+        met = self.stops.met(self.levels)
+        if met is not None:
+            return f"cycle {self.system.tick}: breakpoint {met.number}, {reached(met.what)}"
+        return f"cycle {self.system.tick}: interrupted" if self.interrupted else ""
+
+    def not_met(self, most: int, until: StateQuery | NamedLine | None) -> str:
+        """Say that so many cycles are done.
+
+        Raises:
+            Refused: They were to come to something, and did not.
+        """
+        if until is None:
+            return f"cycle {self.system.tick}"
+        raise Refused(Code.SHELL_COMMAND, f"{most} cycles did not come to it")
+
+    def restart(self, name: str, *, anew: bool) -> str:
+        """Start a level again, as if its process had been killed: from what its last cycle left, or anew.
+
+        Raises:
+            Refused: Its tables are not proved for that state.
+        """
+        level = self.system.level(name)
+        checkpoint = None if anew else level.values
+        self._keep()
+        try:
+            self.system.restart(name, checkpoint)
+        except StateTableError as error:
+            self._forget()
+            raise Refused(Code.STATE_TABLE_ERROR, str(error)) from error
+        return f"level `{name}` is started again, {begun_in_words(self.system.restarts[-1].begun)}"
+
+    def fault(self, name: str, *, on: bool) -> str:
+        """Switch a fault of a plant on or off.
+
+        Raises:
+            Refused: No plant has it.
+        """
+        try:
+            switch(self.system.outside, name, on=on)
+        except UnknownFault as error:
+            raise Refused(Code.SHELL_COMMAND, str(error), *error.helps) from error
+        self.faults = self.faults | {name} if on else self.faults - {name}
+        return f"{name} is {'on' if on else 'off'}"
+
+    def freeze(self, buffer: str, *, on: bool) -> str:
+        """Have what is written to a buffer get lost, or no more: readers go on seeing what it holds.
+
+        Raises:
+            Refused: There is no such buffer.
+        """
+        known = [wire.source for wire in self.system.description.wires]
+        if buffer not in known:
+            raise Refused(Code.SHELL_NAME, f"there is no buffer `{buffer}`", *nearest(buffer, known))
+        self._keep()
+        self.memory.frozen = self.memory.frozen | {buffer} if on else self.memory.frozen - {buffer}
+        return f"what is written to {buffer} {'is lost from now on' if on else 'arrives again'}"
+
+    def undo(self, count: int) -> None:
+        """Goes back to before the last cycles.
+
+        Raises:
+            Refused: So many are not kept.
+        """
+        if count > len(self._past):
+            raise Refused(Code.SHELL_COMMAND, f"only {len(self._past)} cycles can be undone")
+        moment = self._past[-count]
+        for _ in range(count):
+            self._forget()
+        reloaded = moment.levels != self.system.levels
+        history.put_back(moment, self.system, self.memory)
+        self._answers, self.faults = dict(moment.answers), moment.faults
+        if reloaded:
+            self.stops.ask_again(self.levels)
+
+    @property
+    def kept(self) -> int:
+        """How often `undo` can go back."""
+        return len(self._past)
+
+    def holds(self, what: StateQuery | NamedLine) -> bool:
+        """Whether `run until` would have nothing to do: the condition holds already."""
+        return isinstance(what, StateQuery) and stands(what, self.levels)
+
+    def changed(self) -> list[str]:
+        """Variables that the last cycle left with another value: `task.cur_state: d_state -> state_2`."""
+        if not self._past:
+            return []
+        changes = []
+        for level in self.levels:
+            old, values = self._past[-1].of(level.name)
+            alike = old.sign is level.sign
+            for at, leaf in enumerate(level.sign.leaves):
+                if alike and values[at] == level.values[at]:
+                    continue
+                before = old.sign.index.get(leaf.name)
+                shown = "" if before is None else old.sign.leaves[before].shown(values[before])
+                if shown != leaf.shown(level.values[at]):
+                    changes.append(
+                        f"{level.name}.{leaf.name}: {shown or 'nothing'} -> {leaf.shown(level.values[at])}"
+                    )
+        return changes
+
+    # --- variables ---
+
+    def set(self, name: str, text: str) -> str:
+        """Sets a variable; in the buffer that carries it, too.
+
+        Raises:
+            Refused: There is none, or the text is no value of it.
+        """
+        level, at = typed_names.one_leaf(name, self.levels, self.level)
+        value = typed_names.value_of(level.sign.leaves[at], text)
+        level.executor.put(at, (value,))
+        level.values = _spoken(level, _with(level.values, at, value))
+        for buffer, first, end in _carriers(level):
+            if first <= at < end:
+                held = self.memory.latest(buffer)
+                record = level.values[first:end] if held is None else _with(held, at - first, value)
+                self.memory.publish(buffer, record)
+        self._answer(level, at)
+        return typed_names.shown(level, at)
+
+    def order(self, to: Served, given: Mapping[str, str]) -> int:
+        """Orders a level from outside, with the next number; fields that are not given are as at first.
+
+        Raises:
+            Refused: The order has no such field, or a text is no value of one; nothing was set.
+        """
+        fields = to.fields
+        for name in given:
+            if name not in fields:
+                helps = nearest(name, list(fields))
+                raise Refused(Code.SHELL_NAME, f"an order of `{to.level}` has no field `{name}`", *helps)
+        line = line_to(to)
+        standing = self.memory.latest(to.order)
+        level = next(level for level in self.levels if level.name == to.level)
+        last = level.value(to.order_leaves[to.number].name) if standing is None else standing[to.number]
+        line.number = int(last)
+        line.send(
+            to.order_with({name: typed_names.value_of(fields[name], text) for name, text in given.items()})
+        )
+        for leaf, value in zip(to.order_leaves, line.sent, strict=True):
+            self.set(f"{to.level}.{leaf.name}", leaf.shown(value))
+        return line.number
+
+    def _answer(self, level: RunningLevel, at: int) -> None:
+        """Keep a value set by hand as the database's answer to the same question from now on."""
+        for feed, fill in zip(self.spec(level.name).feeds, level.fills, strict=True):
+            run = level.sign.record(feed.into)
+            if at in run:
+                keys = tuple(level.values[key] for key in fill.keys)
+                self._answers[level.name, fill.first, keys] = level.values[run.start : run.stop]
+
+    def _answer_by_hand(self, level: RunningLevel) -> None:
+        level.fills = tuple(
+            Fill(self._query(level.name, fill), fill.first, fill.keys, fill.form) for fill in level.fills
+        )
+
+    def _query(self, level: str, fill: Fill) -> Query:
+        def query(*keys: Value) -> Values:
+            answer = self._answers.get((level, fill.first, keys))
+            return fill.query(*keys) if answer is None else answer
+
+        return query
+
+    # --- other tables ---
+
+    def reload(self, name: str, *, anyway: bool = False, prove: bool = False) -> list[str]:
+        """Take a level's tables as they are now, between two cycles; return what they do otherwise.
+
+        Args:
+            name: The level's.
+            anyway: Whether they are taken although the next cycle does, or may do, otherwise.
+            prove: Whether they are taken only if they are proved together with their neighbours; which is tried first.
+
+        Raises:
+            Refused: They are not taken; the old ones run on.
+        """
+        old, reloaded, judged = self._try_reload(name, prove=prove)
+        if judged is None:
+            return [f"level `{name}` runs these very tables: nothing changed"]
+        if judged.doubts and not anyway:
+            raise Refused(
+                Code.SHELL_OTHERWISE,
+                "\n".join(
+                    (
+                        f"level `{name}` keeps its tables: {judged.doubts[0]}",
+                        *judged.doubts[1:],
+                        *judged.notes,
+                    )
+                ),
+                f"`reload {name} anyway` takes them",
+            )
+        self._keep()
+        self._programs[id(reloaded.level)] = reloaded.level, reloaded.program
+        self._builds[id(reloaded.level)] = reloaded.level, reloaded.digest, reloaded.sources
+        self.system.levels = tuple(reloaded.level if level is old else level for level in self.levels)
+        gone = self.stops.ask_again(self.levels)
+        taken = f"level `{name}` runs its new tables from cycle {self.system.tick + 1} on: {reloaded.carried}"
+        return [*judged.notes, *judged.doubts, taken, *gone]
+
+    def difference(self, name: str) -> list[str]:
+        """Return what `reload` would take, and whether it would.
+
+        Raises:
+            Refused: It would not take it, not even with `anyway`.
+        """
+        _, reloaded, judged = self._try_reload(name)
+        if judged is None:
+            return [f"level `{name}` runs these very tables: nothing changed"]
+        would = f"`reload {name}{' anyway' if judged.doubts else ''}` takes it: {reloaded.carried}"
+        return [*judged.notes, *judged.doubts, would]
+
+    def _try_reload(self, name: str, *, prove: bool = False) -> tuple[RunningLevel, Reloaded, Judged | None]:
+        """Return the running level, its reload, and the verdict on that; None where they are the same."""
+        old = self.system.level(name)
+        reloaded = reload(self.plant, self.spec(name), old, lambda: self._meaning(old))
+        if self._builds[id(old)][1:] == (reloaded.digest, reloaded.sources):
+            return old, reloaded, None
+        self._answer_by_hand(reloaded.level)
+        running = Running(old, self._meaning(old))
+        judged = judge(running, reloaded.level, reloaded.program, self.memory)
+        runs = {
+            level.name: reloaded.sources if level is old else self._builds[id(level)][2]
+            for level in self.levels
+        }
+        known = together(self.plant, name, runs, self._compiled, prove=prove)
+        if spent():
+            raise Refused(Code.SHELL_RELOAD, f"level `{name}` keeps its tables: their proof was given up")
+        return old, reloaded, replace(judged, notes=(*judged.notes, known))
+
+    def _meaning(self, level: RunningLevel) -> Program | None:
+        """What a level's tables mean; None where their sources are not known."""
+        try:
+            return self.program(level)
+        except Refused:
+            return None
+
+    def _compiled(self, name: str) -> bool:
+        """Whether a level's executors were made of the sources that were there when it began to run."""
+        try:
+            self.program(self.system.level(name))
+        except Refused:
+            return False
+        return True
+
+    def _forget(self) -> None:
+        self._past.pop()
+        self.changes -= 1
+
+    def _keep(self) -> None:
+        self.changes += 1
+        self._past.append(history.kept(self.system, self.memory, self._answers, self.faults))
+
+
+def _with(values: Values, at: int, value: Value) -> Values:
+    return (*values[:at], value, *values[at + 1 :])
+
+
+def _spoken(level: RunningLevel, values: Values) -> Values:
+    """Return the values, without the line where they now select another table."""
+    line = len(level.sign.leaves)
+    same = level.sign.table_of(level.level, values) == level.table or values[line] != level.values[line]
+    return values if same else _with(values, line, -1)
+
+
+def _carriers(level: RunningLevel) -> list[tuple[str, int, int]]:
+    """Buffers that the level takes or gives, and which leaves they carry."""
+    taken = [(take.buffer, take.first, take.first + take.count) for take in level.takes]
+    return taken + [(give.buffer, give.first, give.end) for give in level.gives]
+
+
+def _fit(level: RunningLevel) -> None:
+    """Refuse a cycle from a state that was set by hand and that the proof does not cover.
+
+    Raises:
+        Refused: It is.
+    """
+    at = level.executor.check()
+    if at >= 0:
+        wrong = level.sign.unfit(at, level.values)
+        message = f"level `{level.name}` cannot go on from this state: {wrong}"
+        raise Refused(Code.STATE_TABLE_ERROR, message, "`set` what it is about, or `undo`")
+
+
+def _fault(level: RunningLevel) -> str:
+    return f"level `{level.name}`, table `{level.table}`: {level.fault_text}"
+
+
+def silent_queries(system: Description, signs: Mapping[str, Signature]) -> dict[str, Query]:
+    """Return the queries of an empty database: every answer is the record's initial value.
+
+    Raises:
+        BadDescription: A feed fills what its program does not have.
+    """
+    queries = {}
+    for spec in system.levels:
+        for feed in spec.feeds:
+            try:
+                run = signs[spec.name].record(feed.into)
+            except KeyError as error:
+                raise BadDescription(f"level `{spec.name}` has no variable `{feed.into}` to fill") from error
+            queries[feed.query] = _silent(tuple(signs[spec.name].leaves[at].initial for at in run))
+    return queries
+
+
+def _silent(answer: Values) -> Query:
+    return lambda *_: answer

@@ -1,0 +1,85 @@
+"""Breakpoints: conditions and lines; `run` stops where one comes to hold."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rcsc.desk.shell.queries import StateQuery, asked, question
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.desk.shell.typed_names import NamedLine, level_of, line_of, unknown
+from rcsc.run.levels import RunningLevel
+
+Levels = Sequence[RunningLevel]
+
+
+@dataclass(slots=True)
+class Stop:
+    """A breakpoint.
+
+    Attributes:
+        stood: Whether it held already before the cycle: it stops where it comes to hold.
+    """
+
+    number: int
+    what: StateQuery | NamedLine
+    stood: bool = False
+
+    @property
+    def text(self) -> str:
+        """As it was given."""
+        return self.what.text if isinstance(self.what, StateQuery) else str(self.what)
+
+
+def stands(what: StateQuery | NamedLine, levels: Levels) -> bool:
+    """Whether the condition holds, or the line was the level's last."""
+    return asked(what, levels) if isinstance(what, StateQuery) else what.matched(level_of(what.level, levels))
+
+
+def reached(what: StateQuery | NamedLine) -> str:
+    """What was come to, in words."""
+    return f"`{what.text}` holds" if isinstance(what, StateQuery) else f"line {what}"
+
+
+@dataclass(slots=True)
+class Stops:
+    """The breakpoints of a session, in the order in which they were set."""
+
+    every: list[Stop] = field(default_factory=list)
+    _numbered: int = 0
+
+    def add(self, what: StateQuery | NamedLine) -> Stop:
+        """Add a breakpoint."""
+        self._numbered += 1
+        self.every.append(Stop(self._numbered, what))
+        return self.every[-1]
+
+    def look(self, levels: Levels) -> None:
+        """Notes what holds already."""
+        for stop in self.every:
+            stop.stood = stands(stop.what, levels)
+
+    def met(self, levels: Levels) -> Stop | None:
+        """Return the first that has come to hold since `look`."""
+        before = [stop.stood for stop in self.every]
+        self.look(levels)
+        return next(
+            (stop for stop, stood in zip(self.every, before, strict=True) if stop.stood and not stood), None
+        )
+
+    def ask_again(self, levels: Levels) -> list[str]:
+        """Read every breakpoint against other levels; drop those that do not fit, and name them."""
+        kept, dropped = [], []
+        for stop in self.every:
+            try:
+                _again(stop, levels)
+                kept.append(stop)
+            except Refused as refused:
+                dropped.append(f"breakpoint {stop.number}, `{stop.text}`, is gone: {refused}")
+        self.every = kept
+        return dropped
+
+
+def _again(stop: Stop, levels: Levels) -> None:
+    if isinstance(stop.what, StateQuery):
+        stop.what = question(stop.what.text, levels, level_of(stop.what.chosen, levels))
+    elif line_of(str(stop.what), levels, levels[0]) is None:
+        raise unknown(str(stop.what), "line", ())

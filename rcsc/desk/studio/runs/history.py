@@ -1,0 +1,159 @@
+"""What a run did, kept while it runs, as the log that a file would be.
+
+In: a system, after each cycle. Out: `Log`s: one for as long as the levels run the same tables. A state that comes again is kept once
+(`Track`), so that waiting costs no memory; `undo` takes back what was kept.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from rcsc.desk.studio.runs.gaps import Gaps, gaps_of
+from rcsc.run.adopt import Begun
+from rcsc.run.levels import RunningLevel
+from rcsc.run.log.read import Log, LoggedLevel, LoggedRestart, Track
+from rcsc.run.log.records import ChainCheck
+from rcsc.run.log.schema import system_facts
+from rcsc.run.signature import Values
+from rcsc.run.system import System
+
+MOST_TICKS = 200_000
+"""Ticks that are kept: more than two hours at 40 ms; after them the older half is let go."""
+
+
+@dataclass(slots=True)
+class History:
+    """The ticks of one run.
+
+    Attributes:
+        logs: In order, the last still growing.
+        era: How often ticks that were known were taken back or let go.
+        gaps: What nobody had set; of a log, once somebody asked.
+    """
+
+    logs: list[Log] = field(default_factory=list)
+    era: int = 0
+    gaps: Gaps | None = None
+
+    def begin(self, system: System) -> None:
+        """Go on with levels as they are now, at first or after other tables were taken."""
+        levels = tuple(_begun(level, system.tick) for level in system.levels)
+        self.gaps = self.gaps or Gaps()
+        self.gaps.begin(system)
+        self.logs.append(Log(system_facts(system.description), {}, levels, {}, ChainCheck()))
+
+    def add(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
+        """Keep a tick; what `System.watch` calls."""
+        log = self._fitting(system)
+        assert self.gaps is not None  # a log was begun
+        self.gaps.add(system, ran)
+        if system.restarts:
+            log = self._restarted(log, system)
+        for level in ran:
+            log.level(level.name).track.add(system.tick, level.sign.packed.pack(*level.values))
+        if len(log.levels[0].track.ticks) > MOST_TICKS:
+            self._forget(log)
+
+    def settle(self, system: System) -> None:
+        """Follow what something else than a cycle did: undo, other tables, values that were set by hand.
+
+        What was set between two cycles is kept as the state from which the later one begins, as of a level that is started again.
+        """
+        held = [log for log in self.logs if log.first <= system.tick]
+        taken_back = len(held) < len(self.logs)
+        self.logs[:] = held
+        if self.gaps is not None:
+            self.gaps.back_to(system.tick)
+        log = self._fitting(system)
+        levels = []
+        for level in system.levels:
+            logged = log.level(level.name)
+            track = logged.track
+            keep = track.place(system.tick) + 1
+            taken_back |= keep < len(track.ticks)
+            del track.ticks[keep:], track.packed[keep:]
+            levels.append(_settled(logged, level, system.tick))
+        self.era += taken_back
+        self.logs[-1] = replace(log, levels=tuple(levels))
+
+    def find_gaps(self) -> Iterator[None]:
+        """Find what nobody had set in a log that was opened, and yield after each piece of it; a live run has it."""
+        for found in () if self.gaps is not None else gaps_of(self.logs[0]):
+            if found is None:
+                yield
+            self.gaps = found
+
+    def ran_at(self, tick: int) -> Log:
+        """Return the log that has the cycles of a tick; of the first tick there are none."""
+        return next((log for log in reversed(self.logs) if log.first < tick), self.logs[0])
+
+    def stood_at(self, tick: int) -> Log:
+        """Return the log that has the values as a tick left them."""
+        return next((log for log in reversed(self.logs) if log.first <= tick), self.logs[0])
+
+    def values(self, name: str, tick: int) -> Values:
+        """Return a level's leaves and trace as of a tick, with what was set by hand after it.
+
+        Raises:
+            KeyError: There is no such level.
+        """
+        level = self.stood_at(tick).level(name)
+        values = level.track.latest(tick) or level.track.layout.unpack(level.track.packed[0])
+        by_hand = next((one for one in reversed(level.restarts) if one.tick == tick + 1), None)
+        return values if by_hand is None else (*by_hand.values, *values[len(level.sign.leaves) :])
+
+    @property
+    def first(self) -> int:
+        """The first tick that is kept: that before the first cycle."""
+        return self.logs[0].first
+
+    @property
+    def last(self) -> int:
+        """The last tick."""
+        return self.logs[-1].last
+
+    def _fitting(self, system: System) -> Log:
+        """Return the log that grows; a new one where a level runs other tables than it."""
+        if not self.logs or any(
+            level.sign is not logged.sign
+            for level, logged in zip(system.levels, self.logs[-1].levels, strict=True)
+        ):
+            self.begin(system)
+        return self.logs[-1]
+
+    def _restarted(self, log: Log, system: System) -> Log:
+        again = {
+            restart.level: LoggedRestart(system.tick, restart.begun, restart.values)
+            for restart in system.restarts
+        }
+        levels = tuple(
+            replace(level, restarts=(*level.restarts, again[level.name])) if level.name in again else level
+            for level in log.levels
+        )
+        self.logs[-1] = replace(log, levels=levels)
+        return self.logs[-1]
+
+    def _forget(self, log: Log) -> None:
+        """Let the older half go."""
+        self.logs[:] = [log]
+        self.era += 1
+        for level in log.levels:
+            half = level.track.place(log.last - MOST_TICKS // 2)
+            del level.track.ticks[:half], level.track.packed[:half]
+            kept = set(map(id, level.track.packed))
+            level.track.known = {key: value for key, value in level.track.known.items() if id(value) in kept}
+
+
+def _begun(level: RunningLevel, tick: int) -> LoggedLevel:
+    logged = LoggedLevel(level.name, level.sign, level.level, Track(level.sign.packed))
+    logged.track.add(tick, level.sign.packed.pack(*level.values))
+    return logged
+
+
+def _settled(logged: LoggedLevel, level: RunningLevel, tick: int) -> LoggedLevel:
+    """Return a level with what was set by hand since its last cycle, and nothing that was taken back."""
+    earlier = tuple(one for one in logged.restarts if one.tick <= tick)
+    leaves = level.values[: len(level.sign.leaves)]
+    record = logged.track.layout.unpack(logged.track.packed[-1])[: len(leaves)]
+    before = next((one.values for one in reversed(earlier) if one.tick > logged.track.ticks[-1]), record)
+    by_hand = () if leaves == before else (LoggedRestart(tick + 1, Begun.CHECKPOINT, leaves),)
+    return replace(logged, restarts=(*earlier, *by_hand))

@@ -1,0 +1,136 @@
+"""Logs that pages may open: those of the system's folder and of the one that the studio was started in.
+
+In: questions of kind `log.*`. Out: which logs there are, and one of them as the run that everybody looks at. A page names a log of that
+list, and nothing else is read. Reading has a lane of its own, for it takes seconds.
+"""
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.desk.studio.hub import Ask, Handler, Json
+from rcsc.desk.studio.runs.kept import KeptFinding, finding_in, glance
+from rcsc.run.log.read import Log, UnreadableLog, read
+
+LANE = "log"
+MOST_LOGS = 200
+DEEPEST = 5
+MOST_LOOKED_AT = 20_000
+"""Files and folders that are looked at for logs."""
+_ASIDE = {".git", ".venv", "venv", "node_modules", "__pycache__"}
+
+
+class Logs:
+    """The logs that may be opened."""
+
+    name, lane = "log", LANE
+
+    def __init__(
+        self,
+        folders: tuple[Path, ...],
+        given: tuple[Path, ...],
+        show: Callable[[str, Log, KeptFinding | None], None],
+    ) -> None:
+        """Args: folders: Where logs are looked for; given: Logs that the user named; show: Takes one that was read, and what it breaks."""
+        self._folders, self._given, self._show = folders, given, show
+
+    @property
+    def handlers(self) -> Mapping[str, Handler]:
+        """By kind."""
+        return {"log.list": self._list, "log.open": self._open}
+
+    def greeting(self) -> Json:
+        """Nothing that a page must know at once."""
+        return {}
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def begin(self) -> None:
+        """Show the first log that the user named, if any."""
+        for path in self._given[:1]:
+            self._open_at(self._called(path), path)
+
+    def _list(self, ask: Ask) -> Json:
+        """The latest logs, each with what it breaks."""
+        found = []
+        for name, path in self._found().items():
+            with contextlib.suppress(OSError):  # it went meanwhile
+                found.append((path.stat(), name, path))
+        found.sort(key=lambda one: -one[0].st_mtime)
+        told = []
+        for stat, name, path in found[:MOST_LOGS]:
+            ask.check()
+            told.append(
+                {
+                    "name": name,
+                    "bytes": stat.st_size,
+                    "changed_s": stat.st_mtime,
+                    "finding": glance(path),
+                }
+            )
+        return told
+
+    def _open(self, ask: Ask) -> Json:
+        name = ask.body.text("name")
+        path = self._found().get(name)
+        if path is None:
+            raise Refused(Code.STUDIO, f"there is no log `{name}`")
+        ask.progress(f"reading {name}")
+        self._open_at(name, path, ask.check)
+        return {"name": name}
+
+    def _open_at(self, name: str, path: Path, check: Callable[[], None] = lambda: None) -> None:
+        log = _read(path)
+        check()
+        self._show(name, log, finding_in(path, log))
+
+    def _found(self) -> dict[str, Path]:
+        """Every log by how it is called: its path in the first of the folders that has it, or as the user gave it."""
+        found: dict[str, Path] = {}
+        for path in self._given:
+            found[self._called(path)] = path
+        for folder in self._folders:
+            for path in _logs(folder):
+                found.setdefault(self._called(path), path)
+        return found
+
+    def _called(self, path: Path) -> str:
+        whole = path.resolve()
+        within = next((folder for folder in self._folders if whole.is_relative_to(folder)), None)
+        return str(path if within is None else whole.relative_to(within))
+
+
+def _read(path: Path) -> Log:
+    """Read a log.
+
+    Raises:
+        Refused: It is none.
+    """
+    try:
+        return read(path)
+    except UnreadableLog as error:
+        raise Refused(Code.LOG_UNREADABLE, str(error)) from error
+
+
+def _logs(top: Path) -> Iterator[Path]:
+    waiting, left = [(top, 0)], MOST_LOOKED_AT
+    while waiting and left > 0:
+        folder, deep = waiting.pop()
+        try:
+            entries = list(os.scandir(folder))
+        except OSError:
+            continue
+        left -= len(entries)
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False) and deep < DEEPEST and entry.name not in _ASIDE:
+                waiting.append((Path(entry.path), deep + 1))
+            elif (
+                entry.name.endswith(".mcap")
+                and not entry.name.startswith(".")
+                and entry.is_file(follow_symlinks=False)
+            ):
+                yield Path(entry.path)

@@ -1,0 +1,276 @@
+"""The time line of a run, live or of a log: which line each level ran, any moment of it, and why a line did not match.
+
+In: questions of kind `time.*`. Out: what was at a tick. Which run it is about is the same for every page: the live one, or a log that a
+page opened.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.desk.studio.hub import PROVER, Ask, Handler, Json
+from rcsc.desk.studio.runs.history import History
+from rcsc.desk.studio.runs.kept import KeptFinding
+from rcsc.desk.studio.runs.lines import Lines
+from rcsc.desk.studio.runs.live import LANE, Live, range_of
+from rcsc.desk.studio.runs.shown import Shown
+from rcsc.desk.studio.runs.why import why
+from rcsc.lang.model import Program
+from rcsc.run.description import BadDescription, description
+from rcsc.run.log.queries import predicate
+from rcsc.run.log.read import Log, LoggedLevel
+from rcsc.run.orders.conditions import BadCondition
+from rcsc.run.signature import Signature, number_word
+
+MOST_MARKED = 1000
+LONGEST = 4000
+_BREATH = 2000
+"""Ticks between two looks at whether a search is still wanted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A run that pages look at.
+
+    Attributes:
+        name: How it is called; empty for the live one.
+        history: Its ticks.
+        log: Where it is a file's.
+        finding: What it is kept for.
+    """
+
+    name: str
+    history: History
+    log: Log | None = None
+    finding: KeptFinding | None = None
+
+
+class TimeLine:
+    """Answers about the ticks of the run that everybody looks at; in the lane of the run."""
+
+    name, lane = "time", LANE
+
+    def __init__(self, live: Live, tell: Callable[[str, Json], None]) -> None:
+        """Args: live: The running system; tell: As `Hub.tell`."""
+        self.live, self._tell = live, tell
+        self._log: Source | None = None
+        self._lines, self._shown = Lines(), Shown()
+
+    @property
+    def handlers(self) -> Mapping[str, Handler]:
+        """By kind."""
+        return {
+            "time.tracks": self._tracks, "time.moment": self._moment, "time.values": self._values, "time.why": self._why,
+            "time.find": self._find, "time.live": self._to_live,
+        }  # fmt: skip
+
+    def greeting(self) -> Json:
+        """Which run it is."""
+        return self.state()
+
+    def begin(self) -> None:
+        """Nothing."""
+
+    def close(self) -> None:
+        """Let the log go."""
+        self._log = None
+
+    @property
+    def source(self) -> Source:
+        """The run that everybody looks at."""
+        return self._log or Source("", self.live.history)
+
+    def state(self) -> Json:
+        """Which run it is, and of a log from where to where."""
+        if self._log is None:
+            return {"source": "live"}
+        log = self._log.log
+        assert log is not None
+        finding = self._log.finding
+        return {
+            "source": "log",
+            "name": self._log.name,
+            "first": log.first,
+            "last": log.last,
+            "tick_ms": log.tick_ms,
+            "levels": [_named(level) for level in log.levels],
+            "text": log.checked.text,
+            "other": self._other(log),
+            "finding": None if finding is None else finding.shown(),
+        }
+
+    def _other(self, log: Log) -> str:
+        """Of which system a log is; empty where it is the studio's, or nobody knows what that is called."""
+        with contextlib.suppress(BadDescription, OSError):
+            name = log.facts["name"]
+            return "" if name == description(self.live.opening.path).name else name
+        return ""
+
+    def show(self, name: str, log: Log, finding: KeptFinding | None = None) -> None:
+        """Have everybody look at a log, and at what it breaks."""
+        self._log = Source(name, History([log]), log, finding)
+        self._tell("time.state", self.state())
+
+    def _to_live(self, _: Ask) -> Json:
+        self._log = None
+        self._tell("time.state", self.state())
+        return self.state()
+
+    # --- ticks ---
+
+    def _history(self) -> History:
+        history = self.source.history
+        if not history.logs:
+            raise Refused(Code.STUDIO, f"no run is there: {self.live.why}")
+        return history
+
+    def _tick(self, ask: Ask) -> int:
+        history = self._history()
+        return ask.body.whole("tick", history.first, history.last)
+
+    def _level(self, ask: Ask, tick: int) -> LoggedLevel:
+        name = ask.body.text("level")
+        try:
+            return self._history().ran_at(tick).level(name)
+        except KeyError as error:
+            raise Refused(Code.STUDIO, f"the run has no level `{name}`") from error
+
+    def _moment(self, ask: Ask) -> Json:
+        return self._shown.moment(self._history(), self._tick(ask))
+
+    def _tracks(self, ask: Ask) -> Json:
+        """Every change of a level's line after a tick; `era` says whether what the page has is still so."""
+        history = self._history()
+        since = ask.body.whole("since", -1, 2**53)
+        known = since if ask.body.whole("era", -1, 2**53) == history.era and history.first <= since else -1
+        levels, to = self._lines.changes(history, known)
+        return {
+            "era": history.era,
+            "from": known,
+            "to": to,
+            "first": history.first,
+            "last": history.last,
+            "levels": levels,
+            "marks": [asdict(mark) for mark in self._marks()][-MOST_MARKED:],
+        }
+
+    def _marks(self) -> Iterator[Any]:
+        if self._log is None:
+            yield from self.live.marks
+        elif self._log.finding is not None:
+            yield _Marked(self._log.finding.tick, "finding", self._log.finding.text)
+
+    # --- values ---
+
+    def _values(self, ask: Ask) -> Json:
+        """Every variable of a level as a tick left it, and which the tick changed."""
+        tick = self._tick(ask)
+        history = self._history()
+        logged = self._level(ask, tick)
+        try:
+            now, before = (
+                history.values(logged.name, tick),
+                history.values(logged.name, max(history.first, tick - 1)),
+            )
+        except KeyError as error:
+            raise Refused(Code.STUDIO, f"the run has no level `{logged.name}`") from error
+        sign = history.stood_at(tick).level(logged.name).sign
+        alike = len(now) == len(before)
+        return [
+            {**_leaf(sign, at), "text": leaf.shown(now[at]), "changed": alike and now[at] != before[at]}
+            for at, leaf in enumerate(sign.leaves)
+        ]
+
+    # --- questions about a cycle ---
+
+    def _why(self, ask: Ask) -> Json:
+        """Each table that a level's cycle tried, and for each of its lines what did not hold."""
+        tick = self._tick(ask)
+        logged = self._level(ask, tick)
+        at = logged.track.place(tick)
+        if at < 1:
+            raise Refused(Code.STUDIO, f"level `{logged.name}` had no cycle up to tick {tick}")
+        with PROVER:
+            program = self._program(logged)
+            after = logged.track.layout.unpack(logged.track.packed[at])
+            restart = logged.restarted(at)
+            before = (
+                logged.track.layout.unpack(logged.track.packed[at - 1]) if restart is None else restart.values
+            )
+            began = {
+                leaf.name: (after if leaf.kind == "input" else before)[place]
+                for place, leaf in enumerate(logged.sign.leaves)
+            }
+            tables = why(program, logged.name, began)
+        return {"tick": logged.track.ticks[at], "tables": [asdict(table) for table in tables]}
+
+    def _program(self, logged: LoggedLevel) -> Program:
+        """What the tables of a level mean that a run had.
+
+        Raises:
+            Refused: The levels that run here have others.
+        """
+        session = self.live.session()
+        level = next((one for one in session.levels if one.name == logged.name), None)
+        if self._log is None:
+            same = level is not None and level.sign is logged.sign
+        else:
+            assert self._log.log is not None
+            same = level is not None and self._log.log.programs.get(logged.sign.program) == session.digest(
+                level
+            )
+        if not same or level is None:
+            raise Refused(Code.STUDIO, f"level `{logged.name}` ran other tables then than it runs now")
+        return session.program(level)
+
+    def _find(self, ask: Ask) -> Json:
+        """The next tick, or the one before, in which a condition holds; null where there is none."""
+        text = ask.body.text("text")
+        if len(text) > LONGEST:
+            raise Refused(Code.STUDIO, f"a condition of more than {LONGEST} characters")
+        tick, back = self._tick(ask), ask.body.flag("back")
+        history = self._history()
+        ticks = range(tick - 1, history.first, -1) if back else range(tick + 1, history.last + 1)
+        asked: dict[int, Any] = {}
+        for count, at in enumerate(ticks):
+            log = history.ran_at(at)
+            if id(log) not in asked:
+                try:
+                    asked[id(log)] = predicate(text, log)
+                except BadCondition as error:
+                    raise Refused(Code.STUDIO, str(error), *error.helps) from error
+            if count % _BREATH == 0:
+                ask.progress("searching", count, len(ticks))
+            held = {one.name: values for one in log.levels if (values := one.track.latest(at)) is not None}
+            if asked[id(log)](held):
+                return {"tick": at}
+        return {"tick": None}
+
+
+@dataclass(frozen=True, slots=True)
+class _Marked:
+    tick: int
+    kind: str
+    text: str
+
+
+def _named(level: LoggedLevel) -> dict[str, Any]:
+    tables = {table: list(level.sign.tables.get(table, ())) for table in level.level.every_table}
+    return {
+        "name": level.name,
+        "period_ms": level.level.period_ms,
+        "tables": tables,
+        "program": level.sign.program,
+    }
+
+
+def _leaf(sign: Signature, at: int) -> dict[str, Any]:
+    leaf = sign.leaves[at]
+    kind = "choice" if leaf.members else "bool" if leaf.c_type == "bool" else number_word(leaf)
+    return {
+        "name": leaf.name, "kind": leaf.kind, "type": kind, "members": list(leaf.members), "unit": leaf.unit,
+        "range": range_of(leaf), "doc": leaf.doc,
+    }  # fmt: skip

@@ -1,0 +1,116 @@
+"""Answers what is to be handed on: the concern `share`, for moments of runs, and `handed`, for findings.
+
+In: questions about a tick in the lane of the run, about a finding in that of proofs. Out: the name of a file and its text; the page that
+asked writes it where its user says.
+"""
+
+import itertools
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.desk.studio.hub import LATER, Ask, Handler, Hub, Json
+from rcsc.desk.studio.runs.live import LANE
+from rcsc.desk.studio.runs.timeline import TimeLine
+from rcsc.desk.studio.scene import Cell
+from rcsc.desk.studio.share.document import of_film, of_finding
+from rcsc.desk.studio.share.film import film
+from rcsc.desk.studio.tables import shown
+from rcsc.desk.studio.tables.desk import PROOF, Desk
+
+MOST_AROUND = 1000
+_ODD = re.compile(r"[^A-Za-z0-9_]+")
+
+
+class Moments:
+    """Hands on moments of the run that everybody looks at."""
+
+    name, lane = "share", LANE
+
+    def __init__(self, hub: Hub, time: TimeLine, cell: Cell) -> None:
+        """Args: hub: Does things in lanes; time: The run; cell: What stands outside."""
+        self._hub, self._time, self._cell = hub, time, cell
+
+    @property
+    def handlers(self) -> Mapping[str, Handler]:
+        """By kind."""
+        return {"share.moment": self._moment}
+
+    def greeting(self) -> Json:
+        """Nothing."""
+        return {}
+
+    def begin(self) -> None:
+        """Nothing is to be done."""
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _moment(self, ask: Ask) -> Json:
+        """Gather ticks one after another, the lane free for others in between."""
+        source = self._time.source
+        if not source.history.logs:
+            raise Refused(Code.STUDIO, f"no run is there: {self._time.live.why}")
+        tick = ask.body.whole("tick", source.history.first, source.history.last)
+        around = ask.body.whole("around", 0, MOST_AROUND)
+        title = source.name or str(source.history.logs[0].facts["name"])
+        history, era = source.history, source.history.era
+        pieces = film(history, tick, around, lambda at: self._cell.drawing(at, projected=False))
+
+        def piece() -> Json:
+            if self._time.source.history is not history or history.era != era:
+                raise Refused(Code.STUDIO, "the run that was shared is another one by now", "share it again")
+            so_far = next(pieces, None)
+            if so_far is None:
+                return {"name": f"{_plain(title)}_tick_{tick}.html", "text": of_film(title, whole)}
+            whole.update(so_far)
+            ask.progress("gathering ticks and pictures", next(count))
+            self._hub.do(LANE, lambda: ask.done(piece))
+            return LATER
+
+        whole, count = dict[str, Any](), itertools.count(1)
+        return piece()
+
+
+class Findings:
+    """Hands on findings of the files that are open."""
+
+    name, lane = "handed", PROOF
+
+    def __init__(self, desk: Desk) -> None:
+        """Args: desk: The open files."""
+        self._desk = desk
+
+    @property
+    def handlers(self) -> Mapping[str, Handler]:
+        """By kind."""
+        return {"handed.finding": self._finding}
+
+    def greeting(self) -> Json:
+        """Nothing."""
+        return {}
+
+    def begin(self) -> None:
+        """Nothing is to be done."""
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _finding(self, ask: Ask) -> Json:
+        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+        number = ask.body.whole("finding", 0, 1_000_000)
+        known = self._desk.known(name, version)
+        offered = self._desk.repairs(name, version, number)
+        whole = shown.document(name, self._desk.at(name, version), known)
+        finding = whole["findings"][number]
+        table = next((each for each in whole["tables"] if each["name"] == finding["table"]), None)
+        repairs = [shown.repair(at, each) for at, each in enumerate(offered)]
+        title = f"{name}{', table ' + finding['table'] if finding['table'] else ''}"
+        file = _plain(f"{finding['table'] or name}_{finding['code']}_{finding['line'] or ''}")
+        return {"name": f"{file}.html", "text": of_finding(title, table, finding, repairs)}
+
+
+def _plain(title: str) -> str:
+    return _ODD.sub("_", title).strip("_") or "run"

@@ -1,0 +1,451 @@
+"""Changes that a grid makes of a table, as changes of its text.
+
+In: a text, a table's name, what is to be changed. Out: the text with it. After each change the table is read again from the text, cell by
+cell; where it does not say what was asked for, nothing is changed. Comments stay where they are, rows that go on with a line are kept, and
+a text that parses is laid out as `rcsc fmt` does it.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.source import Source
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.lang.syntax.rows import Cell, Cells, stub_of
+from rcsc.lang.written.changes import formatted, spliced
+from rcsc.lang.written.tables import (
+    RowText,
+    WrittenPart,
+    WrittenTable,
+    cells_of,
+    dashes,
+    fresh_name,
+    joined_cells,
+    pieces,
+    table_of,
+    whole_line,
+)
+
+MOST_CELLS = 20_000
+"""Cells that may be written at once."""
+LONGEST_CELL = 4_000
+STUB = -1
+"""The column of the line's name and marks."""
+_Splice = tuple[int, int, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A cell: line and column from 0; conditions of all parts are counted first, then actions. Line -1 is the heading."""
+
+    line: int
+    column: int
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A table, cell by cell.
+
+    Attributes:
+        stubs: Name and marks of each line.
+        conditions: How many of its columns are conditions.
+    """
+
+    headings: tuple[str, ...]
+    conditions: int
+    stubs: tuple[str, ...]
+    cells: tuple[tuple[str, ...], ...]
+
+
+def sheet_of(table: WrittenTable) -> Sheet:
+    """What a table says."""
+    parts = [_read(part) for part in table.parts]
+    many = max((len(part.lines) for part in table.parts), default=0)
+    headings = [cell.text for heading, _ in parts for cell in heading.conditions[1:]]
+    conditions = len(headings)
+    headings += [cell.text for heading, _ in parts for cell in heading.actions]
+    rows = [
+        (
+            *(
+                cell.text
+                for _, lines in parts
+                for cell in (lines[at].conditions[1:] if at < len(lines) else ())
+            ),
+            *(cell.text for _, lines in parts for cell in (lines[at].actions if at < len(lines) else ())),
+        )
+        for at in range(many)
+    ]
+    stubs = [lines.conditions[0].text if lines.conditions else "" for lines in (parts[0][1] if parts else [])]
+    return Sheet(tuple(headings), conditions, tuple(stubs), tuple(rows))
+
+
+def _read(part: WrittenPart) -> tuple[Cells, list[Cells]]:
+    """The cells of a part; rows with too many or too few as many as its heading has."""
+    heading = joined_cells(part.heading)
+    return heading, [_fitted(joined_cells(rows), heading, rows[0].past) for rows in part.lines]
+
+
+def _fitted(cells: Cells, heading: Cells, past: int) -> Cells:
+    end = Cell("", "", past)
+
+    def as_many(own: Sequence[Cell], count: int) -> tuple[Cell, ...]:
+        return (*own[:count], *[end] * (count - len(own)))
+
+    return Cells(
+        as_many(cells.conditions, len(heading.conditions)), as_many(cells.actions, len(heading.actions))
+    )
+
+
+# --- changes ------------------------------------------------------------------------------
+
+
+def with_cells(text: str, name: str, changes: Sequence[tuple[Place, str]]) -> str:
+    """Write cells, headings and stubs; a line's new name is written in every part, and where other lines name it.
+
+    Raises:
+        Refused: There is no such cell, or the text would not say what was asked for.
+    """
+    table = _table(text, name)
+    before = sheet_of(table)
+    if len(changes) > MOST_CELLS:
+        raise Refused(Code.STUDIO, f"more than {MOST_CELLS} cells at once")
+    wanted = {place: _checked(new) for place, new in changes}
+    splices = list[_Splice]()
+    headings, stubs, cells = list(before.headings), list(before.stubs), [list(row) for row in before.cells]
+    for place, new in wanted.items():
+        if not (-1 <= place.line < len(before.stubs) and -1 <= place.column < len(before.headings)):
+            raise Refused(
+                Code.STUDIO, f"table `{name}` has no cell in line {place.line + 1}, column {place.column + 1}"
+            )
+        if place.column == STUB:
+            if place.line < 0:
+                raise Refused(Code.STUDIO, "the heading of the first column is `line`")
+            stubs[place.line] = new
+        elif place.line < 0:
+            headings[place.column] = new
+        else:
+            cells[place.line][place.column] = new
+        if place.column != STUB:
+            splices += _cell_splices(text, table, place, new)
+    splices += _stub_splices(table, before.stubs, stubs)
+    after = Sheet(tuple(headings), before.conditions, tuple(stubs), tuple(map(tuple, cells)))
+    return _sure(text, name, spliced(text, splices), _renamed(before, after))
+
+
+def with_line(text: str, name: str, at: int, cells: Sequence[str] = (), stub: str = "") -> str:
+    """Insert a line before position `at`.
+
+    Args:
+        text: Of the file.
+        name: Of the table.
+        at: From 0 to the number of lines.
+        cells: One a column; empty for none.
+        stub: Its name; empty for a new one.
+
+    Raises:
+        Refused: There is no such place, or the text would not say what was asked for.
+    """
+    table = _table(text, name)
+    before = sheet_of(table)
+    if not 0 <= at <= len(before.stubs):
+        raise Refused(Code.STUDIO, f"table `{name}` has no place {at} for a line")
+    row = tuple(_checked(cell) for cell in cells) or ("",) * len(before.headings)
+    stub = _checked(stub) or fresh(before, at)
+    splices, column, action = list[_Splice](), 0, before.conditions
+    for part in table.parts:
+        heading = joined_cells(part.heading)
+        many, more = len(heading.conditions) - 1, len(heading.actions)
+        new = _row_text(
+            (name_of(stub) if splices else stub, *row[column : column + many]),
+            row[action : action + more],
+        )
+        column, action = column + many, action + more
+        splices.append(_inserted(text, table, part, at, new))
+    after = Sheet(
+        before.headings,
+        before.conditions,
+        (*before.stubs[:at], stub, *before.stubs[at:]),
+        (*before.cells[:at], row, *before.cells[at:]),
+    )
+    return _sure(text, name, spliced(text, splices), after)
+
+
+def without_lines(text: str, name: str, lines: Sequence[int]) -> str:
+    """Delete lines.
+
+    Raises:
+        Refused: There is no such line, or the text would not say what was asked for.
+    """
+    table = _table(text, name)
+    before = sheet_of(table)
+    gone = set(lines)
+    if not gone <= set(range(len(before.stubs))):
+        raise Refused(Code.STUDIO, f"table `{name}` has {len(before.stubs)} lines")
+    splices = [
+        (*whole_line(text, row), "")
+        for part in table.parts
+        for at in gone
+        if at < len(part.lines)
+        for row in part.lines[at]
+    ]
+    kept = [at for at in range(len(before.stubs)) if at not in gone]
+    after = Sheet(
+        before.headings,
+        before.conditions,
+        tuple(before.stubs[at] for at in kept),
+        tuple(before.cells[at] for at in kept),
+    )
+    return _sure(text, name, spliced(text, splices), after)
+
+
+def with_column(text: str, name: str, at: int, heading: str, *, action: bool) -> str:
+    """Insert a column of empty cells.
+
+    Args:
+        text: Of the file.
+        name: Of the table.
+        at: Before which column; the number of conditions, or of columns, to come last of its kind.
+        heading: Not empty.
+        action: Whether it is one of those after `||`.
+
+    Raises:
+        Refused: There is no such place, or the text would not say what was asked for.
+    """
+    table = _table(text, name)
+    before = sheet_of(table)
+    low, high = (before.conditions, len(before.headings)) if action else (0, before.conditions)
+    if not low <= at <= high:
+        raise Refused(Code.STUDIO, f"table `{name}` has no place {at} for such a column")
+    if not _checked(heading):
+        raise Refused(
+            Code.STUDIO, "a column needs a heading", "a variable, an expression, `when`, or `procedures`"
+        )
+    part, side = _part_of(table, at, action=action)
+
+    def insert(cells: tuple[str, ...], new: str, first: int) -> tuple[str, ...]:
+        return (*cells[: side + first], new, *cells[side + first :])
+
+    def change(cells: Cells, *, top: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        left, right = (tuple(cell.text for cell in each) for each in (cells.conditions, cells.actions))
+        new = heading if top else ""
+        return (left, insert(right, new, 0)) if action else (insert(left, new, 1), right)
+
+    splices = list(_reshaped(table, part, change))
+    after = Sheet(
+        (*before.headings[:at], heading, *before.headings[at:]),
+        before.conditions + (not action),
+        before.stubs,
+        tuple((*row[:at], "", *row[at:]) for row in before.cells),
+    )
+    return _sure(text, name, spliced(text, splices), after)
+
+
+def without_column(text: str, name: str, at: int) -> str:
+    """Delete a column; a part of the table that has no other goes with it.
+
+    Raises:
+        Refused: There is no such column, it is the only one, or the text would not say what was asked for.
+    """
+    table = _table(text, name)
+    before = sheet_of(table)
+    if not 0 <= at < len(before.headings) or len(before.headings) == 1:
+        raise Refused(Code.STUDIO, f"table `{name}` has no column {at + 1} that could be deleted")
+    action = at >= before.conditions
+    part, side = _part_of(table, at, action=action, inside=True)
+    heading = joined_cells(part.heading)
+    if len(heading.conditions) - 1 + len(heading.actions) == 1:
+        splices = [(*whole_line(text, row), "") for row in table.rows_of(part)]
+    else:
+
+        def change(cells: Cells, *, top: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:  # noqa: ARG001  # as for one that is new
+            left, right = (tuple(cell.text for cell in each) for each in (cells.conditions, cells.actions))
+            if action:
+                return left, (*right[:side], *right[side + 1 :])
+            return (*left[: side + 1], *left[side + 2 :]), right
+
+        splices = list(_reshaped(table, part, change))
+    after = Sheet(
+        (*before.headings[:at], *before.headings[at + 1 :]),
+        before.conditions - (not action),
+        before.stubs,
+        tuple((*row[:at], *row[at + 1 :]) for row in before.cells),
+    )
+    return _sure(text, name, spliced(text, splices), after)
+
+
+def fresh(sheet: Sheet, at: int) -> str:
+    """A name for a line before position `at` that no other has."""
+    names = [name_of(stub) for stub in sheet.stubs]
+    return fresh_name(names, names[at - 1] if 0 < at <= len(names) else "")
+
+
+def name_of(stub: str) -> str:
+    """The name in a stub, without its marks."""
+    return stub_of(Cell(stub, "", 0)).name.text
+
+
+# --- parts --------------------------------------------------------------------------------
+
+
+def _table(text: str, name: str) -> WrittenTable:
+    table = table_of(text, name)
+    if table is None or not table.parts:
+        raise Refused(Code.STUDIO, f"the text has no table `{name}` with a heading")
+    return table
+
+
+def _checked(text: str) -> str:
+    """A cell's text in one line.
+
+    Raises:
+        Refused: No cell can hold it.
+    """
+    text = " ".join(text.split())
+    if len(text) > LONGEST_CELL:
+        raise Refused(Code.STUDIO, f"a cell of more than {LONGEST_CELL} characters")
+    if "|" in text:
+        raise Refused(
+            Code.STUDIO, "a cell holds no `|`: it parts cells", "conditions are joined by `or` under `when`"
+        )
+    if "#" in text:
+        raise Refused(
+            Code.STUDIO, "a cell holds no `#`: it begins a comment", "write the comment in the text"
+        )
+    if not text.isprintable():
+        raise Refused(Code.STUDIO, "a cell holds letters, digits and signs only")
+    return "" if text == "-" else text
+
+
+def _sure(before: str, name: str, after: str, wanted: Sheet) -> str:
+    """The text laid out, if its table says what was asked for.
+
+    Raises:
+        Refused: It does not.
+    """
+    table = table_of(after, name)
+    if table is None or sheet_of(table) != wanted:
+        raise Refused(Code.STUDIO, "the table would not say what was typed", "change the text itself")
+    return formatted(Source("", after), "\n") or after if before != after else after
+
+
+def _cell_splices(text: str, table: WrittenTable, place: Place, new: str) -> Iterator[_Splice]:
+    """Yield what writes a cell into the first of its rows, and takes it out of the others."""
+    rows, cell = _found(table, place)
+    whole = joined_cells(rows)
+    if cell not in whole.all:  # the row ends before it
+        raise Refused(Code.STUDIO, "this line has other cells than the heading", "mend it in the text")
+    first, *more = pieces(cell)
+    yield (*first, new if first[0] != first[1] else f" {new} ")
+    for start, end in more:
+        row = next(row for row in rows if row.start <= start < row.past)
+        alone = not any(each.text for each in cells_of(row).all if each.start != start)
+        yield (*whole_line(text, row), "") if alone and "#" not in row else (start, end, "")
+
+
+def _found(table: WrittenTable, place: Place) -> tuple[tuple[RowText, ...], Cell]:
+    """The rows of a line, or of the heading, in the part that has a column; and the cell."""
+    column, every = place.column, [joined_cells(part.heading) for part in table.parts]
+    conditions = sum(len(heading.conditions) - 1 for heading in every)
+    for part, heading in zip(table.parts, every, strict=True):
+        many = len(heading.actions) if place.column >= conditions else len(heading.conditions) - 1
+        at = column - conditions if place.column >= conditions else column
+        if at < many:
+            if place.line >= len(part.lines):
+                break
+            rows = part.heading if place.line < 0 else part.lines[place.line]
+            cells = _fitted(joined_cells(rows), heading, rows[0].past)
+            return rows, cells.actions[at] if place.column >= conditions else cells.conditions[at + 1]
+        column -= many
+    raise Refused(Code.STUDIO, "this line is not in every part of the table", "mend it in the text")
+
+
+def _stub_splices(table: WrittenTable, before: Sequence[str], after: Sequence[str]) -> Iterator[_Splice]:
+    """Yield what writes stubs that changed, in every part, and new names where other lines name a line by its old one."""
+    renamed = {
+        name_of(old): name_of(new)
+        for old, new in zip(before, after, strict=True)
+        if name_of(old) != name_of(new) and name_of(old)
+    }
+    if not renamed and before == after:
+        return
+    for number, part in enumerate(table.parts):
+        first = number == 0
+        for at, rows in enumerate(part.lines):
+            stub = joined_cells(rows).conditions[0]
+            if at < len(before) and before[at] != after[at]:
+                new = after[at] if first else name_of(after[at])
+                yield (*pieces(stub)[0], new)
+            elif first:
+                for mark in (*stub_of(stub).above, *stub_of(stub).same):
+                    if mark.text in renamed:
+                        yield mark.start, mark.start + len(mark.text), renamed[mark.text]
+
+
+def _renamed(before: Sheet, after: Sheet) -> Sheet:
+    """What is to come out, where lines that name others follow a new name."""
+    renamed = {
+        name_of(old): name_of(new)
+        for old, new in zip(before.stubs, after.stubs, strict=True)
+        if name_of(old) != name_of(new) and name_of(old)
+    }
+    stubs = list(after.stubs)
+    for at, stub in enumerate(stubs):
+        if stub == before.stubs[at]:
+            cell = stub_of(Cell(stub, "", 0))
+            marks = [mark for mark in (*cell.above, *cell.same) if mark.text in renamed]
+            splices = [(mark.start, mark.start + len(mark.text), renamed[mark.text]) for mark in marks]
+            stubs[at] = spliced(stub, splices)
+    return Sheet(after.headings, after.conditions, tuple(stubs), after.cells)
+
+
+def _part_of(table: WrittenTable, at: int, *, action: bool, inside: bool = False) -> tuple[WrittenPart, int]:
+    """The part that has a column, or takes one before it, and the column's position among its own of this kind."""
+    parts = table.parts
+    every = [joined_cells(part.heading) for part in parts]
+    at -= sum(len(heading.conditions) - 1 for heading in every) if action else 0
+    for part, heading in zip(parts, every, strict=True):
+        many = len(heading.actions) if action else len(heading.conditions) - 1
+        if at < many or (at == many and not inside and (part is parts[-1] or not action)):
+            return part, at
+        at -= many
+    raise AssertionError("a column is in a part")
+
+
+def _reshaped(
+    table: WrittenTable, part: WrittenPart, change: Callable[..., tuple[tuple[str, ...], tuple[str, ...]]]
+) -> Iterator[_Splice]:
+    """Yield what gives every row of a part other cells; `change` is told whether it is the first of the heading."""
+    for row in table.rows_of(part):
+        body, mark, comment = row.partition("#")
+        tail = f" {mark}{comment}" if mark else ""
+        if dashes(row):
+            left, _, right = body.partition("||")
+            cells = Cells((Cell("", "", 0),) * left.count("|"), (Cell("", "", 0),) * right.count("|"))
+            conditions, actions = change(cells, top=False)
+            yield row.start, row.past, _row_text(["---"] * len(conditions), ["---"] * len(actions), "") + tail
+        else:
+            top = row.start == part.heading[0].start
+            yield row.start, row.past, _row_text(*change(cells_of(row), top=top)) + tail
+
+
+def _row_text(conditions: Sequence[str], actions: Sequence[str], blank: str = " ") -> str:
+    left = "|".join(f"{blank}{cell}{blank}" for cell in conditions)
+    right = "".join(f"{blank}{cell}{blank}|" for cell in actions)
+    return f"|{left}||{right}"
+
+
+def _inserted(text: str, table: WrittenTable, part: WrittenPart, at: int, row: str) -> _Splice:
+    """What writes a row before the line at a position of a part."""
+    if at < len(part.lines):
+        start, _ = whole_line(text, part.lines[at][0])
+        indent = text[start : part.lines[at][0].start]
+        return start, start, f"{indent}{row}\n"
+    last = table.rows_of(part)[-1]
+    start, _ = whole_line(text, last)
+    more = "" if part.lines or dashes(last) else f"\n{text[start : last.start]}{_dashes_of(part)}"
+    return last.past, last.past, f"{more}\n{text[start : last.start]}{row}"
+
+
+def _dashes_of(part: WrittenPart) -> str:
+    heading = joined_cells(part.heading)
+    return _row_text(["---"] * len(heading.conditions), ["---"] * len(heading.actions), "")

@@ -1,0 +1,155 @@
+"""Options that several commands share."""
+
+import os
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+
+from rcsc.base.host.files.read import standard_input
+from rcsc.driver.settings import Settings
+from rcsc.front.commands.shared.show import Color, Output, OutputForm, Progress
+from rcsc.lang.project import MOST_BYTES
+from rcsc.proof.solvers.options import Options
+
+Command = Callable[..., int]
+
+PATHS = click.argument(
+    "paths", nargs=-1, type=click.Path(exists=True, readable=False, allow_dash=True), metavar="[PATH]..."
+)
+"""Files, folders, or `-`, which are there; the folder one stands in where none is given."""
+
+
+def cores() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class _Millions(click.FloatRange):
+    """A number of millions on the command line, single ones in the program."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number; a default is converted like what is typed."""
+        return max(1, round(super().convert(value, param, ctx) * 1_000_000))
+
+
+def steps_option(default: float, also: str = "") -> Callable[[Command], Command]:
+    """Adds `--steps`, in millions, and what else it bounds; the command gets `steps`, in single ones."""
+    return click.option(
+        "--steps",
+        type=_Millions(min=0, min_open=True),
+        default=default,
+        show_default=True,
+        metavar="MILLIONS",
+        help="Budget of each question to the solver, in its own steps, which are the same on every machine: a million takes "
+        f"some tenths of a second.{also} Past it the answer is `undecided`, never `proved`.",
+    )
+
+
+def proving(command: Command) -> Command:
+    """Adds the options that say how to prove; the command gets them as `options` and `use_cache`."""
+
+    @steps_option(20, " All questions about one table, or one procedure, get 20 times as many together.")
+    @click.option(
+        "--memory",
+        type=click.IntRange(min=64),
+        default=4096,
+        show_default=True,
+        metavar="MB",
+        help="Memory limit of the solver.",
+    )
+    @click.option(
+        "--solver",
+        type=click.Choice(["auto", "both", "boxes"]),
+        default="auto",
+        show_default=True,
+        help="auto: boxes and regions, confirmed by Z3 where that is quick. both: confirmed by Z3 always. "
+        "boxes: Z3 only for what nothing else decides.",
+    )
+    @click.option(
+        "-j",
+        "--jobs",
+        type=click.IntRange(min=0),
+        default=0,
+        metavar="N",
+        help="How many tables to prove at once; 0 (the default) is one a processor.",
+    )
+    @click.option("--no-cache", is_flag=True, help="Neither read nor keep what earlier runs proved.")
+    @wraps(command)
+    def wrapped(
+        *args: Any,
+        steps: int,
+        memory: int,
+        solver: Literal["auto", "both", "boxes"],
+        jobs: int,
+        no_cache: bool,
+        **kwargs: Any,
+    ) -> int:
+
+        options = Options(
+            steps=steps,
+            memory_mb=memory,
+            solver=solver,
+            jobs=jobs or cores(),
+        )
+        return command(*args, options=options, use_cache=not no_cache, **kwargs)
+
+    return wrapped
+
+
+def showing(command: Command) -> Command:
+    """Adds the options that say how to show the report; the command gets them as `output`."""
+
+    @click.option(
+        "--format",
+        "form",
+        type=click.Choice([form.value for form in OutputForm]),
+        default=None,
+        help="text (default), line (one line a finding), json, sarif (2.1.0) or github (annotations).",
+    )
+    @click.option("--json", "form", flag_value="json", help="The same as --format json.")
+    @click.option("--sarif", "form", flag_value="sarif", help="The same as --format sarif.")
+    @click.option("--github", "form", flag_value="github", help="The same as --format github.")
+    @click.option(
+        "-o",
+        "--output",
+        "file",
+        type=click.Path(dir_okay=False, path_type=Path),
+        default=None,
+        metavar="FILE",
+        help="Write the report to FILE instead of standard output.",
+    )
+    @click.option(
+        "--color",
+        type=click.Choice([color.value for color in Color]),
+        default="auto",
+        show_default=True,
+        help="Colour the text; `auto` on a terminal, unless NO_COLOR is set.",
+    )
+    @click.option(
+        "-q",
+        "--quiet",
+        is_flag=True,
+        help="Only what needs attention: no summary, no progress, no note that every check repeats.",
+    )
+    @wraps(command)
+    def wrapped(
+        *args: Any, form: str | None, file: Path | None, color: str, quiet: bool, **kwargs: Any
+    ) -> int:
+        output = Output(OutputForm(form or "text"), file, Color(color), quiet)
+        return command(*args, output=output, **kwargs)
+
+    return wrapped
+
+
+def settings_of(options: Options, use_cache: bool, output: Output, paths: tuple[str, ...]) -> Settings:
+    """What the driver works on: these paths, or else this folder."""
+    progress = Progress(wanted=not output.quiet)
+    return Settings(paths or (".",), options, piped(paths), use_cache=use_cache, progress=progress)
+
+
+def piped(paths: tuple[str, ...]) -> bytes | None:
+    """Return what `-` stands for, if it is one of the paths; of a text that is too large no more than shows it."""
+    return standard_input().read(MOST_BYTES + 1) if "-" in paths else None

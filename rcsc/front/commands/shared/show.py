@@ -1,0 +1,334 @@
+"""A report in the form that was asked for, on standard output or in a file."""
+
+import json
+import os
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import groupby
+from pathlib import Path
+
+import click
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.base.diagnostics.github import annotations
+from rcsc.base.diagnostics.jsonform import report_to_json
+from rcsc.base.diagnostics.printable import escape, pad, width
+from rcsc.base.diagnostics.render import (
+    OF_SEVERITY,
+    WIDEST_LINE,
+    Row,
+    Style,
+    TextPiece,
+    full,
+    one_line,
+    paint,
+    plain,
+)
+from rcsc.base.diagnostics.report import (
+    NOT_PROVED,
+    InSystem,
+    Report,
+    SystemReport,
+    TableReport,
+    Verdict,
+    named,
+    trusting,
+)
+from rcsc.base.diagnostics.sarif import sarif
+from rcsc.base.host.files import write_atomically
+
+
+class OutputForm(StrEnum):
+    """How a report is shown."""
+
+    TEXT = "text"
+    LINE = "line"
+    JSON = "json"
+    SARIF = "sarif"
+    GITHUB = "github"
+
+
+class Color(StrEnum):
+    """When the text is coloured."""
+
+    AUTO = "auto"
+    ALWAYS = "always"
+    NEVER = "never"
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """Where and how a report is shown.
+
+    Attributes:
+        file: Written whole or not at all; None is standard output.
+        quiet: Leave out the summary, and the notes that every check repeats.
+    """
+
+    form: OutputForm = OutputForm.TEXT
+    file: Path | None = None
+    color: Color = Color.AUTO
+    quiet: bool = False
+
+
+class UnwritableError(Exception):
+    """A report could not be written: where, and why."""
+
+
+_OF_VERDICT = {
+    Verdict.PROVED: Style.HELP,
+    Verdict.CONDITIONAL: Style.WARNING,
+    Verdict.REFUTED: Style.ERROR,
+    Verdict.UNDECIDED: Style.WARNING,
+}
+_REPEATED = {Code.DEFAULT_COVERS, Code.GIVES_WAY, Code.PROPERTY_ELSEWHERE}
+"""What is right, and said again by every check."""
+_METHODS = {"boxes": "boxes", "tree": "a tree of regions", "z3": "Z3"}
+
+
+def show(report: Report, command: str, output: Output, closing: str = "") -> None:
+    """Write the report; `closing` is a last line for people.
+
+    Raises:
+        UnwritableError: The file, or standard output, could not be written.
+        BrokenPipeError: Whoever read standard output has gone.
+    """
+    put(_FORMS[output.form](report, command, output, closing), output.file)
+
+
+def put(text: str, file: Path | None) -> None:
+    """Write a text to a file, whole or not at all, or to standard output.
+
+    Raises:
+        UnwritableError: Neither could be written.
+        BrokenPipeError: Whoever read standard output has gone.
+    """
+    with writing(file or "standard output"):
+        if file is None:
+            click.echo(text, nl=False, color=True)
+        else:
+            write_atomically(file, text.encode())
+
+
+@contextmanager
+def writing(place: Path | str) -> Iterator[None]:
+    """Say where something was to be written, should that fail.
+
+    Raises:
+        UnwritableError: What stands inside could not write.
+    """
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise UnwritableError(str(place), error.strerror or "no reason given") from error
+
+
+def finish(report: Report, command: str, output: Output, closing: str = "") -> int:
+    """Show the report; return the exit status."""
+    show(report, command, output, closing)
+    return 1 if report.failed else 0
+
+
+def _json(report: Report, command: str, _output: Output, _closing: str) -> str:
+
+    return json_text(report_to_json(report, command))
+
+
+def _sarif(report: Report, _command: str, _output: Output, _closing: str) -> str:
+
+    return json_text(sarif(report))
+
+
+def json_text(value: object) -> str:
+    r"""Write a value as JSON in UTF-8; a byte of a file's name that is not UTF-8 is escaped, as `\udcff`."""
+    text = json.dumps(value, indent=2, ensure_ascii=False) + "\n"
+    return text.encode(errors="backslashreplace").decode()
+
+
+def _github(report: Report, _command: str, _output: Output, _closing: str) -> str:
+
+    return annotations(report)
+
+
+def _lines(report: Report, _command: str, output: Output, _closing: str) -> str:
+    return "".join(f"{one_line(diagnostic, report.sources)}\n" for diagnostic in _told(report, output))
+
+
+def _told(report: Report, output: Output) -> Iterator[Diagnostic]:
+    """What a person is told."""
+    for diagnostic in report.diagnostics:
+        if not (output.quiet and diagnostic.severity is Severity.NOTE and diagnostic.code in _REPEATED):
+            yield diagnostic
+
+
+def _text(report: Report, _command: str, output: Output, closing: str) -> str:
+    coloured = wants_color(output.color, output.file)
+    columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else WIDEST_LINE
+    rows: list[Row] = []
+    for diagnostic in (each for each in _told(report, output) if not each.told_with):
+        rows += (*full(diagnostic, report.sources, columns), ())
+    if not output.quiet:
+        rows += summary(report)
+        if closing:
+            rows.append((TextPiece(closing, Style.STRONG),))
+    return paint(rows) if coloured else plain(rows)
+
+
+_FORMS: dict[OutputForm, Callable[[Report, str, Output, str], str]] = {
+    OutputForm.TEXT: _text,
+    OutputForm.LINE: _lines,
+    OutputForm.JSON: _json,
+    OutputForm.SARIF: _sarif,
+    OutputForm.GITHUB: _github,
+}
+
+
+def _is_terminal(handle: int) -> bool:
+    try:
+        return os.isatty(handle)
+    except OSError:
+        return False
+
+
+def wants_color(color: Color, file: Path | None) -> bool:
+    """Whether a text for standard output, or for a file, is coloured.
+
+    Source: no-color.org for `NO_COLOR`; `--color` wins over it.
+    """
+    if color is not Color.AUTO:
+        return color is Color.ALWAYS
+    plain_terminal = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return not plain_terminal and file is None and _is_terminal(1)
+
+
+def summary(report: Report) -> Iterator[Row]:
+    """What backs each table's verdict, then the counts."""
+    names = max((width(escape(table.table)) for table in report.tables), default=0)
+    words = max((9, *(len(table.verdict.value) for table in report.tables)))
+    for file, tables in groupby(report.tables, key=lambda table: table.file):
+        yield (TextPiece(escape(file), Style.STRONG),)
+        for table in tables:
+            yield (
+                TextPiece(f"  {pad(escape(table.table), names)}  "),
+                TextPiece(pad(table.verdict.value, words), _OF_VERDICT[table.verdict]),
+                TextPiece(f"  {backing(table)}"),
+            )
+    for system in report.systems:
+        if system.wanted:
+            yield (TextPiece(_of_system(system), Style.NOTE),)
+        elif system.missing:
+            yield (TextPiece(_missing(system), Style.NOTE),)
+    if report.tables or report.diagnostics:
+        yield tuple(_counts(report))
+
+
+def backing(table: TableReport) -> str:
+    """`15 lines, by boxes, confirmed by Z3, assuming f_means_paused (monitored), 3.1 ms`."""
+    parts = [f"{table.lines} line{'' if table.lines == 1 else 's'}"]
+    if table.method:
+        parts.append(f"by {_METHODS.get(table.method, table.method)}")
+    if table.confirmed_by_z3:
+        parts.append("confirmed by Z3")
+    if table.assumptions:
+        parts.append(f"assuming {', '.join(_assumed(table))}")
+    if table.together is not None:
+        parts += _together(table.together)
+    parts += [
+        f"{word} where {' or '.join(f'`{escape(name)}`' for name in names)} fails"
+        for word, names in (("stops", table.stops), ("only tells", table.tells))
+        if names
+    ]
+    doubtful = [f"`{escape(name)}`" for name, standing in table.assumptions if standing == NOT_PROVED]
+    if doubtful and table.verdict is Verdict.CONDITIONAL:
+        parts.append(
+            f"rests on {' and '.join(doubtful)}, which {'is' if len(doubtful) == 1 else 'are'} not proved"
+        )
+    parts.append(f"{table.proof_ms:.1f} ms{' (earlier run)' if table.cached else ''}")
+    return ", ".join(parts)
+
+
+def _assumed(table: TableReport) -> Iterator[str]:
+    """Each assumption with its state."""
+    together = table.together
+    remarks = (
+        {} if together is None else dict.fromkeys(together.not_proved, ", not proved of the levels together")
+    )
+    remarks |= (
+        {}
+        if together is None
+        else dict.fromkeys(together.conditional, ", conditional of the levels together")
+    )
+    for name, standing in table.assumptions:
+        yield f"{escape(name)} ({standing}{remarks.get(name, '')})"
+
+
+def _together(known: InSystem) -> Iterator[str]:
+    """What the levels together make of a table."""
+    system = escape(known.system)
+    if known.proved:
+        yield f"kept by the levels together, {system}{escape(trusting(known.trusts))}"
+    if known.conditional:
+        yield f"conditional in {system}: rests on {escape(named(known.rests))}"
+    if known.unreached:
+        noun = "line" if len(known.unreached) == 1 else "lines"
+        lines = ", ".join(map(escape, known.unreached))
+        yield f"{noun} {lines} never reached in {system}{'' if known.proved else escape(trusting(known.trusts))}"
+
+
+def _of_system(system: SystemReport) -> str:
+    command = f"`rcsc prove {escape(system.system)}`"
+    return f"whether the levels together keep what these tables assume is not known: {command} decides it"
+
+
+def _missing(system: SystemReport) -> str:
+    return f"{escape(system.system)} is {system.standing}: {escape(named(system.missing))}"
+
+
+def _counts(report: Report) -> Iterator[TextPiece]:
+    if report.tables:
+        yield from _verdicts(report)
+    for number, severity in enumerate(Severity):
+        count = report.count(severity)
+        noun = severity.value if count == 1 else f"{severity.value}s"
+        yield TextPiece(", " if number else "")
+        yield TextPiece(f"{count} {noun}", OF_SEVERITY[severity] if count else Style.PLAIN)
+
+
+def _verdicts(report: Report) -> Iterator[TextPiece]:
+    always = (Verdict.PROVED, Verdict.REFUTED, Verdict.UNDECIDED)
+    of = dict.fromkeys(always, 0) | dict(Counter(table.verdict for table in report.tables))
+    noun = "table" if len(report.tables) == 1 else "tables"
+    yield TextPiece(f"{len(report.tables)} {noun}: ")
+    for number, (verdict, count) in enumerate(of.items()):
+        style = _OF_VERDICT[verdict] if count else Style.PLAIN
+        yield TextPiece(f"{', ' if number else ''}")
+        yield TextPiece(f"{count} {verdict.value}", style)
+    yield TextPiece("; ")
+
+
+class Progress:
+    """One line on a terminal's standard error that says what is being worked at.
+
+    Attributes:
+        shown: Whether there is a terminal, and it is wanted.
+    """
+
+    def __init__(self, *, wanted: bool = True) -> None:
+        self.shown = wanted and _is_terminal(2)
+        self._width = 0
+
+    def __call__(self, doing: str) -> None:
+        """Say what is being done now; an empty text clears the line."""
+        if not self.shown:
+            return
+        text = escape(doing)[:100]
+        sys.stderr.write(f"\r{pad(text, self._width)}" + ("" if text else "\r"))
+        sys.stderr.flush()
+        self._width = width(text)

@@ -1,0 +1,112 @@
+"""How a command ends that cannot go on: the code, what is wrong, what helps, and exit status 1; or 130, where it was interrupted."""
+
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from types import FrameType
+from typing import TYPE_CHECKING, ParamSpec
+
+import click
+
+from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.render import full, plain
+
+if TYPE_CHECKING:
+    from rcsc.base.host.described import BadFile
+
+_P = ParamSpec("_P")
+
+
+class Stopped(click.ClickException):  # what happened
+    """A coded error of a run; exit status 1."""
+
+    status = 1
+
+    def __init__(self, code: Code, message: str, *helps: str) -> None:
+        super().__init__(message)
+        self.code, self.helps = code, helps
+
+    def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
+        """The error, as every other is shown."""
+        for line in self.message.splitlines():
+            click.echo(f"error[{self.code.value}]: {line}", err=True)
+        for text in self.helps:
+            click.echo(f"  = help: {text}", err=True)
+
+
+class StoppedByFile(Stopped):
+    """The faults of a description or a data file, each with its place."""
+
+    def __init__(self, error: "BadFile") -> None:
+        super().__init__(error.code, str(error))
+        self.diagnostics, self.sources = error.diagnostics, error.sources
+
+    def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
+        """Each fault, with the line it stands in."""
+        for diagnostic in self.diagnostics:
+            click.echo(plain(full(diagnostic, self.sources)), err=True)
+
+
+class Interrupted(Stopped):
+    """The user ended what was under way, or the system did; exit status 130."""
+
+    status = 130
+
+
+class Ending:
+    """SIGINT and SIGTERM interrupt what runs inside, the user's code included; a second one ends the process, where that code holds on.
+
+    Code may catch what interrupts it, and a library need not come back to Python.
+    """
+
+    def __init__(self) -> None:
+        self._held = self._wanted = False
+
+    @contextlib.contextmanager
+    def inside(self) -> Iterator[None]:
+        """Hear them in here; nowhere but in the main thread.
+
+        Raises:
+            KeyboardInterrupt: One of them came.
+        """
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = [(number, signal.signal(number, self._end)) for number in (signal.SIGINT, signal.SIGTERM)]
+        try:
+            yield
+        finally:
+            for number, handler in before:
+                signal.signal(number, handler)
+
+    def whole(self, work: Callable[_P, object]) -> Callable[_P, None]:
+        """Return the same work, which is interrupted once it is done."""
+
+        def done(*args: _P.args, **kwargs: _P.kwargs) -> None:
+            self._held = True
+            try:
+                work(*args, **kwargs)
+            finally:
+                self._held = False
+            if self._wanted:
+                raise KeyboardInterrupt
+
+        return done
+
+    def _end(self, _number: int, _frame: FrameType | None) -> None:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)
+        self._wanted = True
+        if not self._held:
+            raise KeyboardInterrupt
+
+
+def stopped(error: CodedError) -> Stopped:
+    """The end of a command that met the error."""
+    from rcsc.base.host.described import BadFile  # keep lazy: most commands end well
+
+    if isinstance(error, BadFile) and error.diagnostics:
+        return StoppedByFile(error)
+    return Stopped(error.code, error.shown, *error.helps)

@@ -1,0 +1,284 @@
+"""What is not proved, as text and as JSON: the claim, its run as a time line, what follows it, and what would help."""
+
+import io
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import click
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.consequence import MOST, Consequence, How, spelled_leaves, told
+from rcsc.compose.counterexample.explain import Explanation, runs_on_executors
+from rcsc.compose.counterexample.finding import TimeLineRow, beginnings, rows
+
+ALIKE = 2
+"""Consequences of one kind that are shown with their runs; others differ in a reason only, and are told in a line."""
+_WIDTH = 118
+"""Columns of a time line."""
+_LONG = 33
+"""Characters of an assignment that a column has room for, whatever the others hold."""
+_HARD = "\ue000"
+"""A space at which a time line does not break, while it is laid out; of private use, since every other one may."""
+
+
+def say_explanation(
+    systems: Mapping[str, TransitionSystem], explanation: Explanation, cycles: int, further: int
+) -> None:
+    """Say what is not proved; runs of up to `cycles` cycles were searched, and followed on for up to `further`."""
+    where = f"level `{explanation.level}`" + (
+        f", table `{explanation.obligation.table}`" if explanation.obligation.table else ""
+    )
+    if explanation.bug:
+        click.echo(
+            f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run: {explanation.obligation.shown}",
+            err=True,
+        )
+    elif explanation.warns:
+        click.echo(
+            f"warning[{Code.ENDLESS.value}]: {where}: not shown: {explanation.obligation.shown}", err=True
+        )
+    else:
+        click.echo(
+            f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {explanation.obligation.shown}", err=True
+        )
+    if stated := _stated(systems, explanation):
+        click.echo(f"  = note: it says: {stated}", err=True)
+    for line in explanation.beside if not explanation.undefined else ():
+        click.echo(f"  = note: {line}", err=True)
+    if explanation.finding is not None and not explanation.beside:
+        _say_finding(systems, explanation)
+        _say_consequences(systems, explanation, further)
+    elif explanation.undefined:
+        click.echo("  = note: the run that shows it meets an operation that is not defined", err=True)
+    elif explanation.guessed:
+        click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
+    elif (
+        explanation.obligation.sort.value == "assumption"
+        and explanation.obligation.name in systems[explanation.level].trusted
+    ):
+        click.echo(
+            "  = note: no first cycle can be as the tables declare, or no later one, or none that runs this table: "
+            "what rests on it says nothing",
+            err=True,
+        )
+    elif cycles and not explanation.beside:
+        click.echo(f"  = note: {_no_run(systems[explanation.level], explanation, cycles)}", err=True)
+        _say_supposed(systems, explanation)
+    _say_notes(explanation, cycles)
+    for line in explanation.helps:
+        click.echo(f"  = help: {line}", err=True)
+    if explanation.together:
+        click.echo(f"  = note: {explanation.together}", err=True)
+    if explanation.others:
+        click.echo(
+            f"  = note: no such run was found of both of lines {', '.join(explanation.others)}", err=True
+        )
+    _say_logs(explanation)
+
+
+def _no_run(ts: TransitionSystem, explanation: Explanation, cycles: int) -> str:
+    """Say that no run was found, and where none was looked for."""
+    among = " among those in which no input is refused" if ts.refusable else ""
+    gave_up = "; the solver gave up on some" if explanation.gave_up else ""
+    return f"no run of {cycles} cycles or fewer was found{among}{gave_up}"
+
+
+def _say_logs(explanation: Explanation) -> None:
+    """Say where the runs are kept, if they are."""
+    log = explanation.log
+    if log is None:
+        return
+    executor = "" if explanation.in_c else " --executor python"
+    click.echo(f"  = log: rcsc replay {log} --generated {log.parent / 'generated'}{executor}", err=True)
+    click.echo(f"  = picture: rcsc log {log} --report {log.with_suffix('.html')}", err=True)
+    if explanation.follows:
+        then = log.with_name(f"{log.stem}_then_N{log.suffix}")
+        click.echo(
+            f"  = note: the runs of what follows, N from 1 to {len(explanation.follows)}: {then}", err=True
+        )
+
+
+def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> str:
+    """Return the property's source text, or "" where it is none."""
+    if explanation.obligation.sort is not Sort.PROPERTY:
+        return ""
+    return next(
+        stated.text
+        for stated in systems[explanation.level].program.properties
+        if stated.name == explanation.obligation.name
+    )
+
+
+def _say_notes(explanation: Explanation, cycles: int) -> None:
+    """Say what is known without a run."""
+    for note in explanation.notes:
+        click.echo(f"  = note: {note}", err=True)
+    if explanation.notes and explanation.warns:
+        click.echo(
+            "  = help: let the lines count: a number that only falls, or only rises, while they run; "
+            f"`--trace {4 * cycles}` looks at longer runs",
+            err=True,
+        )
+
+
+def _say_finding(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> None:
+    """Print the finding's time line."""
+    finding, in_c = explanation.finding, explanation.in_c
+    assert finding is not None
+    begins = ", after a restart" if finding.restarted else ""
+    legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
+    run_by = "as the interpreter, the Python and the C executors run it"
+    if not runs_on_executors(systems, finding):
+        run_by = "as the interpreter runs it; executors are to run nothing that is not safe"
+    elif not in_c:
+        run_by = "as the interpreter and the Python executor run it (no C function can give what is refused)"
+    what = (
+        f"goes round from cycle {finding.lasso} to cycle {finding.broken_at}"
+        if finding.lasso
+        else f"broken in cycle {finding.broken_at}"
+    )
+    alone = f" of level `{finding.level}` alone" if explanation.supposes else ""
+    click.echo(f"  = note: {what}{alone}{begins}, {run_by}{legal}", err=True)
+    if explanation.supposes:
+        gives = "; ".join(
+            f"`{owner}` gives such {', '.join(f'`{name}`' for name in names)}"
+            for owner, names in explanation.supposes.items()
+        )
+        click.echo(f"  = note: supposed, and not shown of the system: {gives}", err=True)
+    _say_time_line((*beginnings(systems, finding), *rows(systems, finding)))
+
+
+def _say_supposed(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> None:
+    """Print the cycle at which the proof stops."""
+    finding = explanation.supposed
+    if finding is None:
+        return
+    click.echo(
+        "  = note: the proof stops here, at a state that it does not exclude; whether that is ever reached is not known",
+        err=True,
+    )
+    _say_time_line((*beginnings(systems, finding), *rows(systems, finding)))
+    click.echo(
+        "  = help: if it is reached, the table has to do otherwise there; if not, an `invariant` that says why is proved, and used here",
+        err=True,
+    )
+
+
+def _say_consequences(
+    systems: Mapping[str, TransitionSystem], explanation: Explanation, further: int
+) -> None:
+    """Print what follows, each with its run: only what comes after the finding's own where it begins as that does."""
+    ts = systems[explanation.level]
+    alike: Counter[tuple[object, ...]] = Counter()
+    for number, then in enumerate(explanation.follows or (), 1):
+        kind = (
+            then.how,
+            then.level,
+            then.report[:1],
+            then.before[:1],
+        )  # the status; a reason beside it may be any
+        alike[kind] += 1
+        shown = alike[kind] <= ALIKE or then.how is How.STOPS
+        run = "" if then.shared or not shown else "; its run"
+        click.echo(f"  = then {number}: {told(systems[then.level], then)}{run}", err=True)
+        if shown:
+            _say_time_line(_further_rows(systems, then))
+    if explanation.follows is not None and len(explanation.follows) == MOST:
+        click.echo(f"  = note: no more than {MOST} such runs are looked for", err=True)
+    if explanation.follows == () and ts.links.above is not None:
+        click.echo(
+            f"  = then: nothing that `{ts.links.above.name}` takes tells of it in {further} cycles more",
+            err=True,
+        )
+
+
+def _further_rows(systems: Mapping[str, TransitionSystem], then: Consequence) -> tuple[TimeLineRow, ...]:
+    """Return the rows of a run that the finding's own does not have."""
+    every = rows(systems, then.run)
+    later = tuple(row for row in every if row.tick > then.run.broken_at)
+    return later if then.shared else (*beginnings(systems, then.run), *every)
+
+
+def _say_time_line(shown: Sequence[TimeLineRow]) -> None:
+    if not shown:
+        return
+    with io.StringIO() as text:
+        Console(file=text, width=_WIDTH, no_color=True, highlight=False).print(_time_line(shown))
+        click.echo(
+            "\n".join(f"  {line.rstrip()}" for line in text.getvalue().replace(_HARD, " ").splitlines()),
+            err=True,
+        )
+
+
+def _time_line(shown: Sequence[TimeLineRow]) -> Table:
+    """A row a cycle: the line that matched, the inputs that changed, what else changed, and what went wrong."""
+    several = len({row.level for row in shown}) > 1
+    table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
+    for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
+        table.add_column(heading, overflow="fold")
+    for row in shown:
+        takes, leaves = (
+            ", ".join(_unbroken(f"{name} = {value}") for name, value in changed.items())
+            for changed in (row.takes, row.leaves)
+        )
+        ran = "\n".join(row.ran) if row.tick else row.line
+        ran += f"\n! {row.wrong}" if row.wrong else ""
+        table.add_row(str(row.tick or ""), *((row.level,) if several else ()), ran, takes, leaves)
+    return table
+
+
+def _unbroken(text: str) -> str:
+    """On one line, unless it is too long for a column: then it may break at its spaces, and not in a name."""
+    return text.replace(" ", _HARD) if len(text) <= _LONG else text
+
+
+def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> dict[str, Any]:
+    """Return what is not proved, its run, and what follows it, as JSON."""
+    finding = explanation.finding
+    return {
+        "level": explanation.level,
+        "severity": "warning" if explanation.warns else "error",
+        "what": explanation.obligation.sort.value,
+        "table": explanation.obligation.table,
+        "name": explanation.obligation.name,
+        "says": _stated(systems, explanation),
+        "lines": list(explanation.obligation.lines),
+        "reproduces": finding is not None and not explanation.beside,
+        "beside": list(explanation.beside),
+        "restarted": finding is not None and finding.restarted,
+        "supposes": {owner: list(names) for owner, names in explanation.supposes.items()},
+        "notes": list(explanation.notes),
+        "lap": 0 if finding is None else finding.lasso,
+        "time_line": []
+        if finding is None
+        else [asdict(row) for row in (*beginnings(systems, finding), *rows(systems, finding))],
+        "supposed": []
+        if explanation.supposed is None
+        else [
+            asdict(row)
+            for row in (*beginnings(systems, explanation.supposed), *rows(systems, explanation.supposed))
+        ],
+        "follows": [
+            {
+                "how": then.how.value,
+                "what": told(systems[then.level], then),
+                "cycle": then.cycle,
+                "takes": dict(spelled_leaves(systems[then.level], then.report)),
+                "time_line": [
+                    asdict(row) for row in (*beginnings(systems, then.run), *rows(systems, then.run))
+                ],
+            }
+            for then in explanation.follows or ()
+        ],
+        "helps": list(explanation.helps),
+        "helps_together": explanation.together,
+        "others": list(explanation.others),
+        "log": "" if explanation.log is None else str(explanation.log),
+    }

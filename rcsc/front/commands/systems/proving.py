@@ -1,0 +1,448 @@
+"""What `rcsc prove` does: proves the levels of a system together, and says what it found."""
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.cache import Cache
+from rcsc.base.host.files import write_atomically
+from rcsc.compose.contract.beginning import BadStartError, Starts, starts
+from rcsc.compose.contract.claims import CONTRACT
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.variants import VARIANTS
+from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain, file_name
+from rcsc.compose.counterexample.finding import Finding
+from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
+from rcsc.compose.counterexample.trace import usual_length
+from rcsc.compose.invariant.cubes import as_condition, shown
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.level import LevelProof, certificate
+from rcsc.compose.proof.system import (
+    SystemProof,
+    lines_in,
+    prove_transition_systems,
+    read_systems,
+)
+from rcsc.driver.outline import keep_lines
+from rcsc.driver.unchanged import digest_at
+from rcsc.front.commands.shared.options import cores
+from rcsc.front.commands.shared.proved import (
+    as_json,
+    assumptions,
+    claim,
+    confirmed,
+    in_context,
+    left_out,
+    named,
+    not_looked_at,
+    pauses,
+    reaction,
+    standing,
+    summary,
+    trusted,
+    trusting,
+)
+from rcsc.front.commands.shared.show import Progress, UnwritableError
+from rcsc.front.commands.systems.explained import explanation_as_json, say_explanation
+from rcsc.lang.model import Kind
+from rcsc.proof.solvers.options import Limits
+from rcsc.run.description import Description, description
+
+_WORTH_PROCESSES = 40
+"""Lines of the levels' tables from which several processes are quicker than one: each takes a second to begin."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What `rcsc prove` is asked: its options, as they are called there.
+
+    Attributes:
+        variants: Rules that are off.
+    """
+
+    only: tuple[str, ...]
+    steps: int
+    jobs: int | None
+    cycles: int | None
+    further: int
+    begins: tuple[str, ...]
+    logs: Path | None
+    freeze: Path | None
+    variants: tuple[str, ...]
+    certificate: Path | None
+    confirms: bool
+    progress: bool
+    strict: bool
+    invariants: bool
+    as_json: bool
+
+
+def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) -> int:
+    """Prove the levels of a system, say what was found, and return the exit status.
+
+    Under the key is kept what is to be printed where nothing has changed, if all is proved.
+    """
+    stood = digest_at(str(path))
+    systems, loaded = read_systems(path)
+    unknown = [name for name in asked.only if name not in systems]
+    if unknown:
+        raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(systems)}")
+    length = usual_length(systems.values()) if asked.cycles is None else asked.cycles
+    search = _Search(length, asked.further, _starts(systems, asked.begins))
+    for name in asked.variants:
+        systems = {level: ts.of(VARIANTS[name](ts.program)) for level, ts in systems.items()}
+    effort = Effort(limits=Limits.of(asked.steps))
+    names = asked.only or tuple(systems)
+    with _LevelProgress(names, wanted=asked.progress) as done:
+        proof = prove_transition_systems(
+            systems, effort, asked.jobs or _jobs([systems[name] for name in names]), names, done, cache
+        )
+    if asked.certificate is not None:
+        _write(asked.certificate, systems, proof)
+    if not asked.as_json:
+        _say(_lines(path, systems, proof, asked))
+    keep = _Keep(path, asked.logs, asked.freeze, asked.variants)
+    explanations = _explanations(systems, proof, search, keep, quiet=asked.as_json)
+    if asked.as_json:
+        _say(_lines(path, systems, proof, asked, explanations))
+    _say_not_agreed(proof)
+    refused = _refused(systems, proof, quiet=asked.as_json) if asked.confirms else []
+    if refused or any(explanation.bug for explanation in explanations):
+        return 3
+    status = 0 if proof.proved and (proof.whole or not asked.strict) else 1
+    status = max(status, summary(proof).status(strict=asked.strict))
+    if cache is not None and not status and not explanations:
+        keep_lines(cache, path, key, tuple(_lines(path, systems, _recalled(proof), asked)), stood, loaded)
+    return status
+
+
+def _say(lines: Iterable[str]) -> None:
+    for line in lines:
+        click.echo(line)
+
+
+def _recalled(proof: SystemProof) -> SystemProof:
+    """Return the proof as one of which nothing had to be proved."""
+    return replace(proof, levels=tuple(replace(level, cached=True) for level in proof.levels), seconds=0.0)
+
+
+def _lines(
+    path: Path,
+    systems: dict[str, TransitionSystem],
+    proof: SystemProof,
+    asked: Asked,
+    explanations: Sequence[Explanation] = (),
+) -> Iterator[str]:
+    """Yield what is printed of a proof; explanations are part of it as JSON, and else printed by themselves."""
+    if asked.as_json:
+        yield json.dumps(_as_json(proof, systems, explanations), indent=2)
+        return
+    yield summary(proof).line(strict=asked.strict)
+    for level_proof in proof.levels:
+        yield from _of_level(systems[level_proof.level], proof, level_proof)
+    if asked.invariants:
+        yield from _invariants(systems, proof)
+    yield from _agreements(proof)
+    yield from _whole(systems, proof)
+    yield from _unconnected(systems, description(path))
+
+
+def _jobs(levels: Iterable[TransitionSystem]) -> int:
+    """How many levels to prove at once where nobody says."""
+    return cores() if sum(map(lines_in, levels)) >= _WORTH_PROCESSES else 1
+
+
+class _LevelProgress:
+    """Name each level on standard error as it is done, and on a terminal those that are still to come."""
+
+    def __init__(self, names: Sequence[str], *, wanted: bool) -> None:
+        self._left = list(names)
+        self._line = Progress()
+        self._wanted = wanted or self._line.shown
+
+    def __enter__(self) -> Callable[[LevelProof], None]:
+        self._doing()
+        return self._done
+
+    def __exit__(self, *_: object) -> None:
+        self._line("")
+
+    def _doing(self) -> None:
+        self._line(f"proving {', '.join(self._left)}" if self._left else "")
+
+    def _done(self, proof: LevelProof) -> None:
+        self._line("")
+        count = f"{len(proof.verdicts) - len(proof.open)} of {len(proof.verdicts)} found proved"
+        if self._wanted:
+            click.echo(f"level {proof.level}: {count}, {proof.seconds:.1f} s", err=True)
+        self._left.remove(proof.level)
+        self._doing()
+
+
+def _refused(systems: dict[str, TransitionSystem], proof: SystemProof, *, quiet: bool) -> list[str]:
+    """List the questions that cvc5 does not answer as Z3 did, and say how many there were."""
+    refused = []
+    for level in proof.levels:
+        answers = confirmed(systems[level.level], level)
+        wrong = [name for name, same in answers.items() if not same]
+        refused += wrong
+        good = len(answers) - len(wrong)
+        click.echo(
+            f"level {level.level}: cvc5 says the same of {good} of {len(answers)} questions", err=quiet
+        )
+        for name in wrong:
+            click.echo(
+                f"error[{Code.SOLVERS_DISAGREE.value}]: level `{level.level}`: cvc5 does not confirm `{name}`",
+                err=True,
+            )
+    return refused
+
+
+def _of_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> Iterator[str]:
+    """One level: its assumptions first, then what else is proved of it, each with what it rests on that is not."""
+    declared = {str(assumption.name): assumption.standing.value for assumption in ts.program.assumptions}
+    found_before = ", by an earlier run" if proof.cached else ""
+    yield click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}"
+    for sort in Sort:
+        obligations = [obligation for obligation, _ in proof.verdicts if obligation.sort is sort]
+        if sort is Sort.ASSUMPTION:
+            for obligation in obligations:
+                verdict = standing(whole, proof.level, obligation.key)
+                proved = whole.of(proof.level, obligation.key).proved
+                as_declared = "" if proved else f"{declared[obligation.name]}: "
+                together = " of the levels together" if verdict in {"not proved", "undecided"} else ""
+                yield f"  {obligation.table:28} {obligation.name:24} {as_declared}{verdict}{together}"
+        elif sort in {Sort.INVARIANT, Sort.PROPERTY}:
+            for obligation in obligations:
+                yield (
+                    f"  {sort.value:28} {obligation.name:24} {standing(whole, proof.level, obligation.key)}"
+                )
+        elif obligations:
+            good = [obligation for obligation in obligations if whole.of(proof.level, obligation.key).proved]
+            trusts = trusting(whole, proof.level, [obligation.key for obligation in good])
+            yield f"  {sort.value}: {len(good)} of {len(obligations)} proved{trusts}"
+            for obligation in obligations:
+                if obligation not in good:
+                    yield (
+                        f"    {obligation.table or obligation.name or 'within a cycle'}: {standing(whole, proof.level, obligation.key)}"
+                    )
+    for line in not_looked_at(proof):
+        yield f"  {line}"
+    many = len(proof.clauses)
+    yield (
+        f"  invariant: {many} clauses over {len(proof.predicates)} features; {proof.walked} states walked, {proof.learnt} learnt"
+    )
+    for line in in_context(ts, whole, proof):
+        yield f"  {line}"
+
+
+def _invariants(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
+
+    for level in proof.levels:
+        yield f"invariant of level {level.level}: never"
+        for clause in level.clauses:
+            yield f"  {shown(level.predicates, clause)}"
+        program = systems[level.level].program
+        own = {
+            str(leaf)
+            for declared in program.declared
+            if declared.kind is not Kind.INPUT
+            for leaf in declared.leaves
+        }
+        if condition := as_condition(level.predicates, level.clauses, own):
+            yield "of it, what a program can say of its own values:"
+            yield f"  invariant of_{level.level} : {condition}"
+
+
+def _whole(systems: dict[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
+
+    yield from (
+        *reaction(systems, proof),
+        *pauses(systems),
+        assumptions(proof),
+        *trusted(proof),
+        *left_out(proof),
+    )
+    yield f"{proof.seconds:.1f} s in all"
+
+
+def _unconnected(systems: Mapping[str, TransitionSystem], system: Description) -> Iterator[str]:
+    """Which inputs nothing fills, and which outputs nothing takes: perhaps a buffer was forgotten."""
+    named = {
+        kind: [
+            f"{name}.{declared.name}"
+            for name, ts in systems.items()
+            for declared in ts.program.declared
+            if declared.kind is kind
+        ]
+        for kind in (Kind.INPUT, Kind.OUTPUT)
+    }
+    if missing := system.unfilled(named[Kind.INPUT]):
+        yield f"no buffer fills {', '.join(f'`{name}`' for name in missing)}: proved for any value"
+    if idle := system.untaken(named[Kind.OUTPUT]):
+        yield f"no buffer takes {', '.join(f'`{name}`' for name in idle)}"
+
+
+def _agreements(proof: SystemProof) -> Iterator[str]:
+
+    if proof.agreements:
+        yield "between the levels"
+    for agreement in proof.agreements:
+        lacks = named(
+            proof, agreement.level, proof.of(agreement.level, (CONTRACT, "", agreement.record)).lacks
+        )
+        standing = "kept by: " if agreement.outside else "NOT " if not agreement.holds else ""
+        standing += f"only if {lacks}: " if agreement.holds and lacks else ""
+        yield f"  {agreement.level} assumes that {agreement.assumed}"
+        yield f"    {standing}{agreement.reason}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Keep:
+    """Where findings are kept: the system's description, folders of logs and of cases, and the rules that are off."""
+
+    system: Path
+    logs: Path | None
+    cases: Path | None
+    variants: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """Runs that are searched: of how many cycles, followed on for how many, and with which initial values."""
+
+    cycles: int
+    further: int
+    starts: Starts
+
+
+def _starts(systems: dict[str, TransitionSystem], begins: Sequence[str]) -> Starts:
+    """Read the initial values that runs are searched from."""
+    try:
+        return starts(systems, ", ".join(begins))
+    except BadStartError as error:
+        raise click.UsageError("; ".join((f"--where: {error}", *error.helps))) from error
+
+
+def _explanations(
+    systems: dict[str, TransitionSystem],
+    proof: SystemProof,
+    search: _Search,
+    keep: _Keep,
+    *,
+    quiet: bool,
+) -> list[Explanation]:
+    """What is not proved, each with its shortest trace where there is one."""
+    settings = TraceSettings(
+        description(keep.system),
+        search.cycles,
+        altered=bool(keep.variants),
+        log=keep.logs,
+        further=search.further,
+        starts=search.starts,
+    )
+    explanations = []
+    try:
+        for explanation in explain(systems, proof, settings):
+            explanations.append(explanation)
+            if keep.cases is not None and explanation.finding is not None and not explanation.beside:
+                _freeze(systems, explanation.finding, keep.cases, keep)
+            if not quiet:
+                say_explanation(systems, explanation, search.cycles, search.further)
+    except OSError as error:
+        raise UnwritableError(
+            str(error.filename or keep.logs), error.strerror or "no reason given"
+        ) from error
+    return explanations
+
+
+def _freeze(systems: dict[str, TransitionSystem], finding: Finding, folder: Path, keep: _Keep) -> None:
+
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{description(keep.system).name}_{file_name(finding)}.json"
+    write_atomically(path, frozen(finding, systems, keep.system, path, keep.variants).encode())
+
+
+def run_cases(cases: tuple[Path, ...]) -> int:
+    """Run frozen cases; return the exit status."""
+    wrong = 0
+    for path in cases:
+        case = read_case(path)
+        breaks = case_breaks(case)
+        outcome = f"level `{case.level}`: {case.obligation.shown}: {'broken' if breaks else 'kept'}"
+        if breaks is case.expects_broken:
+            click.echo(f"{path}: {outcome}")
+        else:
+            wrong += 1
+            click.echo(f"error[{Code.FOUND_AGAIN.value}]: {path}: {outcome}", err=True)
+    return 1 if wrong else 0
+
+
+def _say_not_agreed(proof: SystemProof) -> None:
+
+    for agreement in proof.agreements:
+        if not agreement.holds:
+            click.echo(
+                f"error[{Code.NOT_AGREED.value}]: level `{agreement.level}` assumes that {agreement.assumed}",
+                err=True,
+            )
+
+
+def _write(folder: Path, systems: dict[str, TransitionSystem], proof: SystemProof) -> None:
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for level in proof.levels:
+            for name, text in certificate(systems[level.level], level).items():
+                write_atomically(folder / f"{level.level} {name}.smt2".replace(" ", "_"), text.encode())
+    except OSError as error:
+        raise UnwritableError(str(folder), error.strerror or "no reason given") from error
+
+
+def _as_json(
+    proof: SystemProof, systems: dict[str, TransitionSystem], explanations: Sequence[Explanation]
+) -> dict[str, Any]:
+
+    return {
+        "proved": proof.proved,
+        "whole": proof.whole,
+        "counts": asdict(summary(proof)),
+        "findings": [explanation_as_json(systems, explanation) for explanation in explanations],
+        "levels": [
+            {
+                "level": level.level,
+                "goals": [
+                    {
+                        "what": obligation.sort.value,
+                        "table": obligation.table,
+                        "name": obligation.name,
+                        **claim(proof, level.level, obligation.key),
+                    }
+                    for obligation, _ in level.verdicts
+                ],
+                "not_looked_at": [
+                    {"what": each.sort.value, "table": each.table, "missing": each.missing}
+                    for each in level.unstated
+                ],
+                "clauses": len(level.clauses),
+                **as_json(proof, level),
+            }
+            for level in proof.levels
+        ],
+        "agreements": [
+            {
+                "level": agreement.level,
+                "assumed": agreement.assumed,
+                "reason": agreement.reason,
+                "holds": agreement.holds,
+                "outside": agreement.outside,
+            }
+            for agreement in proof.agreements
+        ],
+    }

@@ -1,0 +1,453 @@
+"""`rcsc run`: a system with its plant, by a script of orders, on the generated executors."""
+
+import contextlib
+import shlex
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.children import scratch
+from rcsc.base.host.files.read import content, json_of
+from rcsc.base.host.trust import Agreement
+from rcsc.desk.shell.opening import Opening
+from rcsc.front.commands.shared.extras import need
+from rcsc.front.commands.shared.played import with_ticks
+from rcsc.front.commands.shared.stopped import Ending, Interrupted, Stopped
+from rcsc.front.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLANT, SYSTEM, made, meant
+from rcsc.front.commands.systems.studio import serve
+from rcsc.lang.project import project_root
+from rcsc.run.description import BadDescription, Description, description
+from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
+from rcsc.run.orders.script import BadScript
+from rcsc.run.orders.stopped import NotKept, StoppedRuns
+from rcsc.run.plant.staging import StageOrder, staged, standing
+from rcsc.run.processes.serve import Factory
+from rcsc.run.processes.supervisor import Supervisor, run_processes
+from rcsc.run.signature import Signature
+from rcsc.run.system import assemble, signatures
+from rcsc.views.pages.report import report
+from rcsc.views.pages.witness import RunWitness
+
+if TYPE_CHECKING:
+    from rcsc.run.plant.staged import Staged
+
+UNORDERED_TICKS = 1000
+"""Cycles of a run that no script ends."""
+WATCHED_RATE = 4.0
+"""How many times as fast as the clock processes and a page that is watched run, where nobody says."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """What the user asked for.
+
+    Attributes:
+        title: As the user called it.
+        order: System, plant, script and database by name.
+        rate: How many times as fast as the clock; None for as fast as it goes.
+        most: Cycles at most; None where nobody says.
+        again: What to type for the same run; how it begins is to be added.
+    """
+
+    title: str
+    path: Path
+    order: StageOrder
+    kind: Literal["c", "python"]
+    log: Path | None
+    report: Path | None
+    rate: float | None
+    most: int | None
+    quiet: bool
+    again: str
+
+
+@click.command(
+    "run",
+    epilog="""\b
+Examples:
+  rcsc run my_robot                      the system in a folder, with the script that it names
+  rcsc run my_robot --script dock.csv    with other orders
+  rcsc run my_robot --plant base.py      with another plant
+  rcsc run my_robot --rate 1             in real time
+  rcsc run make_boxt                     Fig. 7, corrected, to the end: a script of the system that is here
+  rcsc run make_boxt_printed             as printed: refused at row 22
+  rcsc run make_boxt --plant kinematic   without physics
+  rcsc run make_boxt --log boxt.mcap     keep every cycle
+  rcsc run make_boxt --report boxt.html  a page about it
+  rcsc run make_boxt --live              in the studio's page
+  rcsc run make_boxt --processes         each level in a process of its own
+  rcsc run make_boxt --resume            go on from the row that stopped it""",
+)
+@click.argument("target", metavar="[SYSTEM|SCRIPT]", required=False)
+@SYSTEM
+@click.option("--script", default=None, metavar="SCRIPT",
+              help="The orders: a CSV or TOML file, or the name of one beside the system or in its scripts/.")  # fmt: skip
+@PLANT
+@EXECUTOR
+@DATABASE
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
+              help="Of what is random in the plant; the same seed gives the same log.")  # fmt: skip
+@click.option("--fault", "faults", multiple=True, metavar="NAME",
+              help="A fault of the plant that is on from the first cycle (repeatable).")  # fmt: skip
+@click.option("--cycles", type=click.IntRange(min=1), default=None, metavar="N",
+              help=f"How many cycles at most; without a script {UNORDERED_TICKS}, if nobody says.")  # fmt: skip
+@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Where the complete state of every cycle is kept (MCAP); else in .rcsc-cache beside the system.")  # fmt: skip
+@click.option("--report", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Write a page about the run: its ticks, pictures, curves, lines, timing; one file that needs nothing else.")  # fmt: skip
+@click.option("--live", is_flag=True,
+              help="Run it in the studio: a page for a browser on this machine, at --rate, until Ctrl-C.")  # fmt: skip
+@COMPILES
+@click.option("--processes", is_flag=True,
+              help="Each level in a process of its own, over shared memory, nothing else changed.")  # fmt: skip
+@click.option("--rate", type=click.FloatRange(min=0.1, max=20), default=None, metavar="N",
+              help=f"Times as fast as the clock; else as fast as it goes, with --processes or --live {WATCHED_RATE:g}.")  # fmt: skip
+@click.option("--from-row", type=click.IntRange(min=1), default=None, metavar="N",
+              help="Begin at row N, as if the rows before were done; with --resume, those from the row that stopped.")  # fmt: skip
+@click.option("--resume", "resumes", is_flag=True,
+              help="Go on from the row that stopped the last run, where the plant can be put back as it stood.")  # fmt: skip
+@click.option("-q", "--quiet", is_flag=True, help="Only what stops the script.")
+def command(  # noqa: PLR0913, PLR0917  # as many as there are options
+    target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str,
+    database: Path | None, seed: int, faults: tuple[str, ...], cycles: int | None, log: Path | None, report: Path | None, live: bool,
+    compiles: bool, processes: bool, rate: float | None, from_row: int | None, resumes: bool, quiet: bool,
+) -> int:  # fmt: skip
+    """Run SYSTEM with its plant and its script, or SCRIPT in the system that is here.
+
+    SYSTEM is a description (system.toml) or a folder that has one. What changed is proved and compiled, then the generated
+    executors run with what stands outside: a class in Python, a model for MuJoCo, or nothing. The script's rows are ordered one
+    after the other, and what became of each is printed. A row that fails stops the script with its reason; the level is told
+    to rest.
+    """
+    if processes and (resumes or live or report or cycles or log):
+        raise click.UsageError(
+            "--resume, --live, --report, --log and --cycles are of one process; with --processes, use --from-row"
+        )
+    if live and (resumes or from_row or report or cycles or log):
+        raise click.UsageError(
+            "--resume, --from-row, --report, --log and --cycles are of a run that no page leads; leave --live out"
+        )
+    if live:
+        need("studio")
+    path, named = meant(target, system, script)
+    if not made(path, compiles=compiles, quiet=quiet):
+        return 1
+    described = description(path)
+    order = StageOrder(
+        str(path),
+        plant or "",
+        named or (str(described.script) if described.script else ""),
+        str(database or ""),
+        seed,
+        faults,
+    )
+    kind: Literal["c", "python"] = "c" if executor == "c" else "python"
+    if live:
+        opening = Opening(
+            path, kind, order.plant, order.script, seed=seed, database=order.database, faults=faults
+        )
+        serve(opening, Agreement(Path(project_root(str(path))), given=True), runs_at=rate or WATCHED_RATE)
+        return 0
+    paced = rate or (WATCHED_RATE if processes else None)
+    again = _command(target, system, script, database, executor, plant)
+    title = named or described.name
+    asked = RunOptions(title, path, order, kind, log, report, paced, cycles, quiet, again)
+    try:
+        return _apart(asked, from_row) if processes else _run(asked, from_row, resumes)
+    except ChildProcessError as error:
+        raise Stopped(Code.PROCESS_LOST, str(error), "what levels say as they end stands above") from error
+
+
+def _command(
+    target: str | None,
+    system: Path | None,
+    script: str | None,
+    database: Path | None,
+    executor: str,
+    plant: str | None,
+) -> str:
+    """What to type for the same run; how it begins is to be added."""
+    words = ["rcsc", "run", *([target] if target else [])]
+    words += ["--system", str(system)] if system else []
+    words += ["--script", script] if script else []
+    words += ["--database", str(database)] if database else []
+    words += ["--executor", executor] if executor != "c" else []
+    words += ["--plant", plant] if plant else []
+    return shlex.join(words)
+
+
+def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
+    """The run itself, in this process.
+
+    Raises:
+        CodedError: Something is not in order, and nothing has moved; or a row was not done.
+        StateTableError: A level met a fault that the proofs exclude.
+        Interrupted: The user, or the system, ended it.
+    """
+    system = description(asked.path)
+    signs = signatures(system)
+    stage = staged(asked.order, system, signs)
+    running = assemble(system, asked.kind, stage.queries, standing(stage, system, signs))
+    run = ScriptedRun(running, stage.operator)
+    _place(run, stage.resume, from_row, resumes)
+    witness = stage.witness(run) if stage.witness else RunWitness(run, stage.pictures)
+    witness.film = asked.report is not None
+    ending = Ending()
+    with _recorded(run, asked, ending) as log:
+        if asked.rate is not None:
+            running.watch.append(_Pace(system.tick_ms / 1000 / asked.rate))
+        running.watch.append(witness)
+        try:
+            with ending.inside():
+                seconds = _watch(run, asked)
+        except KeyboardInterrupt as error:
+            raise _interrupted(run, log) from error
+    if asked.report is not None:
+        _write_report(asked.report, witness, log, asked, seconds)
+    return _closing(witness, stage.resume, asked, seconds, log)
+
+
+def _place(run: ScriptedRun, resume: StoppedRuns | None, from_row: int | None, resumes: bool) -> None:
+    """Puts the run where it is to begin.
+
+    Raises:
+        BadScript: There is no such row.
+        CodedError: There is nothing to go on from.
+    """
+    _check_row(run, from_row)
+    if resumes and resume is None:
+        why = (
+            "this plant cannot be put back as it stood"
+            if run.operator
+            else "no script is named to go on with"
+        )
+        raise Stopped(Code.NOT_RESUMED, why, "`--from-row N` begins anew at row N")
+    if resume is not None and resumes:
+        resume.go_on(run)
+    elif resume is not None:
+        resume.forget()  # what stood somewhere else begins anew
+    if from_row is not None and run.operator is not None:
+        run.operator.begin_at(from_row - 1)
+
+
+def _check_row(run: ScriptedRun, from_row: int | None) -> None:
+    rows = 0 if run.operator is None else len(run.operator.rows)
+    if from_row is not None and from_row > rows:
+        raise BadScript(f"the script has {rows} rows, and none is {from_row}")
+
+
+# --- while it runs ---
+
+
+@contextlib.contextmanager
+def _recorded(run: ScriptedRun, asked: RunOptions, ending: Ending) -> Iterator[Path]:
+    """Writes the log, cycle by whole cycle; its path."""
+    from rcsc.run.log.recorder import (
+        Recorder,  # of an extra; a plant that needs a larger one has said so by now
+    )
+
+    system = run.system.description
+    path = asked.log or system.database.parent / ".rcsc-cache" / f"{system.name}.mcap"
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        recorder = Recorder(run.system, path)
+    except OSError as error:
+        raise BadDescription(f"the log {path} cannot be written: {error.strerror}") from error
+    run.system.watch.append(ending.whole(recorder))
+    try:
+        yield path
+    finally:
+        recorder.close()
+
+
+class _Pace:
+    """Waits after each cycle until the clock has come as far."""
+
+    def __init__(self, cycle_s: float) -> None:
+        self._cycle_s, self._next = cycle_s, time.monotonic()
+
+    def __call__(self, system: object, due: object) -> None:  # noqa: ARG002  # what all who watch are given
+        self._next = max(self._next + self._cycle_s, time.monotonic() - 1.0)
+        time.sleep(max(0.0, self._next - time.monotonic()))
+
+
+def _watch(run: ScriptedRun, asked: RunOptions) -> float:
+    """Runs to the end, and says what becomes of each row; the seconds that it took."""
+    begun = time.perf_counter()
+    for result in run.steps(asked.most or (UNORDERED_TICKS if run.operator is None else MOST_TICKS)):
+        if not asked.quiet:
+            _say(result.row.number, result.row.text, result.state, result.reason, result.ticks)
+    return time.perf_counter() - begun
+
+
+def _interrupted(run: ScriptedRun, log: Path) -> Interrupted:
+    """The end of a run whose plant, extern procedure or script the user waited for no longer, or that was long enough."""
+    done = run.system.tick
+    message = f"interrupted in cycle {done + 1}; the log holds the {done - run.first_tick} before it"
+    return Interrupted(Code.SCRIPT_STOPPED, message, f"`rcsc log {shlex.quote(str(log))}` shows them")
+
+
+def _say(number: int, text: str, state: str, reason: str, ticks: int) -> None:
+    shown, why = (state, "") if state != "done" else (click.style("done", fg="green"), reason)
+    click.echo(f"{number:3}  {text:42} {shown}  {ticks:5} cycles{f'  ({why})' if why else ''}")
+    sys.stdout.flush()
+
+
+# --- with processes ---
+
+
+def _apart(asked: RunOptions, from_row: int | None) -> int:
+    """The same with a process for each level."""
+    system = description(asked.path)
+    rows = _checked_apart(asked, system, signatures(system), from_row)
+    with scratch("run") as folder:
+        ends = _rows_apart(asked, system, (from_row or 1) - 1, folder / "results")
+    if ends and ends[-1][2] != "done":
+        number, text, state, reason, _ = ends[-1]
+        raise Stopped(
+            Code.SCRIPT_STOPPED,
+            f"row {number}, {text}: {state}: {reason}",
+            f"mend the cause, then begin anew: {asked.again} --processes --from-row {number}",
+        )
+    if rows > len(ends) + (from_row or 1) - 1:
+        raise Stopped(Code.SCRIPT_STOPPED, f"the plant ended the run in row {len(ends) + (from_row or 1)}")
+    return 0
+
+
+def _checked_apart(
+    asked: RunOptions, system: Description, signs: dict[str, Signature], from_row: int | None
+) -> int:
+    """How many rows there are; what is wrong with plant and script is told before a process is begun."""
+    stage: Staged = staged(asked.order, system, signs)
+    if stage.operator is None:
+        raise Stopped(
+            Code.BAD_SCRIPT,
+            "processes run until a script ends, and none is named",
+            "`--script FILE` names one",
+        )
+    rows = len(stage.operator.rows)
+    if from_row is not None and from_row > rows:
+        raise BadScript(f"the script has {rows} rows, and none is {from_row}")
+    return rows
+
+
+def _rows_apart(asked: RunOptions, system: Description, first: int, results: Path) -> list[list[Any]]:
+    """Runs the processes to the end: of each row its number, text, state, reason and ticks; `results` is where they travel."""
+    outside = Factory("rcsc.run.plant.staging:outside", (asked.order, str(results), first))
+    queries = Factory("rcsc.run.plant.staging:queries", (asked.order,))
+    rows: list[list[Any]] = []
+    rate = asked.rate or WATCHED_RATE
+    if not asked.quiet:
+        click.echo(f"each level in a process of its own, {rate:g} times as fast as the clock")
+
+    def watch(_: Supervisor) -> None:
+        show()
+
+    def show() -> None:
+        new = [json_of(line) for line in content(results).decode().splitlines()[len(rows) :]]
+        for number, text, state, reason, ticks in [] if asked.quiet else new:
+            _say(number, text, state, reason, ticks)
+        rows.extend(new)
+
+    results.touch()
+    run_processes(system, asked.kind, {"outside": outside}, queries=queries, rate=rate, watch=watch)
+    show()
+    return rows
+
+
+# --- when it is over ---
+
+
+def _write_report(path: Path, witness: RunWitness, log: Path, asked: RunOptions, seconds: float) -> None:
+    from rcsc.run.log.read import read  # of an extra, which the recorder had
+
+    try:
+        report(path, with_ticks(witness.story(asked.title, seconds), read(log), witness.drawn))
+    except OSError as error:
+        raise BadDescription(f"the report {path} cannot be written: {error.strerror}") from error
+
+
+def _closing(
+    witness: RunWitness, resume: StoppedRuns | None, asked: RunOptions, seconds: float, log: Path
+) -> int:
+    run = witness.run
+    again = _kept(run, resume, asked)
+    if not asked.quiet:
+        for line in (*witness.closing(), *_unconnected(run), _figures(run, seconds)):
+            click.echo(line)
+        here = log.relative_to(Path.cwd()) if log.is_relative_to(Path.cwd()) else log
+        click.echo(f"log: {here}" + (f"; report: {asked.report}" if asked.report else ""))
+    operator = run.operator
+    if operator is None:
+        return 0
+    end = operator.stopped
+    if end is not None:
+        word = "refused" if end.state == "refused" else "failed"
+        raise Stopped(
+            Code.SCRIPT_STOPPED, f"row {end.row.number}, {end.row.text}: {word}: {end.reason}", again
+        )
+    if not operator.over:
+        raise Stopped(
+            Code.SCRIPT_STOPPED,
+            f"row {operator.at + 1} did not end in {run.system.tick - run.first_tick} cycles",
+        )
+    return 0
+
+
+def _unconnected(run: ScriptedRun) -> Iterator[str]:
+    """Which inputs nobody filled and which outputs nobody takes: a buffer, a plant or a script that a newcomer forgot."""
+    system = run.system.description
+    levels = {level.name: level.sign for level in run.system.levels}
+    silent = [
+        wire.target
+        for wire in system.wires
+        if wire.source.partition(".")[0] not in levels and run.system.buffers.latest(wire.source) is None
+    ]
+    missing = [*silent, *system.unfilled(_named(levels, "input"))]
+    if missing:
+        yield f"nobody filled {', '.join(f'`{name}`' for name in missing)}: these inputs stayed as at first"
+    idle = system.untaken(_named(levels, "output"))
+    if idle:
+        yield f"no buffer takes {', '.join(f'`{name}`' for name in idle)}"
+
+
+def _named(levels: Mapping[str, Signature], kind: str) -> list[str]:
+    return [f"{name}.{variable}" for name, sign in levels.items() for variable in sign.variables(kind)]
+
+
+def _figures(run: ScriptedRun, seconds: float) -> str:
+    """How long it took."""
+    system = run.system
+    ticks = system.tick - run.first_tick
+    control_s = ticks * system.description.tick_ms / 1000
+    failed = sum(1 for level in system.levels if level.values[-1])
+    return (
+        f"{ticks} cycles, {control_s:.1f} s of control time in {seconds:.2f} s: {control_s / max(seconds, 1e-9):.0f} times "
+        f"as fast as the clock; {failed} assumptions failed"
+    )
+
+
+def _kept(run: ScriptedRun, resume: StoppedRuns | None, asked: RunOptions) -> str:
+    """Keeps a run that stopped, forgets one that came to its end; what to do about it."""
+    operator = run.operator
+    if operator is None:
+        return ""
+    if operator.stopped is None:
+        if operator.over and resume is not None:
+            resume.forget()
+        return ""
+    row = f"{asked.again} --from-row {operator.at + 1}"
+    if resume is None:
+        return f"mend the cause, then begin anew: {row}"
+    try:
+        resume.keep(run, asked.title)
+    except (OSError, NotKept) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        return f"where it stopped could not be kept: {why}; mend the cause, then begin anew: {row}"
+    return f"its level rests; mend the cause, then: {asked.again} --resume"

@@ -1,0 +1,79 @@
+"""Which lines of a table can match where a condition holds.
+
+In: a program, one of its tables, a condition. Out: yes, no or unknown for each line, by Z3 under the table's assumptions and the declared
+ranges. A line that nobody can tell of is never said to be out of reach.
+"""
+
+from dataclasses import dataclass
+
+from rcsc.lang.meaning import relying
+from rcsc.lang.model import Expr, Program, Table
+from rcsc.proof.relation.steps import assumed
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smt import Answer, Solver, troubles
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.evaluation import TooLongError
+from rcsc.proof.symbolic.execution import Run
+
+
+@dataclass(frozen=True, slots=True)
+class Under:
+    """Lines by name, DEFAULT too, in the table's order.
+
+    Attributes:
+        can: Those that match for some input for which the condition holds.
+        unknown: Those of which nobody could tell within the limits.
+        every: Those that match for no other input.
+    """
+
+    can: tuple[str, ...]
+    unknown: tuple[str, ...]
+    every: tuple[str, ...]
+
+
+def lines_under(program: Program, table: Table, condition: Expr, options: Options) -> Under:
+    """The lines that can match where a condition holds."""
+    program = relying(program)
+    meant = next(each for each in program.tables if each.name == table.name)
+    run = Run(
+        {str(each.name): each for each in program.procedures},
+        {str(each.name): each.type for each in program.variables},
+        {},
+    )
+    names = [str(line.name) for line in meant.every_line]
+    try:
+        known = [run.evaluate(each) for each in assumed(program, meant)]
+        lines = [
+            values.all_of(run.evaluate(test.condition) for test in line.tests if test) for line in meant.lines
+        ]
+        if meant.default is not None:
+            lines.append(values.negation(values.any_of(lines)))
+        wanted = run.evaluate(condition)
+        solver = Solver(options.limits)
+        solver.add(*values.domain(list(values.variables([*known, *lines, wanted]).values())))
+        solver.add(*map(values.term_of, known))
+        inside = [_answer(solver, wanted, line) for line in lines]
+        outside = [_answer(solver, values.negation(wanted), line) for line in lines]
+    except (TooLongError, RecursionError):
+        return Under((), tuple(names), ())
+    except troubles():
+        return Under((), tuple(names), ())
+    told = list(zip(names, inside, outside, strict=True))
+    return Under(
+        tuple(name for name, now, _ in told if now is Answer.SATISFIABLE),
+        tuple(name for name, now, _ in told if now is Answer.UNKNOWN),
+        tuple(
+            name for name, now, else_ in told if (now, else_) == (Answer.SATISFIABLE, Answer.UNSATISFIABLE)
+        ),
+    )
+
+
+def _answer(solver: Solver, *nodes: values.Node) -> Answer:
+    if any(node is values.FALSE for node in nodes):
+        return Answer.UNSATISFIABLE
+    solver.push()
+    try:
+        solver.add(*map(values.term_of, nodes))
+        return solver.check()
+    finally:
+        solver.pop()

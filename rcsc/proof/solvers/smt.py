@@ -1,0 +1,619 @@
+"""Z3 behind a small typed face; its only importer, and only when a question is asked.
+
+In: terms built by the functions here. Out: `Answer`s. A time-out, exhausted memory, an exception and
+`unknown` are all `UNKNOWN`: nobody can take them for a proof.
+"""
+
+import signal
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum, auto
+from fractions import Fraction
+from functools import cache
+from typing import Any, NewType
+
+from rcsc.lang.model import Bool, Real, Scalar, Single, Value
+from rcsc.proof.solvers.options import Limits
+
+Term = NewType("Term", object)
+"""A Z3 expression; only this module looks inside."""
+
+
+class Answer(Enum):
+    """What the solver says of the formulas together."""
+
+    SATISFIABLE = auto()
+    UNSATISFIABLE = auto()
+    UNKNOWN = auto()
+
+
+@cache
+def _z3() -> Any:
+    import z3
+
+    if _threads.is_set():
+        _count_with_care()
+    return z3
+
+
+_threads = threading.Event()
+
+
+def for_threads() -> None:
+    """Let every thread of this process let go of terms, whichever of them asks at the time.
+
+    Python throws away what is in a cycle in whatever thread happens to run, and Z3, unless told, counts there without care: the question
+    that another thread asks meanwhile is answered wrongly, or the process ends. Threads still ask one after the other.
+    """
+    if not _threads.is_set():
+        _threads.set()
+        if "z3" in sys.modules:
+            _count_with_care()
+
+
+def _count_with_care() -> None:
+    z3 = sys.modules["z3"]
+    z3.Z3_enable_concurrent_dec_ref(z3.main_ctx().ref())
+
+
+_cut: list[int] = []
+"""Processor time, in seconds, of each question of this process that the backstop ended."""
+
+
+def cut_short() -> int:
+    """Count this process's questions that the clock ended: no verdict that saw one is kept."""
+    return len(_cut)
+
+
+_open: list[str] = []
+"""Why there was none, of each question of this process without an answer."""
+
+
+def unanswered() -> int:
+    """Count this process's questions that had no answer: where none is added, a larger budget changes nothing."""
+    return len(_open)
+
+
+def leave_open(why: str) -> None:
+    """Count a question that nobody asked, to be asked later."""
+    _open.append(why)
+
+
+@dataclass(
+    slots=True, eq=False
+)  # each is itself: of two that are as far spent, one inside the other, either ends by itself
+class Budget:
+    """What all questions that are asked inside `together` may cost.
+
+    Attributes:
+        left: Steps; with none left nothing more is asked, and every answer is `UNKNOWN`.
+        of_all: Whether it bounds what is done outside Z3, too, where that is charged.
+    """
+
+    left: int
+    of_all: bool = False
+
+    @property
+    def spent(self) -> bool:
+        """Whether there are none left."""
+        return self.left <= 0
+
+
+@dataclass(slots=True, eq=False, kw_only=True)
+class _Until(Budget):
+    """No steps, but something that happens, in place of a budget: for who shows what is known so far, or gives up."""
+
+    over: Callable[[], bool]
+
+    @property
+    def spent(self) -> bool:
+        """Whether it has happened."""
+        return self.over()
+
+
+class _Thread(threading.local):
+    """What a thread's questions may cost: what one gives up is not given up by another."""
+
+    def __init__(self) -> None:
+        self.budgets: list[Budget] = []
+
+
+_own = _Thread()
+WATCH_S = 0.008
+"""A question that nobody waits for any more is broken off within so long, and what Z3 takes to hear of it."""
+_asking: dict[int, bool] = {}
+"""Threads whose question Z3 is at, and whether it was broken off."""
+_breaking = threading.Lock()
+"""Held by who looks whether a question is under way, until he has broken it off; so nothing is broken off that has begun since."""
+
+
+@contextmanager
+def until(over: Callable[[], bool], *, breaks_off: bool = False) -> Iterator[None]:
+    """Inside, nothing more is asked once something is over; every answer is then `UNKNOWN`.
+
+    Args:
+        over: Whether it is.
+        breaks_off: Whether the question under way is broken off, too; `over` is then asked in another thread as well.
+    """
+    ending, left = _Until(sys.maxsize, over=over), threading.Event()
+    watcher = (
+        threading.Thread(target=_watch, args=(over, left, threading.get_ident()), daemon=True)
+        if breaks_off
+        else None
+    )
+    _own.budgets.append(ending)
+    if watcher is not None:
+        watcher.start()
+    try:
+        yield
+    finally:
+        left.set()
+        if watcher is not None:
+            watcher.join()  # whoever asks next is not broken off
+        _own.budgets.remove(ending)
+
+
+def _watch(over: Callable[[], bool], left: threading.Event, asker: int) -> None:
+    while not left.wait(WATCH_S):
+        if over():
+            with _breaking:
+                if asker in _asking:
+                    _asking[asker] = True
+                    _z3().main_ctx().interrupt()
+
+
+def _absorb() -> None:
+    """Ask something that anybody can answer until Z3 does: what is stated before it has heard that it is broken off may be lost."""
+    z3, answer = _z3(), None
+    while answer != z3.sat:
+        solver = z3.Solver()
+        solver.add(z3.Bool("absorbed"))
+        answer = solver.check()
+
+
+@contextmanager
+def together(steps: int, *, of_all: bool = False) -> Iterator[Budget]:
+    """Inside, all questions of all solvers take at most so many steps; with `of_all` what is charged outside Z3, too."""
+    budget = Budget(steps, of_all)
+    with within(budget):
+        yield budget
+
+
+@contextmanager
+def within(budget: Budget) -> Iterator[None]:
+    """Inside, all questions take at most what a budget has left: again for each part of a work that has one in all."""
+    _own.budgets.append(budget)
+    try:
+        yield
+    finally:
+        _own.budgets.remove(budget)
+
+
+def charge(steps: int) -> bool:
+    """Take what a piece of work outside Z3 costs, in its steps, from the budgets that bound both; return whether one is spent."""
+    charged = [budget for budget in _own.budgets if budget.of_all]
+    for budget in charged:
+        budget.left -= steps
+    return any(budget.spent for budget in charged)
+
+
+def spent() -> bool:
+    """Whether no question is asked any more, so that none need be made."""
+    return any(budget.spent for budget in _own.budgets)
+
+
+def gives_up(what: str) -> bool:
+    """Whether something is over (`until`): what takes long outside Z3 asks it, and what is then not looked for counts as left open.
+
+    Args:
+        what: What would be looked for.
+    """
+    if any(isinstance(budget, _Until) and budget.spent for budget in _own.budgets):
+        leave_open(what)
+        return True
+    return False
+
+
+def troubles() -> tuple[type[BaseException], ...]:
+    """Errors of Z3 and exhausted memory, also outside a check: nothing is proved then."""
+    loaded = sys.modules.get("z3")
+    return (MemoryError,) if loaded is None else (MemoryError, loaded.Z3Exception)
+
+
+def _float_sort(kind: Real) -> Any:
+    return _z3().Float32() if isinstance(kind, Single) else _z3().Float64()
+
+
+def variable(name: str, kind: Scalar) -> Term:
+    """A fresh constant: Bool, IEEE double or single, or a mathematical integer (also for enumerations)."""
+    z3 = _z3()
+    if isinstance(kind, Bool):
+        return Term(z3.Bool(name))
+    return Term(z3.FP(name, _float_sort(kind)) if isinstance(kind, Real) else z3.Int(name))
+
+
+def word(name: str, bits: int) -> Term:
+    """A fresh constant for a whole number that is its bits: of masks hundreds of times quicker than an integer.
+
+    Where that is calculated with otherwise, it is the integer that they are, which takes longer: `expressions.words.bits_alone`.
+    """
+    return Term(_z3().BitVec(name, bits))
+
+
+def literal(kind: Scalar, value: Value) -> Term:
+    """A constant of the kind."""
+    z3 = _z3()
+    if isinstance(kind, Bool):
+        return Term(z3.BoolVal(bool(value)))
+    return Term(
+        z3.FPVal(float(value), _float_sort(kind)) if isinstance(kind, Real) else z3.IntVal(int(value))
+    )
+
+
+def member(name: str) -> Term:
+    """A fresh constant for a member of an enumeration, by index, in 16 bits: quicker than an integer."""
+    return Term(_z3().BitVec(name, 16))
+
+
+def member_literal(index: int) -> Term:
+    """A member as a constant; indices are far below the sign bit, so that order is theirs."""
+    return Term(_z3().BitVecVal(index, 16))
+
+
+def number(name: str) -> Term:
+    """A fresh constant for a real number, with no end to its digits."""
+    return Term(_z3().Real(name))
+
+
+def fraction(value: float) -> Term:
+    """A finite double as the number that it is."""
+    return Term(_z3().RealVal(str(Fraction(value))))
+
+
+def as_number(term: Term) -> Term:
+    """An integer among the real numbers."""
+    return Term(_z3().ToReal(_whole(term)))
+
+
+def truth(value: bool) -> Term:
+    """The constant true or false."""
+    return Term(_z3().BoolVal(value))
+
+
+def negation(term: Term) -> Term:
+    """Negate it."""
+    return Term(_z3().Not(term))
+
+
+def all_of(terms: Sequence[Term]) -> Term:
+    """Every one; true when there are none."""
+    return (
+        Term(_z3().And(list(terms))) if terms else truth(True)
+    )  # other solvers do not read `and` of nothing
+
+
+def any_of(terms: Sequence[Term]) -> Term:
+    """At least one; false when there are none."""
+    return Term(_z3().Or(list(terms))) if terms else truth(False)
+
+
+def _whole(term: Term) -> Any:
+    """A whole number as an integer."""
+    z3: Any = _z3()
+    return z3.BV2Int(term) if z3.is_bv(term) else term
+
+
+def _alike(left: Term, right: Term) -> tuple[Any, Any]:
+    """Two whole numbers as terms of one sort: bits where both are, or one is a constant that has no more bits; else integers."""
+    z3: Any = _z3()
+    one: Any = left
+    other: Any = right
+    if z3.is_bv(one) and z3.is_bv(other):
+        wider = max(one.size(), other.size())
+        return z3.ZeroExt(wider - one.size(), one), z3.ZeroExt(wider - other.size(), other)
+    if z3.is_bv(one) and z3.is_int_value(other) and 0 <= other.as_long() < 1 << one.size():
+        return one, z3.BitVecVal(other.as_long(), one.size())
+    if z3.is_bv(other) and z3.is_int_value(one) and 0 <= one.as_long() < 1 << other.size():
+        return z3.BitVecVal(one.as_long(), other.size()), other
+    return _whole(left), _whole(right)
+
+
+def at_point(term: Term, point: Sequence[tuple[Term, Term]]) -> Term:
+    """What is left of a term where constants, each given with a literal of its kind, have these values: mostly true or false."""
+    z3: Any = _z3()
+    return Term(z3.simplify(z3.substitute(term, *(_alike(leaf, value) for leaf, value in point))))
+
+
+def implication(left: Term, right: Term) -> Term:
+    """Left implies right."""
+    return Term(_z3().Implies(left, right))
+
+
+def choice(condition: Term, then: Term, orelse: Term) -> Term:
+    """`then` where the condition holds, else `orelse`."""
+    return Term(then if then is orelse else _z3().If(condition, *_alike(then, orelse)))
+
+
+def equal(left: Term, right: Term, kind: Scalar) -> Term:
+    """Equality of two values of the kind; 0.0 equals -0.0."""
+    if isinstance(kind, Real):
+        return Term(_z3().fpEQ(left, right))
+    a, b = _alike(left, right)
+    return Term(a == b)
+
+
+def at_most(left: Term, right: Term, kind: Scalar) -> Term:
+    """`left <= right`; false comes before true."""
+    z3: Any = _z3()
+    if isinstance(kind, Bool):
+        return Term(z3.Implies(left, right))
+    if isinstance(kind, Real):
+        return Term(z3.fpLEQ(left, right))
+    a, b = _alike(left, right)
+    return Term(z3.ULE(a, b) if z3.is_bv(a) else a <= b)
+
+
+def below(left: Term, right: Term, kind: Scalar) -> Term:
+    """`left < right`; false comes before true."""
+    z3: Any = _z3()
+    if isinstance(kind, Bool):
+        return Term(z3.And(z3.Not(left), right))
+    if isinstance(kind, Real):
+        return Term(z3.fpLT(left, right))
+    a, b = _alike(left, right)
+    return Term(z3.ULT(a, b) if z3.is_bv(a) else a < b)
+
+
+def integer_operation(op: str, left: Term, right: Term) -> Term:
+    """`+ - * / mod` of mathematical integers, the first three also of real numbers; `/` rounds toward zero, `mod` goes with it."""
+    z3: Any = _z3()
+    if op in ("/", "mod") and z3.is_bv(left) and z3.is_int_value(right):
+        by: Any = right
+        if by.as_long() > 0:
+            return part(op, left, by.as_long())
+    a, b = _whole(left), _whole(right)
+    if op in ("+", "-", "*"):
+        return Term({"+": a + b, "-": a - b, "*": a * b}[op])
+    size = z3.If(a >= 0, a, -a) / z3.If(b >= 0, b, -b)
+    quotient = z3.If((a >= 0) == (b > 0), size, -size)
+    return Term(quotient if op == "/" else a - quotient * b)
+
+
+def part(op: str, left: Term, right: int) -> Term:
+    """`/` and `mod` of an integer that is not below zero by one above: of bits of words, which are many, in few terms."""
+    z3: Any = _z3()
+    a: Any = left
+    places = right.bit_length() - 1
+    if not z3.is_bv(a) or right != 1 << places:
+        return Term(_whole(left) / right if op == "/" else _whole(left) % right)
+    if places >= a.size():
+        return Term(z3.IntVal(0)) if op == "/" else left
+    if op == "/":
+        return Term(z3.Extract(a.size() - 1, places, a))
+    return Term(z3.Extract(places - 1, 0, a) if places else z3.IntVal(0))
+
+
+def masked(word: Term, care: int, value: int) -> Term | None:
+    """State that a word has these bits of those that are looked at; None for one that is a number."""
+    z3: Any = _z3()
+    a: Any = word
+    return Term(a & care == value) if z3.is_bv(a) else None
+
+
+def quotient(left: Term, right: float) -> Term:
+    """A real number divided by one that is not zero."""
+    a: Any = left
+    return Term(a / _z3().RealVal(str(Fraction(right))))
+
+
+def float_operation(op: str, left: Term, right: Term) -> Term:
+    """`+ - * /` of doubles, or of singles, rounded to nearest even."""
+    z3: Any = _z3()
+    operation = {"+": z3.fpAdd, "-": z3.fpSub, "*": z3.fpMul, "/": z3.fpDiv}[op]
+    return Term(operation(z3.RNE(), left, right))
+
+
+def minus(term: Term, kind: Scalar) -> Term:
+    """The negative."""
+    return Term(_z3().fpNeg(term) if isinstance(kind, Real) else -_whole(term))
+
+
+def absolute(term: Term, kind: Scalar) -> Term:
+    """The value without its sign."""
+    z3: Any = _z3()
+    if isinstance(kind, Real):
+        return Term(z3.fpAbs(term))
+    a = _whole(term)
+    return Term(z3.If(a < 0, -a, a))
+
+
+def to_float(term: Term, kind: Scalar, target: Real) -> Term:
+    """The nearest double or single, as `target` is, of a term of this kind: an integer, a double or a single."""
+    z3: Any = _z3()
+    if isinstance(kind, Real):
+        return Term(z3.fpFPToFP(z3.RNE(), term, _float_sort(target)))
+    return Term(z3.fpRealToFP(z3.RNE(), z3.ToReal(_whole(term)), _float_sort(target)))
+
+
+def to_integer(term: Term) -> Term:
+    """A finite double or single without its fraction."""
+    z3: Any = _z3()
+    return Term(z3.ToInt(z3.fpToReal(z3.fpRoundToIntegral(z3.RTZ(), term))))
+
+
+class Solver:
+    """One incremental solver.
+
+    Attributes:
+        queries: How often it was asked.
+        refuted: If it remembers: for each unsatisfiable answer, the assertions that are not permanent.
+        names: How many constants stand for terms.
+    """
+
+    def __init__(self, limits: Limits = Limits(), *, remembers: bool = False) -> None:
+        z3 = _z3()
+        z3.set_param("memory_max_size", limits.memory_mb)
+        self._solver: Any = z3.Solver()
+        self._steps = self._given = limits.steps
+        self._solver.set("rlimit", limits.steps)
+        self._cpu_s = self._patience_s = limits.cpu_s
+        self._wait()
+        self._solver.set("random_seed", 0)
+        self.queries = 0
+        self.refuted: list[Term] = []
+        self._remembers = remembers
+        self._added: list[list[Term]] = []
+        self._model: Any = None
+        self.names = 0
+
+    def begins_anew(self, steps: int, seed: int) -> None:
+        """Have each question from now on take so many steps at most, by another way through the same search."""
+        self._steps = steps
+        self._solver.set("random_seed", seed)
+
+    def named(self, term: Term) -> Term:
+        """Return a constant that stands for the term: quicker to read from a model, and to ask of. Call outside `push`."""
+        defined: Any = term
+        self.names += 1
+        constant: Any = _z3().Const(f"named!{self.names}", defined.sort())
+        self._solver.add(constant == term)
+        return Term(constant)
+
+    def switch(self, term: Term) -> Term:
+        """Return a constant under which, assumed in `check`, the term holds; what is learnt meanwhile outlives the question."""
+        asked: Any = term
+        if _z3().is_const(asked):
+            return term
+        self.names += 1
+        constant = Term(_z3().Bool(f"switch!{self.names}"))
+        self.add(implication(constant, term))
+        return constant
+
+    def add(self, *terms: Term) -> None:
+        """Asserts the terms."""
+        self._solver.add(*terms)
+        if self._added:
+            self._added[-1] += terms
+
+    def push(self) -> None:
+        """Remembers what is asserted."""
+        self._solver.push()
+        self._added.append([])
+
+    def pop(self) -> None:
+        """Goes back to what was remembered."""
+        self._solver.pop()
+        self._added.pop()
+
+    def check(self, *assuming: Term) -> Answer:
+        """Whether all asserted terms, and these, hold together for some values."""
+        self._model = None
+        if spent():
+            _open.append("spent")
+            return Answer.UNKNOWN
+        z3 = _z3()
+        self.queries += 1
+        self._give(min([self._steps, *(budget.left for budget in _own.budgets)]))
+        try:
+            answer, why = self._answer(assuming)
+        except (z3.Z3Exception, MemoryError) as error:
+            answer, why = z3.unknown, str(error)
+        if "interrupted" in why and not spent():  # Z3 takes Ctrl-C for itself
+            raise KeyboardInterrupt
+        if answer == z3.unsat and self._remembers:
+            self.refuted.append(all_of([*(term for terms in self._added for term in terms), *assuming]))
+        if answer == z3.sat:
+            return Answer.SATISFIABLE
+        if answer != z3.unsat:
+            _open.append(why)
+        return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
+
+    def _answer(self, assuming: tuple[Term, ...]) -> tuple[Any, str]:
+        """Z3's answer and why there is none; asked again where other processes took the time that it was given."""
+        z3 = _z3()
+        while True:
+            counted = self._count()
+            used_s, passed_s = time.thread_time(), time.monotonic()
+            answer, broken_off = self._asked(assuming)
+            signal.siginterrupt(signal.SIGINT, True)  # Z3 leaves it so that Ctrl-C ends no wait for a worker
+            if broken_off:
+                return z3.unknown, "interrupted"  # whatever Z3 says by then
+            if answer != z3.unknown:
+                self._charge(counted)
+                return answer, ""
+            used_s, passed_s = time.thread_time() - used_s, time.monotonic() - passed_s
+            why = str(self._solver.reason_unknown())
+            if passed_s < 0.9 * self._patience_s or "interrupted" in why:
+                self._charge(counted)
+                return answer, why
+            if used_s >= 0.9 * self._cpu_s:
+                _cut.append(round(used_s))
+                return answer, why
+            self._patience_s *= 4
+            self._wait()
+
+    def _asked(self, assuming: tuple[Term, ...]) -> tuple[Any, bool]:
+        """What Z3 says, and whether it was broken off."""
+        asker, broken_off = threading.get_ident(), False
+        with _breaking:
+            _asking[asker] = False
+        try:
+            answer = self._solver.check(*assuming)
+        finally:
+            with _breaking:
+                broken_off = _asking.pop(asker)
+            if broken_off:
+                _absorb()
+        return answer, broken_off
+
+    def _give(self, steps: int) -> None:
+        """Has Z3 end the next question after so many steps."""
+        if steps != self._given:
+            self._given = steps
+            self._solver.set("rlimit", steps)
+
+    def _count(self) -> int:
+        """Steps that Z3 has counted so far, where anybody wants to know."""
+        return int(self._solver.statistics().get_key_value("rlimit count")) if _own.budgets else 0
+
+    def _charge(self, before: int) -> None:
+        """Takes what a question cost from all budgets; not what an attempt cost that only the clock ended."""
+        used = self._count() - before
+        for budget in _own.budgets:
+            budget.left -= used
+
+    def _wait(self) -> None:
+        """Has Z3 end a question after so much time as passes, which on a busy machine is more than it gets."""
+        self._solver.set("timeout", max(1, round(1000 * self._patience_s)))
+
+    def script(self) -> str:
+        """Spell what is asserted as an SMT-LIB 2 script that ends in `(check-sat)`."""
+        return f"(set-logic ALL)\n{self._solver.to_smt2()}"
+
+    def refutations(self) -> str:
+        """Return a script that is unsatisfiable just if all such answers, one at least, were right; call outside `push`."""
+        self.push()
+        self.add(any_of(self.refuted))
+        script = self.script()
+        self.pop()
+        return script
+
+    def value(self, term: Term, kind: Scalar) -> Value:
+        """The value of a constant in the model of the last satisfiable answer."""
+        z3 = _z3()
+        if self._model is None:
+            self._model = self._solver.model()
+        evaluated = self._model.eval(term, model_completion=True)
+        if isinstance(kind, Bool):
+            return bool(z3.is_true(evaluated))
+        if isinstance(kind, Real):
+            bits = z3.simplify(z3.fpToIEEEBV(evaluated)).as_long()
+            sizes = ("<f", "<I") if isinstance(kind, Single) else ("<d", "<Q")
+            number: float = struct.unpack(sizes[0], struct.pack(sizes[1], bits))[0]
+            return number + 0.0
+        return int(evaluated.as_long())

@@ -1,0 +1,149 @@
+"""Z3 asked what masks, counting and region trees have answered; two queries a table.
+
+In: a table and what was found. Out: whether Z3 agrees.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from enum import Enum, auto
+
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import Expr, Program, Snapshot, Table, Variable
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import WRONG_STEPS, Options
+from rcsc.proof.solvers.smt import Answer, Solver, Term
+from rcsc.proof.symbolic.encode import declared, encode, least_witness
+from rcsc.proof.table.certificate import must_cover
+from rcsc.proof.table.verdict import Gap, Overlap, TableFinding, Undecided, refutes
+
+
+def shown(program: Program, table: Table) -> list[Variable]:
+    """The variables of a witness, in declared order: what the table or its assumptions read."""
+    assumed = (a.condition for a in program.assumptions if a.name in table.assumptions)
+    wanted = set(table.variables).union(*map(read_by, assumed))
+    return [variable for variable in program.variables if variable.name in wanted]
+
+
+class TableSolver:
+    """One solver that knows the table's domain and assumptions, and each line as a literal."""
+
+    def __init__(self, program: Program, table: Table, options: Options) -> None:
+        self.program, self.table = program, table
+        # What nothing here reads has some value in its range, whatever the others have.
+        wanted = set(table.assumptions)
+        assumed = [a.condition for a in program.assumptions if a.name in wanted]
+        tests = [test.condition for test in table.distinct_tests]
+        self.frame, domain = declared(shown(program, table), [*tests, *assumed])
+        self.solver = Solver(options.limits)
+        self.solver.add(*domain, *(encode(condition, self.frame) for condition in assumed))
+        self._lines: dict[int, Term] = {}
+        self._tests: dict[int, Term] = {}
+
+    def line(self, at: int) -> Term:
+        """State that a line matches."""
+        if at not in self._lines:
+            self._lines[at] = smt.all_of(
+                [self._test(test.condition, id(test)) for test in self.table.lines[at].tests if test]
+            )
+        return self._lines[at]
+
+    def _test(self, condition: Expr, key: int) -> Term:
+        if key not in self._tests:
+            self._tests[key] = encode(condition, self.frame)
+        return self._tests[key]
+
+    def none(self) -> Term:
+        """State that no line matches."""
+        return smt.negation(smt.any_of([self.line(at) for at in range(len(self.table.lines))]))
+
+    def witness(self, *terms: Term, spare: smt.Budget | None = None) -> Snapshot | None:
+        """The least input for which the terms hold; None where the solver gives up.
+
+        `spare`, where there is one, is what may be spent to find the least once some input is known.
+        """
+        self.solver.push()
+        self.solver.add(*terms)
+        witness = least_witness(self.solver, shown(self.program, self.table), self.frame, spare)
+        self.solver.pop()
+        return witness
+
+    def holds(self, *terms: Term) -> Answer:
+        """Whether the terms can hold together."""
+        return self.solver.check(*terms)
+
+
+_COSTLY = 60_000
+"""Lines times columns above which Z3 takes more than about a second (`tests/bench`)."""
+_STEPS = 20_000_000
+"""Budget of each question that is asked only because it should be cheap."""
+
+
+class Agreement(Enum):
+    """What Z3 says of the verdict."""
+
+    AGREES = auto()
+    DISAGREES = auto()
+    NOT_ASKED = auto()
+    UNKNOWN = auto()
+
+
+def worth_asking(table: Table, options: Options) -> bool:
+    """Whether Z3 is to be asked, by what it should cost."""
+    if options.solver == "both":
+        return True
+    cells = sum(1 for line in table.lines for test in line.tests if test is not None)
+    return options.solver == "auto" and cells * len(table.lines) <= _COSTLY
+
+
+def confirm(
+    program: Program, table: Table, findings: tuple[TableFinding, ...], options: Options
+) -> Agreement:
+    """Compare the findings with Z3's answers: do two lines overlap, and is there a gap?"""
+    if not worth_asking(table, options) or any(isinstance(finding, Undecided) for finding in findings):
+        return Agreement.NOT_ASKED
+    if smt.gives_up(
+        "whether Z3 agrees"
+    ):  # before anything is put into its words, which takes longer than to ask
+        return Agreement.UNKNOWN
+    if options.solver == "auto":
+        steps = WRONG_STEPS // 3 if refutes(table, findings) else _STEPS
+        options = replace(options, steps=min(options.steps, steps))
+    asked = TableSolver(program, table, options)
+    gaps = [finding for finding in findings if isinstance(finding, Gap)]
+    gap = _some_gap(asked, gaps) if must_cover(table) or gaps else None  # while the solver knows no line
+    overlap = _some_overlap(asked)
+    answers = (
+        (overlap, any(isinstance(finding, Overlap) for finding in findings)),
+        (gap, bool(gaps)),
+    )
+    if any(answer is Answer.UNKNOWN for answer, _ in answers):
+        return Agreement.UNKNOWN
+    agrees = all(answer is None or (answer is Answer.SATISFIABLE) == wrong for answer, wrong in answers)
+    return Agreement.AGREES if agrees else Agreement.DISAGREES
+
+
+def _some_gap(asked: TableSolver, gaps: Sequence[Gap]) -> Answer:
+    """Whether no line matches some input: first at one that was found, which costs little, as values are put in."""
+    for witness in (gap.witnesses[0] for gap in gaps if gap.witnesses):
+        named = [v for v in shown(asked.program, asked.table) if v.name in witness]
+        point = [(asked.frame.leaves[v.name], smt.literal(v.type, witness[v.name])) for v in named]
+        here = [smt.equal(leaf, value, v.type) for v, (leaf, value) in zip(named, point, strict=True)]
+        if asked.holds(smt.at_point(asked.none(), point), *here) is Answer.SATISFIABLE:
+            return Answer.SATISFIABLE
+    return asked.holds(asked.none())
+
+
+def _some_overlap(asked: TableSolver) -> Answer:
+    """Whether two lines can match at once: each line against all before it."""
+    terms = []
+    seen = smt.truth(False)
+    from rcsc.lang.model import Bool
+
+    for at in range(len(asked.table.lines)):
+        bit = smt.variable(f"line!{at}", Bool())
+        before = seen
+        seen = smt.variable(f"seen!{at}", Bool())
+        asked.solver.add(smt.equal(bit, asked.line(at), Bool()))
+        asked.solver.add(smt.equal(seen, smt.any_of([before, bit]), Bool()))
+        terms.append(smt.all_of([before, bit]))
+    return asked.holds(smt.any_of(terms))

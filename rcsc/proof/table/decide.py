@@ -1,0 +1,110 @@
+"""Decide one table by the method that suits it, confirm and certify it."""
+
+import time
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from rcsc.base.host.memory import uncollected
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import AssumptionName, Backing, Program, Table
+from rcsc.proof.solvers.options import Options
+from rcsc.proof.table import boxes
+from rcsc.proof.table.certificate import box_certificate, must_cover
+from rcsc.proof.table.regions import partition
+from rcsc.proof.table.regions.word_bits import Words, words_of
+from rcsc.proof.table.verdict import (
+    DeadLine,
+    Gap,
+    Overlap,
+    SolversDisagree,
+    TableFinding,
+    TableVerdict,
+    Undecided,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@uncollected()
+def prove_table(program: Program, table: Table, options: Options) -> TableVerdict:
+    """Decide whether exactly one line matches every input in the declared ranges, under the assumptions."""
+    begun = time.perf_counter()
+    used: tuple[AssumptionName, ...] = ()
+    certificate: Mapping[str, object] | None = None
+    words = words_of(program, table)
+    settled = None if words is None else _by_boxes(program, table, words)
+    if settled is not None and (not table.assumptions or not _wrong(table, settled)):
+        method, findings = "boxes", settled
+        if not _wrong(table, findings):
+            certificate = _certificate(program, table, options)
+            if _narrows(program, table):
+                from rcsc.proof.table.relational import under_assumptions
+
+                findings = under_assumptions(program, table, options, settled)
+    else:
+        from rcsc.proof.table.relational import decide
+
+        decided = decide(program, table, options)
+        method, findings, certificate, used = "tree", decided.findings, decided.certificate, decided.used
+    confirmed = False
+    if options.solver != "boxes":
+        confirmed, findings = _confirmed(program, table, findings, options)
+    standing = {a.name: a.standing for a in program.assumptions}
+    backing = Backing(method, confirmed, tuple((name, standing[name]) for name in used))
+    return TableVerdict(table, findings, backing, certificate, time.perf_counter() - begun)
+
+
+def _certificate(program: Program, table: Table, options: Options) -> "Mapping[str, object] | None":
+    """The certificate of a table of boxes that is right; one with words taken apart is a tree of regions for the checker."""
+    if boxes.applies(table):
+        return box_certificate(program, table)
+    from rcsc.proof.table.relational import certificate_alone
+
+    return certificate_alone(program, table, options)
+
+
+def _by_boxes(program: Program, table: Table, words: Words) -> tuple[TableFinding, ...]:
+    decided = boxes.TableBoxes.of(program, table, words)
+    pairs = list(islice(decided.overlaps(), partition.MOST_PAIRS))
+    findings: list[TableFinding] = [DeadLine(at) for at in decided.dead()]
+    findings.extend(decided.both(first, second) for first, second in pairs)
+    try:
+        gap = decided.gap(not pairs, boxes.MOST_GAPS if must_cover(table) else boxes.MOST_FALLS)
+    except partition.BudgetError:
+        return (*findings, Undecided("whether every input is matched by some line; first mend the overlaps"))
+    if gap is not None:
+        findings.append(gap)
+    return tuple(findings)
+
+
+def _narrows(program: Program, table: Table) -> bool:
+    """Whether an assumption reads what the table's conditions read."""
+    assumed = [assumption for assumption in program.assumptions if assumption.name in table.assumptions]
+    return any(not set(read_by(assumption.condition)).isdisjoint(table.variables) for assumption in assumed)
+
+
+def _wrong(table: Table, findings: tuple[TableFinding, ...]) -> bool:
+    """Whether anything is found but inputs that a DEFAULT line takes."""
+    return any(not isinstance(finding, Gap) or must_cover(table) for finding in findings)
+
+
+def _confirmed(
+    program: Program, table: Table, findings: tuple[TableFinding, ...], options: Options
+) -> tuple[bool, tuple[TableFinding, ...]]:
+    """Ask Z3 whether it agrees, and add a finding where it does not."""
+    from rcsc.proof.table.confirm import Agreement, confirm, worth_asking
+
+    if not worth_asking(table, options):
+        return False, findings
+    match confirm(program, table, findings, options):
+        case Agreement.AGREES:
+            return True, findings
+        case Agreement.DISAGREES:
+            pairs = sum(isinstance(finding, Overlap) for finding in findings)
+            return False, (*findings, SolversDisagree(f"{pairs} overlapping pairs were found"))
+        case Agreement.UNKNOWN:
+            left = Undecided("Z3 gave no answer within its limits")
+            return False, (*findings, left) if options.solver == "both" else findings
+        case Agreement.NOT_ASKED:
+            return False, findings

@@ -1,0 +1,188 @@
+"""What a program declares and nobody reads: warnings, by position.
+
+In: a program, and the texts that it was made of. Out: a warning for each state and input of the root file of which nothing reads any part,
+for each constant that nothing uses, and for each member of an enumeration that nothing gives or asks for.
+
+Only the root file is judged, and only where it has a table or a level: what a vocabulary declares is for whoever uses it. Outputs are for
+whoever takes them, with the members that they may have; members of an input, of a link or of what an extern procedure gives come from
+outside. What the protocol makes is its own. In doubt something is read.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
+from rcsc.base.diagnostics.source import Span
+from rcsc.lang.expressions.scope import root_of
+from rcsc.lang.leaves import every_statement, expressions, read_by, written_by
+from rcsc.lang.model import BEFORE, Array, Declared, Enum, Expr, Kind, Program, Record, Type
+from rcsc.lang.restart import After, SameAs
+from rcsc.lang.syntax import tree
+
+TOLD = frozenset({Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER})
+"""The codes of these warnings: `rcsc check` tells them, and no editor, while a text is being written."""
+
+
+def unread(program: Program, files: Mapping[str, tree.File]) -> Iterator[Diagnostic]:
+    """Yield the warnings; none of a file that only declares words.
+
+    Args:
+        program: It may have findings of its own.
+        files: Those of the program.
+    """
+    if not program.own_tables and not any(level.span.file == program.file for level in program.levels):
+        return
+    written = [d for file in files.values() for d in file.declarations]
+    own = files[program.file].declarations
+    yield from _variables(program, {d.name.text for d in own if isinstance(d, tree.VariableDecl)})
+    mentioned = _Mentioned()
+    mentioned.add(written)
+    for const in own:
+        if isinstance(const, tree.ConstDecl) and const.name.text not in mentioned.names:
+            yield _warning(
+                Code.UNUSED_CONSTANT, f"nothing uses constant `{const.name.text}`", const.name.span
+            )
+    outside = _from_outside(program) | _linked(written)
+    for enum in own:
+        if isinstance(enum, tree.EnumDecl) and enum.name.text not in outside:
+            yield from _members(enum, mentioned)
+
+
+def _warning(code: Code, message: str, span: Span, *helps: str) -> Diagnostic:
+    return Diagnostic(code, message, Label(span), help=helps, severity=Severity.WARNING)
+
+
+# --- states and inputs ---
+
+
+def _variables(program: Program, own: set[str]) -> Iterator[Diagnostic]:
+    assigned = set(_assigned(program))
+    reads = {*map(root_of, _read(program)), *(name for name, by in assigned if by != name)}
+    kept = {name for name, by in assigned if by == name}
+    for declared in program.declared:
+        if declared.name in own and declared.name not in reads and declared.kind is not Kind.OUTPUT:
+            yield _unread(declared, to_itself=declared.name in kept)
+
+
+def _unread(declared: Declared, *, to_itself: bool) -> Diagnostic:
+    message = f"nothing reads {declared.kind.value} `{declared.name}`"
+    if to_itself:
+        message += " but assignments to itself"
+    helps = () if declared.kind is Kind.INPUT else ("what is only to be shown is an `output`",)
+    return _warning(Code.UNREAD, message, declared.span, *helps)
+
+
+def _read(program: Program) -> Iterator[str]:
+    """Leaves that something reads, but for the values of assignments."""
+    for condition in _conditions(program):
+        yield from (leaf.removeprefix(BEFORE) for leaf in read_by(condition))
+    for procedure in program.procedures:
+        if procedure.extern is not None:
+            yield from procedure.reads
+    for adopted in program.adopted.values():
+        if isinstance(adopted, SameAs | After):
+            yield adopted.leaf
+    yield from (str(variable.previous_of) for variable in program.variables)
+
+
+def _conditions(program: Program) -> Iterator[Expr]:
+    for stated in (program.assumptions, program.invariants, program.properties):
+        yield from (each.condition for each in stated)
+    for variable in program.variables:
+        yield from (each for each in (variable.deferred_until, variable.counts) if each is not None)
+    for level in program.levels:
+        yield from level.selectors
+    for table in program.tables:
+        yield from (column.subject for column in table.columns if column.subject is not None)
+        yield from (test.condition for test in table.distinct_tests)
+        yield from (meeting.where for meeting in table.meetings)
+    for statement in every_statement(program):
+        if not written_by(statement):
+            yield from expressions(statement)
+
+
+def _assigned(program: Program) -> Iterator[tuple[str, str]]:
+    """Each variable that an assignment reads, and the one that it is assigned to."""
+    for statement in every_statement(program):
+        for place in written_by(statement)[:1]:
+            for expr in expressions(statement):
+                yield from ((root_of(leaf), root_of(place)) for leaf in read_by(expr))
+
+
+# --- constants and members ---
+
+
+class _Mentioned:
+    """Names that a text mentions, but for those that it declares there."""
+
+    def __init__(self) -> None:
+        self.names: set[str] = set()
+        self.seen: set[int] = set()
+
+    def add(self, nodes: Iterable[object]) -> None:
+        """Add what these nodes mention, and all in them; lines share their cells."""
+        waiting = list(nodes)
+        while waiting:
+            node = waiting.pop()
+            if isinstance(node, tuple):
+                waiting += node
+            elif isinstance(node, tree.Name):
+                self.names.add(node.text)
+            elif is_dataclass(node) and not isinstance(node, type) and id(node) not in self.seen:
+                self.seen.add(id(node))
+                waiting += (getattr(node, each.name) for each in fields(node) if _says(node, each.name))
+
+
+_DECLARES = (tree.Documented, tree.Local, tree.For, tree.Parameter)
+_ASIDE = frozenset(("span", "cell", "cells", "places", "above", "same", "requirements", "doc", "comments"))
+
+
+def _says(node: object, part: str) -> bool:
+    """Whether names in this part of a node are mentioned, not declared."""
+    if part in _ASIDE or (part == "name" and isinstance(node, _DECLARES)):
+        return False
+    return not (part == "members" and isinstance(node, tree.EnumDecl))
+
+
+def _members(enum: tree.EnumDecl, mentioned: _Mentioned) -> Iterator[Diagnostic]:
+    """What is wrong with one enumeration; its variables start with the first member."""
+    for member in enum.members[1:]:
+        if member.text not in mentioned.names:
+            message = f"nothing gives or asks for member `{member.text}` of `{enum.name.text}`"
+            yield _warning(Code.UNUSED_MEMBER, message, member.span)
+
+
+def _from_outside(program: Program) -> set[str]:
+    """Enumerations of inputs and outputs, of what extern procedures give, and of what is adopted at a restart."""
+    outside = [d.type for d in program.declared if d.kind is not Kind.STATE]
+    given = {str(leaf) for each in program.procedures if each.extern is not None for leaf in each.writes}
+    given |= program.adopted.keys()
+    outside += [variable.type for variable in program.variables if variable.name in given]
+    return {name for kind in outside for name in _enums(kind)}
+
+
+def _enums(kind: Type) -> Iterator[str]:
+    match kind:
+        case Enum(name=name):
+            yield name
+        case Array(element=element):
+            yield from _enums(element)
+        case Record(fields=parts):
+            for part in parts:
+                yield from _enums(part.type)
+        case _:
+            return
+
+
+def _linked(written: Iterable[tree.Declaration]) -> set[str]:
+    """Names of types in links, and of those that these are made of."""
+    links, types = _Mentioned(), list[tree.TypeDecl | tree.RecordDecl]()
+    for each in written:
+        if isinstance(each, tree.LinkDecl):
+            links.add((each,))
+        elif isinstance(each, tree.TypeDecl | tree.RecordDecl):
+            types.append(each)
+    while made := [each for each in types if each.name.text in links.names and id(each) not in links.seen]:
+        links.add(made)
+    return links.names

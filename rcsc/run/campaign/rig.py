@@ -1,0 +1,190 @@
+"""What a campaign plays on: episodes of which kind, of which system; the lines of its tables; a digest of all that outcomes depend on.
+
+In: a description's path, and a kind of episodes. Out: a `Rig`, from which every worker draws the same episodes.
+"""
+
+import hashlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar
+
+from rcsc.base.host.files.read import MOST_OF_OURS, content
+from rcsc.run.description import BadDescription, description
+from rcsc.run.episodes.outcome import EpisodeOutcome
+from rcsc.run.episodes.proved.claims import NOTHING, Claims
+from rcsc.run.executors import NotBuilt
+from rcsc.run.log.schema import fingerprints
+from rcsc.run.system import Kind, signatures
+
+LineName: TypeAlias = tuple[str, str, str]
+"""Level, table, line."""
+NamedFile: TypeAlias = tuple[str, Path]
+"""A file, and a name for it that is the same in every checkout."""
+
+
+class EpisodeValue(Protocol):
+    """An episode of any kind: a frozen dataclass of plain values and tuples, with a field `executor`.
+
+    Attributes:
+        LISTS: Fields that hold any number of things, those first that a smaller episode can best do without.
+        PLAINER: Fields of words of which the default is the simplest.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+    LISTS: ClassVar[tuple[str, ...]]
+    PLAINER: ClassVar[tuple[str, ...]]
+
+    def to_json(self) -> str:
+        """Return text of which the kind's `read` makes the same episode."""
+        ...
+
+    def script(self) -> str:
+        """Return its orders as `rcsc run` reads them."""
+        ...
+
+
+E = TypeVar("E", bound=EpisodeValue)
+
+
+def usual_chunk(system: Path, plant: str) -> int:  # noqa: ARG001  # a kind may look at both
+    """Episodes that a worker is given at once."""
+    return 10
+
+
+def _untold(episode: EpisodeValue) -> tuple[str, ...]:  # noqa: ARG001  # of a kind without words
+    return ()
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeKind(Generic[E]):
+    """Episodes of one kind. It travels to workers, so its functions stand in modules; a system is the path of its description.
+
+    Attributes:
+        draw: Makes the episode of a seed, for a system, a plant and a script by their names; empty for its own.
+        run: Runs an episode of a system; the third is where the log goes.
+        read: Makes an episode of its text; raises ValueError in words where it is none.
+        admit: Gives a saved episode, which may come from anybody, as it is to run on a system and a plant; raises ValueError where it
+            names what they have not.
+        fault_classes: Which fault classes an episode of a system has; empty where it is nominal.
+        faults: Every fault class of a system and plant, in the order in which they are shown.
+        files: What outcomes depend on beside the description and the executors.
+        not_in_order: What `draw` and `run` raise when the system is not in order, which is no episode's doing.
+        chunk: Episodes a task at most, for a system and plant: about a second of work, which handing over does not slow, and
+            which is all that a kill loses.
+        extra: The extra of the package that it needs.
+        takes_script: Whether `draw` takes a script.
+        watched: As `run`, and watches what was proved of the system; None where episodes of the kind cannot.
+        told: What happens in an episode, in words, a line each.
+    """
+
+    draw: Callable[[int, Path, str, str], E]
+    run: Callable[[E, Path, Path | None], EpisodeOutcome]
+    read: Callable[[str], E]
+    admit: Callable[[E, Path, str], E]
+    fault_classes: Callable[[E, Path], tuple[str, ...]]
+    faults: Callable[[Path, str], tuple[str, ...]]
+    files: Callable[[Path, str, str], Iterable[NamedFile]]
+    not_in_order: tuple[type[Exception], ...] = (BadDescription, NotBuilt)
+    chunk: Callable[[Path, str], int] = usual_chunk
+    extra: str = "log"
+    takes_script: bool = True
+    told: Callable[[E], tuple[str, ...]] = _untold
+    watched: Callable[[E, Path, Path | None, Claims], EpisodeOutcome] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Rig(Generic[E]):
+    """What episodes are played on; it travels to workers.
+
+    Attributes:
+        system: The description; workers elsewhere have it at the same place.
+        plant: As `--plant` names it; empty for the description's first.
+        script: What is ordered; empty where nobody says.
+        limit_s: Seconds of the clock after which an episode hangs; generous, so that a busy machine changes nothing.
+        claims: What was proved of the system, to be watched.
+    """
+
+    kind: EpisodeKind[E]
+    system: Path
+    plant: str = ""
+    executor: Kind = "c"
+    script: str = ""
+    limit_s: float = 120.0
+    claims: Claims = NOTHING
+
+    def run(self, episode: E, log: Path | None) -> EpisodeOutcome:
+        """Run an episode, with what was proved watched where its kind can."""
+        if self.kind.watched is None or not self.claims.levels:
+            return self.kind.run(episode, self.system, log)
+        return self.kind.watched(episode, self.system, log, self.claims)
+
+    def episode(self, seed: int, index: int) -> E:
+        """Episode `index` of the campaign of `seed`."""
+        drawn = self.kind.draw(episode_seed(seed, index), self.system, self.plant, self.script)
+        return replace(drawn, executor=self.executor)
+
+
+def episode_seed(seed: int, index: int) -> int:
+    """The seed of an episode, of 63 bits: campaigns of neighbouring seeds have no episodes in common."""
+    return int.from_bytes(hashlib.sha256(f"{seed} {index}".encode()).digest()[:8]) >> 1
+
+
+@cache
+def known_lines(system: Path) -> tuple[LineName, ...]:
+    """Every line of every table that a level of the system may run, in the tables' order.
+
+    Raises:
+        BadDescription: The system is not in order.
+    """
+    described = description(system)
+    lines = []
+    for name, sign in signatures(described).items():
+        level = next(level for level in sign.levels if level.name == name)
+        lines += [(name, table, line) for table in level.every_table for line in sign.tables.get(table, ())]
+    return tuple(lines)
+
+
+@cache
+def _places(system: Path) -> dict[LineName, int]:
+    return {name: at for at, name in enumerate(known_lines(system))}
+
+
+def mask(lines: Iterable[LineName], system: Path) -> int:
+    """Lines as bits, the first of `known_lines` the lowest; a cycle that ran no line, being refused, has no bit."""
+    places = _places(system)
+    return sum({1 << places[line] for line in lines if line in places})
+
+
+@cache
+def digest(rig: Rig[Any]) -> str:
+    """Return the digest of the description, its executors, and the kind's files: equal digests, equal outcomes.
+
+    By content, so that it is the same in every checkout; taken once a process.
+
+    Raises:
+        BadDescription: The system is not in order.
+    """
+    hashed = hashlib.sha256()
+    for name, fingerprint in fingerprints(description(rig.system)).items():
+        hashed.update(f"{name} {fingerprint}\n".encode())
+    hashed.update(f"claims {rig.claims.digest if rig.claims.levels else ''}\n".encode())
+    for name, path in (("system", rig.system), *rig.kind.files(rig.system, rig.plant, rig.script)):
+        held = content(path, MOST_OF_OURS) if path.is_file() else b""
+        hashed.update(f"{name} {len(held)}\n".encode() + held)
+    return hashed.hexdigest()
+
+
+def run_sources() -> list[NamedFile]:
+    """Every module that has a part in a run of any system."""
+    return sources(Path(__file__).parents[1], "log", "link", "episodes", "campaign")
+
+
+def sources(folder: Path, *lookers: str) -> list[NamedFile]:
+    """Every module below a folder, but for those of rooms that only look on and change no outcome."""
+    return [
+        (path.relative_to(folder.parent).as_posix(), path)
+        for path in sorted(folder.rglob("*.py"))
+        if not any(path.is_relative_to(folder / room) for room in lookers)
+    ]

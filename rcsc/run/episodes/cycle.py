@@ -1,0 +1,69 @@
+"""What a property sees of a cycle, and what it says where it does not hold.
+
+In: a running system after a tick. Out: a `Cycle`, one for the whole run, which changes with it; `Broken`s.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+from rcsc.run.episodes.operator import EpisodeOperator
+from rcsc.run.levels import RunningLevel
+from rcsc.run.plant.bind import BoundPlant
+from rcsc.run.signature import Values
+
+MOST_MESSAGE = 300
+
+
+class Broken(NamedTuple):
+    """A property that does not hold in this cycle.
+
+    Attributes:
+        property: Its name, the same in every run.
+        message: With the values that show it.
+        level: Where it was seen; empty for what the plant itself says.
+        leaves: That it is about, where only readings of these explain it; empty where any level that was misled does.
+        proved: Whether it was proved: then only older values that came again explain it.
+    """
+
+    property: str
+    message: str
+    level: str = ""
+    leaves: tuple[str, ...] = ()
+    proved: bool = False
+
+
+@dataclass(slots=True)
+class Cycle:
+    """The state after a cycle.
+
+    Attributes:
+        tick: Of the cycle that has just been done, from 1.
+        before: What each level had after its last cycle that was no fault; at first, and after a restart, what it begins with.
+        left: What it had after its last cycle, whatever ended that: what `was` means in a property.
+        ran: The levels that ran.
+        said: What was last published in each buffer.
+        restarted: Levels that started anew before this cycle.
+        refused: By level, leaves that now hold what the level must refuse.
+        faulty: Whether any fault is at work.
+    """
+
+    levels: Mapping[str, RunningLevel]
+    plants: tuple[BoundPlant, ...]
+    operator: EpisodeOperator
+    said: Mapping[str, Values]
+    before: dict[str, Values]
+    left: dict[str, Values]
+    tick: int = 0
+    ran: tuple[RunningLevel, ...] = ()
+    restarted: frozenset[str] = frozenset()
+    refused: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    faulty: bool = False
+
+
+class Property(Protocol):
+    """Something that is to hold in every cycle of a run; made for one run."""
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """What does not hold in this cycle."""
+        ...

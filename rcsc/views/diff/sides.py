@@ -1,0 +1,162 @@
+"""What is to be compared: two files, folders or revisions, read and resolved, their programs matched.
+
+In: arguments as the user gave them. Out: `Side`s, and pairs of programs.
+"""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
+from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.children import scratch
+from rcsc.lang.model import Program
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
+from rcsc.views.diff.revision import NotComparedError, lay_out
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """One side as the user gave it.
+
+    Attributes:
+        name: To show.
+        paths: Files or folders; of a revision from where one stands, or from the top of the repository.
+        revision: Empty for the files as they are.
+        from_top: Whether paths begin at the top of the repository.
+        may_lack: Whether a path that is not there is an empty side: what is new has no earlier version.
+    """
+
+    name: str
+    paths: tuple[str, ...]
+    revision: str = ""
+    from_top: bool = False
+    may_lack: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One version of the tables.
+
+    Attributes:
+        programs: By the path of the root file below what was given.
+        diagnostics: What keeps a file from being read or resolved.
+        sources: Of the files that `diagnostics` point into.
+    """
+
+    name: str
+    programs: Mapping[str, Program]
+    diagnostics: tuple[Diagnostic, ...]
+    sources: Mapping[str, Source]
+
+
+def given(argument: str) -> Given:
+    """A file, a folder, or `REV:path` as git has it: from the top, or from where one stands with `./`."""
+    revision, colon, path = argument.partition(":")
+    if os.path.lexists(argument) or not colon or not revision:
+        return Given(argument, (argument,))
+    return Given(argument, (path or ".",), revision, from_top=not path.startswith(("./", "../")))
+
+
+def revisions(text: str, paths: Sequence[str]) -> tuple[Given, Given]:
+    """`REV1..REV2`, or `REV` against the files as they are; each of the paths."""
+    before, dots, after = text.partition("..")
+    where = tuple(paths) or (".",)
+    after = after or ("HEAD" if dots else "")
+    first = Given(before or "HEAD", where, before or "HEAD", may_lack=True)
+    return first, Given(after or "the files as they are", where, after, may_lack=True)
+
+
+def read(asked: Given) -> Side:
+    """The programs of one side.
+
+    Raises:
+        NotComparedError: The revision, or a path in it, cannot be had.
+    """
+    if not asked.revision:
+        return _read(asked, asked.paths, "", "")
+    with scratch("diff") as place:
+        top = os.path.realpath(place)
+        stands = lay_out(asked.revision, Path(top))
+        here = "" if asked.from_top else stands
+        paths = tuple(os.path.normpath(os.path.join(top, here, path)) for path in asked.paths)
+        for path, shown in zip(paths, asked.paths, strict=True):
+            if os.path.commonpath([path, top]) != top:
+                raise NotComparedError(f"`{shown}` lies outside the repository")
+        return _read(asked, paths, top + os.sep, f"{asked.revision}:")
+
+
+def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side:
+    """Load and resolve; the names of files begin with `shown` in place of `hidden`."""
+    there = tuple(path for path in paths if os.path.lexists(path))
+    if not there and not asked.may_lack:
+        raise NotComparedError(f"there is no file or folder `{asked.name}`")
+    loaded = load(there) if there else None
+    if loaded is None or (asked.may_lack and not loaded.given):
+        return Side(asked.name, {}, (), {})
+    programs: dict[str, Program] = {}
+    diagnostics = [diagnostic for diagnostic in loaded.diagnostics if diagnostic.severity is Severity.ERROR]
+    for root in loaded.roots:
+        resolved = resolve(root, loaded)
+        if isinstance(resolved, Program):
+            programs[_key(root, there)] = resolved
+        else:
+            diagnostics += resolved
+    named = {_renamed(name, hidden, shown): source for name, source in loaded.sources.items()}
+    sources = {name: Source(name, source.text) for name, source in named.items()}
+    return Side(
+        asked.name,
+        programs,
+        tuple(_as_given(diagnostic, hidden, shown) for diagnostic in dict.fromkeys(diagnostics)),
+        sources,
+    )
+
+
+def _key(root: str, paths: tuple[str, ...]) -> str:
+    """The root file below the folder that it was found in; its own name where it was given itself."""
+    for path in paths:
+        if os.path.isdir(path):
+            below = os.path.relpath(root, path)
+            if not below.startswith(".."):
+                return below.replace(os.sep, "/")
+    return os.path.basename(root)
+
+
+def _renamed(text: str, hidden: str, shown: str) -> str:
+    return text.replace(hidden, shown) if hidden else text
+
+
+def _as_given(diagnostic: Diagnostic, hidden: str, shown: str) -> Diagnostic:
+    """The diagnostic with the names that the user knows."""
+
+    def label(at: Label) -> Label:
+        return replace(at, span=replace(at.span, file=_renamed(at.span.file, hidden, shown)))
+
+    return replace(
+        diagnostic,
+        message=_renamed(diagnostic.message, hidden, shown),
+        primary=label(diagnostic.primary),
+        related=tuple(map(label, diagnostic.related)),
+        notes=tuple(_renamed(note, hidden, shown) for note in diagnostic.notes),
+        help=tuple(_renamed(text, hidden, shown) for text in diagnostic.help),
+    )
+
+
+def pairs(before: Side, after: Side) -> Iterator[tuple[str, Program | None, Program | None]]:
+    """Programs that are versions of each other: of one path, else of one name; two single ones always are."""
+    old, new = dict(before.programs), dict(after.programs)
+    if len(old) == len(new) == 1:
+        [(name, first)], [(_, second)] = old.items(), new.items()
+        yield name, first, second
+        return
+    for name, first in before.programs.items():
+        other = (
+            name
+            if name in new
+            else next((key for key in new if key not in old and new[key].name == first.name), None)
+        )
+        yield name, first, new.pop(other) if other is not None else None
+    for name, program in new.items():
+        yield name, None, program

@@ -1,0 +1,22 @@
+"""What a safety case asks of the generated C, each made by a command and kept as files.
+
+In: paths of tables, and which kinds are asked for. Out: one folder with a file or more of each kind, an index, and
+what is not as it must be, as findings. A kind looks at one program: its tables, its plan and its emitted files. It
+gives figures for the terminal, files for the folder and shortfalls, each with its place and its reason. A tool that
+is not installed is named, and is no evidence: the kind then says that it shows nothing.
+
+>>> from rcsc.views.evidence.kinds import KINDS
+>>> all(kind.summary for kind in KINDS.values())
+True
+
+Trusted: the tools that a kind names, in the versions that its files state. No verdict of `rcsc check` rests on
+anything here. What it costs: seconds to minutes a program, by kind.
+
+Rooms: `misra` (MISRA C:2012, guideline by guideline), `whole` (the C that links a system).
+
+Modules: `kind` (what a kind takes and gives), `kinds` (their names), `collect` (all that was asked for, on one screen).
+Kinds: `coverage` (vectors of the whole C, measured in `llvm`; why the rest is `out_of_reach`), `runtime` (Frama-C's EVA),
+`analysers` (compilers, analysers, sanitizers); `harness` is the C that the last two give their tools,
+`model_check` (ESBMC). `resources` (what each
+function needs) has a room of its own, `processors`.
+"""

@@ -1,0 +1,54 @@
+"""C that calls every function of an emitted header, for tools that run the C or analyse it.
+
+In: a program and the names in its C. Out: text: functions of the user's that give anything of their type, and a call of
+each function, with what it asks of its caller: a state that `check` accepts, and of a matcher admitted inputs.
+"""
+
+import re
+from collections.abc import Callable, Iterator
+
+from rcsc.code.testing.executors.externs import externs
+from rcsc.code.testing.executors.symbols import Symbols
+from rcsc.lang.model import Bool, Program, Real, Scalar, key_bounds
+
+Value = Callable[[str, Scalar, bool], str]
+"""An expression of a value of a C type and a kind: any within the kind's range, or any of the C type where asked."""
+
+
+def calls(symbols: Symbols, *, defensive: bool) -> Iterator[str]:
+    """A call of every function; `any` makes a state, `admitted` one with inputs within their ranges."""
+    check = f"{symbols.program}_check(&s)"
+    yield f"any(); {symbols.init}(&s);"
+    yield f"any(); (void){check};"
+    for function in (*symbols.steps.values(), *symbols.cycles.values()):
+        call = f"(void){function}(&s);"
+        yield f"any(); {call}" if defensive else f"any(); if ({check} < 0) {{ {call} }}"
+    for name, function in symbols.lines.items():
+        many = f"int32_t at[1]; {symbols.batches[name]}(&s, at, 1u);"
+        yield f"admitted(); if ({check} < 0) {{ (void){function}(&s); {many} }}"
+
+
+def stand_ins(program: Program, symbols: Symbols, value: Value) -> Iterator[str]:
+    """Functions of the user's, that give anything of its type."""
+    for procedure in externs(program):
+        given = [symbols.c_type(name) for name in procedure.reads]
+        given += [symbols.value_type(p.type) for p in procedure.params]
+        params = [f"{c_type} a{at}" for at, c_type in enumerate(given)]
+        params += [f"{symbols.c_type(name)} *r{at}" for at, name in enumerate(procedure.writes)]
+        function = procedure.extern.c if procedure.extern else ""
+        unread = " ".join(f"(void)a{at};" for at, _ in enumerate(given))
+        written = " ".join(
+            f"*r{at} = {value(symbols.c_type(name), program.variable(name).type, True)};"
+            for at, name in enumerate(procedure.writes)
+        )
+        yield f"void {function}({', '.join(params) or 'void'}) {{ {unread} {written} }}"
+
+
+def bounds(c_type: str, kind: Scalar, *, whole: bool) -> tuple[int, int]:
+    """The bounds of a kind that is no real, or of its C type."""
+    if isinstance(kind, Bool):
+        return 0, 1
+    if not whole and not isinstance(kind, Real):
+        return key_bounds(kind)
+    bits = int(re.sub(r"\D", "", c_type.removesuffix("_t")))
+    return (0, (1 << bits) - 1) if c_type.startswith("u") else (-(1 << bits - 1), (1 << bits - 1) - 1)

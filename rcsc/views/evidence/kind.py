@@ -1,0 +1,79 @@
+"""What a kind of evidence takes and gives."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from rcsc.code.emit import emitted
+from rcsc.code.emit.plan import Plan
+from rcsc.lang.model import Program, ProvedProgram
+from rcsc.proof.solvers.options import Options
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """A proved program, and what was emitted of it.
+
+    Attributes:
+        files: The emitted files, text by path below the generated folder.
+        options: How its proofs are made, where a kind makes some.
+        progress: Told what is being done.
+    """
+
+    proved: ProvedProgram
+    plan: Plan
+    files: Mapping[str, str]
+    options: Options
+    progress: Callable[[str], None] = field(default=lambda _: None)
+
+    @property
+    def program(self) -> Program:
+        """What was proved."""
+        return self.proved.program
+
+    def defensive(self) -> "Subject":
+        """Return the same program with the C that trusts no state: `rcsc compile --defensive`."""
+        plan = replace(self.plan, defensive=True)
+        return replace(self, plan=plan, files=emitted(plan, ("c",)))
+
+
+@dataclass(frozen=True, slots=True)
+class Shortfall:
+    """Something that the evidence does not show.
+
+    Attributes:
+        where: File and line, of the C or of a table, as a person would look it up.
+        what: What is not shown, and why.
+    """
+
+    where: str
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What one kind says of one program.
+
+    Attributes:
+        figures: Lines for the terminal and the index.
+        files: What is kept, by path below the folder of the program and kind.
+        shortfalls: What is not shown; none for evidence that is whole.
+        missing: The tool that is not installed, and what would install it; then nothing is shown.
+    """
+
+    figures: tuple[str, ...]
+    files: Mapping[str, str] = field(default_factory=dict)
+    shortfalls: tuple[Shortfall, ...] = ()
+    missing: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of evidence.
+
+    Attributes:
+        summary: What it shows, in a few words, for the help and the index.
+        collect: Makes it for one program.
+    """
+
+    summary: str
+    collect: Callable[[Subject], Evidence]

@@ -1,0 +1,325 @@
+"""A table's graph, derived from what its lines mean.
+
+In: a program and one of its tables, as written too. Out: a `StateGraph`, and notes on what the graph does not hold; or why there is
+none. Which line leads from which state to which is answered by Z3 (`relation.steps`); the words on the edges are the table's own.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.lang.leaves import may_write
+from rcsc.lang.model import (
+    Action,
+    Assign,
+    Bool,
+    Default,
+    Enum,
+    Int,
+    Kind,
+    Line,
+    Program,
+    Table,
+    Value,
+    Variable,
+    key_bounds,
+    spell,
+)
+from rcsc.lang.resolve.precedence import expanded
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.spell import spell_condition, spell_expr
+from rcsc.proof.relation.steps import MOST_STATES, Step, Steps, UnansweredError
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.options import Options
+from rcsc.views.graph import labels
+from rcsc.views.graph.formats.state_graph import ANY, Edge, StateGraph
+
+
+@dataclass(frozen=True, slots=True)
+class Derived:
+    """A table's graph.
+
+    Attributes:
+        everywhere: Terms of every edge that leaves a single state; they are left out of `shown`.
+        lost: What the graph does not hold, in sentences; no proof rests on them.
+    """
+
+    graph: StateGraph
+    everywhere: str = ""
+    lost: tuple[str, ...] = ()
+
+
+def derive(
+    program: Program, table: Table, file: tree.File, options: Options, state: str = ""
+) -> Derived | Diagnostic:
+    """The graph of a table.
+
+    Args:
+        program: What runs the table.
+        table: One of its tables.
+        file: The file that declares the table.
+        options: Limits of the solver.
+        state: The variable whose values are the states; "" for `cur_state`, else the only one that fits.
+    """
+    chosen = _state(program, table, state)
+    if isinstance(chosen, Diagnostic):
+        return chosen
+    written = next(
+        expanded(declaration, table, apart=True)
+        for declaration in file.declarations
+        if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
+    )
+    try:
+        with smt.together(options.drawn):
+            return _Derivation(
+                program, table, file, written, Steps(program, table, chosen, options)
+            ).derived()
+    except UnansweredError:
+        return _undecided(table)
+    except smt.troubles():
+        return _undecided(table)
+
+
+def _undecided(table: Table) -> Diagnostic:
+    message = f"the steps of table `{table.name}` are not decided within the limits"
+    return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
+
+
+def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic:
+    """The variable whose values are the states."""
+    fit = [
+        v
+        for v in program.variables
+        if v.kind is Kind.STATE
+        and not v.name.endswith(".next")
+        and v.previous_of is None
+        and v.counts is None
+        and _few(v)
+    ]
+    if wanted:
+        candidates = [v for v in fit if v.name == wanted]
+    else:
+        candidates = [v for v in fit if v.name == "cur_state"] or [
+            v for v in fit if isinstance(v.type, Enum) and v.name in table.variables
+        ]
+    if len(candidates) > 1:
+        candidates = _moved(program, table, candidates) or candidates
+    if len(candidates) == 1:
+        return candidates[0]
+    several = f"several variables could be the state of table `{table.name}`: " + ", ".join(
+        f"`{v.name}`" for v in candidates
+    )
+    none = (
+        f"`{wanted}` is no state variable of few values"
+        if wanted
+        else f"table `{table.name}` has no variable that could be its state"
+    )
+    helps = ("name one with `--state`: an enumeration, a boolean or a few integers",)
+    return Diagnostic(Code.GRAPH_NO_STATE, several if candidates else none, Label(table.span), help=helps)
+
+
+def _moved(program: Program, table: Table, candidates: list[Variable]) -> list[Variable]:
+    """Those that some line of the table may write: what others write, such as a report, is no state of it."""
+    procedures = {str(each.name): each for each in program.procedures}
+    statements = [action.statement for line in table.every_line for action in line.actions]
+    written = may_write(statements, procedures)
+    return [v for v in candidates if v.name in written or f"{v.name}.next" in written]
+
+
+def _few(variable: Variable) -> bool:
+    low, high = key_bounds(variable.type)
+    return isinstance(variable.type, Enum | Bool | Int) and high - low < MOST_STATES
+
+
+@dataclass(slots=True)
+class _Derivation:
+    """One table's graph in the making."""
+
+    program: Program
+    table: Table
+    file: tree.File
+    written: tree.TableDecl
+    steps: Steps
+    lost: list[str] = field(default_factory=list)
+
+    def derived(self) -> Derived:
+        states = self.steps.states()
+        steps = self.steps.steps(states)
+        edges: list[Edge] = []
+        for at, line in enumerate(self._lines()):
+            edges += self._edges(at, line, [step for step in steps if step.line == at], states)
+        common = self._common(edges)
+        values = {self._spelled(value): value for value in states}
+        edges = [self._eased(edge, common, values) for edge in edges]
+        self._comments()
+        used = tuple(
+            name for name in map(self._spelled, states) if any(name in (e.source, e.target) for e in edges)
+        )
+        graph = StateGraph(
+            self.table.name,
+            self.steps.state.name,
+            tuple(edges),
+            self.steps.state.deferred_until is not None,
+            self._spelled(self.steps.state.initial),
+            tuple(
+                name.text for name in self.written.assuming
+            ),  # those that the protocol offers come by themselves
+            tuple(
+                declaration.path
+                for declaration in self.file.declarations
+                if isinstance(declaration, tree.Use)
+            ),
+            self._columns(),
+            tuple(line.name for line in self._lines()),
+            used,
+        )
+        return Derived(graph, labels.guard(common), tuple(self.lost))
+
+    # --- words ---
+
+    def _lines(self) -> list[Line | Default]:
+        return [*self.table.lines, *([self.table.default] if self.table.default else [])]
+
+    def _row(self, at: int) -> tree.Row:
+        name = self._lines()[at].name
+        return next(row for row in self.written.rows if row.name == name)
+
+    def _spelled(self, value: Value) -> str:
+        return spell(self.steps.state.type, value)
+
+    def _is_state(self, heading: tree.Heading) -> bool:
+        return heading.subject is not None and spell_expr(heading.subject) == self.steps.state.name
+
+    def _columns(self) -> str:
+        left = dict.fromkeys(_heading(condition) for condition in self.written.conditions)  # `when` once
+        right = [_heading(action) for action in self.written.actions]
+        return f"{' | '.join(left)} || {' | '.join(right)}".strip()
+
+    def _terms(self, at: int, columns: tuple[int, ...] | None = None) -> list[tree.Expr]:
+        """What the line's cells say, the state's left out; of these columns only where they are given."""
+        cells = zip(self.written.conditions, self._row(at).conditions, strict=True)
+        return [
+            tree.term(heading, cell)
+            for column, (heading, cell) in enumerate(cells)
+            if cell is not None and not self._is_state(heading) and (columns is None or column in columns)
+        ]
+
+    # --- edges ---
+
+    def _edges(self, at: int, line: Line | Default, steps: list[Step], states: list[Value]) -> list[Edge]:
+        """The edges of one line; a single edge from ANY where it leads alike from every state."""
+        default = "" if isinstance(line, Line) else f"DEFAULT{' unreachable' if line.unreachable else ''}"
+        sources = list(dict.fromkeys(step.source for step in steps))
+        goal = self._goal(line.actions)
+        if goal is not None and goal in sources and sources != states:
+            goal = None  # a loop says that nothing is written: here the action has to say it
+        by = self._deciders(line.actions, goal)
+        stays = goal is None and not by
+        effect = self._effect(self._row(at), line.actions, goal)
+        base = Edge(line.name, ANY, ANY, labels.guard(self._terms(at)), effect, default=default)
+        if not steps:
+            return self._unreached(base, goal, at)
+        anywhere = sources == states and (stays or all(step.target == goal for step in steps))
+        self._narrowed(at, [] if anywhere else sources)
+        if anywhere:
+            return [replace(base, target=ANY if goal is None else self._spelled(goal))]
+        return [
+            replace(
+                base,
+                source=self._spelled(step.source),
+                target=self._spelled(step.target),
+                decided="" if stays or step.target == goal else by,
+            )
+            for step in steps
+        ]
+
+    def _goal(self, actions: tuple[Action, ...]) -> Value | None:
+        """The state to which one action goes, whatever the input, before any other can write it; None where none does."""
+        writers = [action for action in actions if self.steps.writes(action)]
+        goals = [self.steps.sets(action) for action in writers]
+        return goals[0] if goals and all(goal is None for goal in goals[1:]) else None
+
+    def _deciders(self, actions: tuple[Action, ...], goal: Value | None) -> str:
+        """The actions that can write the state, without the one that the edge itself says."""
+        writers = [action for action in actions if self.steps.writes(action)]
+        return ", ".join(action.text for action in (writers if goal is None else writers[1:]))
+
+    def _unreached(self, base: Edge, goal: Value | None, at: int) -> list[Edge]:
+        """A DEFAULT line that is never reached is drawn for what it says; another line has no edge."""
+        if base.default:
+            return [replace(base, target=ANY if goal is None else self._spelled(goal))]
+        self.lost.append(
+            f"line `{self._lines()[at].name}` matches nothing under the assumptions and has no edge"
+        )
+        return []
+
+    def _narrowed(self, at: int, sources: list[Value]) -> None:
+        """Notes as lost that the states written are not those from which the edges come."""
+        stated = [
+            spell_condition(cell, whole=False)
+            for heading, cell in zip(self.written.conditions, self._row(at).conditions, strict=True)
+            if cell is not None and self._is_state(heading)
+        ]
+        names = [self._spelled(source) for source in sources]
+        again = names[0] if len(names) == 1 else "in {" + ", ".join(names) + "}" if names else ""
+        before = " and ".join(stated)
+        if before != again and not self._row(at).default:
+            written, then = (f"`{text}`" if text else "a blank" for text in (before, again))
+            name = self._lines()[at].name
+            self.lost.append(f"line `{name}`: {written} under `{self.steps.state.name}` comes back as {then}")
+
+    def _effect(self, row: tree.Row, actions: tuple[Action, ...], goal: Value | None) -> str:
+        """The action cells, without the one action that the edge itself says."""
+        left = list(actions)
+        told = None if goal is None else next(action for action in actions if self.steps.writes(action))
+        cells = []
+        for cell in row.actions:
+            written = (cell,) if isinstance(cell, tree.Comparison) else cell
+            taken = [_taken(left) for _ in written]
+            cells.append("; ".join(action.text for action in taken if action is not told))
+        return labels.effect(tuple(map(_heading, self.written.actions)), tuple(cells))
+
+    # --- what is shown ---
+
+    def _common(self, edges: list[Edge]) -> list[tree.Expr]:
+        """The terms shared by every edge that leaves a single state."""
+        own = [labels.terms_of(edge.guard) for edge in edges if edge.source != ANY]
+        return [term for term in own[0] if all(term in terms for terms in own)] if len(own) > 1 else []
+
+    def _eased(self, edge: Edge, common: list[tree.Expr], values: Mapping[str, Value]) -> Edge:
+        if edge.default:
+            return edge
+        at = next(at for at, line in enumerate(self._lines()) if line.name == edge.line)
+        source = None if edge.source == ANY else values[edge.source]
+        terms = self._terms(at, self.steps.needed(at, source))
+        if source is not None:
+            terms = [term for term in terms if term not in common]
+        return replace(edge, shown=labels.guard(terms))
+
+    def _comments(self) -> None:
+        many = (
+            len(self.written.doc)
+            + len(self.written.comments)
+            + sum(len(row.comments) for row in self.written.rows)
+        )
+        if many:
+            self.lost.append(f"{many} lines of comment")
+
+
+def _heading(heading: tree.Heading) -> str:
+    return heading.word if heading.subject is None else spell_expr(heading.subject)
+
+
+def _taken(left: list[Action]) -> Action:
+    """The next action written; the assignment of a whole record is several in the model."""
+    first = left.pop(0)
+    while left and isinstance(first.statement, Assign) and _of_one(first, left[0]):
+        left.pop(0)
+    return first
+
+
+def _of_one(first: Action, other: Action) -> bool:
+    a, b = first.statement, other.statement
+    alike = other.heading == first.heading and other.text == first.text
+    return alike and isinstance(a, Assign) and isinstance(b, Assign) and a.place != b.place

@@ -1,0 +1,96 @@
+"""A finding as a page: one frame a tick, in each its levels as boxes from the top down and the cell as far as the log says it.
+
+In: a log that keeps a finding, and the cell where there is one to be drawn. Out: one HTML file that needs nothing else; the same text for
+the same log and cell.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rcsc.base.host.files import write_atomically
+from rcsc.run.log.finding import LoggedFinding
+from rcsc.run.log.read import Log
+from rcsc.run.log.ticks import LoggedTick, frames
+from rcsc.views.pages.drawn import Cell, Drawing
+from rcsc.views.pages.frame import PAGES
+
+
+@dataclass(frozen=True, slots=True)
+class _Tick:
+    """What a frame of the page shows.
+
+    Attributes:
+        mark: What stands out about it; empty for nothing.
+        broken: Whether it is the one in which the obligation is broken.
+        drawn: The cell; None where there is none.
+    """
+
+    frame: LoggedTick
+    ms: int
+    mark: str
+    broken: bool
+    drawn: Drawing | None
+
+
+def trace(path: Path, log: Log, finding: LoggedFinding, cell: Cell | None, why_not: str = "") -> None:
+    """Writes the page.
+
+    Args:
+        path: Where to.
+        log: The run.
+        finding: What it breaks.
+        cell: To be drawn.
+        why_not: Why there is none, a sentence.
+
+    Raises:
+        OSError: The file could not be written.
+    """
+    write_atomically(path, page(log, finding, cell, why_not).encode())
+
+
+def page(log: Log, finding: LoggedFinding, cell: Cell | None, why_not: str = "") -> str:
+    """The page; arguments as those of `trace`."""
+    return PAGES.get_template("trace.html.jinja").render(
+        finding=finding,
+        ticks=[_tick(frame, log, finding, cell) for frame in frames(log)],
+        notes=_notes(log, finding),
+        cell=about_cell(cell, why_not),
+        sign=_SIGNS,
+    )
+
+
+_SIGNS: Mapping[bool, str] = {True: "\N{CHECK MARK}", False: "\N{BALLOT X}"}
+
+
+def _tick(frame: LoggedTick, log: Log, finding: LoggedFinding, cell: Cell | None) -> _Tick:
+    broken = frame.tick == finding.broken_at
+    mark = "broken here" if broken else "what comes of it" if frame.tick > finding.broken_at else ""
+    drawn = None if cell is None else cell.drawn(frame.tick)
+    return _Tick(frame, frame.tick * log.tick_ms, mark, broken, drawn)
+
+
+def _notes(log: Log, finding: LoggedFinding) -> list[str]:
+    """Return what holds of the whole run, a sentence each."""
+    at, many = finding.broken_at, len(log.ticks)
+    begun = (
+        f"The shortest run that shows it, of system `{log.facts['name']}`: broken in cycle {at} of {many}."
+    )
+    notes = [f"{begun} The interpreter, the Python and the C executors all did this."]
+    if finding.restarted:
+        notes.append("It begins where a restart does, not with the initial values.")
+    if not finding.legal:
+        notes.append("Numbers have gone round, or a neighbour was restarted before it begins.")
+    if finding.altered:
+        notes.append("The tables were looked at under another rule than the language's: a demonstration.")
+    return notes
+
+
+def about_cell(cell: Cell | None, why_not: str) -> str:
+    """What the pictures of the cell rest on; arguments as those of `trace`."""
+    if cell is None:
+        return f"No cell is drawn: {why_not}"
+    return (
+        f"The log holds what levels said, not where things are: stations, places and parts are drawn where `{cell.data}` has them now, "
+        "parts as they lie when a run begins. What a level names is marked."
+    )

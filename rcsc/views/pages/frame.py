@@ -1,0 +1,55 @@
+"""Templates of pages, and a script that a page names by its hash.
+
+In: a package's folder of templates, which may extend `page.html.jinja`. Out: an environment in which what is shown is escaped.
+"""
+
+import base64
+import hashlib
+import json
+from typing import Any
+
+import jinja2
+from markupsafe import Markup, escape
+
+from rcsc.base.host.files.write import compressed
+
+
+def environment(package: str, folder: str) -> jinja2.Environment:
+    """Return the templates of a package's folder, beside those that all pages have in common."""
+    templates = jinja2.Environment(
+        loader=jinja2.ChoiceLoader(
+            [jinja2.PackageLoader(package, folder), jinja2.PackageLoader("rcsc.views", "pages")]
+        ),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=True,
+    )
+    templates.filters["quoted"] = quoted
+    return templates
+
+
+def quoted(text: str) -> Markup:
+    """A text whose names stand in backticks, with the names set apart."""
+    pieces = text.split("`")
+    if len(pieces) % 2 == 0:  # one is left over: nothing is meant by any
+        return escape(text)
+    return Markup("").join(
+        Markup("<code>{}</code>").format(piece) if at % 2 else escape(piece)
+        for at, piece in enumerate(pieces)
+    )
+
+
+def hashed(script: str) -> str:
+    """Name a script as a policy does: by its SHA-256."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"
+
+
+def packed(data: Any) -> Markup:
+    """Write data into a `script` element that is none: gzip, in letters that mean nothing to HTML; the same for the same."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return Markup(base64.b64encode(compressed(text.encode())).decode())  # noqa: S704  # nothing is left that means something to HTML
+
+
+PAGES = environment("rcsc.views", "pages")
+"""The templates of this folder."""

@@ -1,0 +1,436 @@
+"""The matrix of one program: for each line of its tables the code, the tests, the proofs and the requirements, as data.
+
+In: a proved program, its plan, its emitted files, what was proved and which vectors there are. Out: a `Matrix`, in plain values.
+"""
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.base.diagnostics.source import Source, Span
+from rcsc.code.emit.plan import Plan, PlanLine, PlanTable
+from rcsc.code.testing.coverage.document import VectorSet
+from rcsc.code.testing.coverage.lines import TakenLine, taken
+from rcsc.code.testing.inputs.condition_text import words
+from rcsc.lang.leaves import everything, read_by, written_by
+from rcsc.lang.meaning import digest
+from rcsc.lang.model import (
+    BEFORE,
+    Assumption,
+    Call,
+    Invariant,
+    Level,
+    Procedure,
+    ProcedureName,
+    Program,
+    Property,
+    Statement,
+)
+from rcsc.views.trace.c_code import c_names, c_pieces, system_pieces
+from rcsc.views.trace.origin import Origin, Piece, Sort
+from rcsc.views.trace.python_code import python_pieces
+
+OWES_NOTHING = "proved: it owes nothing"
+KEPT = "proved: every cycle keeps it"
+NOT_HERE = "not proved here: `rcsc prove` proves it of the levels together"
+
+
+@dataclass(frozen=True, slots=True)
+class TableProof:
+    """What is proved of a table.
+
+    Attributes:
+        verdict: `proved`, as the check of the table says it.
+        method: How exactly-one was decided, and whether Z3 agreed.
+        rests: Assumptions and invariants that it rests on, each with its standing.
+    """
+
+    verdict: str
+    method: str
+    rests: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Tests:
+    """The vectors of a line, by the numbers that they have in the file of `rcsc test --vectors`.
+
+    Attributes:
+        made: They show that the line is reached, or one half of what shows a condition to decide it.
+        taken: Those whose call takes the line: it matches, or it runs in a step or a cycle.
+        conditions: How many conditions the line states, and `shown` how many a pair of vectors shows to decide it.
+        unshown: Conditions without such a pair, each with the reason.
+    """
+
+    made: tuple[int, ...] = ()
+    taken: tuple[int, ...] = ()
+    conditions: int = 0
+    shown: int = 0
+    unshown: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TracedLine:
+    """A line of a table, forward.
+
+    Attributes:
+        place: File and line of its row.
+        requirements: Its own; `inherited` are those of its table.
+        states: Its conditions, heading by heading.
+        does: Its actions in the table's words.
+        procedures: What it runs, calls included, in the order of calls.
+        properties: Each that speaks of what the line changes or tests, with why.
+        findings: What the check of the table says of the line.
+    """
+
+    table: str
+    name: str
+    place: str
+    requirements: tuple[str, ...]
+    inherited: tuple[str, ...]
+    states: tuple[str, ...]
+    does: tuple[str, ...]
+    procedures: tuple[str, ...]
+    properties: tuple[tuple[str, str], ...]
+    findings: tuple[str, ...] = ()
+    tests: Tests = Tests()
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """Requirements of the line and of its table."""
+        return tuple(dict.fromkeys((*self.requirements, *self.inherited)))
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """A procedure, an assumption, an invariant or a property.
+
+    Attributes:
+        states: What it is, in words.
+        used: Lines and levels that run a procedure; tables that rely on an assumption or an invariant.
+        proof: What is known of it.
+    """
+
+    sort: str
+    name: str
+    place: str
+    requirements: tuple[str, ...]
+    states: str = ""
+    used: tuple[str, ...] = ()
+    proof: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Matrix:
+    """All of one program.
+
+    Attributes:
+        source: Its root file.
+        digest: Of its meaning, which no layout and no requirement changes.
+        files: SHA-256 of each generated file, by its path below the generated folder.
+        tables: What is proved of each.
+        requirements: Of tables.
+        places: File and line of tables, variables, types and levels, by sort and name.
+        pieces: Of all generated files, in order.
+        untraced: Lines of generated files that come from nothing, as `file:line`.
+    """
+
+    program: str
+    source: str
+    digest: str
+    files: Mapping[str, str]
+    tables: Mapping[str, TableProof]
+    lines: tuple[TracedLine, ...]
+    declared: tuple[Declared, ...]
+    requirements: Mapping[str, tuple[str, ...]]
+    pieces: tuple[Piece, ...]
+    untraced: tuple[str, ...]
+    places: Mapping[tuple[str, str], str] = field(default_factory=dict)
+
+    def answers(self, origin: Origin) -> tuple[str, ...]:
+        """Give the requirements that code of an origin answers: its own, and those of all that runs it."""
+        if origin.sort is Sort.LINE:
+            return next(
+                one.answers for one in self.lines if (one.table, one.name) == (origin.name, origin.line)
+            )
+        names = list(self.requirements.get(origin.name, ())) if origin.sort is Sort.TABLE else []
+        for line in self.lines:
+            runs = origin.sort is Sort.PROCEDURE and origin.name in line.procedures
+            if runs or (origin.sort is Sort.TABLE and origin.name == line.table):
+                names += line.answers
+        own = (
+            one.requirements for one in self.declared if (one.sort, one.name) == (origin.sort, origin.name)
+        )
+        return tuple(dict.fromkeys((*(name for each in own for name in each), *names)))
+
+    def place(self, origin: Origin) -> str:
+        """Give file and line of an origin in the tables; empty where it has none."""
+        places = {(one.table, one.name): one.place for one in self.lines}
+        places |= {(str(one.sort), one.name): one.place for one in self.declared}
+        key = (origin.name, origin.line) if origin.sort is Sort.LINE else (str(origin.sort), origin.name)
+        return places.get(key, self.places.get(key, ""))
+
+    def of(self, *origins: Origin) -> tuple[Piece, ...]:
+        """Give the pieces with one of these origins."""
+        return tuple(piece for piece in self.pieces if piece.origin in origins)
+
+    def code(self, line: TracedLine) -> tuple[tuple[str, tuple[Piece, ...]], ...]:
+        """Give the code of a line: what runs for it alone, what matches it, what it calls."""
+        own = self.of(Origin(Sort.LINE, line.table, line.name))
+        table = self.of(Origin(Sort.TABLE, line.table))
+        called = self.of(*(Origin(Sort.PROCEDURE, name) for name in line.procedures))
+        return ("runs", own), ("matches", table), ("calls", called)
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What others found out of a program.
+
+    Attributes:
+        tables: What is proved of each table.
+        findings: Of the check, with their places.
+        vectors: Of the whole C; None where they were not asked for.
+        properties: What is proved of each property.
+        sources: Texts of the tables, for the numbers of lines.
+    """
+
+    tables: Mapping[str, TableProof]
+    findings: tuple[tuple[Span, str], ...] = ()
+    vectors: VectorSet | None = None
+    properties: Mapping[str, str] = field(default_factory=dict)
+    sources: Mapping[str, Source] = field(default_factory=dict)
+
+
+def matrix(plan: Plan, files: Mapping[str, str], known: Known) -> Matrix:
+    """Build the matrix of a program from its plan, its emitted files and what is known of it."""
+    code = {path: text for path, text in files.items() if path.endswith((".c", ".h", ".py"))}
+    pieces = tuple(_pieces(plan, code))
+    build = _Build(plan, known)
+    return Matrix(
+        plan.program.name,
+        plan.source,
+        digest(plan.program),
+        _hashed(files),
+        known.tables,
+        tuple(build.lines()),
+        tuple(build.declared()),
+        {str(table.table.name): table.table.requirements for table in plan.tables},
+        pieces,
+        tuple(untraced(code, pieces)),
+        dict(build.places()),
+    )
+
+
+def of_system(name: str, source: str, files: Mapping[str, str]) -> Matrix:
+    """Build the matrix of the C of a whole system, all of which comes from its description."""
+    code = {path: text for path, text in files.items() if path.endswith((".c", ".h"))}
+    pieces = tuple(piece for path, text in code.items() for piece in system_pieces(name, path, text))
+    hashed = _hashed(files)
+    return Matrix(name, source, digest(*sorted(hashed.values())), hashed, {}, (), (), {}, pieces, tuple(untraced(code, pieces)),
+        {(Sort.SYSTEM, name): source})  # fmt: skip
+
+
+def _hashed(files: Mapping[str, str]) -> dict[str, str]:
+    return {path: hashlib.sha256(text.encode()).hexdigest() for path, text in files.items()}
+
+
+def _pieces(plan: Plan, code: Mapping[str, str]) -> Iterator[Piece]:
+    names = c_names(plan)
+    for path, text in code.items():
+        if path.endswith(".py"):
+            yield from python_pieces(plan, path, text)
+        else:
+            yield from c_pieces(names, path, text)
+
+
+def untraced(code: Mapping[str, str], pieces: Iterable[Piece]) -> Iterator[str]:
+    """Give the lines of files that are in no piece, blank ones left out."""
+    inside: dict[str, set[int]] = {}
+    for piece in pieces:
+        inside.setdefault(piece.file, set()).update(range(piece.first, piece.last + 1))
+    for path, text in code.items():
+        for at, line in enumerate(text.splitlines(), 1):
+            if line.strip() and at not in inside.get(path, ()):
+                yield f"{path}:{at}"
+
+
+class _Build:
+    """Reads one program for its matrix."""
+
+    def __init__(self, plan: Plan, known: Known) -> None:
+        self.plan, self.known = plan, known
+        self.taking = {} if known.vectors is None else dict(_taking(known.vectors))
+        self.program: Program = plan.program
+        self.procedures: dict[str, Procedure] = {str(one.name): one for one in self.program.procedures}
+        self.spoken = {
+            one.name: {leaf.removeprefix(BEFORE) for leaf in read_by(one.condition)}
+            for one in self.program.properties
+        }
+
+    # --- lines ---
+
+    def lines(self) -> Iterator[TracedLine]:
+        """Every line of every table."""
+        for table in self.plan.tables:
+            written = {str(line.name): line for line in table.table.lines}
+            for line in table.lines:
+                own = written.get(str(line.name))
+                tests = own.tests if own is not None else ()
+                tested = {str(leaf) for test in tests if test is not None for leaf in test.variables}
+                span = self._row(table, line)
+                yield self._line(table, line, span, tested)
+
+    def _row(self, table: PlanTable, line: PlanLine) -> Span:
+        return next(one.span for one in table.table.every_line if one.name == line.name)
+
+    def _line(self, table: PlanTable, line: PlanLine, span: Span, tested: set[str]) -> TracedLine:
+        body = [action.statement for action in line.actions]
+        return TracedLine(
+            str(table.table.name),
+            str(line.name),
+            self.place(span),
+            line.requirements,
+            table.table.requirements,
+            line.conditions,
+            tuple(dict.fromkeys(f"{action.heading}: {action.text}" for action in line.actions)),
+            tuple(self.called(body)),
+            tuple(self._properties(set(self.written(body)), tested)),
+            tuple(told for at, told in self.known.findings if _inside(at, span)),
+            self._tests(table, line),
+        )
+
+    def _properties(self, written: set[str], tested: set[str]) -> Iterator[tuple[str, str]]:
+        for name, leaves in self.spoken.items():
+            changed, seen = sorted(leaves & written), sorted(leaves & tested - written)
+            why = [
+                f"{word} {', '.join(found)}"
+                for word, found in (("changes", changed), ("tests", seen))
+                if found
+            ]
+            if why:
+                yield name, "; ".join(why)
+
+    def _tests(self, table: PlanTable, line: PlanLine) -> Tests:
+        document = self.known.vectors
+        if document is None:
+            return Tests()
+        table_name, name = str(table.table.name), str(line.name)
+        vectors = next(each for each in document.tables if each.table == table_name)
+        own = {at for at, vector in enumerate(vectors.vectors, 1) if vector.line == name}
+        made = (
+            number
+            for number, kept in enumerate(document.kept, 1)
+            if kept.case.entry.name == table_name and own.intersection(kept.case.shows)
+        )
+        unshown = [one for one in vectors.unshown if one.line == name]
+        shown = {(one.column, one.condition) for one in vectors.vectors if one.line == name and one.condition}
+        lacking = [one for one in unshown if one.condition]
+        return Tests(
+            tuple(made),
+            tuple(self.taking.get((table_name, name), ())),
+            len(shown) + len(lacking),
+            len(shown),
+            tuple(f"{one.column} {one.condition}: {one.reason}".strip() for one in unshown),
+        )
+
+    # --- procedures and conditions ---
+
+    def declared(self) -> Iterator[Declared]:
+        """Every procedure that something runs, every assumption, invariant and property."""
+        for procedure in self.program.procedures:
+            if runs := tuple(self._users(str(procedure.name))):
+                yield self._named("procedure", procedure, procedure.doc, runs, OWES_NOTHING)
+        for assumption in self.program.assumptions:
+            relying = (
+                f"table {one.name}" for one in self.program.tables if assumption.name in one.assumptions
+            )
+            states = assumption.doc or words(assumption.condition)
+            yield self._named("assumption", assumption, states, relying, assumption.standing.value)
+        for invariant in self.program.invariants:
+            states = invariant.doc or words(invariant.condition)
+            yield self._named("invariant", invariant, states, (), KEPT)
+        for stated in self.program.properties:
+            proof = self.known.properties.get(stated.name, NOT_HERE)
+            changing = (line.words for line in self._speaking(stated))
+            yield self._named("property", stated, stated.text, changing, proof)
+
+    def _named(
+        self,
+        sort: str,
+        one: Procedure | Assumption | Invariant | Property,
+        states: str,
+        used: Iterable[str],
+        proof: str = "",
+    ) -> Declared:
+        return Declared(
+            sort, str(one.name), self.place(one.span), one.requirements, states, tuple(used), proof
+        )
+
+    def _users(self, procedure: str) -> Iterator[str]:
+        for table in self.plan.tables:
+            for line in table.lines:
+                if procedure in self.called([action.statement for action in line.actions]):
+                    yield f"{table.table.name} line {line.name}"
+        for level in self.program.levels:
+            if procedure in self.called(_calls(level)):
+                yield f"level {level.name}"
+
+    def _speaking(self, stated: Property) -> Iterator[Origin]:
+        """The lines that change what a property speaks of."""
+        for table in self.plan.tables:
+            for line in table.lines:
+                if self.spoken[stated.name] & set(
+                    self.written([action.statement for action in line.actions])
+                ):
+                    yield Origin(Sort.LINE, str(table.table.name), str(line.name))
+
+    def called(self, body: Iterable[Statement]) -> dict[str, None]:
+        """The procedures that statements run, calls of calls included."""
+        names: dict[str, None] = {}
+        waiting = [str(call.procedure) for call in everything(body) if isinstance(call, Call)]
+        while waiting:
+            name = waiting.pop(0)
+            if name not in names:
+                names[name] = None
+                inner = everything(self.procedures[name].body)
+                waiting += [str(call.procedure) for call in inner if isinstance(call, Call)]
+        return names
+
+    def written(self, body: list[Statement]) -> Iterator[str]:
+        """The leaves that statements may write, calls included; a deferred one by its own name."""
+        for statement in everything(body):
+            leaves = (
+                self.procedures[str(statement.procedure)].writes
+                if isinstance(statement, Call)
+                else written_by(statement)
+            )
+            yield from (leaf.removesuffix(".next") for leaf in leaves)
+
+    def places(self) -> Iterator[tuple[tuple[str, str], str]]:
+        """Where tables, variables, levels and the program itself are declared."""
+        yield from (((Sort.TABLE, str(one.name)), self.place(one.span)) for one in self.program.tables)
+        yield from (((Sort.VARIABLE, one.name), self.place(one.span)) for one in self.program.declared)
+        yield from (((Sort.LEVEL, one.name), self.place(one.span)) for one in self.program.levels)
+        yield from (((Sort.TYPE, one.name), one.file) for one in self.program.types)
+        yield (Sort.PROGRAM, self.program.name), self.program.file
+
+    def place(self, span: Span) -> str:
+        """File and line of a span."""
+        source = self.known.sources.get(span.file)
+        return f"{span.file}:{source.position(span.start).line}" if source is not None else span.file
+
+
+def _taking(document: VectorSet) -> Mapping[TakenLine, list[int]]:
+    """The numbers of the vectors that take each line."""
+    numbers: dict[TakenLine, list[int]] = {}
+    for number, lines in enumerate(taken(document.program, document.kept), 1):
+        for line in dict.fromkeys(lines):
+            numbers.setdefault(line, []).append(number)
+    return numbers
+
+
+def _calls(level: Level) -> list[Statement]:
+    return [Call(ProcedureName(str(name))) for name in (*level.preprocess, *level.postprocess)]
+
+
+def _inside(at: Span, span: Span) -> bool:
+    return at.file == span.file and span.start <= at.start <= span.end

@@ -1,0 +1,227 @@
+"""A matrix as one page: it needs no script and no other file, is dark where the reader's screen is, and prints.
+
+In: matrices. Out: HTML.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from html import escape
+from itertools import groupby
+
+from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
+from rcsc.views.trace.origin import Origin, Piece, Sort
+from rcsc.views.trace.requirements import places
+from rcsc.views.trace.tables_of import spots
+
+_STYLE = """
+:root { --ink: #1d2329; --soft: #5b6670; --paper: #fff; --panel: #f4f6f8; --edge: #d5dbe0; --bad: #b3261e; --mark: #155fa8; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { --ink: #e4e8eb; --soft: #9aa6b0; --paper: #14181c; --panel: #1c2228; --edge: #38424b; --bad: #ff8672; --mark: #7db8f0; }
+}
+* { box-sizing: border-box; }
+body { margin: 0 auto; padding: 1.2rem 1.5rem; max-width: 92rem; background: var(--paper); color: var(--ink);
+  font: 14px/1.4 system-ui, sans-serif; }
+h1 { font-size: 1.5rem; margin: 0 0 .3rem; }
+h2 { font-size: 1.2rem; margin: 2rem 0 .4rem; border-bottom: 2px solid var(--edge); }
+h3 { font-size: 1rem; margin: 1.2rem 0 .2rem; }
+p { margin: .2rem 0 .5rem; color: var(--soft); max-width: 80rem; }
+table { border-collapse: collapse; width: 100%; margin-bottom: .6rem; }
+th, td { padding: .2rem .5rem; text-align: left; vertical-align: top; border-bottom: 1px solid var(--edge); overflow-wrap: anywhere; }
+th { font-size: .8rem; color: var(--soft); background: var(--panel); }
+td { font-size: .82rem; }
+code { font: .95em ui-monospace, monospace; }
+.soft { color: var(--soft); } .bad { color: var(--bad); font-weight: 600; }
+.for { color: var(--mark); font-weight: 600; } a { color: inherit; }
+.at { white-space: nowrap; }
+nav a { margin-right: 1rem; }
+tr:target { outline: 2px solid var(--mark); }
+@media print {
+  body { padding: 0; max-width: none; font-size: 9pt; } h2 { break-before: page; }
+  tr { break-inside: avoid; } thead { display: table-header-group; }
+}
+@page { size: A4 landscape; margin: 12mm; }
+"""
+_ABOUT = (
+    "From requirements and lines of tables to generated code, tests and proofs, and back. Places of code are lines of a file, first "
+    "and last. Vectors have the numbers of the file that <code>rcsc test --vectors</code> writes: those that show a condition of the line "
+    "to decide it, and those that take the line."
+)
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+
+
+def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
+    """The page: requirements, then each program forward by lines and backward by code."""
+    links = (f'<a href="#{escape(one.program)}">{escape(one.program)}</a>' for one in matrices)
+    body = [
+        "<h1>Traceability</h1>",
+        f"<p>{_ABOUT}</p>",
+        f"<nav>{''.join(links)}</nav>",
+        *_requirements(places(matrices), listed),
+        *(part for one in matrices for part in _program(one)),
+    ]
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<meta name="color-scheme" content="light dark">\n'
+        f'<link rel="icon" href="data:,">\n<title>Traceability</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n'
+        + "\n".join(body)
+        + "\n</body>\n</html>\n"
+    )
+
+
+def _table(headings: Mapping[str, int], rows: Iterable[str]) -> str:
+    """A table; the width of each column in per cent."""
+    columns = "".join(f'<col style="width: {width}%">' for width in headings.values())
+    heads = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
+    return f"<table><colgroup>{columns}</colgroup><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _row(*cells: str, name: str = "") -> str:
+    """A row of cells that are HTML; a name that others can point at."""
+    mark = f' id="{escape(name)}"' if name else ""
+    return f"<tr{mark}>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+
+def _listing(words: Iterable[str], style: str = "") -> str:
+    cell = "<br>".join(map(escape, words))
+    return f'<span class="{style}">{cell}</span>' if style and cell else cell
+
+
+def _requirements(known: Mapping[str, Sequence[str]], listed: Sequence[str]) -> Iterator[str]:
+    yield "<h2>Requirements</h2>"
+    names = dict.fromkeys((*listed, *known))
+    if not names:
+        yield "<p>No line and no declaration names one: a column <code>req</code> of a table does.</p>"
+        return
+    if listed:
+        yield f"<p>{sum(name in known for name in listed)} of {len(listed)} in the list have a place.</p>"
+    rows = []
+    for name in names:
+        where = _listing(known[name]) if name in known else '<span class="bad">nothing is for it</span>'
+        note = ' <span class="bad">not in the list</span>' if listed and name not in listed else ""
+        rows.append(_row(f'<span class="for">{escape(name)}</span>{note}', where))
+    yield _table({"requirement": 25, "named by": 75}, rows)
+
+
+def _program(matrix: Matrix) -> Iterator[str]:
+    yield f'<h2 id="{escape(matrix.program)}">{escape(matrix.program)}</h2>'
+    yield f"<p>Of <code>{escape(matrix.source)}</code>, meaning <code>{matrix.digest[:16]}</code>. {_untraced(matrix)}</p>"
+    for name, proof in matrix.tables.items():
+        own = [line for line in matrix.lines if line.table == name]
+        rests = ", ".join(f"{one} ({was})" for one, was in proof.rests)
+        known = f"{proof.verdict}: {proof.method}{f'; rests on {rests}' if rests else ''}"
+        matched = [("matched in", matrix.of(Origin(Sort.TABLE, name)))]
+        code = "; ".join(_where(matched, ends) for ends in ((".c",), (".py",)))
+        names = _listing([", ".join(matrix.requirements.get(name, ()))], "for")
+        yield f"<h3>Table {escape(name)} {names}</h3>"
+        yield f"<p>{escape(known)}.<br>{code}.</p>"
+        yield _table(
+            {"line": 10, "for": 7, "when": 22, "does": 15, "C": 13, "Python": 12, "vectors": 10, "shown": 11},
+            (_line(matrix, line) for line in own),
+        )
+    if matrix.declared:
+        yield "<h3>Procedures, assumptions, invariants and properties</h3>"
+        widths = {"what": 16, "for": 10, "states": 30, "used by": 26, "known": 18}
+        yield _table(widths, map(_declared, matrix.declared))
+    yield from _code(matrix)
+
+
+def _untraced(matrix: Matrix) -> str:
+    if not matrix.untraced:
+        return "Every line of its generated code comes from the tables, or is named below as infrastructure with its reason."
+    some = escape(", ".join(matrix.untraced[:20]))
+    return (
+        f'<span class="bad">{len(matrix.untraced)} lines of generated code come from nothing: {some}</span>'
+    )
+
+
+def _line(matrix: Matrix, line: TracedLine) -> str:
+    code = [(word, pieces) for word, pieces in matrix.code(line) if word != "matches"]
+    tests = line.tests
+    spoken = ", ".join(name for name, _ in line.properties)
+    proved = [*line.findings, *([f"properties: {spoken}"] if spoken else [])]
+    shown = f"{tests.shown} of {tests.conditions}" if tests.conditions else ""
+    return _row(
+        f'<b>{escape(line.name)}</b><br><span class="soft">{_place(line.place.rpartition("/")[2])}</span>',
+        _listing(line.requirements, "for"),
+        _listing([*line.states]) + (f'<br><span class="soft">{_listing(proved)}</span>' if proved else ""),
+        _listing(line.does),
+        _where(code, (".c",)),
+        _where(code, (".py",)),
+        _numbered("show", tests.made) + _numbered("take", tests.taken),
+        shown + (f'<br><span class="soft">{_listing(tests.unshown)}</span>' if tests.unshown else ""),
+        name=f"{matrix.program}-{line.table}-{line.name}",
+    )
+
+
+def _place(place: str) -> str:
+    """A place that breaks between folders, file and number, never in one of them."""
+    file, colon, number = place.rpartition(":")
+    file, number = (f"{file}:", number) if colon and number.isdigit() else (place, "")
+    *folders, name = file.split("/")
+    pieces = (*(f"{folder}/" for folder in folders), name, number)
+    return "<wbr>".join(_unbroken(piece) for piece in pieces if piece)
+
+
+def _unbroken(words: str) -> str:
+    """A name or numbers that stay on one line: a column grows with its longest."""
+    return f'<span class="at">{escape(words)}</span>'
+
+
+def _numbered(word: str, numbers: Sequence[int]) -> str:
+    """Numbers of vectors, neighbours joined: `3-5, 9`."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    words = (_unbroken(f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0])) for run in runs)
+    return f'<div><span class="soft">{word}</span> {", ".join(words)}</div>' if runs else ""
+
+
+def _where(code: Iterable[tuple[str, tuple[Piece, ...]]], ends: tuple[str, ...]) -> str:
+    """The places of a line's code, the words before them soft; what only numbers it is left out."""
+    rows = []
+    for word, pieces in code:
+        for file, runs in spots(piece for piece in pieces if piece.file.endswith(ends)):
+            lines = ", ".join(_unbroken(f"{first}-{last}") for first, last in runs)
+            name = _unbroken(f"{file.rpartition('/')[2]}:")
+            rows.append(f'<span class="soft">{word}</span> {name} {lines}')
+    return "<br>".join(rows)
+
+
+def _declared(one: Declared) -> str:
+    return _row(
+        f'<b>{escape(one.name)}</b><br><span class="soft">{escape(one.sort)}, {_place(one.place)}</span>',
+        _listing(one.requirements, "for"),
+        escape(one.states),
+        escape(", ".join(one.used)),
+        escape(one.proof),
+    )
+
+
+def _code(matrix: Matrix) -> Iterator[str]:
+    """Each generated file back to the tables, neighbours of one origin joined."""
+    yield "<h3>Generated code, back to the tables</h3>"
+    widths = {"lines": 9, "called": 27, "comes from": 34, "where": 18, "for": 12}
+    for file, pieces in groupby(
+        sorted(matrix.pieces, key=lambda piece: piece.file), key=lambda piece: piece.file
+    ):
+        ordered = sorted(pieces, key=lambda piece: (piece.first, -piece.last))
+        yield f"<p><code>{escape(file)}</code>, SHA-256 <code>{matrix.files.get(file, '')[:16]}</code></p>"
+        joined = (list(same) for _, same in groupby(ordered, key=lambda piece: piece.origin))
+        yield _table(widths, (_piece(matrix, same) for same in joined))
+
+
+def _piece(matrix: Matrix, same: list[Piece]) -> str:
+    origin = same[0].origin
+    names = list(dict.fromkeys(piece.name for piece in same if piece.name))
+    named = ", ".join(names) if len(names) < 4 else f"{names[0]}, {names[1]} and {len(names) - 2} more"
+    words = escape(origin.words)
+    return _row(
+        _unbroken(f"{same[0].first}-{max(piece.last for piece in same)}"),
+        f"<code>{escape(named)}</code>" if named else "",
+        f'<span class="soft">infrastructure: {words}</span>' if origin.sort is Sort.INFRASTRUCTURE else words,
+        _place(matrix.place(origin)),
+        _listing(matrix.answers(origin), "for"),
+    )
