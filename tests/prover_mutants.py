@@ -48,12 +48,12 @@ MODULES = tuple(
     f"rcsc/{room}{name}.py"
     for room, names in {
         "lang/": "interpret interval_sets operator_table",
-        "certify/": "__init__ known owed execution settle table values",
-        "table/regions/": "atoms ends holes linear partition points region splitting",
-        "table/": "boxes confirm program relational decide",
-        "procedures/": "discharge invariants obligations",
-        "symbolic/": "effect encode evaluation execution trial values keyed measured",
-        "solvers/": "search smt",
+        "proof/certify/": "__init__ known owed execution settle table values",
+        "proof/table/regions/": "atoms ends holes linear partition points region splitting",
+        "proof/table/": "boxes confirm program relational decide",
+        "proof/procedures/": "discharge invariants obligations",
+        "proof/symbolic/": "effect encode evaluation execution trial values keyed measured",
+        "proof/solvers/": "search smt",
         "compose/proof/": "assume_guarantee context termination level ranking system",
         "compose/contract/": "claims environment obligations properties transition",
         "compose/invariant/": "confirm",
