@@ -109,7 +109,7 @@ class Digests:
         return repr(procedure.params) + self.body([Call(procedure.name)])
 
     def touched(self, body: Iterable[Statement], conditions: Iterable[Expr]) -> set[str]:
-        """Leaves that statements, all that they call, and conditions read or write."""
+        """Return the leaves that statements, all that they call, and conditions read or write."""
         called = [self.procedures[name] for name in self.closure(body)]
         leaves = {str(leaf) for condition in conditions for leaf in read_by(condition)}
         for part in (body, *(procedure.body for procedure in called)):
@@ -121,7 +121,7 @@ class Digests:
         return leaves
 
     def closure(self, body: Iterable[Statement]) -> list[str]:
-        """The procedures that run when the statements do, sorted."""
+        """Return the procedures that run when the statements do, sorted."""
         waiting, seen = list(_called(body)), set[str]()
         while waiting:
             name = waiting.pop()
@@ -131,7 +131,7 @@ class Digests:
         return sorted(seen)
 
     def _rest(self, body: list[Statement], conditions: Iterable[Expr]) -> str:
-        """Procedures as they are defined, and variables as they are declared."""
+        """Return, as text, the definitions of the procedures called and the declarations of the variables touched."""
         defined = [repr(replace(self.procedures[name], doc="")) for name in self.closure(body)]
         leaves = sorted(self.touched(body, conditions))
         declared = [(name, repr(self.variables[name].type), self.variables[name].kind) for name in leaves]

@@ -19,14 +19,14 @@ _Feed: TypeAlias = tuple[str, str]
 
 
 def fed_with(variable: Variable) -> _Feed | None:
-    """What a hidden state holds, in words that say all of it; None for any other variable."""
+    """Return a complete description of what a hidden state holds; None for any other variable."""
     if variable.previous_of is not None:
         return "was", str(variable.previous_of)
     return None if variable.counts is None else ("for", spelled(variable.counts))
 
 
 def hidden(program: Program) -> frozenset[str]:
-    """The states that the compiler adds: what is looked back at, how long conditions have held, and which line ran."""
+    """Return the states that the compiler adds: values of the cycle before, counters of conditions, and the lines that ran."""
     return frozenset(
         str(variable.name)
         for variable in program.variables
@@ -35,7 +35,7 @@ def hidden(program: Program) -> frozenset[str]:
 
 
 def keeps(program: Program) -> Callable[[str], bool]:
-    """Whether a procedure, by name, is the one that ends a cycle: it writes hidden states, and nothing else may."""
+    """Return a test, by name, for the procedure that ends a cycle: it writes hidden states, and no other may."""
     own = hidden(program)
     known = {str(p.name) for p in program.procedures if _keeps(p, own)}
     return known.__contains__
@@ -46,7 +46,7 @@ def _keeps(procedure: Procedure, own: frozenset[str]) -> bool:
 
 
 def matched(first: Program, second: Program) -> tuple[Program, Program]:
-    """The two programs with hidden states named alike where they are fed alike, and as the second names them where it has them."""
+    """Return both programs with hidden states named alike where they are fed alike, by the second's names where it has them."""
     feeds = _fed(first), _fed(second)
     if not feeds[0] and not feeds[1]:
         return first, second
@@ -71,7 +71,7 @@ def _fed(program: Program) -> dict[_Feed, str]:
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """The name, or the first of `NAME_2`, `NAME_3` that nothing else has; of an element of an array, before the index."""
+    """Return the name, or the first of `NAME_2`, `NAME_3` that nothing else has; for an array element numbered before the index."""
     base, bracket, rest = name.partition("[")
     number, free = 2, name
     while free in taken:
@@ -80,7 +80,7 @@ def _free(name: str, taken: set[str]) -> str:
 
 
 def _limits(*programs: Program) -> dict[_Feed, Scalar]:
-    """How far each counter goes in either program: below that, both count alike."""
+    """Return the greater limit of each counter in the two programs: below it, both count alike."""
     limits: dict[_Feed, Scalar] = {}
     for program in programs:
         for variable in program.variables:
@@ -129,7 +129,7 @@ class _Named:
         )
 
     def _any(self, value: Any, *, leaf: bool = False) -> Any:
-        """Any part of the model; `leaf`: strings in it are names of leaves."""
+        """Rename leaves in any part of the model; with `leaf`, its strings are names of leaves."""
         if isinstance(value, str):
             return self.names.get(value, value) if leaf else value
         if isinstance(value, tuple):
@@ -151,7 +151,7 @@ class _Named:
 
 
 def _leaf_fields(kind: "type[DataclassInstance]") -> tuple[tuple[str, bool], ...]:
-    """The fields of a class of the model, and whether each holds names of leaves by what it declares."""
+    """Return the fields of a class of the model, and whether each is declared to hold names of leaves."""
     hints = typing.get_type_hints(kind)
     return tuple(
         (field.name, VariableName in _within(hints[field.name])) for field in fields(kind) if field.init

@@ -56,7 +56,7 @@ from rcsc.lang.operator_table import UNDECIDED, Op, is_logic, single
 
 
 class Fault(IntEnum):
-    """Why a cycle ended early; the executors return the same numbers."""
+    """The reason why a cycle ended early; the executors return the same numbers."""
 
     OK = 0
     ADMIT = 1
@@ -70,7 +70,7 @@ class Fault(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a step or cycle did.
+    """The result of a step or cycle.
 
     Attributes:
         snapshot: The complete state afterwards.
@@ -109,7 +109,7 @@ _ANSWERS: ContextVar[Answers | None] = ContextVar("answers", default=None)
 
 
 def operated(op: Op, kind: Scalar, *operands: Value) -> Value:
-    """The value of an operator that looks at all its operands; the first is of type `kind`.
+    """Return the value of an operator that looks at all its operands; the first is of type `kind`.
 
     Raises:
         ArithmeticError, ValueError: It has none: a divisor that is zero, or a real without a whole number.
@@ -120,7 +120,7 @@ def operated(op: Op, kind: Scalar, *operands: Value) -> Value:
 
 
 def evaluate(expr: Expr, snapshot: Snapshot, local: Mapping[str, Value] | None = None) -> Value:
-    """The value of `expr`; undefined operations (proved absent) raise."""
+    """Return the value of `expr`; undefined operations (proved absent) raise."""
     match expr:
         case Literal(value=value):
             return value
@@ -152,12 +152,12 @@ def _applied(op: Op, args: tuple[Expr, ...], snapshot: Snapshot, local: Mapping[
 
 
 def holds(condition: Expr | Test, snapshot: Snapshot) -> bool:
-    """Whether a condition is true of `snapshot`."""
+    """Return whether a condition is true of `snapshot`."""
     return bool(evaluate(condition.condition if isinstance(condition, Test) else condition, snapshot))
 
 
 def matching_lines(table: Table, snapshot: Snapshot) -> list[LineName]:
-    """The lines that match, DEFAULT left out, in order."""
+    """Return the names of the lines that match, in order, without DEFAULT."""
     return [
         line.name for line in table.lines if all(test is None or holds(test, snapshot) for test in line.tests)
     ]
@@ -169,7 +169,7 @@ def matching_lines(table: Table, snapshot: Snapshot) -> list[LineName]:
 def execute(
     program: Program, body: Iterable[Statement], snapshot: dict[str, Value], local: dict[str, Value]
 ) -> None:
-    """Runs statements; `snapshot` and `local` are changed in place."""
+    """Run statements; change `snapshot` and `local` in place."""
     for statement in body:
         match statement:
             case Assign(place=place, value=value):
@@ -195,7 +195,7 @@ def execute(
 
 
 def _stored(value: Value) -> Value:
-    """-0.0 is 0.0 wherever it is kept."""
+    """Return a value as it is kept: 0.0 for -0.0."""
     return value + 0.0 if isinstance(value, float) else value
 
 
@@ -214,7 +214,7 @@ def _assign(
 
 
 def call(program: Program, name: str, args: list[Value], snapshot: dict[str, Value]) -> None:
-    """Runs one procedure; `snapshot` is changed in place."""
+    """Run one procedure; change `snapshot` in place."""
     procedure = next(procedure for procedure in program.procedures if procedure.name == name)
     if procedure.extern is not None:
         _call_extern(program, procedure, args, snapshot)
@@ -254,7 +254,7 @@ def _of_user(procedure: Procedure, args: list[Value]) -> tuple[Value, ...]:
 
 @contextmanager
 def answering(answers: Answers) -> Iterator[None]:
-    """Inside, no extern procedure is called: `answers` gives the results, in range or not."""
+    """Replace every call of an extern procedure, inside, by the results of `answers`, in range or not."""
     before = _ANSWERS.set(answers)
     try:
         yield
@@ -266,12 +266,12 @@ def answering(answers: Answers) -> Iterator[None]:
 
 
 def initial(program: Program) -> dict[str, Value]:
-    """Every leaf's value before the first cycle."""
+    """Return the value of every leaf before the first cycle."""
     return {variable.name: variable.initial for variable in program.variables}
 
 
 def _admitted(variable: Variable, value: Value) -> Value | None:
-    """The value a table may see; None where it is refused."""
+    """Return the value that tables may see; None where it is refused."""
     given = _exactly(float if isinstance(variable.type, Real) else int, value)
     if given is None:
         return None
@@ -300,7 +300,7 @@ def _exactly(kind: type[int | float], value: Any) -> Value | None:
 
 
 def admit(program: Program, snapshot: Snapshot) -> dict[str, Value] | str:
-    """The snapshot with every input admitted, or the first leaf that is refused."""
+    """Return the snapshot with every input admitted, or the first leaf that is refused."""
     admitted = dict(snapshot)
     for variable in program.variables:
         if variable.kind is Kind.INPUT:
@@ -312,9 +312,9 @@ def admit(program: Program, snapshot: Snapshot) -> dict[str, Value] | str:
 
 
 def unfit(program: Program, snapshot: Snapshot) -> str:
-    """The first state or output that is no value of its type, or else the first invariant that does not hold; empty for none.
+    """Return the first state or output whose value is not of its type, else the first invariant that does not hold, else "".
 
-    Inputs are admitted by every cycle.
+    Inputs are left out: every cycle admits them.
     """
     for variable in program.variables:
         value, kind = snapshot[variable.name], variable.type
@@ -330,7 +330,7 @@ def unfit(program: Program, snapshot: Snapshot) -> str:
 
 
 def settle(program: Program, snapshot: dict[str, Value]) -> None:
-    """Deferred variables whose condition holds take their next value, all at once; no table has run yet."""
+    """Give every deferred variable whose condition holds its next value, all at once; mark all tables as not yet run."""
     ready = [
         v.name
         for v in program.variables
@@ -346,18 +346,18 @@ Chosen: TypeAlias = Callable[[Snapshot], Table]
 
 
 def run_table(program: Program, table: Table, snapshot: Snapshot) -> Outcome:
-    """One step of a table outside any level."""
+    """Run one step of a table outside any level."""
     return _shown(program, _cycle(program, (lambda _: table,), (), (), snapshot))
 
 
 def cycle(program: Program, level: Level, snapshot: Snapshot) -> Outcome:
-    """One cycle of a level."""
+    """Run one cycle of a level."""
     chosen = tuple(partial(chosen_table, program, choice) for choice in level.choices)
     return _shown(program, _cycle(program, chosen, level.preprocess, level.postprocess, snapshot))
 
 
 def chosen_table(program: Program, choice: TableChoice, now: Snapshot) -> Table:
-    """The table that runs on these values."""
+    """Return the table that runs on these values."""
     name = (
         choice.table if isinstance(choice, OneTable) else dict(choice.tables)[evaluate(choice.selector, now)]
     )
@@ -365,7 +365,7 @@ def chosen_table(program: Program, choice: TableChoice, now: Snapshot) -> Table:
 
 
 def run_stage(program: Program, table: Table, now: dict[str, Value]) -> Fault:
-    """Run a table that others follow, at its place in a cycle: OK, or why the cycle ends there.
+    """Run a table that others follow, at its place in a cycle; return OK, or the fault that ends the cycle there.
 
     Raises:
         ExternError: As `execute`.
@@ -377,7 +377,7 @@ def run_stage(program: Program, table: Table, now: dict[str, Value]) -> Fault:
 
 
 def _shown(program: Program, outcome: Outcome) -> Outcome:
-    """The outcome of a cycle; after a fault the outputs that have a safe value show it."""
+    """Return the outcome of a cycle; after a fault, outputs with a safe value show that."""
     if outcome.fault is Fault.OK:
         return outcome
     shown = {str(v.name): v.safe for v in program.variables if v.safe is not None}
@@ -413,7 +413,7 @@ def _cycle(
 
 @dataclass(frozen=True, slots=True)
 class _Matched:
-    """How far a cycle's tables have come: the fields of `Outcome`, and what the line does; only the last table's line is told."""
+    """The progress of a cycle through its tables: the fields of `Outcome`, and the line's actions; `line` is of the last table only."""
 
     line: LineName | None = None
     index: int = -1
@@ -424,7 +424,7 @@ class _Matched:
 
 
 def _run(program: Program, table: Table, now: dict[str, Value], before: _Matched, *, last: bool) -> _Matched:
-    """Match one table on the values at its place; keep the line of one that other tables follow."""
+    """Match one table on the values at its place; store the matched line in the state kept for it, where other tables follow."""
     failed = failed_assumptions(program, table, now)
     stopped = next((name for name in failed if name in table.stops), None)
     every = tuple(
@@ -443,7 +443,7 @@ def _run(program: Program, table: Table, now: dict[str, Value], before: _Matched
 
 
 def failed_assumptions(program: Program, table: Table, now: Snapshot) -> tuple[str, ...]:
-    """The table's assumptions that are checked, because they are monitored or stop the cycle, and do not hold."""
+    """Return those of the table's assumptions that are checked (monitored, or able to stop the cycle) and do not hold."""
     return tuple(
         assumption.name
         for assumption in program.assumptions

@@ -7,7 +7,7 @@ from rcsc.lang.operator_table import MIRRORED, Comparison, Op
 
 
 def meet(left: Box, right: Box) -> Box:
-    """The keys in both."""
+    """Return the keys in both."""
     if len(left) == len(right) == 1:  # nearly always, and very often: hence no call
         (a, b), (c, d) = left[0], right[0]
         low, high = (a if a > c else c), (b if b < d else d)  # noqa: FURB136  # as above
@@ -26,7 +26,7 @@ def meet(left: Box, right: Box) -> Box:
 
 
 def joined(intervals: Iterable[tuple[int, int]]) -> Box:
-    """The keys in any of the intervals."""
+    """Return the keys in any of the intervals."""
     merged: list[tuple[int, int]] = []
     for low, high in sorted(interval for interval in intervals if interval[0] <= interval[1]):
         if merged and low <= merged[-1][1] + 1:
@@ -37,7 +37,7 @@ def joined(intervals: Iterable[tuple[int, int]]) -> Box:
 
 
 def complement(box: Box, low: int, high: int) -> Box:
-    """The keys from `low` to `high` that are not in the box."""
+    """Return the keys from `low` to `high` that are not in the box."""
     edges, at = list[tuple[int, int]](), low
     for first, last in box:
         edges.append((at, first - 1))
@@ -46,7 +46,7 @@ def complement(box: Box, low: int, high: int) -> Box:
 
 
 def compared(op: Comparison, key: int, low: int, high: int) -> Box:
-    """The keys from `low` to `high` that stand in this relation to a key."""
+    """Return the keys from `low` to `high` that stand in this relation to a key."""
     below, at, above = (low, min(key - 1, high)), (max(key, low), min(key, high)), (max(key + 1, low), high)
     match op:
         case Op.EQ:
@@ -64,7 +64,7 @@ def compared(op: Comparison, key: int, low: int, high: int) -> Box:
 
 
 def scaled(op: Comparison, factor: int, bound: int, low: int, high: int) -> Box:
-    """The keys x from `low` to `high` for which factor * x stands in this relation to the bound; the factor is not 0.
+    """Return the keys x from `low` to `high` for which factor * x stands in this relation to the bound; the factor is not 0.
 
     For 2 * x < 5, where 5 / 2 is no key, that is x <= 2.
     """
@@ -78,10 +78,10 @@ def scaled(op: Comparison, factor: int, bound: int, low: int, high: int) -> Box:
 
 
 def holds(box: Box, key: int) -> bool:
-    """Whether the key is in the box."""
+    """Return whether the key is in the box."""
     return any(low <= key <= high for low, high in box)
 
 
 def size(box: Box) -> int:
-    """How many keys it has."""
+    """Return the number of keys in the box."""
     return sum(high - low + 1 for low, high in box)

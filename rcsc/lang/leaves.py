@@ -33,7 +33,7 @@ from rcsc.lang.model import (
 
 
 def parts(expr: Expr) -> Iterator[Expr]:
-    """The expression and all below it, wholes before parts."""
+    """Yield the expression and all below it, wholes before parts."""
     waiting = [expr]
     while waiting:
         part = waiting.pop()
@@ -45,7 +45,7 @@ def parts(expr: Expr) -> Iterator[Expr]:
 
 
 def operands(expr: Expr) -> tuple[Expr, ...]:
-    """The expressions directly below it."""
+    """Return the expressions directly below it."""
     match expr:
         case Apply(args=args):
             return args
@@ -58,12 +58,12 @@ def operands(expr: Expr) -> tuple[Expr, ...]:
 
 
 def is_finite(expr: Expr) -> bool:
-    """Whether no NaN or infinity can arise in the expression: then its values are ordered, and a comparison has an opposite."""
+    """Return whether no NaN or infinity can arise in the expression: then its values are ordered, and a comparison has an opposite."""
     return not isinstance(expr.type, Real) or (isfinite(expr.type.low) and isfinite(expr.type.high))
 
 
 def conjuncts(condition: Expr) -> Iterator[Expr]:
-    """The conditions that `and` joins, left to right."""
+    """Yield the conditions that `and` joins, left to right."""
     waiting = [condition]
     while waiting:
         part = waiting.pop()
@@ -74,7 +74,7 @@ def conjuncts(condition: Expr) -> Iterator[Expr]:
 
 
 def rebuilt(expr: Expr, change: Callable[[Expr], Expr]) -> Expr:
-    """The expression with each of its operands changed; one that has none as it is."""
+    """Return the expression with each of its operands changed; one without operands stays."""
     match expr:
         case Apply(args=args):
             return replace(expr, args=tuple(map(change, args)))
@@ -87,7 +87,7 @@ def rebuilt(expr: Expr, change: Callable[[Expr], Expr]) -> Expr:
 
 
 def read_by(expr: Expr) -> Iterator[VariableName]:
-    """Leaves that the expression reads, with repetition."""
+    """Yield the leaves that the expression reads, with repetition."""
     for part in parts(expr):
         if isinstance(part, Read):
             yield part.name
@@ -96,12 +96,12 @@ def read_by(expr: Expr) -> Iterator[VariableName]:
 
 
 def one_earlier(expr: Expr) -> Expr:
-    """The same expression of the values after the cycle before (`model.earlier`)."""
+    """Return the same expression over the values after the cycle before (`model.earlier`)."""
     return renamed(expr, earlier)
 
 
 def renamed(expr: Expr, name_of: Callable[[VariableName], VariableName]) -> Expr:
-    """The same expression of leaves of other names."""
+    """Return the same expression with other names of leaves."""
     if isinstance(expr, Read):
         return replace(expr, name=name_of(expr.name))
     rest = rebuilt(expr, lambda part: renamed(part, name_of))
@@ -109,7 +109,7 @@ def renamed(expr: Expr, name_of: Callable[[VariableName], VariableName]) -> Expr
 
 
 def expressions(statement: Statement) -> Iterator[Expr]:
-    """Expressions that the statement itself evaluates, not those of its blocks."""
+    """Yield the expressions that the statement itself evaluates, not those of its blocks."""
     match statement:
         case Assign(place=place, value=value):
             yield value
@@ -131,7 +131,7 @@ def expressions(statement: Statement) -> Iterator[Expr]:
 
 
 def blocks(statement: Statement) -> Iterator[tuple[Statement, ...]]:
-    """The blocks inside the statement."""
+    """Yield the blocks inside the statement."""
     match statement:
         case If(then=then, orelse=orelse):
             yield then
@@ -149,7 +149,7 @@ def blocks(statement: Statement) -> Iterator[tuple[Statement, ...]]:
 
 
 def everything(body: Iterable[Statement]) -> Iterator[Statement]:
-    """All statements, blocks included."""
+    """Yield all statements, blocks included."""
     for statement in body:
         yield statement
         for block in blocks(statement):
@@ -157,7 +157,7 @@ def everything(body: Iterable[Statement]) -> Iterator[Statement]:
 
 
 def every_statement(program: Program) -> Iterator[Statement]:
-    """All statements of the procedures and of the tables' lines, blocks included."""
+    """Yield all statements of the procedures and of the tables' lines, blocks included."""
     for procedure in program.procedures:
         yield from everything(procedure.body)
     for table in program.tables:
@@ -166,7 +166,7 @@ def every_statement(program: Program) -> Iterator[Statement]:
 
 
 def may_write(body: Iterable[Statement], procedures: Mapping[str, Procedure]) -> frozenset[VariableName]:
-    """Leaves that the statements may write, calls included."""
+    """Return the leaves that the statements may write, calls included."""
     leaves: set[VariableName] = set()
     for statement in everything(body):
         leaves.update(written_by(statement))
@@ -176,7 +176,7 @@ def may_write(body: Iterable[Statement], procedures: Mapping[str, Procedure]) ->
 
 
 def written_by(statement: Statement) -> tuple[VariableName, ...]:
-    """Leaves that the statement itself may write."""
+    """Return the leaves that the statement itself may write."""
     if not isinstance(statement, Assign):
         return ()
     match statement.place:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def spelled(term: Expr) -> str:
-    """A name for `term` that says all of what it is: two terms of one name are one term."""
+    """Return a name for `term` that describes it completely: two terms with one name are one term."""
     match term:
         case Literal(value=value, type=kind):
             return f"{type(kind).__name__.lower()}:{value!r}"
@@ -46,7 +46,7 @@ def spelled(term: Expr) -> str:
 
 
 def relying(program: Program) -> Program:
-    """The program with its invariants as assumptions of the tables that read what they speak of."""
+    """Return the program with its invariants as assumptions of the tables that read any of their leaves."""
     if not program.invariants:
         return program
     assumptions = [
@@ -74,13 +74,13 @@ def relying(program: Program) -> Program:
 
 
 def with_stops(program: Program, stops: Mapping[str, tuple[AssumptionName, ...]]) -> Program:
-    """The program, each table with its stopping assumptions (`Table.stops`); none where it is not named."""
+    """Return the program, each table with its stopping assumptions (`Table.stops`); a table that is not named gets none."""
     tables = tuple(replace(table, stops=stops.get(table.name, ())) for table in program.tables)
     return replace(program, tables=tables)
 
 
 def checked(program: Program) -> tuple[int, ...]:
-    """Positions of the assumptions that the executors check: monitored ones, and those that stop some table."""
+    """Return the positions of the assumptions that the executors check: monitored ones, and those that stop some table."""
     stopping = {name for table in program.tables for name in table.stops}
     return tuple(
         at
@@ -90,7 +90,7 @@ def checked(program: Program) -> tuple[int, ...]:
 
 
 def digest(*meant: object) -> str:
-    """SHA-256 (hex) of values of the model: every field that equality looks at, so spans are left out.
+    """Return the SHA-256 (hex) of values of the model: every field that equality looks at, so spans are left out.
 
     Fields are found by walking the classes, so that one that is added cannot be forgotten.
 
@@ -128,7 +128,7 @@ class _Digest:
         raise TypeError(f"{kind} is no value of the model")
 
     def _fields(self, kind: "type[DataclassInstance]") -> tuple[str, ...]:
-        """Names of the fields that equality looks at."""
+        """Return the names of the fields that equality looks at."""
         if kind not in self._compared:
             self._compared[kind] = tuple(attribute.name for attribute in fields(kind) if attribute.compare)
         return self._compared[kind]

@@ -42,7 +42,7 @@ NOWHERE = Span("", 0, 0)
 
 
 def at() -> Span:
-    """A span field: where it was written; not part of what it means."""
+    """Return a field for the place where something was written, which is no part of its meaning."""
     return field(default=NOWHERE, compare=False, repr=False)
 
 
@@ -124,22 +124,22 @@ Type: TypeAlias = Scalar | Array | Record
 
 
 def real_key(value: float) -> int:
-    """The rank of a finite double: monotone, consecutive doubles differ by one, 0.0 is 0."""
+    """Return the rank of a finite double: monotone, consecutive doubles differ by one, 0.0 is 0."""
     bits: int = struct.unpack("<q", struct.pack("<d", value))[0]
     return bits if bits >= 0 else -(bits & 0x7FFF_FFFF_FFFF_FFFF)
 
 
 def real_of_key(key: int) -> float:
-    """The double of rank `key`; the inverse of `real_key` (with 0.0 for -0.0)."""
+    """Return the double of rank `key`; the inverse of `real_key` (with 0.0 for -0.0)."""
     magnitude: float = struct.unpack("<d", struct.pack("<q", abs(key)))[0]
     return magnitude if key >= 0 else -magnitude
 
 
 def single_key(value: float) -> int:
-    """The rank of a finite single among singles, as `real_key`.
+    """Return the rank of a finite single among singles, as `real_key` does for doubles.
 
     Raises:
-        ValueError: It is no single.
+        ValueError: The value is no single.
     """
     word = struct.pack("<f", value)
     if struct.unpack("<f", word)[0] != value:
@@ -149,13 +149,13 @@ def single_key(value: float) -> int:
 
 
 def single_of_key(key: int) -> float:
-    """The single of rank `key`; the inverse of `single_key` (with 0.0 for -0.0); past the greatest an infinity, then none."""
+    """Return the single of rank `key`; the inverse of `single_key` (with 0.0 for -0.0). Past the greatest: infinity, then NaNs."""
     magnitude: float = struct.unpack("<f", struct.pack("<i", abs(key)))[0]
     return magnitude if key >= 0 else -magnitude
 
 
 def next_value(kind: Scalar, value: int | float, by: int) -> int | float:
-    """The value after (`by` 1) or before (-1) this number of the kind; an infinity is its own."""
+    """Return the value after (`by` 1) or before (-1) this number of the kind; after an infinity, itself."""
     if not isinstance(kind, Real):
         return value + by
     if not isinstance(kind, Single):
@@ -164,14 +164,14 @@ def next_value(kind: Scalar, value: int | float, by: int) -> int | float:
 
 
 def key_of(kind: Scalar, value: Value) -> int:
-    """The key of `value`, a value of type `kind`."""
+    """Return the key of `value`, a value of type `kind`."""
     if isinstance(kind, Single):
         return single_key(float(value))
     return real_key(float(value)) if isinstance(kind, Real) else int(value)
 
 
 def value_of_key(kind: Scalar, key: int) -> Value:
-    """The value of type `kind` with this key."""
+    """Return the value of type `kind` with this key."""
     if isinstance(kind, Bool):
         return bool(key)
     if isinstance(kind, Single):
@@ -180,7 +180,7 @@ def value_of_key(kind: Scalar, key: int) -> Value:
 
 
 def key_bounds(kind: Scalar) -> tuple[int, int]:
-    """Least and greatest key of the type."""
+    """Return the least and the greatest key of the type."""
     match kind:
         case Bool():
             return 0, 1
@@ -193,7 +193,7 @@ def key_bounds(kind: Scalar) -> tuple[int, int]:
 
 
 def spell(kind: Scalar, value: Value) -> str:
-    """`value` in the table's words: `true`, a member's name, a number."""
+    """Return `value` as tables write it: `true`, a member's name, a number."""
     match kind:
         case Bool():
             return "true" if value else "false"
@@ -223,7 +223,7 @@ def unspelled(kind: Scalar, text: str) -> Value:
 
 
 def unit_text(unit: Unit) -> str:
-    """A unit without its brackets, as it would be declared; empty for none.
+    """Return a unit without its brackets, as a declaration writes it; "" for no unit.
 
     >>> unit_text((("mm", 1), ("s", -2))), unit_text((("s", -1),))
     ('mm/s^2', '1/s')
@@ -238,7 +238,7 @@ def _power(name: str, power: int) -> str:
 
 
 def value_of_text(kind: Scalar, text: str) -> Value | None:
-    """The value that is spelled so; None where the type has none such."""
+    """Return the value that this text spells; None where the type has no such value."""
     try:
         value: Value
         match kind:
@@ -259,7 +259,7 @@ def value_of_text(kind: Scalar, text: str) -> Value | None:
 
 
 def start(kind: Scalar) -> Value:
-    """What a variable of the type starts with where nothing is written: 0, or what is nearest to it; the first member; false."""
+    """Return the value a variable starts with where none is written: the one nearest to 0; the first member; false."""
     match kind:
         case Int(low, high) | Real(low, high):
             zero = 0.0 if isinstance(kind, Real) else 0
@@ -272,7 +272,7 @@ def start(kind: Scalar) -> Value:
 
 
 class Kind(StrEnum):
-    """Who writes a variable: the world, or the level's own procedures."""
+    """The writer of a variable: the world, or the level's own procedures."""
 
     INPUT = "input"
     STATE = "state"
@@ -280,7 +280,7 @@ class Kind(StrEnum):
 
 
 class Admit(StrEnum):
-    """What happens to a reading outside its declared range; a NaN is always rejected."""
+    """The treatment of a reading outside its declared range; a NaN is always rejected."""
 
     REJECT = "reject"
     CLAMP = "clamp"
@@ -296,7 +296,7 @@ class Variable:
         initial: Its value before the first cycle (inputs too): what is written, else the safe value, else `start`.
         deferred_until: For a deferred variable: at the start of a cycle, when this holds of
             the snapshot, `x` takes the value of `x.next`. `next x := e` writes `x.next`.
-        safe: What an output shows after a cycle that ended in a fault; None where it stays as it is.
+        safe: The value that an output shows after a cycle that ended in a fault; None where it stays as it is.
         previous_of: Of a hidden state, the leaf whose value after the cycle before it holds.
         line_of: Of a hidden state, the table whose line of this cycle it holds: 0 for none, else one more than the line's position.
         counts: Of a hidden state that counts cycles, the condition that has held for so many.
@@ -321,14 +321,14 @@ class Variable:
 
     @property
     def part(self) -> Part:
-        """What its name may mean when the program starts anew."""
+        """The variable's type as `rcsc.lang.restart` needs it, to tell what the name adopts when the program starts anew."""
         members = self.type.members if isinstance(self.type, Enum) else ()
         whole = (self.type.low, self.type.high) if isinstance(self.type, Int) else None
         return Part(self.kind is Kind.OUTPUT, members, whole)
 
 
 def pending(name: str) -> VariableName:
-    """The leaf that holds the deferred next value of `name`."""
+    """Return the name of the leaf that holds the deferred next value of `name`."""
     return VariableName(f"{name}.next")
 
 
@@ -337,7 +337,7 @@ BEFORE = "was "
 
 
 def earlier(name: str) -> VariableName:
-    """The name, in a property, of the value of a leaf after the cycle before."""
+    """Return the name that means, in a property, the value of a leaf after the cycle before."""
     return VariableName(f"{BEFORE}{name}")
 
 
@@ -572,7 +572,7 @@ class Procedure:
 
 
 class Standing(StrEnum):
-    """How an assumption is known."""
+    """The standing of an assumption: how it is known."""
 
     ASSUMED = "assumed"
     MONITORED = "monitored"  # checked by the executors each cycle
@@ -581,12 +581,12 @@ class Standing(StrEnum):
 
     @property
     def checked(self) -> bool:
-        """Whether the executors check it in each cycle, even where no safety rests on it."""
+        """True where the executors check the assumption in each cycle, even if no safety rests on it."""
         return self in {Standing.MONITORED, Standing.WATCHED}
 
     @property
     def believed(self) -> bool:
-        """Whether the proof of the levels together takes it for granted, where it speaks of inputs."""
+        """True where the proof of the levels together takes the assumption for granted, as far as it speaks of inputs."""
         return self in {Standing.ASSUMED, Standing.WATCHED}
 
 
@@ -618,7 +618,7 @@ class Invariant:
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """What holds after every cycle of a level, in its environment; proved of the levels together (`compose`).
+    """A condition that holds after every cycle of a level, in its environment; proved of the levels together (`compose`).
 
     Nothing is emitted for it, and no table relies on it.
 
@@ -650,7 +650,7 @@ class Test:
 
     Attributes:
         text: The cell in the table's words, normalised.
-        condition: What it means, a boolean expression.
+        condition: The meaning, a boolean expression.
         variables: Leaves that it reads, in declared order.
         box: Where `condition` depends on exactly one leaf (`variables[0]`), compared with
             constants: the keys for which it holds, within the declared range. Else None.
@@ -709,7 +709,7 @@ class Line:
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def cell_span(self, column: int) -> Span:
-        """The span of the condition cell in `column` (the row's if unknown)."""
+        """Return the span of the condition cell in `column` (the span of the whole line if unknown)."""
         at_ = 2 * (column + 1)
         if at_ + 1 >= len(self.bounds):
             return self.span
@@ -729,7 +729,7 @@ class Default:
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """Two lines that are said to match together: `first above second`, or both do the `same`.
+    """A declaration about two lines that match together: `first above second`, or both do the `same`.
 
     Attributes:
         where: Where both match as they are written, and, of two that do the same, no line above one of them does.
@@ -745,14 +745,14 @@ class Meeting:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """What a level tries for one command: exactly one line must match in every cycle.
+    """The lines that a level tries for one command: exactly one must match in every cycle.
 
     Attributes:
         variables: Test variables: every leaf some test reads, in declared order.
         assumptions: Names of those that the table's proof may use.
         stops: Those of them on which the safety of the table's conditions and lines rests, in declared order; `prove` sets it.
             Where one fails the cycle ends before the table is matched; the others only tell.
-        meetings: What is said of pairs of its lines by name.
+        meetings: Declarations about pairs of its lines, by name.
     """
 
     name: TableName
@@ -770,17 +770,17 @@ class Table:
 
     @property
     def every_line(self) -> tuple[Line | Default, ...]:
-        """The lines, and after them DEFAULT where the table has one."""
+        """The lines, then DEFAULT where the table has one."""
         return self.lines if self.default is None else (*self.lines, self.default)
 
     @property
     def distinct_tests(self) -> tuple[Test, ...]:
-        """Each test of the lines once, in order of its first line."""
+        """Each test of the lines once, in order of the first line that has it."""
         every = (test for line in self.lines for test in line.tests if test is not None)
         return tuple({id(test): test for test in every}.values())
 
     def added(self, line: Line) -> str:
-        """What `above` and `same` add to the conditions of one of its lines, in words; empty for nothing."""
+        """Return the conditions that `above` and `same` add to a line, as text; "" where they add none."""
         tests = zip(line.tests, self.columns, strict=True)
         return " and ".join(test.text for test, column in tests if test is not None and not column.written)
 
@@ -806,7 +806,7 @@ class OneTable:
 
     @property
     def names(self) -> tuple[TableName, ...]:
-        """What it runs."""
+        """The name of its table."""
         return (self.table,)
 
 
@@ -819,7 +819,7 @@ class TableByCommand:
 
     @property
     def names(self) -> tuple[TableName, ...]:
-        """What it runs, each once, in order of commands."""
+        """The names of its tables, each once, in order of commands."""
         return tuple(dict.fromkeys(name for _, name in self.tables))
 
 
@@ -831,8 +831,8 @@ class Level:
     """One control level: every cycle deferred values, preprocess, stages, table, postprocess.
 
     Attributes:
-        tables: What runs last of its tables; where it has one, that.
-        stages: What runs before, in the order of what they read and write: each on the values that those before it leave.
+        tables: The choice of tables that runs last, or the only one.
+        stages: The choices that run before it, in the order of what they read and write: each on the values that those before it leave.
     """
 
     name: str
@@ -846,28 +846,28 @@ class Level:
 
     @property
     def choices(self) -> tuple[TableChoice, ...]:
-        """All that it runs, in order."""
+        """The choices of tables in the order in which they run."""
         return (*self.stages, self.tables)
 
     @property
     def selectors(self) -> tuple[Expr, ...]:
-        """What its choices are made by, in order."""
+        """The expressions by which tables are chosen, in order."""
         return tuple(choice.selector for choice in self.choices if isinstance(choice, TableByCommand))
 
     @property
     def table_names(self) -> tuple[TableName, ...]:
-        """Every table that it may run."""
+        """The names of all tables that it may run."""
         return tuple(name for choice in self.choices for name in choice.names)
 
     @property
     def staged(self) -> tuple[TableName, ...]:
-        """Every table that it may run before the last."""
+        """The names of all tables that it may run before the last."""
         return tuple(name for stage in self.stages for name in stage.names)
 
 
 @dataclass(frozen=True, slots=True)
 class LinkPart:
-    """What a link says of one thing: `what` it is about, what it `says` in words that do not depend on names of types, and where."""
+    """One part of a link: its subject (`what`), its content (`says`) in words that do not depend on names of types, and its place."""
 
     what: str
     says: str
@@ -876,7 +876,7 @@ class LinkPart:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """What a superior and a subordinate say to each other, as one of them declares it: both have to declare the same parts."""
+    """The messages between a superior and a subordinate, as one of them declares them; both must declare the same parts."""
 
     name: str
     span: Span
@@ -913,7 +913,7 @@ class Role:
 
 @dataclass(frozen=True, slots=True)
 class Roles:
-    """Whom the level of a program serves and commands.
+    """The neighbours that the level of a program serves and commands.
 
     Attributes:
         superior: None where it takes no orders.
@@ -924,11 +924,11 @@ class Roles:
 
     @property
     def clocks(self) -> frozenset[str]:
-        """Leaves in which the protocol counts the cycles of an order: no line has an effect on them."""
+        """The leaves in which the protocol counts the cycles of an order: no line has an effect on them."""
         return frozenset(f"{role.peer}_waited" for role in self.subordinates if role.late is not None)
 
     def makes(self, leaf: str) -> bool:
-        """Return whether the protocol makes the leaf: a buffer, or what is kept of orders and reports."""
+        """Return whether the protocol makes the leaf: a buffer, or state about orders and reports."""
         peers = [role.peer for role in (self.superior, *self.subordinates) if role is not None]
         records = {f"{word}{peer}" for peer in peers for word in ("", "to_", "from_", "last_")}
         own = {
@@ -954,7 +954,7 @@ class Program:
         tables: Tables of the root file and of the files it uses.
         own_tables: Names of the tables that the root file itself declares.
         roles: None where the protocol is written by hand, or there is none.
-        restart: What leaves adopt when the level starts anew (`rcsc.lang.restart`); None where nothing declares it, and names tell.
+        restart: What leaves adopt when the level starts anew (`rcsc.lang.restart`); None where nothing declares it, and names decide.
     """
 
     name: str
@@ -976,25 +976,25 @@ class Program:
 
     @property
     def types(self) -> "tuple[Enum | Record, ...]":
-        """Every declared type."""
+        """All declared types."""
         return (*self.enums, *self.records)
 
     @property
     def adopted(self) -> dict[str, Adopted]:
-        """What each leaf adopts that starts anew other than initially."""
+        """The new value of each leaf that does not return to its initial value when the level starts anew."""
         if self.restart is None:
             return by_names({str(variable.name): variable.part for variable in self.variables})
         return {str(leaf): adopted for leaf, adopted in self.restart}
 
     @property
     def line_leaves(self) -> dict[TableName, VariableName]:
-        """The hidden state that holds the line of each table that runs before another."""
+        """The hidden state that holds the line, for each table that runs before another."""
         return {
             variable.line_of: variable.name for variable in self.variables if variable.line_of is not None
         }
 
     def variable(self, name: str) -> Variable:
-        """The leaf called `name`; KeyError if there is none."""
+        """Return the leaf called `name`; raise KeyError if there is none."""
         for variable in self.variables:
             if variable.name == name:
                 return variable
@@ -1006,7 +1006,7 @@ class Program:
 
 @dataclass(frozen=True, slots=True)
 class Backing:
-    """What a verdict rests on, shown in the report.
+    """The grounds of a verdict, shown in the report.
 
     Attributes:
         method: `boxes` (masks and counting), `tree` (region tree) or `z3`.

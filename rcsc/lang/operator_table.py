@@ -22,7 +22,7 @@ IMPLICATION, DISJUNCTION, EXCLUSION, CONJUNCTION, NEGATION, RELATION, SUM, PRODU
 
 
 def divide(a: int, b: int) -> int:
-    """Quotient rounded toward zero, as in C."""
+    """Return the quotient rounded toward zero, as in C."""
     quotient = abs(a) // abs(b)
     return quotient if (a < 0) == (b < 0) else -quotient
 
@@ -31,9 +31,9 @@ _SINGLE = struct.Struct("<f")
 
 
 def single(number: float) -> float:
-    """The nearest IEEE binary32, ties to even, as a float; infinite beyond all of them.
+    """Return the nearest IEEE binary32, ties to even, as a float; an infinity beyond all of them.
 
-    Of the binary64 of a sum, difference, product or quotient of two binary32 it is that of the exact one, subnormal or not.
+    Of the binary64 sum, difference, product or quotient of two binary32, it is the exact result's binary32, subnormal or not.
 
     >>> single(0.1), single(2**24 + 1), single(1e39)
     (0.10000000149011612, 16777216.0, inf)
@@ -54,7 +54,7 @@ def single(number: float) -> float:
 
 
 def spell_single(value: float) -> str:
-    """The shortest decimal that is read back as this single, whether it is rounded once or by way of a double.
+    """Return the shortest decimal that is read back as this single, whether it is rounded once or by way of a double.
 
     >>> spell_single(0.10000000149011612), spell_single(16777216.0)
     ('0.1', '16777216.0')
@@ -67,7 +67,7 @@ def spell_single(value: float) -> str:
 
 
 def _halfway(value: float) -> bool:
-    """Whether a double lies halfway between two singles, so that its own error may decide."""
+    """Return whether a double lies halfway between two singles, so that its own error may decide."""
     return (
         math.isfinite(value) and struct.unpack("<Q", struct.pack("<d", value))[0] & 0x1FFF_FFFF == 0x1000_0000
     )
@@ -91,7 +91,7 @@ class Op(StrEnum):
     meaning: Callable[..., Any]
 
     def __new__(cls, word: str, strength: int = POSTFIX, meaning: Callable[..., Any] = abs) -> Self:
-        """Makes a member of its row."""
+        """Make a member from its row."""
         member = str.__new__(cls, word)
         member._value_, member.strength, member.meaning = word, strength, meaning
         return member
@@ -153,17 +153,17 @@ OPPOSITE: dict[Op, Comparison] = {
 
 
 def is_logic(op: Operator) -> "TypeIs[Logic]":
-    """Whether it is a truth function of two operands."""
+    """Return whether it is a truth function of two operands."""
     return op in LOGIC
 
 
 def is_comparison(op: Operator) -> "TypeIs[Comparison]":
-    """Whether it compares."""
+    """Return whether it compares."""
     return op in COMPARISONS
 
 
 def is_arithmetic(op: Operator) -> "TypeIs[Arithmetic]":
-    """Whether it takes numbers and gives one of their kind."""
+    """Return whether it takes numbers and gives one of their kind."""
     return op in get_args(Arithmetic)
 
 
@@ -180,10 +180,10 @@ def truth_function(
     every: Callable[[tuple[T, T]], T],
     some: Callable[[tuple[T, T]], T],
 ) -> Signed[T]:
-    """An operator on two truth values in negation normal form.
+    """Express an operator on two truth values in negation normal form.
 
-    True of one pair of operands, it is the conjunction that holds there; false of one, the disjunction that fails there: so `a implies
-    b`, false of (true, false), is `not a or b`. Else it is two conjunctions: `a = b` is `a and b or not a and not b`.
+    True for one pair of operands alone, it is the conjunction that holds there; false for one alone, the disjunction that fails there:
+    `a implies b`, false for (true, false), is `not a or b`. Else it is two conjunctions: `a = b` is `a and b or not a and not b`.
     """
 
     def signed(wanted: bool) -> T:

@@ -23,7 +23,7 @@ PROJECT_FILE = "rcsc.toml"
 SYSTEM_FILE = "system.toml"
 MOST_BYTES = 16 * 1024 * 1024
 PREFIX = re.compile(r"(?:[A-Za-z][A-Za-z0-9_]{0,7})?")
-"""What the C names of a project may begin with."""
+"""Prefixes that the C names of a project may have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +53,12 @@ def load(
     stdin_name: str = "-",
     overlay: Mapping[str, str] | None = None,
 ) -> Loaded:
-    """Reads and parses files, folders and (`-`) the text `stdin`, and all that they use.
+    """Read and parse files, folders and (`-`) the text `stdin`, and all that they use.
 
     Args:
         paths: As the user gave them.
-        stdin: What `-` stands for.
-        stdin_name: What it is called in messages.
+        stdin: The text for `-`.
+        stdin_name: Its name in messages.
         overlay: Texts that stand for what is on disk, by real path: an editor's, saved or not.
     """
     loader = _Loader(stdin, stdin_name, overlay or {})
@@ -86,13 +86,13 @@ def _heads(roots: tuple[str, ...], named: set[str], uses: Mapping[str, tuple[str
 
 
 def listed(paths: Sequence[str]) -> tuple[str, ...]:
-    """The files that the paths mean, unread, as `load` takes them for roots."""
+    """Return the files that the paths mean, unread, as `load` takes them for roots."""
     loader = _Loader(None, "-")
     return tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
 
 
 def places(loaded: Loaded) -> list[str]:
-    """Files read, and the places where a used file or a project file was looked for."""
+    """Return the files read, and the places where a used file or a project file was looked for."""
     from rcsc.lang.syntax.tree import Use
 
     names = set(loaded.sources)
@@ -107,7 +107,7 @@ def places(loaded: Loaded) -> list[str]:
 
 
 def project_root(file: str) -> str:
-    """The nearest folder upward with an `rcsc.toml`; else the file's own folder."""
+    """Return the nearest folder upward with an `rcsc.toml`; else the file's own folder."""
     folder = os.path.dirname(file) or "."
     here = Path(folder).resolve()
     for up, above in enumerate((here, *here.parents)):
@@ -119,7 +119,7 @@ def project_root(file: str) -> str:
 
 
 def systems_above(file: str) -> list[Path]:
-    """Descriptions beside the file and above it, up to the project's folder, or one up where there is no project."""
+    """Return the system descriptions beside the file and above it, up to the project's folder, or one up without a project."""
     here = Path(os.path.dirname(file) or ".").resolve()
     folders = [here, *here.parents]
     root = next((at for at, path in enumerate(folders) if (path / PROJECT_FILE).is_file()), 1)
@@ -127,7 +127,7 @@ def systems_above(file: str) -> list[Path]:
 
 
 def used_elsewhere(file: str) -> bool:
-    """Whether another file of its project may use a file, by the last word of a `use` in its text."""
+    """Return whether another file of its project may use a file, by the last word of a `use` in its text."""
     stem, real = os.path.basename(file).removesuffix(".rcs"), os.path.realpath(file)
     for other in listed((project_root(file),))[:_MOST_FILES]:
         raw = b"" if os.path.realpath(other) == real else _bytes(other)
@@ -139,7 +139,7 @@ def used_elsewhere(file: str) -> bool:
 
 
 def prefix(root: str) -> str:
-    """What the C names of a project begin with, as its file says; empty where it says nothing, or nothing that is right.
+    """Return the prefix of a project's C names from its file; "" where it has none, or no valid one.
 
     Args:
         root: The project's folder.
@@ -152,7 +152,7 @@ def prefix(root: str) -> str:
 
 
 def starts_at_zero(root: str) -> bool:
-    """Whether the file of the project in the folder `root` says that its tables were written since numbers start at 0."""
+    """Return whether the project file in `root` declares that its tables were written after start values became 0."""
     try:
         return toml_of(content(Path(root, PROJECT_FILE), MOST_TOML_BYTES)).get("starts_at_zero") is True
     except (OSError, ValueError, Malformed):
@@ -161,7 +161,7 @@ def starts_at_zero(root: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Unread:
-    """Why a file was not read; told again at every `use` of it."""
+    """The reason why a file was not read; reported again at every `use` of it."""
 
     code: Code
     message: str
@@ -192,13 +192,13 @@ class _Loader:
     root_of: dict[str, str] = field(default_factory=dict)
 
     def report(self, code: Code, message: str, span: Span, *helps: str) -> None:
-        """Adds an error."""
+        """Add an error."""
         self.diagnostics.append(Diagnostic(code, message, Label(span), help=helps))
 
     # --- which files ---
 
     def roots(self, path: str) -> Iterator[str]:
-        """The files that a path of the user's means."""
+        """Yield the files that a path of the user's means."""
         if path == "-":
             yield self.stdin_name
         elif os.path.isdir(path):
@@ -214,11 +214,11 @@ class _Loader:
             self.report(Code.UNREADABLE, "there is no such file or folder", Span(path, 0, 0))
 
     def _stands(self, path: str) -> bool:
-        """Whether anything stands at a place, be it on disk or in the overlay."""
+        """Return whether a file or folder is at a place, on disk or in the overlay."""
         return os.path.lexists(path) or os.path.realpath(path) in self.overlay
 
     def _unsaved(self, folder: str) -> dict[str, list[str]]:
-        """The names of files below a folder that only the overlay has, by the real path of the folder that they are in."""
+        """Return the names of files below a folder that only the overlay has, by the real path of their folder."""
         real = os.path.join(os.path.realpath(folder), "")
         found: dict[str, list[str]] = {}
         for path in self.overlay:
@@ -228,7 +228,7 @@ class _Loader:
         return found
 
     def _inside(self, folder: str) -> Iterator[str]:
-        """Files of a folder and the folders in it, each folder once whatever links lead to it."""
+        """Yield the files of a folder and the folders in it, each folder once whatever links lead to it."""
         seen: set[str] = set()
         unsaved = self._unsaved(folder)
         for here, folders, names in os.walk(folder, followlinks=True):
@@ -247,7 +247,7 @@ class _Loader:
                     yield self._name(path)
 
     def _name(self, path: str) -> str:
-        """The name of the file in messages: the path by which it was first reached."""
+        """Return the name of the file in messages: the path by which it was first reached."""
         return self.named.setdefault(os.path.realpath(path), os.path.normpath(path))
 
     def _root(self, folder: str) -> str:
@@ -256,7 +256,7 @@ class _Loader:
         return self.root_of[folder]
 
     def _exclude(self, root: str) -> tuple[str, ...]:
-        """The globs of a project; what is wrong with its file is reported once."""
+        """Return the exclude globs of a project; report errors in its file once."""
         path = os.path.join(root, PROJECT_FILE)
         if root not in self.excluded:
             self.excluded[root] = self._settings(path) if os.path.isfile(path) else ()
@@ -296,7 +296,7 @@ class _Loader:
     # --- reading ---
 
     def reach(self, root: str) -> None:
-        """Reads a file and all that it uses; a circle is reported where it closes."""
+        """Read a file and all that it uses; report a circle where it closes."""
         path = {root: self._used_by(root)} if self._read(root, Span(root, 0, 0)) else {}
         while path:
             file = next(reversed(path))
@@ -323,7 +323,7 @@ class _Loader:
         )
 
     def _read(self, file: str, asked: Span) -> bool:
-        """Whether the file is now read and parsed, for the first time."""
+        """Read and parse the file; return True if this succeeded and is the first time."""
         from rcsc.lang.syntax.parse import parse
         from rcsc.lang.syntax.tree import File
 
@@ -382,7 +382,7 @@ class _Loader:
 
 
 def _bytes(file: str) -> bytes | _Unread:
-    """The content of a regular file of bounded size; a pipe or a device might never end."""
+    """Return the content of a regular file of bounded size; a pipe or a device might never end."""
     try:
         return content(Path(file), MOST_BYTES)
     except OSError as error:
@@ -399,7 +399,7 @@ def _too_large(file: str) -> _Unread:
 
 
 def _toml_place(message: str, text: str) -> int:
-    """The offset of an error of `tomllib`'s, which names line and column only in words."""
+    """Return the offset of a `tomllib` error, which names line and column only in its text."""
     place = re.search(r"\(at line (\d+), column (\d+)\)", message)
     if place is None:
         return len(text) if "end of document" in message else 0
@@ -419,17 +419,17 @@ _MOST_FILES = 1000
 
 @dataclass(slots=True)
 class Neighbours:
-    """What the program of a level declares: the link to each neighbour, by its name."""
+    """The declared neighbours of a level: the link to each, by its name."""
 
     serves: dict[str, str] = field(default_factory=dict)
     commands: dict[str, str] = field(default_factory=dict)
 
 
 def neighbours(root: Path) -> Neighbours:
-    """Find whom a program serves and commands, in its root file and in those that it uses, sound or not.
+    """Find the neighbours that a program serves and commands, in its root file and in those that it uses, sound or not.
 
-    The declarations are looked for in the text, which takes a hundredth of the time of the parser: nothing may rest on it that is not
-    held against the program later.
+    It searches the text, a hundred times faster than the parser: nothing may rest on it that is not held against the program
+    later.
     """
     declared, seen, waiting = Neighbours(), set[Path](), [root]
     while waiting and len(seen) < _MOST_FILES:

@@ -28,29 +28,29 @@ _TRUE = Literal(True, Bool())
 
 
 def located(bounds: Iterable[tuple[list[tuple[Expr, int]], int, int]]) -> list[Expr]:
-    """Conditions that hold in a region, as far as conditions express it."""
+    """Return conditions that hold in a region, as far as conditions express it."""
     return [condition for terms, low, high in bounds for condition in _within(terms, low, high)]
 
 
 def conjunction(conditions: Iterable[Expr]) -> Expr:
-    """Conjoin; true for none."""
+    """Return the conjunction of the conditions; true for none."""
     kept = [condition for condition in conditions if condition != _TRUE]
     return reduce(lambda a, b: Apply(Op.AND, (a, b), Bool()), kept) if kept else _TRUE
 
 
 def disjunction(conditions: Iterable[Expr]) -> Expr:
-    """Disjoin; false for none."""
+    """Return the disjunction of the conditions; false for none."""
     kept = list(conditions)
     return reduce(lambda a, b: Apply(Op.OR, (a, b), Bool()), kept) if kept else Literal(False, Bool())
 
 
 def negation(condition: Expr) -> Expr:
-    """Negate it."""
+    """Return the negated condition."""
     return Apply(Op.NOT, (condition,), Bool())
 
 
 def _within(terms: list[tuple[Expr, int]], low: int, high: int) -> list[Expr]:
-    """`low <= sum <= high` in keys, as far as conditions express it."""
+    """Return `low <= sum <= high` in keys, as far as conditions express it."""
     first = terms[0][0]
     if len(terms) == 1:
         return _bounded(first, low, high)
@@ -93,7 +93,7 @@ def _times(term: Expr, factor: int) -> Expr:
 
 
 def _arithmetic(op: Op, left: Expr, right: Expr) -> Expr:
-    """A sum or product; its bounds are those of interval arithmetic."""
+    """Return a sum or product; its bounds are those of interval arithmetic."""
     (a, b), (c, d) = key_bounds(left.type), key_bounds(right.type)
     ends = (a * c, a * d, b * c, b * d) if op is Op.MUL else (a + c, b + d)
     return Apply(op, (left, right), Int(min(ends), max(ends)))

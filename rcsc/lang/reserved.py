@@ -88,7 +88,7 @@ C_LIBRARIES = frozenset(
     anl asan c crypt dl gcc m nsl pthread resolv rt stdc tsan ubsan util
     """.split()
 )
-"""What a linker finds by `-l` on its own."""
+"""Libraries that a linker finds by `-l` on its own."""
 
 CMAKE_TARGETS = frozenset(
     """
@@ -152,4 +152,4 @@ PYTHON_MEMBERS = frozenset(
     values
     """.split()
 )
-"""What a member of an `IntEnum` may not be called."""
+"""Names that a member of an `IntEnum` may not have."""

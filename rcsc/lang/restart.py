@@ -28,7 +28,7 @@ class Fixed:
 
 @dataclass(frozen=True, slots=True)
 class SameAs:
-    """What an input has."""
+    """The value of an input."""
 
     leaf: str
 
@@ -42,7 +42,7 @@ class After:
 
 @dataclass(frozen=True, slots=True)
 class Stands:
-    """What stands of the leaf itself in the level's own buffer; where nothing stands, its initial value."""
+    """The leaf's own value in the level's buffer; where nothing stands there, its initial value."""
 
 
 Adopted: TypeAlias = Fixed | SameAs | After | Stands
@@ -66,7 +66,7 @@ _ORDER = "to_"
 _ECHOES = {"inc_command": "inc_command_echo", "number": "number"}
 """How an order is numbered, and where the level below repeats the number; the camera's pictures are numbered, too."""
 ECHOED = ("inc_command_echo", "ref_command_echo")
-"""Of a report, the order that it answers: it never goes back, not even if the first cycle takes nothing."""
+"""Fields of a report with the order that it answers: they never go back, not even if the first cycle takes nothing."""
 _FAILED = {
     "status_report": "failed",
     "failure": "restart",
@@ -79,7 +79,7 @@ _REPORTED = ("status_report", "failure")
 
 
 def by_names(parts: Mapping[str, Part]) -> dict[str, Adopted]:
-    """What a program adopts that does not declare it; what it has no variable for, or one of another type, it does not adopt."""
+    """Return what a program without declarations adopts; leaves that are missing or have another type are left out."""
     return dict((*_failed(parts), *_seen(parts), *_reports(parts), *_orders(parts)))
 
 

@@ -4,11 +4,11 @@ from rcsc.base.diagnostics.codes import Code
 
 
 class CodedError(Exception):
-    """What a user, a file or a machine did wrong; says what.
+    """A mistake of a user, or a fault of a file or a machine; the text describes it.
 
     Attributes:
-        code: What `rcsc explain` has a page about.
-        helps: What would help.
+        code: The code under which `rcsc explain` describes it.
+        helps: Help texts.
     """
 
     code: Code = Code.BAD_SYSTEM
@@ -16,14 +16,14 @@ class CodedError(Exception):
 
     @property
     def shown(self) -> str:
-        """What is wrong, a line each."""
+        """The message, which may have several lines."""
         return str(self)
 
 
 USERS_FAILURES = (Exception, SystemExit, GeneratorExit)
-"""What code of the user's may raise as it is called, and that ends a cycle and not rcsc; an interrupt is the user's own."""
+"""Exceptions of the user's code that end a cycle, and not rcsc; an interrupt is the user's own."""
 
 
 def raised(error: BaseException) -> str:
-    """Return what was raised, in words: its class, and what it says of itself."""
+    """Return the class of an exception and its message."""
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

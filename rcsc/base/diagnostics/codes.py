@@ -17,7 +17,7 @@ FAMILIES = {
     "7": "running systems and recorded runs",
     "9": "bugs in rcsc",
 }
-"""What the codes with this first digit are about."""
+"""The subject of the codes with this first digit."""
 
 _REPORT = re.compile(r"(?:error|warning|note): ")
 
@@ -50,7 +50,7 @@ class Code(StrEnum):
     entry: str
 
     def __new__(cls, entry: str) -> Self:
-        """The member whose value is the code that `entry` begins with."""
+        """Return a member with its entry; its value is the code that the entry begins with."""
         code = entry.partition(":")[0]
         member = str.__new__(cls, code)
         member._value_ = code

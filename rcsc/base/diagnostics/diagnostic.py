@@ -10,7 +10,7 @@ from rcsc.base.diagnostics.source import Span
 
 
 class Severity(StrEnum):
-    """How much it matters: only errors make `rcsc` exit with 1."""
+    """The severity of a diagnostic: only errors make `rcsc` exit with 1."""
 
     ERROR = "error"
     WARNING = "warning"
@@ -19,7 +19,7 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A place and what is said about it."""
+    """A place and a message about it."""
 
     span: Span
     message: str = ""
@@ -35,7 +35,7 @@ class MatchedLine:
 
 
 class Place(StrEnum):
-    """What of a table a change writes."""
+    """The part of a table that a change writes."""
 
     CELL = "cell"  # a condition of a line
     SAME = "same"  # after the name of a line: that it does the same as others
@@ -62,13 +62,13 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """What would mend a finding: `help` says it for people, or a note.
+    """A change that would mend a finding; `help`, or a note, describes it for people.
 
     Attributes:
         title: What to do, in the imperative.
-        proved: What is to be proved of it.
+        proved: The claim that is to be proved of it.
         changes: To be made together.
-        told: What is said of it, in two pieces between which stands whether it is proved; in one where that is not said.
+        told: The text of a note: two pieces around "proved" or "not proved", or one piece without that.
         whole: Whether it is to mend all that was found of this kind: every overlap of the table, not these two lines alone.
         certain: Whether it is proved: of the text that it makes (`table.mending`).
     """
@@ -83,7 +83,7 @@ class Proposal:
 
     @property
     def said(self) -> str:
-        """What is said of it; empty where a help says it in general."""
+        """The text that announces the proposal and its proof; "" where a help describes it in general."""
         return ("proved" if self.certain else "not proved").join(self.told)
 
 
@@ -93,11 +93,11 @@ MOST_SHOWN = 3
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """What two lines that overlap do where both match.
+    """The effects of two overlapping lines where both match.
 
     Attributes:
         same: Whether both do the same for every such input; None where nobody could tell.
-        differ_in: What some such input leaves different: variables in declared order, after what else the actions do.
+        differ_in: Differences for some such input: other effects of the actions, then variables in declared order.
     """
 
     same: bool | None
@@ -114,7 +114,7 @@ class Effects:
 
 
 def _with_ranges(names: Sequence[str]) -> list[str]:
-    """Names of variables; elements of an array that follow each other are one name.
+    """Return names of variables, with consecutive elements of an array as one name.
 
     >>> _with_ranges(["n", "at[0].x", "at[1].x", "at[2].x", "at[2].y", "at[4].y"])
     ['n', 'at[0 .. 2].x', 'at[2].y', 'at[4].y']
@@ -150,7 +150,7 @@ class WitnessColumn:
         lines: The lines that match the witness; none for a gap.
         region: The maximal region around the witness, one condition a variable in the
             table's words; variables left out are free (`any other`).
-        inputs: How many inputs the region has; None where nobody counted.
+        inputs: The number of inputs in the region; None where nobody counted.
         effects: Of two lines that overlap and have no diagnostic of their own; None for any other, and where nobody looked.
     """
 
@@ -192,7 +192,7 @@ class Diagnostic:
 
     @property
     def left_out(self) -> str:
-        """What a text says of those that it does not show; empty for none."""
+        """The text about witnesses that are not shown; "" where there are none."""
         left = () if self.only_listed else self.witnesses[MOST_SHOWN:]
         inputs = self.more + sum(witness.inputs or 1 for witness in left)
         words = f"{inputs} more input{'' if inputs == 1 else 's'}" if inputs else ""
@@ -205,6 +205,6 @@ class Diagnostic:
 
 
 def sort_key(diagnostic: Diagnostic) -> tuple[str, int, int, str, str]:
-    """Position first, so that output is stable."""
+    """Return a key that sorts by position first, so that output is stable."""
     span = diagnostic.primary.span
     return (span.file, span.start, span.end, diagnostic.code.value, diagnostic.message)

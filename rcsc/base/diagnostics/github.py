@@ -14,12 +14,12 @@ _WORD = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "n
 
 
 def annotations(report: Report) -> str:
-    """One workflow command a diagnostic, each on its own line."""
+    """Return one workflow command for each diagnostic, each on its own line."""
     return "".join(f"{annotation(diagnostic, report.sources)}\n" for diagnostic in report.diagnostics)
 
 
 def annotation(diagnostic: Diagnostic, sources: Sources) -> str:
-    """One workflow command; columns only where the place is within a line, as GitHub asks."""
+    """Return one workflow command; columns only where the place is within a line, as GitHub asks."""
     span = diagnostic.primary.span
     properties = {}
     if span.file:

@@ -18,7 +18,7 @@ Json = dict[str, Any]
 
 
 def report_to_json(report: Report, command: str) -> Json:
-    """The whole outcome of `command`.
+    """Return the whole outcome of `command`.
 
     Raises:
         ValueError: A value cannot be written as JSON (not for any that rcsc makes).
@@ -36,7 +36,7 @@ def report_to_json(report: Report, command: str) -> Json:
 
 
 def table_to_json(table: TableReport) -> Json:
-    """A table's verdict and what backs it."""
+    """Return a table's verdict and its backing."""
     return {
         "table": table.table,
         "file": table.file,
@@ -58,7 +58,7 @@ def _listed(known: InSystem | SystemReport | Effects) -> Json:
 
 
 def diagnostic_to_json(diagnostic: Diagnostic, sources: Sources) -> Json:
-    """One diagnostic, with its places as offsets and as lines and columns."""
+    """Return one diagnostic, with its places as offsets and as lines and columns."""
     return {
         "code": diagnostic.code.value,
         "severity": diagnostic.severity.value,

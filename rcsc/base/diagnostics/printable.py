@@ -10,7 +10,7 @@ TAB_WIDTH = 4
 
 
 def escape(text: str) -> str:
-    r"""`text` on one line with every unprintable character spelled, as `\u{202e}`."""
+    r"""Return `text` on one line with every unprintable character spelled, as `\u{202e}`."""
     if text.isprintable():
         return text
     return "".join(_spelled(char) for char in text)
@@ -38,7 +38,7 @@ def _cells(char: str) -> int:
 
 
 def pad(text: str, cells: int) -> str:
-    """`text` followed by as many spaces as make it `cells` wide."""
+    """Return `text` followed by as many spaces as make it `cells` wide."""
     return text + " " * max(0, cells - width(text))
 
 

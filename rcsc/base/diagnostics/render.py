@@ -18,7 +18,7 @@ WIDEST_LINE = 110
 
 
 class Style(StrEnum):
-    """What a piece of text is; `paint` gives it a colour."""
+    """The role of a piece of text; `paint` gives it a colour."""
 
     PLAIN = ""
     STRONG = "bold"
@@ -46,7 +46,7 @@ Row = tuple[TextPiece, ...]
 
 
 def full(diagnostic: Diagnostic, sources: Sources, columns: int = WIDEST_LINE) -> tuple[Row, ...]:
-    """The diagnostic with its source, witnesses, notes and help, at most about `columns` wide."""
+    """Return the diagnostic with its source, witnesses, notes and help, at most about `columns` wide."""
     style = OF_SEVERITY[diagnostic.severity]
     rows: list[Row] = [
         (
@@ -68,14 +68,14 @@ def full(diagnostic: Diagnostic, sources: Sources, columns: int = WIDEST_LINE) -
 
 
 def one_line(diagnostic: Diagnostic, sources: Sources) -> str:
-    """`file:line:column: error[RCS401]: message`, for grep and editors."""
+    """Return `file:line:column: error[RCS401]: message`, for grep and editors."""
     place = _place(diagnostic.primary, sources)
     message = escape(diagnostic.message)
     return f"{place}: {diagnostic.severity.value}[{diagnostic.code.value}]: {message}"
 
 
 def with_witness(diagnostic: Diagnostic, sources: Sources) -> str:
-    """The one line, and below it each witness that a text shows: its values, its region, how many more there are."""
+    """Return the one line, and below it each witness that a text shows: its values, its region, and the number of others."""
     lines = [one_line(diagnostic, sources)]
     for witness in diagnostic.shown:
         values = (f"{name} = {value}" for name, value in zip(witness.variables, witness.values, strict=True))
@@ -88,12 +88,12 @@ def with_witness(diagnostic: Diagnostic, sources: Sources) -> str:
 
 
 def plain(rows: Iterable[Row]) -> str:
-    """The rows' text alone, each ended by a newline."""
+    """Return the rows' text alone, each row ended by a newline."""
     return "".join("".join(piece.text for piece in row).rstrip() + "\n" for row in rows)
 
 
 def paint(rows: Iterable[Row]) -> str:
-    """The rows with ANSI colours, each ended by a newline."""
+    """Return the rows with ANSI colours, each ended by a newline."""
     from rich.console import Console
     from rich.text import Text
 
@@ -127,7 +127,7 @@ def _place(label: Label, sources: Sources) -> str:
 def _snippets(
     diagnostic: Diagnostic, sources: Sources, gutter: int, columns: int, style: Style
 ) -> Iterator[Row]:
-    """The primary place's file first, then each other file that is pointed into."""
+    """Yield the excerpt of the primary place's file, then one of each other file with a label."""
     primary = diagnostic.primary
     here = [label for label in diagnostic.related if label.span.file == primary.span.file]
     others = [label for label in diagnostic.related if label.span.file != primary.span.file]
@@ -145,7 +145,7 @@ def _snippets(
 
 
 def _snippet(source: Source, marked: list[tuple[Label, Style]], gutter: int, columns: int) -> Iterator[Row]:
-    """The lines that the labels point into, each followed by its marks."""
+    """Yield the lines that the labels point into, each followed by its marks."""
     edge = TextPiece(f"{' ' * gutter} | ", Style.GUTTER)
     yield (TextPiece(f"{' ' * gutter} |", Style.GUTTER),)
     numbered = sorted(
@@ -168,7 +168,7 @@ def _snippet(source: Source, marked: list[tuple[Label, Style]], gutter: int, col
 def _windows(
     source: Source, number: int, labels: list[tuple[Label, Style]], room: int
 ) -> Iterator[tuple[int, list[tuple[Label, Style]]]]:
-    """Where each excerpt of a line begins, and the labels in it: one where all fit, else as many as show each label."""
+    """Yield the start of each excerpt of a line, and the labels in it: one where all fit, else as many as show each label."""
     long = width(escape(source.line(number)))
     left = sorted(labels, key=lambda item: item[0].span)
     while left:
@@ -181,7 +181,7 @@ def _windows(
 
 
 def _cells_of(source: Source, number: int, label: Label) -> tuple[int, int]:
-    """First cell and count of cells that `label` covers on line `number`."""
+    """Return the first cell and the number of cells that `label` covers on line `number`."""
     line = source.line(number)
     start = source.position(label.span.start).column - 1
     end = max(start, min(len(line), start + label.span.end - label.span.start))
@@ -211,12 +211,12 @@ def _attached(gutter: int, word: str, text: str, style: Style) -> Row:
 
 
 def _hanging(text: str, indent: int) -> str:
-    """Escaped text; its own line ends are kept and what follows them is indented."""
+    """Return escaped text; its own line ends are kept, and the lines after them are indented."""
     return f"\n{' ' * indent}".join(escape(line) for line in text.splitlines())
 
 
 def _witness(witness: WitnessColumn, gutter: int) -> Iterator[Row]:
-    """A small table: a variable a row; the witness beside the lines that match it."""
+    """Yield a small table, one row for each variable, with the witness beside the lines that match it."""
     heads = ("input", "witness", *(f"line {line.name}" for line in witness.lines))
     columns = [heads] + [
         (name, value, *(_cell(line.cells, row) for line in witness.lines))
@@ -245,7 +245,7 @@ def _region(witness: WitnessColumn, gutter: int) -> Row:
 
 
 def region(witness: WitnessColumn) -> str:
-    """The maximal region around the witness, in the table's words."""
+    """Return the maximal region around the witness, in the table's words."""
     free = len(witness.variables) > len(witness.region)
     return ", ".join((*witness.region, "any other") if free else witness.region)
 

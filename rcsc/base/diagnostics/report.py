@@ -9,7 +9,7 @@ from rcsc.base.diagnostics.source import Source
 
 
 class Verdict(StrEnum):
-    """What is known of a table, best first; anything but `proved` makes `rcsc` exit with 1."""
+    """The verdict on a table, best first; anything but `proved` makes `rcsc` exit with 1."""
 
     PROVED = "proved"
     CONDITIONAL = "conditional"  # proved from something that is not proved itself
@@ -23,7 +23,7 @@ NOT_PROVED = "not proved"
 
 @dataclass(frozen=True, slots=True)
 class InSystem:
-    """What is known of a table from the proof of the levels together.
+    """The results about a table from the proof of the levels together.
 
     Attributes:
         system: The system's description.
@@ -45,7 +45,7 @@ class InSystem:
 
 @dataclass(frozen=True, slots=True)
 class SystemReport:
-    """What is known of a system that checked tables belong to.
+    """The standing of a system that checked tables belong to.
 
     Attributes:
         system: Its description.
@@ -62,18 +62,18 @@ class SystemReport:
 
 @dataclass(frozen=True, slots=True)
 class TableReport:
-    """One table's verdict and what it rests on.
+    """One table's verdict and its backing.
 
     Attributes:
         table: Its name.
         file: Where it stands.
-        lines: How many lines it has, DEFAULT not counted.
+        lines: The number of its lines, DEFAULT not counted.
         method: `boxes`, `tree` or `z3`; empty where nothing was decided.
         confirmed_by_z3: Whether Z3 was asked the same and agreed.
         assumptions: Each assumption and invariant that the proof used, and its standing.
-        proof_ms: What the proof took when it was made.
+        proof_ms: The duration of the proof when it was made.
         cached: Whether it was made by an earlier run.
-        together: What the levels together make of it; None where nobody knows.
+        together: The results from the proof of the levels together; None where there are none.
         stops: Assumptions on which safety rests: the executors end the cycle where one fails.
         tells: Monitored assumptions whose failure is only reported.
     """
@@ -97,20 +97,20 @@ MOST_NAMED = 3
 
 
 def named(words: Collection[str]) -> str:
-    """Name what a verdict rests on, up to a limit."""
+    """Return the claims on which a verdict rests as text, up to a limit; the others are counted."""
     more = f" and {len(words) - MOST_NAMED} more" if len(words) > MOST_NAMED else ""
     return "; ".join(list(words)[:MOST_NAMED]) + more
 
 
 def trusting(words: Collection[str]) -> str:
-    """Text, put after a verdict, of what it takes for granted; may be empty."""
+    """Return text, put after a verdict, about its unproved assumptions; "" where there are none."""
     return f", trusting {', '.join(words)}" if words else ""
 
 
 def resting(table: TableReport, unproved: Collection[str], unsafe: Collection[str] = ()) -> TableReport:
-    """The report where these invariants and assumptions are not proved, and lines of these tables can go wrong.
+    """Return the report after these invariants and assumptions are known not to be proved, and lines of these tables can go wrong.
 
-    What rests on one of them is conditional: exactly one line matches, as long as all goes well.
+    A proved verdict that rests on one of them becomes conditional: exactly one line matches, as long as all goes well.
     """
     assumptions = tuple((name, NOT_PROVED if name in unproved else was) for name, was in table.assumptions)
     shaken = table.table in unsafe or any(standing == NOT_PROVED for _, standing in assumptions)
@@ -120,10 +120,10 @@ def resting(table: TableReport, unproved: Collection[str], unsafe: Collection[st
 
 
 def merged(tables: Iterable[TableReport]) -> tuple[TableReport, ...]:
-    """One report a table, in the order in which they are met: the worst of what several programs make of it.
+    """Return one report for each table, in order of first occurrence: the worst that any program makes of it.
 
-    A table is part of every program that uses its file, and may rely on other invariants in each. Where all
-    prove it, what it rests on in any of them is listed.
+    A table is part of every program that uses its file, and may rely on other invariants in each. Where all prove it, the grounds of all
+    are listed.
     """
     worst: dict[tuple[str, str], TableReport] = {}
     for table in tables:
@@ -167,7 +167,7 @@ class Report:
 
     @property
     def failed(self) -> bool:
-        """Whether there is an error, or a table that is not proved."""
+        """True where there is an error, or a table that is not proved."""
         return self.count(Severity.ERROR) > 0 or any(
             table.verdict is not Verdict.PROVED for table in self.tables
         )

@@ -22,7 +22,7 @@ Json = dict[str, Any]
 
 
 def sarif(report: Report) -> Json:
-    """One run with a result for each diagnostic; table verdicts are properties of the run."""
+    """Return one run with a result for each diagnostic; table verdicts are properties of the run."""
     codes = sorted({diagnostic.code for diagnostic in report.diagnostics})
     index = {code: number for number, code in enumerate(codes)}
     return {
@@ -81,7 +81,7 @@ def _result(diagnostic: Diagnostic, rule: int, sources: Sources) -> Json:
 
 
 def fingerprint(diagnostic: Diagnostic) -> str:
-    """Stays the same when lines above are added or cells realigned: code, file, table, lines, message."""
+    """Return a hash of code, file, table, lines and message, which added or realigned lines leave unchanged."""
     tables = [(witness.table, [line.name for line in witness.lines]) for witness in diagnostic.witnesses]
     stable = (diagnostic.code.value, diagnostic.primary.span.file, tables, diagnostic.message)
     return hashlib.sha256(repr(stable).encode()).hexdigest()[:32]
@@ -133,6 +133,6 @@ def _region(span: Span, source: Source | None) -> Json:
 
 
 def uri(file: str) -> str:
-    """A relative reference for a relative path, a `file:` URI for an absolute one."""
+    """Return a relative reference for a relative path, a `file:` URI for an absolute one."""
     path = PurePath(file)
     return path.as_uri() if path.is_absolute() else quote(path.as_posix(), errors="surrogateescape")

@@ -24,7 +24,7 @@ class Span:
     end: int
 
     def to(self, other: "Span") -> "Span":
-        """The span from the start of this one to the end of `other`."""
+        """Return the span from the start of this one to the end of `other`."""
         return Span(self.file, self.start, max(self.end, other.end))
 
 
@@ -50,12 +50,12 @@ class Source:
         object.__setattr__(self, "_starts", tuple(starts))
 
     def position(self, offset: int) -> Position:
-        """Line and column of the character at `offset`."""
+        """Return the line and column of the character at `offset`."""
         line = bisect_right(self._starts, offset) - 1
         return Position(line + 1, offset - self._starts[line] + 1)
 
     def line(self, number: int) -> str:
-        """The text of line `number` (from 1) without its end; empty past the last line."""
+        """Return the text of line `number` (from 1) without its end; "" past the last line."""
         if not 1 <= number <= len(self._starts):
             return ""
         start = self._starts[number - 1]
@@ -63,7 +63,7 @@ class Source:
         return self.text[start:end].rstrip("\r")
 
     def slice(self, span: Span) -> str:
-        """The text that `span` covers."""
+        """Return the text that `span` covers."""
         return self.text[span.start : span.end]
 
 

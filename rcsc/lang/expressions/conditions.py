@@ -65,9 +65,9 @@ class Tests:
     """The tests of one table: one a column and meaning, shared by the lines that state it.
 
     Attributes:
-        subjects: What each column's heading means; None under `when`, and after an error.
-        texts: What each heading says.
-        pieces: What each condition means that `and` joins to others in a cell, by its identity: one stands in many cells.
+        subjects: The expression of each column's heading; None under `when`, and after an error.
+        texts: The text of each heading.
+        pieces: The meaning of each condition that `and` joins to others in a cell, by its identity: one stands in many cells.
         reads: The leaves that each of these meanings reads, by its identity.
     """
 
@@ -82,7 +82,7 @@ class Tests:
     __test__ = False
 
     def test(self, column: int, written: tree.Condition, cell: Cell) -> Test | None:
-        """The test of a cell; None where it is always true, or after an error."""
+        """Return the test of a cell; None where it is always true, or after an error."""
         meaning = (column, cell.text if self.headings[column].subject is None else written)
         if meaning not in self.meant:
             self.scope.cell = cell
@@ -149,7 +149,7 @@ class Tests:
         return None if condition is None else condition.expr
 
     def _joined(self, written: tree.Expr, places: tuple[tuple[int, int], ...], cell: Cell) -> Expr | None:
-        """What the conditions mean that `and` joins, at these places of a cell."""
+        """Resolve the conditions that `and` joins, at these places of a cell."""
         if len(places) == 1:
             return self._piece(written, cell, places[0])
         assert isinstance(written, tree.Binary)
@@ -160,7 +160,7 @@ class Tests:
         return Apply(Op.AND, (left, right), Bool(), tree.absolute(written.span, cell))
 
     def _piece(self, written: tree.Expr, whole: Cell, place: tuple[int, int]) -> Expr | None:
-        """What one of them means, which is resolved once; where it may be undefined, with spans of its own in each line."""
+        """Resolve one of the joined conditions, once; where it may be undefined, each line gets it with spans of its own."""
         if id(written) not in self.pieces:
             cell = self.scope.cell = whole.part(*place)
             condition = boolean(self.scope, Body(), written)
@@ -182,7 +182,7 @@ class Tests:
         return frozenset(read_by(condition))
 
     def _fits(self, column: int, subject: Typed, other: Typed, span: Span) -> bool:
-        """Whether a cell's value is of the kind of its column; reports it where not."""
+        """Return whether a cell's value is of the kind of its column; report it where it is not."""
         wanted, given = subject.expr.type, other.expr.type
         if same_kind(wanted, given):
             return True
@@ -199,7 +199,7 @@ class Tests:
 
 
 def box_of(condition: Expr, leaf: Variable) -> Box | None:
-    """The keys of the one leaf it reads for which the condition holds; None where not a box."""
+    """Return the keys of the one leaf that the condition reads for which it holds; None where they are not found as a box."""
     low, high = key_bounds(leaf.type)
     box = _box(condition, leaf.type, low, high)
     if box is None and high - low < _SMALL and not isinstance(leaf.type, Real):
@@ -271,7 +271,7 @@ def _compared(op: Comparison, left: Expr, right: Expr, kind: Scalar, low: int, h
 
 
 def _affine(expr: Expr) -> tuple[int, int] | None:
-    """`(a, b)` where the expression is a * leaf + b; None where it is not."""
+    """Return `(a, b)` where the expression is a * leaf + b; None where it is not."""
     value: Value | None = fold(expr)
     if value is not None:
         return 0, int(value)
@@ -297,7 +297,7 @@ def _combined(op: Op, left: tuple[int, int], right: tuple[int, int]) -> tuple[in
 
 
 def _affine_box(op: Comparison, line: tuple[int, int], value: int, low: int, high: int) -> Box:
-    """Keys x with a * x + b `op` value."""
+    """Return the keys x with a * x + b `op` value."""
     a, rest = line[0], value - line[1]
     if a == 0:
         return ((low, high),) if op.meaning(0, rest) else ()

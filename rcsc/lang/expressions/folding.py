@@ -7,7 +7,7 @@ from rcsc.lang.model import Expr, Value
 
 
 def fold(expr: Expr, values: Mapping[str, Value] | None = None) -> Value | None:
-    """The interpreter's value, reading leaves from `values`; None where something is missing or undefined."""
+    """Return the interpreter's value, reading leaves from `values`; None where one is missing or the value is undefined."""
     try:
         return evaluate(expr, values or {})
     except (LookupError, ArithmeticError, ValueError):

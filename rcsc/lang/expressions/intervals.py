@@ -20,7 +20,7 @@ Number = TypeVar("Number", int, float)
 
 
 def apply(op: Arithmetic, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
-    """The type of `op` over operands of these types."""
+    """Return the type of `op` over operands of these types."""
     if isinstance(kinds[0], Int):
         low, high = _integers(op, *((k.low, k.high) for k in kinds if isinstance(k, Int)))
         return Int(min(max(low, -WIDEST), WIDEST), min(max(high, -WIDEST), WIDEST), unit)
@@ -32,12 +32,12 @@ def apply(op: Arithmetic, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
 
 
 def word(kinds: Iterable[Int]) -> tuple[int, int]:
-    """The 64-bit type in which an operation on these is done: unsigned where none can be negative."""
+    """Return the bounds of the 64-bit type in which an operation on these is done: unsigned where none can be negative."""
     return (0, U64_MAX) if min(kind.low for kind in kinds) >= 0 else (I64_MIN, I64_MAX)
 
 
 def may_be_undefined(expr: Expr) -> bool:
-    """Whether the types of an expression leave open that it is defined: that nothing in it overflows, or divides by zero."""
+    """Return whether the types in an expression leave room for an undefined value: an overflow, a zero divisor, a bad index."""
     return any(
         isinstance(part, Select) or (isinstance(part, Apply) and _may_fail(part)) for part in parts(expr)
     )
@@ -72,7 +72,7 @@ def _integers(op: Arithmetic, a: tuple[int, int], b: tuple[int, int] = (0, 0)) -
 def _reals(
     op: Arithmetic, a: tuple[float, float], b: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[float, float] | None:
-    """The bounds; None where an operand may be infinite, or a divisor zero."""
+    """Return the bounds; None where an operand may be infinite, or a divisor zero."""
     if not all(map(math.isfinite, (*a, *b))):
         return None
     if op is not Op.DIV:
@@ -86,7 +86,7 @@ def _reals(
 def _ends(
     op: Arithmetic, a: tuple[Number, Number], b: tuple[Number, Number], zero: Number
 ) -> tuple[Number, Number]:
-    """The bounds by an operation that is bounded alike for both: at corners."""
+    """Return the bounds of an operation that integers and reals share; they lie at the ends of the operands."""
     match op:
         case Op.NEG:
             return -a[1], -a[0]

@@ -16,7 +16,7 @@ LONGEST = 1_000
 
 
 def number_of(text: str) -> int:
-    """The whole number that a text spells; one of more than 80 digits comes back as its first 80, which 64 bits hold no more.
+    """Return the whole number that a text spells; one of more than 80 digits by its first 80, which is past 64 bits all the same.
 
     >>> number_of("05"), number_of("0x1_0"), number_of("0b101")
     (5, 16, 5)
@@ -28,7 +28,7 @@ def number_of(text: str) -> int:
 
 
 def integer(scope: Scope, written: tree.IntLiteral) -> Typed | None:
-    """A whole number that fits in 64 bits."""
+    """Return the literal of a whole number; None (reported) where it does not fit in 64 bits."""
     value = number_of(written.text)
     if value > U64_MAX:
         message = "no 64-bit integer holds this number"
@@ -39,7 +39,7 @@ def integer(scope: Scope, written: tree.IntLiteral) -> Typed | None:
 
 
 def real(scope: Scope, written: tree.RealLiteral) -> Typed | None:
-    """The double nearest to the number written.
+    """Return the double nearest to the number written.
 
     Source: IEEE 754-2019, 5.12 (correctly rounded conversion from decimal).
     """
@@ -59,7 +59,7 @@ def real(scope: Scope, written: tree.RealLiteral) -> Typed | None:
 
 
 def as_single(scope: Scope, want: Scalar | None, given: Typed | None, written: tree.Expr) -> Typed | None:
-    """A constant double as the nearest single, where a single is wanted; anything else as it is; None where too large (reported).
+    """Return a constant double as the nearest single, where one is wanted; anything else as it is; None where too large (reported).
 
     Two different numbers of the text that are one single are reported, as those are that are one double.
     """
@@ -81,7 +81,7 @@ def as_single(scope: Scope, want: Scalar | None, given: Typed | None, written: t
 
 
 def _one_single(scope: Scope, value: float, written: tree.RealLiteral) -> None:
-    """Reports two different numbers of the text that are the same single."""
+    """Report two different numbers of the text that are the same single."""
     text = written.text.replace("_", "")
     first = scope.singles.setdefault(value, (text, scope.at(written.span)))
     if Fraction(first[0]) != Fraction(text):
@@ -94,7 +94,7 @@ def _one_single(scope: Scope, value: float, written: tree.RealLiteral) -> None:
 
 
 def _one_spelling(scope: Scope, value: float, text: str, span: Span) -> None:
-    """Reports two different numbers of the text that are the same double."""
+    """Report two different numbers of the text that are the same double."""
     first = scope.doubles.setdefault(value, (text, scope.at(span)))
     if first[0] != text and Fraction(first[0]) != Fraction(text):
         shown = [spelling if len(spelling) <= 40 else spelling[:37] + "..." for spelling in (text, first[0])]

@@ -37,18 +37,18 @@ class Typed:
     bare: bool = False
 
     def unit(self) -> Unit:
-        """Its unit; () for a bare number, a bool or an enumeration."""
+        """Return its unit; () for a bare number, a bool or an enumeration."""
         kind = self.expr.type
         return kind.unit if isinstance(kind, Int | Real) else ()
 
     def literal(self) -> Literal:
-        """Itself, of a folded constant."""
+        """Return the literal of a folded constant."""
         assert isinstance(self.expr, Literal)
         return self.expr
 
 
 def kind_word(kind: Scalar) -> str:
-    """The kind, for messages."""
+    """Return the word for the kind, for messages."""
     match kind:
         case Bool():
             return "bool"
@@ -63,12 +63,12 @@ def kind_word(kind: Scalar) -> str:
 
 
 def width(kind: Scalar) -> str:
-    """What the numbers of a kind with a decimal point are called, for messages."""
+    """Return the word for numbers of a kind with a decimal point, for messages."""
     return "single" if isinstance(kind, Single) else "double"
 
 
 def same_kind(left: Scalar, right: Scalar) -> bool:
-    """Whether values of the two can be compared or assigned, units aside."""
+    """Return whether values of the two can be compared or assigned, units aside."""
     if isinstance(left, Enum) or isinstance(right, Enum):
         return left == right
     return type(left) is type(right)
@@ -77,7 +77,7 @@ def same_kind(left: Scalar, right: Scalar) -> bool:
 def applied(
     scope: Scope, op: Arithmetic, operands: tuple[Typed, ...], unit: Unit, span: Span
 ) -> Typed | None:
-    """The operation with its bounds; folded where all operands are constants."""
+    """Return the operation with its bounds; folded where all operands are constants."""
     kinds = tuple(o.expr.type for o in operands if isinstance(o.expr.type, Int | Real))
     args = tuple(o.expr for o in operands)
     bare = all(o.bare for o in operands)
@@ -99,7 +99,7 @@ def applied(
 
 
 def scaled(scope: Scope, op: Arithmetic, left: Typed, right: Typed, span: Span) -> Typed | None:
-    """A product or quotient: units multiply."""
+    """Type a product or quotient; its unit is the product or quotient of the units."""
     if not one_kind(scope, left, right, span):
         return None
     powers = dict(left.unit())
@@ -109,7 +109,7 @@ def scaled(scope: Scope, op: Arithmetic, left: Typed, right: Typed, span: Span) 
 
 
 def alike(scope: Scope, op: Arithmetic, operands: tuple[Typed, ...], span: Span) -> Typed | None:
-    """A sum, difference, remainder, least or greatest: units agree."""
+    """Type a sum, difference, remainder, least or greatest; the units must agree."""
     unit = common_unit(scope, operands, span)
     if unit is None or not one_kind(scope, operands[0], operands[-1], span):
         return None
@@ -117,7 +117,7 @@ def alike(scope: Scope, op: Arithmetic, operands: tuple[Typed, ...], span: Span)
 
 
 def side(operand: Typed) -> str:
-    """An operand and its kind, for messages: by its name where it has one."""
+    """Return an operand with its kind, for messages: by its name where it has one."""
     match operand.expr:
         case Read(name=name) | ReadLocal(name=name):
             shown = f"`{name}`"
@@ -136,12 +136,12 @@ _CONVERSIONS = {
 
 
 def conversion(one: Scalar, two: Scalar) -> tuple[str, ...]:
-    """What helps where numbers of two kinds meet."""
+    """Return the help texts for a place where numbers of two kinds meet."""
     return _CONVERSIONS.get(frozenset({kind_word(one), kind_word(two)}), ())
 
 
 def one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
-    """Whether both sides are of one kind, and one 64-bit integer type holds both."""
+    """Return whether both sides are of one kind and fit one 64-bit integer type; report it where not."""
     if not same_kind(left.expr.type, right.expr.type):
         message = f"the left side is {side(left)}; the right side is {side(right)}"
         scope.report(Code.KIND, message, span, *conversion(left.expr.type, right.expr.type))
@@ -157,7 +157,7 @@ def one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
 
 
 def common_unit(scope: Scope, operands: tuple[Typed, ...], span: Span) -> Unit | None:
-    """The unit of all that have one; None (reported) where they differ."""
+    """Return the unit of all operands that have one; None (reported) where they differ."""
     units = [operand.unit() for operand in operands if not operand.bare]
     if not units:
         return ()
@@ -169,7 +169,7 @@ def common_unit(scope: Scope, operands: tuple[Typed, ...], span: Span) -> Unit |
 
 
 def compared(scope: Scope, op: Comparison, pair: tuple[Typed, Typed], span: Span) -> Typed | None:
-    """A comparison of the two."""
+    """Type a comparison of the two; None after an error."""
     left, right = pair
     if not one_kind(scope, left, right, span) or common_unit(scope, pair, span) is None:
         return None
@@ -180,7 +180,7 @@ def compared(scope: Scope, op: Comparison, pair: tuple[Typed, Typed], span: Span
 
 
 def _nearest(bound: float) -> float:
-    """The double nearest to a bound; infinite beyond all doubles, where a bound of a bound may lie."""
+    """Return the double nearest to a bound; an infinity beyond all doubles, where a bound may lie."""
     try:
         return float(bound)
     except OverflowError:
@@ -195,7 +195,7 @@ _CONVERTED: dict[Conversion, str] = {
 
 
 def converted(scope: Scope, op: Conversion, operand: Typed, span: Span) -> Typed | None:
-    """`int(x)` toward zero, `real(n)` to the nearest double, or `single(n)` to the nearest single; the unit stays."""
+    """Type `int(x)` toward zero, `real(n)` to the nearest double, or `single(n)` to the nearest single; the unit stays."""
     kind = operand.expr.type
     if not isinstance(kind, Int | Real) or kind_word(kind) == op.value:
         scope.report(Code.KIND, f"`{op.value}` converts {_CONVERTED[op]}", span)
@@ -221,7 +221,7 @@ def converted(scope: Scope, op: Conversion, operand: Typed, span: Span) -> Typed
 
 
 def counted(condition: Expr, span: Span) -> Typed:
-    """`int(b)` of a truth value: 1 where it holds, else 0; it takes the unit of what it meets, as a number written does."""
+    """Type `int(b)` of a truth value: 1 where it holds, else 0; like a written number it takes the unit of the other side."""
     conversion = Apply(Op.TO_INT, (condition,), Int(0, 1), span)
     value = fold(conversion)
     return Typed(

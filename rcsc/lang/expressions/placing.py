@@ -23,7 +23,7 @@ from rcsc.lang.syntax.rows import Cell
 
 
 def placed(expr: Expr, cell: Cell) -> Expr:
-    """The expression with spans in the file; parts that have them already are left alone."""
+    """Return the expression with spans in the file; leave parts alone that have them already."""
     if expr.span.file:
         return expr
     span = tree.absolute(expr.span, cell)
@@ -37,7 +37,7 @@ def placed(expr: Expr, cell: Cell) -> Expr:
 
 
 def placed_statement(statement: Statement, cell: Cell) -> Statement:
-    """The statement of an action cell, a call or an assignment, with spans in the file."""
+    """Return the statement of an action cell, a call or an assignment, with spans in the file."""
     span = statement.span
     if not span.file:
         span = tree.absolute(span, cell)

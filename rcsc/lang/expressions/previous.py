@@ -53,7 +53,7 @@ KEEP = "keep_previous"
 
 
 def before(scope: Scope, now: Expr, span: Span) -> Expr | None:
-    """The expression of the values after the cycle before; None after an error."""
+    """Return the expression over the values after the cycle before; None after an error."""
     if scope.in_property:
         return one_earlier(now)
     if next(read_by(now), None) is None:
@@ -74,7 +74,7 @@ _MS = {(("ms", 1),): 1, (("s", 1),): 1000}
 
 
 def cycles_of(scope: Scope, time: Value, unit: Unit, span: Span) -> int | None:
-    """How many cycles a constant time is, at least 1; None after an error, as where it is no whole number of them."""
+    """Return the number of cycles in a constant time, at least 1; None (reported) where it is no whole number of them."""
     period = _period(scope, span)
     if period is None:
         return None
@@ -99,7 +99,7 @@ def _in_ms(number: int) -> str:
 
 
 def _period(scope: Scope, span: Span) -> int | None:
-    """The period of the program's levels in ms; None (reported) where there is not one alone."""
+    """Return the period of the program's levels in ms; None (reported) where they have several, or none."""
     if scope.periods is None:
         message = "`for` stands in tables, assumptions, procedures and properties"
     elif scope.untimed:
@@ -116,7 +116,7 @@ def _period(scope: Scope, span: Span) -> int | None:
 
 
 def lasting(scope: Scope, condition: Expr, text: str, cycles: int, span: Span) -> Expr | None:
-    """The condition that this one, written as `text`, holds, and held after each of the last so many cycles; None after an error."""
+    """Return the condition that `condition` (spelled `text`) holds and held after each of the last `cycles` cycles; None after an error."""
     if next(read_by(condition), None) is None:
         message = "`for` is about a variable; a constant, a local or a parameter has not held for a time"
         scope.report(Code.NO_CYCLE_BEFORE, message, span)
@@ -143,7 +143,7 @@ def lasting(scope: Scope, condition: Expr, text: str, cycles: int, span: Span) -
 
 
 def _plain(condition: Expr) -> Expr:
-    """The same condition, however its truth is compared: `x = true` is `x`."""
+    """Return the same condition without comparisons to truth values: `x = true` is `x`."""
     match condition:
         case Apply(op=Op.EQ | Op.NE as op, args=(inner, Literal(value=value, type=Bool()))):
             holds = bool(value) is (op is Op.EQ)
@@ -160,7 +160,7 @@ def _plain(condition: Expr) -> Expr:
 
 
 def _counted(scope: Scope, condition: Expr, text: str, limit: int, span: Span) -> Held:
-    """The counter of a condition, made when it is first asked for."""
+    """Make the counter of a condition, when it is first asked for."""
     of = str(next(read_by(condition))).translate(str.maketrans(".[", "__", "]"))
     name = VariableName(fresh(scope, f"held_{of}"))
     doc = f"cycles for which {text} has held, up to {limit}"
@@ -176,7 +176,7 @@ def _number(value: int, span: Span) -> Expr:
 
 
 def _count(held: Held) -> Statement:
-    """Count a cycle on in which the condition holds at the end, else begin anew."""
+    """Count a cycle at whose end the condition holds; after any other, return to 0."""
     kind, span = Int(0, held.limit), held.condition.span
     counter, place = Read(held.counter, kind, span), ToLeaf(held.counter, kind)
     more = Apply(Op.ADD, (counter, _number(1, span)), Int(1, held.limit + 1), span)
@@ -186,7 +186,7 @@ def _count(held: Held) -> Statement:
 
 
 def _hidden(scope: Scope, name: VariableName) -> VariableName:
-    """The state that holds a leaf's value of the cycle before, made when it is first asked for; of an array all elements are."""
+    """Return the state that holds a leaf's value of the cycle before; make it at first use, for an array with all its elements."""
     if name not in scope.previous:
         base, bracket, _ = name.partition("[")
         leaves = [leaf for leaf in scope.leaves if leaf.startswith(f"{base}[")] if bracket else [name]
@@ -204,7 +204,7 @@ def _hidden(scope: Scope, name: VariableName) -> VariableName:
 
 
 def _keeper(leaf: Variable, name: VariableName, doc: str) -> Variable:
-    """The state that keeps a leaf's value; it begins, and begins anew, as the leaf does."""
+    """Return the state that keeps a leaf's value; its initial value and its value after a restart are the leaf's."""
     return replace(
         leaf,
         name=name,
@@ -218,7 +218,7 @@ def _keeper(leaf: Variable, name: VariableName, doc: str) -> Variable:
 
 
 def _type_at(scope: Scope, path: str) -> Type:
-    """The type of a variable, or of a field of it."""
+    """Return the type of a variable, or of a field of it."""
     root, *fields = path.split(".")
     kind = scope.declared[root].type
     for field in fields:
@@ -228,7 +228,7 @@ def _type_at(scope: Scope, path: str) -> Type:
 
 
 def fresh(scope: Scope, name: str) -> str:
-    """The name, or the first of `NAME_2`, `NAME_3` that nothing else has."""
+    """Return the name, or the first of `NAME_2`, `NAME_3` that nothing else has."""
     taken = {*scope.leaves, *(kept.name for kept in scope.kept), *scope.declared, *scope.variables}
     taken |= {*scope.constants, *scope.members, *scope.types}
     number, unique = 2, name
@@ -238,7 +238,7 @@ def fresh(scope: Scope, name: str) -> str:
 
 
 def keeping(scope: Scope, names: set[str], span: Span) -> Procedure | None:
-    """The procedure that keeps all that is looked back at; None where nothing is.
+    """Return the procedure that keeps all values that are looked back at; None where there are none.
 
     Args:
         scope: All that is resolved.
@@ -274,7 +274,7 @@ def keeping(scope: Scope, names: set[str], span: Span) -> Procedure | None:
 def with_keeping(
     keep: Procedure, levels: tuple[Level, ...], tables: tuple[Table, ...]
 ) -> tuple[tuple[Level, ...], tuple[Table, ...]]:
-    """Levels that keep as the last part of their postprocess, and tables outside any level that do as their last action."""
+    """Add the procedure to the end of each level's postprocess, and as the last action to tables outside any level."""
     run = {name for level in levels for name in level.table_names}
     return (
         tuple(replace(level, postprocess=(*level.postprocess, keep.name)) for level in levels),
@@ -295,7 +295,7 @@ def _alone(keep: Procedure, table: Table) -> Table:
 
 
 def adopted_before(scope: Scope, adopted: dict[str, Adopted]) -> dict[str, Adopted]:
-    """What hidden states adopt: what their leaves do, of which they come after; others begin as initially."""
+    """Return what hidden states adopt at a restart: as their leaves do, or the leaf's new value where that is known only then."""
     return {
         hidden: SameAs(name) if isinstance(adopted[name], After | Stands) else adopted[name]
         for name, hidden in scope.previous.items()

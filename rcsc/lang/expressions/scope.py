@@ -45,7 +45,7 @@ SetMember: TypeAlias = Constant | tuple[Constant, Constant] | tree.Mask
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """A condition that has to hold for a time, and the state that counts the cycles for which it has."""
+    """A condition that must hold for a time, and the state that counts the cycles for which it has held."""
 
     condition: Expr
     counter: VariableName
@@ -75,7 +75,7 @@ class Scope:
         previous: The hidden state of each leaf that something looks back at.
         kept: Those states as declared, which no text can name.
         held: The counters of conditions that have to hold for a time, by what the condition says.
-        limits: How far each of these has to count at least, by the same; as far as is known.
+        limits: The least limit of each of these counters, by the same key, as far as it is known.
         periods: The periods of the program's levels in ms, each once; None before they are known.
         untimed: Why `for` cannot stand in the table that is being resolved; empty where it can.
         in_property: Whether a property is being resolved, which has both cycles before it and needs no hidden state.
@@ -123,23 +123,23 @@ class Scope:
     def report(
         self, code: Code, message: str, span: Span, *helps: str, related: tuple[Label, ...] = ()
     ) -> None:
-        """Adds an error; one found in a cell is told where it stands in the file."""
+        """Add an error; one found in a cell gets its place in the file."""
         self.diagnostics.append(Diagnostic(code, message, Label(self.at(span)), related=related, help=helps))
 
     def at(self, span: Span) -> Span:
-        """The span in the file: nodes inside a table cell count from the start of the cell."""
+        """Return the span in the file: nodes inside a table cell count from the start of the cell."""
         if span.file or self.cell is None:
             return span
         return tree.absolute(span, self.cell)
 
     def order(self, leaf: str) -> int:
-        """The place of a leaf in declared order."""
+        """Return the place of a leaf in declared order."""
         if len(self.places_of) != len(self.leaves):
             self.places_of = {name: at for at, name in enumerate(self.leaves)}
         return self.places_of[leaf]
 
     def names(self, base: str, length: int) -> tuple[str, ...]:
-        """The names of the elements of an array; made once, as every use by index has them all."""
+        """Return the names of the elements of an array; cached, as every use by index needs them all."""
         names = self.elements.get((base, length))
         if names is None:
             names = tuple(f"{base}[{at}]" for at in range(length))
@@ -147,7 +147,7 @@ class Scope:
         return names
 
     def claim(self, name: tree.Name, space: str) -> bool:
-        """Takes `name` in a name space; reports and refuses one that is taken."""
+        """Take `name` in a name space; report and refuse one that is taken."""
         key = f"{space} {name.text}"
         if key in self.places:
             first = Label(self.places[key], "first declared here")
@@ -157,7 +157,7 @@ class Scope:
         return True
 
     def unknown(self, kind: str, name: tree.Name, known: list[str], span: Span | None = None) -> None:
-        """Reports a name that nothing declares, with the nearest one that exists."""
+        """Report a name that nothing declares, with the nearest one that exists."""
         near = (
             [_FIELDS[name.text]]
             if _FIELDS.get(name.text) in known
@@ -173,7 +173,7 @@ class Scope:
         self.report(Code.UNKNOWN_NAME, f"no {kind} is called `{name.text}`", span or name.span, *helps)
 
     def _made_by(self, kind: str, name: str, *, near: bool) -> str:
-        """Say what declaration of the protocol would make a name, or who has it; empty where none would."""
+        """Return a help text: the declaration of the protocol that would make the name, or its owner; "" where there is none."""
         word, _, peer = name.partition("_")
         owners = [subordinate for subordinate, commands in self.commands.items() if name in commands]
         if kind == "procedure":
@@ -201,7 +201,7 @@ class Scope:
         return ""
 
     def unit(self, written: tree.Unit | None) -> Unit:
-        """The unit in normal form; () for none."""
+        """Return the unit in normal form; () for none."""
         if written is None:
             return ()
         powers: dict[str, int] = {}
@@ -225,30 +225,30 @@ _FIELDS = {
 }
 """Fields that the protocol makes, by what one would call them."""
 _HELD = frozenset({"resting", "late", "status"})
-"""What is known of a subordinate besides its report's fields."""
+"""Fields of a subordinate's state besides its report's fields."""
 _SERVING = frozenset({"new_command", "answered", "inc_command_seen"})
-"""What a level remembers of its superior's order."""
+"""State that a level keeps about its superior's order."""
 
 
 def root_of(leaf: str) -> str:
-    """The variable that a leaf is a part of."""
+    """Return the variable that a leaf is a part of."""
     return leaf.partition(".")[0].partition("[")[0]
 
 
 def spell_number(value: Value) -> str:
-    """The number for a message; a very long one by its size."""
+    """Return the number for a message; a very long one by its size."""
     if isinstance(value, int) and abs(value) >= 10**40:
         return f"{'-' * (value < 0)}(a number of {value.bit_length()} bits)"
     return repr(value)
 
 
 def normal(powers: dict[str, int]) -> Unit:
-    """Sorted, without zero powers."""
+    """Return the unit with these powers: sorted, without zero powers."""
     return tuple(sorted((name, power) for name, power in powers.items() if power))
 
 
 def spell_unit(unit: Unit) -> str:
-    """`mm/s`; `1` for none."""
+    """Return the unit as text, as `mm/s`; `1` for none."""
     return unit_text(unit) or "1"
 
 
@@ -260,7 +260,7 @@ class Body:
     taken: set[str] = field(default_factory=set)
 
     def fresh(self, name: str) -> str:
-        """`name`, or the first of `name_2`, `name_3` that no other local has."""
+        """Return `name`, or the first of `name_2`, `name_3` that no other local has, and take it."""
         unique, number = name, 1
         while unique in self.taken:
             number += 1

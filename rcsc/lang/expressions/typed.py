@@ -54,7 +54,7 @@ DEEPEST = 200
 
 
 def typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None = None) -> Typed | None:
-    """The typed expression; None after an error, which has then been reported."""
+    """Return the typed expression; None after an error, which has then been reported."""
     if scope.depth == DEEPEST:
         scope.report(Code.TOO_DEEP, f"expressions nest more than {DEEPEST} deep", written.span)
         return None
@@ -184,7 +184,7 @@ def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scal
 
 
 def _is_also(scope: Scope, name: str, want: Enum) -> bool:
-    """Whether a variable or constant of that name has the type wanted, too."""
+    """Return whether a variable or constant of that name has the wanted type, too."""
     declared, constant = scope.declared.get(name), scope.constants.get(name)
     kind = declared.type if declared else constant.literal.type if constant else None
     return kind == want
@@ -192,7 +192,7 @@ def _is_also(scope: Scope, name: str, want: Enum) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """Where a path leads: one leaf or record, or by a computed index one of several.
+    """The place to which a path leads: one leaf or record, or by a computed index one of several.
 
     Attributes:
         names: Path names; one, or one an element of the array that `index` selects from.
@@ -206,7 +206,7 @@ class Path:
 
 
 def path_of(scope: Scope, body: Body, written: tree.Expr) -> Path | None:
-    """Follow a variable path; None after an error."""
+    """Return the place to which a variable path leads; None after an error."""
     match written:
         case tree.Reference(name):
             declared = scope.declared.get(name.text)
@@ -252,7 +252,7 @@ def _field(scope: Scope, base: Path | None, name: tree.Name) -> Path | None:
 
 
 def _hides(enum: Enum, member: tree.Name) -> str:
-    """Say that a variable has the name of an enumeration, and how to mean a member all the same."""
+    """Return a help text: the variable hides the enumeration of its name, and how to name a member all the same."""
     said = f"write `{member.text}` alone, or " if member.text in enum.members else ""
     return f"the variable `{enum.name}` hides the type of that name: {said}call the variable otherwise"
 
@@ -309,7 +309,6 @@ def _path(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
 
 
 def _read(path: Path, span: Span) -> Typed:
-    """Read a path to scalars."""
     assert isinstance(path.type, Bool | Enum | Int | Real)
     leaves = tuple(VariableName(name) for name in path.names)
     if path.index is None:
@@ -318,7 +317,7 @@ def _read(path: Path, span: Span) -> Typed:
 
 
 def _is_value(scope: Scope, body: Body, written: tree.Expr) -> bool:
-    """Whether it is a value that has bits, and no path: a local, a constant, or what is computed."""
+    """Return whether it is a value with bits, and no path: a local, a constant, or a computed value."""
     if not isinstance(written, tree.Reference):
         return not isinstance(written, tree.FieldOf | tree.IndexOf)
     name = written.name.text
@@ -333,13 +332,13 @@ def _bits_of(scope: Scope, body: Body, written: tree.BitsOf) -> Typed | None:
 
 
 def _bit(scope: Scope, body: Body, word: Typed | None, written: tree.IndexOf) -> Typed | None:
-    """Resolve `word[3]`: whether the bit is set."""
+    """Resolve `word[3]`, the condition that the bit is set."""
     place = _place(scope, body, written.index)
     return None if word is None else words.bit(scope, word, place, written.span)
 
 
 def _place(scope: Scope, body: Body, written: tree.Expr) -> int | None:
-    """The number of a bit; None (reported) where it is no constant."""
+    """Return the number of a bit; None (reported) where it is not constant."""
     place = typed(scope, body, written)
     number = None if place is None else fold(place.expr)
     if place is not None and (number is None or not isinstance(place.expr.type, Int)):
@@ -382,7 +381,7 @@ AT_ONCE = "what has to hold for a time is a condition of one cycle, without `was
 def for_a_time(
     scope: Scope, body: Body, condition: Expr, text: str, written: tree.Expr, span: Span
 ) -> Typed | None:
-    """Resolve `c for 2 [s]`: c holds, and has since a time that long ago or longer."""
+    """Resolve `c for 2 [s]`: c holds, and has held for that time or longer."""
     if scope.no_before:
         scope.report(Code.NO_CYCLE_BEFORE, scope.no_before.replace("`was`", "`for`"), span)
         return None
@@ -445,7 +444,7 @@ def _held(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
 
 
 def _changes(past: Expr, now: Expr, *, to: bool, span: Span) -> Expr:
-    """The condition begins to hold, or ceases to."""
+    """Return the condition that `now` begins to hold, or ceases to."""
     not_, and_ = (Apply(Op.NOT, (past if to else now,), Bool(), span), now if to else past)
     pair = (not_, and_) if to else (and_, not_)
     return Apply(Op.AND, pair, Bool(), span)
@@ -453,7 +452,7 @@ def _changes(past: Expr, now: Expr, *, to: bool, span: Span) -> Expr:
 
 @contextmanager
 def without_before(scope: Scope, why: str) -> Iterator[None]:
-    """Inside, `was` is refused for the reason given; an empty one allows it."""
+    """Refuse `was`, inside, for the reason given; an empty one allows it."""
     outer, scope.no_before = scope.no_before, why
     yield
     scope.no_before = outer
@@ -467,7 +466,7 @@ def _number(scope: Scope, operand: Typed, written: tree.Expr) -> bool:
 
 
 def _pair(scope: Scope, body: Body, left: tree.Expr, right: tree.Expr) -> tuple[Typed, Typed] | None:
-    """Both sides; a bare enum member takes the enumeration of the other side."""
+    """Type both sides; a bare enum member takes the enumeration of the other side."""
     if _may_be_member(scope, body, left):
         second = typed(scope, body, right)
         first = typed(scope, body, left, second.expr.type if second else None)
@@ -527,13 +526,13 @@ def _in_set(scope: Scope, body: Body, written: tree.InSet) -> Typed | None:
 
 
 def masked(scope: Scope, subject: Typed, op: str, mask: tree.Mask) -> Typed | None:
-    """`word = 0bx0xx`, or with `/=`."""
+    """Type `word = 0bx0xx`, or the same with `/=`."""
     condition = words.matches(scope, subject, mask.text.replace("_", ""), mask.span)
     return condition if op == "=" or condition is None else other_than(condition)
 
 
 def other_than(condition: Typed) -> Typed:
-    """`not in`."""
+    """Return the negated condition, as `not in` needs it."""
     return Typed(Apply(Op.NOT, (condition.expr,), Bool(), condition.expr.span))
 
 
@@ -552,13 +551,13 @@ _Part: TypeAlias = Typed | _Range | tree.Mask
 def among(
     scope: Scope, body: Body, subject: Typed, members: tuple[tree.Member, ...], span: Span
 ) -> Typed | None:
-    """`subject in {members}`; members are constants, ranges and named sets."""
+    """Type `subject in {members}`; members are constants, ranges and named sets."""
     parts = _parts(scope, body, members, subject.expr.type)
     return None if parts is None else _one_of(scope, subject, parts, span)
 
 
 def _one_of(scope: Scope, subject: Typed, parts: list[_Part], span: Span) -> Typed | None:
-    """The subject is one of these values, in one of these ranges, or fits one of these masks."""
+    """Return the condition that the subject is one of these values, in one of these ranges, or fits one of these masks."""
     values: list[Value] = []
     ranges: list[Expr] = []
     for part in parts:
@@ -582,7 +581,7 @@ def _one_of(scope: Scope, subject: Typed, parts: list[_Part], span: Span) -> Typ
 
 
 def _value(scope: Scope, subject: Typed, element: Typed) -> Value | None:
-    """The value of a member that may be one of the subject's; None after an error."""
+    """Return the value of a member that may be one of the subject's; None after an error."""
     span, value = element.expr.span, fold(element.expr)
     if value is None:
         scope.report(Code.NOT_CONSTANT, "the members of a set are constants", span)
@@ -593,7 +592,7 @@ def _value(scope: Scope, subject: Typed, element: Typed) -> Value | None:
 
 
 def _parts(scope: Scope, body: Body, members: tuple[tree.Member, ...], want: Scalar) -> list[_Part] | None:
-    """The members, with those of named sets, as they were declared, in their place; None after an error."""
+    """Return the members, with those of a named set, in declared order, in its place; None after an error."""
     every: list[_Part] = []
     for member in members:
         name = _set_name(scope, body, member)
@@ -621,7 +620,7 @@ def _part(scope: Scope, body: Body, member: tree.Expr | tree.Range, want: Scalar
 
 
 def _set_name(scope: Scope, body: Body, member: tree.Member) -> tree.Name | None:
-    """The name of the set that a member is; None for a value or a range."""
+    """Return the name of the set that a member is; None for a value or a range."""
     match member:
         case tree.NamedSet(name):
             return name
@@ -631,7 +630,7 @@ def _set_name(scope: Scope, body: Body, member: tree.Member) -> tree.Name | None
 
 
 def named_set(scope: Scope, name: tree.Name) -> list[_Part] | None:
-    """The members of a declared set, at the place of its name; None after an error."""
+    """Return the members of a declared set, with the span of its name here; None after an error."""
     if name.text not in scope.set_names:
         scope.unknown("set", name, sorted(scope.set_names))
         return None
@@ -654,7 +653,7 @@ def named_set(scope: Scope, name: tree.Name) -> list[_Part] | None:
 def members_of(
     scope: Scope, written: tree.SetDecl, kind: Scalar
 ) -> list[tree.Mask | Typed | tuple[Typed, Typed]] | None:
-    """The members of a set that is declared, typed as values of its type; None after an error."""
+    """Return the members of a declared set, typed as values of its type; None after an error."""
     parts = _parts(scope, Body(), written.members, kind)
     any_value = Typed(Literal(value_of_key(kind, key_bounds(kind)[0]), kind, written.name.span))
     if parts is None or _one_of(scope, any_value, parts, written.name.span) is None:
@@ -673,14 +672,14 @@ def _in_range(scope: Scope, body: Body, written: tree.InRange) -> Typed | None:
 def between(
     scope: Scope, body: Body, subject: Typed, low: tree.Expr, high: tree.Expr, span: Span
 ) -> Typed | None:
-    """`low <= subject and subject <= high`."""
+    """Type `low <= subject and subject <= high`."""
     least = typed(scope, body, low, subject.expr.type)
     most = typed(scope, body, high, subject.expr.type)
     return None if least is None or most is None else within(scope, subject, least, most, span)
 
 
 def within(scope: Scope, subject: Typed, least: Typed, most: Typed, span: Span) -> Typed | None:
-    """The subject lies between these two."""
+    """Return the condition that the subject lies between these two; None (reported) for an empty range."""
     ends = fold(least.expr), fold(most.expr)
     if ends[0] is not None and ends[1] is not None and ends[0] > ends[1]:
         scope.report(
@@ -730,7 +729,7 @@ def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
 
 
 def _count(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
-    """Resolve `count(a, b, ...)`, how many of these hold, to `int(a) + int(b) + ...`."""
+    """Resolve `count(a, b, ...)`, the number of these conditions that hold, to `int(a) + int(b) + ...`."""
     conditions = [boolean(scope, body, arg) for arg in written.args]
     numbers = [counted(condition, written.span) for condition in conditions if condition is not None]
     if len(numbers) < len(written.args):

@@ -33,7 +33,7 @@ MOST_ELEMENTS = 4096
 
 
 def type_of(scope: Scope, written: tree.TypeExpr, body: Body | None = None) -> Type:
-    """The type written; after an error some type, so that resolving goes on. `body`: as of `constant`."""
+    """Return the type written; after an error some type, so that resolving goes on. `body` is as in `constant`."""
     match written:
         case tree.BoolType():
             return Bool()
@@ -55,7 +55,7 @@ def type_of(scope: Scope, written: tree.TypeExpr, body: Body | None = None) -> T
 
 
 def size(kind: Type) -> int:
-    """Scalars in a value of the type."""
+    """Return the number of scalars in a value of the type."""
     match kind:
         case Array(length, element):
             return length * size(element)
@@ -73,7 +73,7 @@ def _small(scope: Scope, kind: Array, span: Span) -> Type:
 
 
 def scalar_of(scope: Scope, written: tree.TypeExpr, body: Body) -> Scalar:
-    """The type of a local or parameter, which is a scalar."""
+    """Return the type of a local or parameter, which is a scalar."""
     kind = type_of(scope, written, body)
     if isinstance(kind, Bool | Enum | Int | Real):
         return kind
@@ -84,7 +84,7 @@ def scalar_of(scope: Scope, written: tree.TypeExpr, body: Body) -> Scalar:
 def constant(
     scope: Scope, written: tree.Expr, want: Scalar | None = None, body: Body | None = None
 ) -> Typed | None:
-    """The folded value of a constant expression; None (reported) where it is not one.
+    """Return the folded value of a constant expression; None (reported) where it is not one.
 
     Args:
         scope: Everything declared.
@@ -104,7 +104,7 @@ def constant(
 
 
 def point(kind: Scalar, value: Value) -> Scalar:
-    """The type that has this value alone; of a bool or a member as it is."""
+    """Return the type that has this value alone; a bool or an enumeration stays as it is."""
     if isinstance(kind, Int):
         return Int(int(value), int(value), kind.unit)
     return replace(kind, low=float(value), high=float(value)) if isinstance(kind, Real) else kind
@@ -160,7 +160,7 @@ def _int(scope: Scope, written: tree.IntType, body: Body | None) -> Int:
 
 
 def _real(scope: Scope, written: tree.RealType | tree.SingleType, kind: Real, body: Body | None) -> Real:
-    """A type of numbers with a decimal point; `kind` is one of them."""
+    """Resolve a type of numbers with a decimal point; `kind` is one of that sort."""
     bounds = _bounds(scope, written, body)
     if bounds is None:
         return kind

@@ -35,13 +35,13 @@ class Field:
 
     @property
     def whole(self) -> bool:
-        """Whether these are all bits of the word."""
+        """True where these are all bits of the word."""
         return self.low == 0 and self.high == bits_of(self.word) - 1
 
 
 @dataclass(frozen=True, slots=True)
 class Mask:
-    """That a word has `value` where `care` has ones."""
+    """The condition that a word has `value` where `care` has ones."""
 
     word: Expr
     care: int
@@ -49,7 +49,7 @@ class Mask:
 
 
 def field_of(number: Expr) -> Field | None:
-    """The bits of a variable, element or local that the number is made of; None for any other number."""
+    """Return the field of a variable, element or local that the number is; None for any other number."""
     match number:
         case Read() | ReadLocal() | Select() if isinstance(number.type, Int) and number.type.low >= 0:
             return Field(number, bits_of(number) - 1, 0)
@@ -64,7 +64,7 @@ def field_of(number: Expr) -> Field | None:
 
 
 def mask_of(condition: Expr) -> Mask | None:
-    """The mask that the condition is; None where it is none, or compares a word as a whole."""
+    """Return the mask that the condition states; None where it states none, or compares a word as a whole."""
     match condition:
         case Apply(op=Op.AND, args=(left, right)):
             return _both(mask_of(left), mask_of(right))
@@ -86,7 +86,7 @@ def mask_of(condition: Expr) -> Mask | None:
 
 
 def _both(left: Mask | None, right: Mask | None) -> Mask | None:
-    """The mask of both; None where they are about two words, or contradict each other."""
+    """Return the mask of both; None where they are about two words, or contradict each other."""
     if left is None or right is None or left.word != right.word:
         return None
     if (left.value ^ right.value) & left.care & right.care:
@@ -95,7 +95,7 @@ def _both(left: Mask | None, right: Mask | None) -> Mask | None:
 
 
 def _opposite(mask: Mask | None) -> Mask | None:
-    """The mask that holds where this one does not; None where it has more than one bit."""
+    """Return the mask that holds where this one does not; None where it has more than one bit."""
     if mask is None or mask.care.bit_count() != 1:
         return None
     return replace(mask, value=mask.value ^ mask.care)
@@ -106,9 +106,9 @@ WIDE = 16
 
 
 def bits_alone(conditions: Iterable[Expr], kinds: Mapping[str, Scalar]) -> dict[str, int]:
-    """Wide words, all whose bits are free, that these conditions look at only as fields, masks and by comparison with such; their bits.
+    """Return the wide words, with all bits free, that the conditions read by fields, masks and comparisons alone, and their widths.
 
-    None where no condition looks at bits of any: then integers serve as well.
+    Empty where no condition reads bits of any: integers serve as well then.
     """
     wide = {
         name: kind.high.bit_length()
@@ -137,14 +137,14 @@ def _all_free(kind: Int) -> bool:
 
 @dataclass(slots=True)
 class _Uses:
-    """How conditions look at variables: the words of which a part is looked at, those calculated with, and what is compared."""
+    """The uses of variables in conditions: words read in part, variables in arithmetic, and pairs that are compared."""
 
     split: set[str] = field_(default_factory=set)
     calculated: set[str] = field_(default_factory=set)
     pairs: list[tuple[str, str]] = field_(default_factory=list)
 
     def see(self, condition: Expr) -> None:
-        """Note a condition's."""
+        """Note the uses in a condition."""
         match condition:
             case Apply(op=op, args=(left, right)) if is_comparison(op):
                 names = [self._side(side) for side in (left, right)]
@@ -164,7 +164,7 @@ class _Uses:
                 self.calculated.update(map(str, read_by(condition)))
 
     def _side(self, side: Expr) -> str:
-        """The variable of whose bits a side of a comparison is made; none for any other side, whose variables are calculated with."""
+        """Return the variable whose bits a side of a comparison is; "" for any other side, whose variables count as calculated with."""
         part = field_of(side)
         if part is not None and isinstance(part.word, Read):
             if not isinstance(side, Read):
@@ -178,7 +178,7 @@ class _Uses:
 
 
 def field(scope: Scope, word: Typed, ends: tuple[int | None, int | None], span: Span) -> Typed | None:
-    """`word[high..low]`; None after an error, as where an end is None."""
+    """Type `word[high..low]`; None after an error, and where an end is None."""
     high, low = ends
     width = _width(scope, word, span)
     if width is None or high is None or low is None:
@@ -193,13 +193,13 @@ def field(scope: Scope, word: Typed, ends: tuple[int | None, int | None], span: 
 
 
 def bit(scope: Scope, word: Typed, place: int | None, span: Span) -> Typed | None:
-    """`word[3]`: whether the bit is set; None after an error, as where the place is None."""
+    """Type `word[3]`, the condition that the bit is set; None after an error, and where the place is None."""
     number = field(scope, word, (place, place), span)
     return None if number is None else Typed(_is(number.expr, 1, span))
 
 
 def matches(scope: Scope, word: Typed, digits: str, span: Span) -> Typed | None:
-    """Whether the word has these bits, the greatest first; `x` is any. None after an error."""
+    """Type the condition that the word has these bits, the greatest first; `x` is any. None after an error."""
     width = _width(scope, word, span)
     if width is None:
         return None
@@ -219,7 +219,7 @@ def matches(scope: Scope, word: Typed, digits: str, span: Span) -> Typed | None:
 
 
 def bitwise(scope: Scope, op: str, operands: tuple[Typed | None, Typed | None], span: Span) -> Typed | None:
-    """`&`, `|`, `<<` and `>>`; the right side of a shift and one side of the others is a constant. None after an error."""
+    """Type `&`, `|`, `<<` and `>>`; the right side of a shift and one side of the others is a constant. None after an error."""
     left, right = operands
     if left is None or right is None or any(_width(scope, side, span) is None for side in (left, right)):
         return None
@@ -244,7 +244,7 @@ def bitwise(scope: Scope, op: str, operands: tuple[Typed | None, Typed | None], 
 
 
 def _runs(kept: int, width: int) -> Iterator[tuple[int, int]]:
-    """The greatest and the least place of each run of ones."""
+    """Yield the greatest and the least place of each run of ones."""
     low = None
     for place in range(width + 1):
         one = place < width and kept >> place & 1 == 1
@@ -256,7 +256,7 @@ def _runs(kept: int, width: int) -> Iterator[tuple[int, int]]:
 
 
 def _width(scope: Scope, word: Typed, span: Span) -> int | None:
-    """How many bits it has; None (reported) where it is no word."""
+    """Return the number of bits; None (reported) where it is no word."""
     kind = word.expr.type
     if isinstance(kind, Int) and kind.low >= 0 and not kind.unit:
         return bits_of(word.expr)
@@ -270,7 +270,7 @@ def _width(scope: Scope, word: Typed, span: Span) -> int | None:
 
 
 def bits_of(word: Expr) -> int:
-    """How many bits it has, by the greatest value of its type."""
+    """Return the number of bits, by the greatest value of the type."""
     assert isinstance(word.type, Int)
     return max(word.type.high.bit_length(), 1)
 
@@ -283,7 +283,7 @@ def _has(scope: Scope, width: int, place: int, span: Span) -> bool:
 
 
 def _field(scope: Scope, word: Expr, high: int, low: int, span: Span) -> Expr:
-    """The bits as a number; of a field of a word, those of the word, so that one bit has one spelling."""
+    """Return the bits as a number; of a field of a word, those of the word, so that one bit has one spelling."""
     match word:
         case Apply(op=Op.DIV, args=(inner, Literal(value=by))) if _is_power(inner, by):
             places = int(by).bit_length() - 1
@@ -295,7 +295,7 @@ def _field(scope: Scope, word: Expr, high: int, low: int, span: Span) -> Expr:
 
 
 def _is_power(word: Expr, divisor: Value) -> bool:
-    """Whether it divides a word by 2, 4, 8 or a greater power of two."""
+    """Return whether a word is divided by 2, 4, 8 or a greater power of two."""
     return isinstance(word.type, Int) and word.type.low >= 0 and divisor > 1 and int(divisor).bit_count() == 1
 
 
@@ -304,7 +304,7 @@ def _is(number: Expr, value: int, span: Span) -> Expr:
 
 
 def _by(scope: Scope, op: Arithmetic, left: Expr, value: int, span: Span) -> Expr:
-    """An operation with a constant; nothing where it is one by 1 that changes nothing."""
+    """Apply an operation with a constant; return the left side itself for a product with or quotient by 1."""
     return left if value == 1 and op is not Op.MOD else _apply(scope, op, left, _number(value, span), span)
 
 

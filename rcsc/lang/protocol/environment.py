@@ -29,7 +29,7 @@ class Event(StrEnum):
 
 
 class Kept(StrEnum):
-    """What has become of a part of a level's state."""
+    """The fate of a part of a level's state."""
 
     TAKEN = "taken"
     AS_THEY_CAME = "as they came"
@@ -44,7 +44,7 @@ class Kept(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """What an event leaves.
+    """The state that an event leaves.
 
     Attributes:
         inputs: Of the inputs.
@@ -52,7 +52,7 @@ class Left:
         pending: Of deferred values that wait.
         outputs: Of outputs.
         echo: Of the number and the command that the level's report echoes; it never goes back.
-        fault: How the executors call it; OK for no fault.
+        fault: The executors' name for it; OK for no fault.
     """
 
     inputs: Kept
@@ -81,7 +81,7 @@ EARLY = frozenset(left.fault for left in ENVIRONMENT.values()) - {Fault.OK}
 
 
 def refusable(variable: Variable) -> bool:
-    """Return whether an input can hold a value that is refused: a real a NaN, anything else what its type in C holds beside its range.
+    """Return whether an input can hold a value that is refused: a NaN in a real, in others a value of the C type outside the range.
 
     What cannot be refused in C cannot come through a buffer either: a buffer holds that type.
     """
@@ -89,7 +89,7 @@ def refusable(variable: Variable) -> bool:
 
 
 def unadmitted(variable: Variable) -> bool:
-    """Return whether an input may stand outside its range until a cycle takes it: it is refused or clamped then, and was neither yet.
+    """Return whether an input may stand outside its range until a cycle refuses or clamps it.
 
     So it stands after a cycle that was refused, and where the level begins anew.
     """

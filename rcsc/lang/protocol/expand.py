@@ -54,7 +54,7 @@ def _place(parties: Parties) -> Span:
 
 
 def _made(parties: Parties, whole: Sequence[tree.Declaration]) -> Iterator[str]:
-    """The text of state, modules, procedures and properties that belong to no one neighbour."""
+    """Yield the text of state, modules, procedures and properties that belong to no one neighbour."""
     own = {d.name.text for d in whole if isinstance(d, tree.ProcedureDecl)}
     called = set(_calls(whole)) - own
     if parties.subordinates:
@@ -69,7 +69,7 @@ def _made(parties: Parties, whole: Sequence[tree.Declaration]) -> Iterator[str]:
 
 
 def _members(parties: Parties, called: set[str]) -> Iterator[str]:
-    """Procedures that are called and declared nowhere: a status to report, or a command of one subordinate."""
+    """Yield the procedures that are called and not declared: a status to report, or a command of one subordinate."""
     above = parties.superior
     for name in sorted(called):
         ordered = [
@@ -82,14 +82,14 @@ def _members(parties: Parties, called: set[str]) -> Iterator[str]:
 
 
 def _calls(declarations: Iterable[tree.Declaration]) -> Iterator[str]:
-    """The names of procedures that are called without arguments, in any order."""
+    """Yield the names of procedures that are called without arguments, in any order."""
     for statement in chain.from_iterable(map(tree.statements, declarations)):
         if isinstance(statement, tree.Call) and not statement.args:
             yield statement.name.text
 
 
 def _heading(parties: Parties, heading: tree.Heading) -> tree.Heading:
-    """Under the name of a subordinate stand commands to it."""
+    """Replace a subordinate's name as a heading by the place of its commands, which its column holds."""
     match heading.subject:
         case tree.Reference(name) if (party := parties.named(name.text)) is not None:
             place = tree.FieldOf(
@@ -102,20 +102,20 @@ def _heading(parties: Parties, heading: tree.Heading) -> tree.Heading:
 
 
 def _wrapped(level: tree.LevelDecl) -> tree.LevelDecl:
-    """The level with the protocol before and after its own modules."""
+    """Return the level with the protocol before and after its own modules."""
     first, last = (tree.Name(word, level.name.span) for word in (written.BEFORE, written.AFTER))
     return replace(level, preprocess=(first, *level.preprocess), postprocess=(*level.postprocess, last))
 
 
 def condition(text: str, span: Span) -> tree.Expr:
-    """Parse a condition that stands at a place."""
+    """Parse a condition; its nodes get the span given."""
     declared = _parsed([f"invariant made : {text}"], span)[0]
     assert isinstance(declared, tree.InvariantDecl)
     return declared.condition
 
 
 def _parsed(lines: Iterable[str], span: Span) -> Sequence[tree.Declaration]:
-    """The declarations of a text, all of which stand at the given place."""
+    """Return the declarations of a text, all of which stand at the given place."""
     return _parsed_at("\n".join(lines), span)
 
 
@@ -127,7 +127,7 @@ def _parsed_at(text: str, span: Span) -> Sequence[tree.Declaration]:
 
 
 def _placed(node: T, span: Span) -> T:
-    """The same node at another place, with all its parts."""
+    """Return the same node at another place, with all its parts."""
     changed: dict[str, Any] = {}
     for part in fields(node):  # type: ignore[arg-type]  # a node of the tree
         value = getattr(node, part.name)

@@ -47,20 +47,20 @@ MOST_PATHS, MOST_TUPLES = 512, 20_000
 Known: TypeAlias = Value | None
 """A constant; None for a value that is not known."""
 State: TypeAlias = tuple[tuple[str, Known], ...]
-"""What was assigned so far on a way through a line, by leaf or local."""
+"""The values assigned so far on a way through a line, by leaf or local."""
 Way: TypeAlias = Mapping[str, Known]
-"""What a way through a line assigns."""
+"""The values that a way through a line assigns."""
 Seen: TypeAlias = tuple[int, ...]
 """The members of the leaves that an assumption is about."""
 
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """A leaf that a state is told by: a deferred variable, or the command that a subordinate last echoed.
+    """A leaf whose state is tracked: a deferred variable, or the command that a subordinate last echoed.
 
     Attributes:
-        leaf: What tables read.
-        written: What lines assign: the pending leaf, or the command of the order.
+        leaf: The leaf that tables read.
+        written: The leaf that lines assign: the pending one, or the command of the order.
         begins: Members with which a level begins, first or anew.
         resting: The flag under which a command is the one that rests; empty for a state.
     """
@@ -74,7 +74,7 @@ class Watched:
 
 @dataclass(frozen=True, slots=True)
 class Flags:
-    """The flag of a new command, the one that it is answered, and the one that puts off its answer; empty where no orders are taken."""
+    """The flags of a new command, of its answer, and of an answer put off; empty where no orders are taken."""
 
     new: str
     answered: str
@@ -82,13 +82,13 @@ class Flags:
 
 
 class TooManyPaths(Exception):  # noqa: N818  # what happened, not an error of ours
-    """A line has more ways through it than are looked at."""
+    """A line has more ways through it than the limit."""
 
 
 def in_step(
     table: Table, watched: Sequence[Watched], flags: Flags, procedures: Mapping[str, Procedure]
 ) -> str | None:
-    """Return the condition that the states and commands that the table reads go together; None where it says nothing.
+    """Return the condition that the states and commands which the table reads go together; None where it excludes nothing.
 
     Source: the least set that holds what a level begins with and is closed under the lines of the table (Kildall 1973).
     """
@@ -139,7 +139,7 @@ def _lines(table: Table) -> Iterator[Line | Default]:
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """The tests of a line that are of one leaf alone: what that may have where the line matches, box by box."""
+    """The tests of a line on one leaf alone: the values of that leaf where the line matches, box by box."""
 
     alone: Mapping[str, Sequence[Box]]
 
@@ -152,12 +152,12 @@ class _Line:
         return cls(alone)
 
     def may(self, leaf: str, key: int) -> bool:
-        """Whether the line can match where a leaf has a value."""
+        """Return whether the line can match where a leaf has a value."""
         return all(holds(box, key) for box in self.alone.get(leaf, ()))
 
 
 def _seen_by(line: _Line, watched: Sequence[Watched], flags: Flags) -> list[frozenset[int]]:
-    """The members of each leaf that a line can match with where no command is new: none where it cannot then."""
+    """Return the members of each leaf with which a line can match when no command is new; empty where it cannot match then."""
     if flags.new and not line.may(flags.answered, 0):
         # what the answer left is pending still, whatever the line sees
         return [frozenset(range(len(one.type.members))) for one in watched]
@@ -177,7 +177,7 @@ def _seen_by(line: _Line, watched: Sequence[Watched], flags: Flags) -> list[froz
 
 
 def _answers(line: _Line, way: Way, watched: Sequence[Watched]) -> Iterator[Seen]:
-    """List what may follow a line that answers a new command: what it does not set may be pending still, and so is anything."""
+    """Yield the tuples that may follow a line that answers a new command: a leaf that it does not set may still become any member."""
     parts = (
         _set(one, way) or ((0,) if _rests(line, one) else range(len(one.type.members))) for one in watched
     )
@@ -189,7 +189,7 @@ def _rests(line: _Line, one: Watched) -> bool:
 
 
 def _set(one: Watched, way: Way) -> Sequence[int]:
-    """List what a way through a line sets; nothing where it leaves it."""
+    """Return the members that a way through a line may set; empty where it leaves the leaf."""
     name = next((name for name in (one.written, one.leaf) if name in way), None)
     if name is None:
         return ()
@@ -201,13 +201,13 @@ def _set(one: Watched, way: Way) -> Sequence[int]:
 
 
 class _Paths:
-    """Runs lines with what is constant in them, both ways at each choice."""
+    """Runs lines with the constants in them, both ways at each choice."""
 
     def __init__(self, procedures: Mapping[str, Procedure], leaves: Iterable[str]) -> None:
         self._procedures, self._leaves = procedures, frozenset(leaves)
 
     def through(self, line: Line | Default) -> list[dict[str, Known]]:
-        """Return what each way through a line assigns.
+        """Return the assignments of each way through a line.
 
         Raises:
             TooManyPaths: There are more than `MOST_PATHS`.
@@ -294,7 +294,7 @@ def _constant(expr: Expr | None, state: State) -> Known:
 
 
 def _spelled(seen: set[Seen], watched: Sequence[Watched], flags: Flags) -> str:
-    """Spell a set of tuples as alternatives, as few as merging from the last leaf to the first gives."""
+    """Spell a set of tuples as alternatives, merged from the last leaf to the first."""
     alternatives = [tuple(frozenset({at}) for at in one) for one in sorted(seen)]
     for column in reversed(range(len(watched))):
         merged: dict[tuple[frozenset[int], ...], frozenset[int]] = {}

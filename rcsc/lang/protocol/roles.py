@@ -43,7 +43,7 @@ class Party:
 
     @property
     def name(self) -> str:
-        """What the level calls the neighbour: what the neighbour says."""
+        """The level's name for the neighbour, and for the variable that holds the neighbour's orders or reports."""
         return self.peer.text
 
     @property
@@ -53,7 +53,7 @@ class Party:
 
     @property
     def raw(self) -> str:
-        """A subordinate's report as it comes."""
+        """The input with a subordinate's report, as it comes."""
         return f"from_{self.name}"
 
     @property
@@ -63,7 +63,7 @@ class Party:
 
     @property
     def bounded(self) -> bool:
-        """Whether an order fails that is not echoed, or not answered, in time."""
+        """True where an order fails that is not echoed, or not answered, in time."""
         return self.within is not None or self.answered is not None
 
     @property
@@ -84,7 +84,7 @@ class Party:
 
 @dataclass(frozen=True, slots=True)
 class Parties:
-    """Whom the levels of a program serve and command.
+    """The neighbours that the levels of a program serve and command.
 
     Attributes:
         superior: None where they take no numbered orders.
@@ -100,19 +100,19 @@ class Parties:
 
     @property
     def numbers(self) -> frozenset[str]:
-        """Leaves that only the protocol writes: numbers of orders, what is echoed, and what a subordinate said."""
+        """The leaves that only the protocol writes: numbers of orders, echoes, and the held reports of subordinates."""
         held = (f"{party.name}.{part}" for party in self.subordinates for part in _HELD)
         above = () if self.superior is None else ("inc_command_echo", "ref_command_echo")
         own = (f"{self.superior.told}.{part}" for part in above if self.superior is not None)
         return frozenset((*own, *held, *(f"{party.told}.inc_command" for party in self.subordinates)))
 
     def named(self, name: str) -> Party | None:
-        """The subordinate of that name; None if there is none."""
+        """Return the subordinate of that name; None if there is none."""
         return next((party for party in self.subordinates if party.name == name), None)
 
 
 def declared(scope: Scope, declarations: Sequence[tree.Declaration]) -> Parties:
-    """Find the neighbours that are declared; what is wrong with them is reported."""
+    """Return the neighbours that are declared; report what is wrong with them."""
     types = _Types(declarations)
     written = [d for d in declarations if isinstance(d, tree.LinkDecl) and scope.claim(d.name, "link")]
     links = {link.name.text: link for link in written if _sound(scope, link, types)}
@@ -147,7 +147,7 @@ def _ordered_again(declaration: tree.Declaration) -> Iterator[str]:
 
 
 class _Types:
-    """What is declared of the types that links use.
+    """The declarations of the types that links use.
 
     Attributes:
         members: Of each enumeration.
@@ -163,7 +163,7 @@ class _Types:
         self._constants = {d.name.text: d.value for d in declarations if isinstance(d, tree.ConstDecl)}
 
     def scalars(self, path: str, kind: tree.TypeExpr, depth: int = 0) -> Iterator[str]:
-        """List the scalars of a field; a type that is not sound is taken for one, and is reported elsewhere."""
+        """Yield the scalars of a field; an invalid type counts as one scalar, and is reported elsewhere."""
         named = self._named.get(kind.name.text) if isinstance(kind, tree.NamedType) else None
         length = self._length(kind.length) if isinstance(kind, tree.ArrayType) else None
         if depth > MOST_DEPTH:
@@ -184,13 +184,13 @@ class _Types:
         return length if length is not None and length <= MOST_LENGTH else None
 
     def number(self, written: tree.Expr) -> int | None:
-        """Return a number, or a constant that is one; None where it has to be reckoned."""
+        """Return the value of a number, or of a constant that is one; None for any other expression."""
         if isinstance(written, tree.Reference):
             written = self._constants.get(written.name.text, written)
         return number_of(written.text) if isinstance(written, tree.IntLiteral) else None
 
     def unit(self, written: tree.Expr) -> bool:
-        """Whether a number, or a constant that is one, has a unit."""
+        """Return whether a number, or a constant that is one, has a unit."""
         if isinstance(written, tree.Reference):
             written = self._constants.get(written.name.text, written)
         return isinstance(written, tree.IntLiteral | tree.RealLiteral) and written.unit is not None
@@ -240,7 +240,7 @@ def _subordinate(
 
 
 def _bounds(scope: Scope, given: tree.CommandsDecl, types: "_Types") -> None:
-    """Report times in which nothing can be echoed or answered; what is no number or constant is checked where it counts."""
+    """Report times in which nothing can be echoed or answered; other expressions are checked where they are used."""
     echo, answer = (
         None if bound is None else types.number(bound) for bound in (given.within, given.answered)
     )
@@ -287,7 +287,7 @@ def _party(peer: tree.Name, link: tree.LinkDecl, types: "_Types", **more: Any) -
 
 
 def _sound(scope: Scope, link: tree.LinkDecl, types: "_Types") -> bool:
-    """Return whether the members of a link are such; a buffer into which nobody has written must say that all rests."""
+    """Return whether a link names members of its types, the resting ones first: a buffer that nobody has written must mean rest."""
     before, members = len(scope.diagnostics), types.members
     for kind, named, first in (
         (link.command, (link.rest,), "the command that rests"),
@@ -319,7 +319,7 @@ def _sound(scope: Scope, link: tree.LinkDecl, types: "_Types") -> bool:
 
 
 def _misplaced(link: tree.LinkDecl, enums: Mapping[str, tuple[str, ...]]) -> Iterator[tuple[str, Span]]:
-    """Describe fields that the protocol makes itself, and reasons that are none."""
+    """Yield a message for each field that the protocol makes itself, and for each invalid reason."""
     own = {"inc_command", "input_command"}, {"inc_command_echo", "ref_command_echo", "status_report", *_HELD}
     for parts, made in zip((link.order, link.report), own, strict=True):
         for part in parts:

@@ -17,7 +17,7 @@ NUMBER = "int 0 .. 65535"
 
 
 def records(link: tree.LinkDecl) -> Iterator[str]:
-    """The records of a link: its order and its report."""
+    """Yield the records of a link: its order and its report."""
     name, command, status = link.name.text, link.command.text, link.status.text
     yield f"record {name}_order {{\n  inc_command : {NUMBER}\n  input_command : {command}"
     yield from _fields(link.order)
@@ -33,7 +33,7 @@ def _fields(fields: Sequence[tree.LinkField]) -> Iterator[str]:
 
 
 def superior(party: Party) -> Iterator[str]:
-    """The buffers to and from the superior, and what the level remembers of its order."""
+    """Yield the buffers to and from the superior, and the state that the level keeps about its order."""
     name, link = party.name, party.link.name.text
     yield f"## Orders of {name}.\ninput {name} : {link}_order"
     yield f"## Reports to {name}.\noutput {party.told} : {link}_report"
@@ -44,7 +44,7 @@ def superior(party: Party) -> Iterator[str]:
 
 
 def subordinate(party: Party) -> Iterator[str]:
-    """The buffers to and from a subordinate, what it said of the last orders, and the order that was numbered last."""
+    """Yield the buffers to and from a subordinate, its held report, and the order that was numbered last."""
     name, link = party.name, party.link
     yield f"record {name}_held {{\n  command : {link.command.text}\n  status : {link.status.text}\n  resting : bool"
     if party.bounded:
@@ -69,7 +69,7 @@ ECHOED = "## Every last order is echoed, or too late.\nstate echoed : bool"
 
 
 def all_echoed(parties: Parties) -> str:
-    """The condition, as a cycle begins, that every last order is echoed, or too late in this cycle."""
+    """Return the condition, as a cycle begins, that every last order is echoed, or becomes late in this cycle."""
     return " and ".join(map(_echoed_at_first, parties.subordinates)) or "true"
 
 
@@ -88,7 +88,7 @@ def _echoes(party: Party) -> str:
 
 
 def _cycles(party: Party) -> str:
-    """The cycles after which an order is late that is not echoed."""
+    """Return the number of cycles after which an order without an echo is late."""
     cycles = party.within or party.answered
     assert cycles is not None
     return spell_expr(cycles)
@@ -98,7 +98,7 @@ def _cycles(party: Party) -> str:
 
 
 def settle(parties: Parties) -> Iterator[str]:
-    """The procedure by which a new command first lets the levels below rest."""
+    """Yield the procedure by which a new command first lets the levels below rest."""
     yield "## A new command finds a level below at work: let it rest first.\nprocedure settle {"
     if parties.superior is not None:
         yield "  settling := true"
@@ -107,12 +107,12 @@ def settle(parties: Parties) -> Iterator[str]:
 
 
 def status_is(party: Party, member: str) -> str:
-    """The procedure that reports a status."""
+    """Return the procedure that reports a status."""
     return f"procedure {member} {{\n  {party.told}.status_report := {member}\n}}"
 
 
 def order_is(party: Party, member: str) -> str:
-    """The procedure that orders a command."""
+    """Return the procedure that orders a command."""
     return f"procedure {member} {{\n  {party.told}.input_command := {member}\n}}"
 
 
@@ -120,7 +120,7 @@ def order_is(party: Party, member: str) -> str:
 
 
 def taken(parties: Parties) -> Iterator[str]:
-    """What runs before everything else of a level."""
+    """Yield the module that runs before everything else of a level."""
     above, below = parties.superior, parties.subordinates
     reads = [part for party in below for part in (party.raw, party.told, party.name)]
     writes = [party.name for party in below] + (["echoed"] if below else [])
@@ -149,7 +149,7 @@ def taken(parties: Parties) -> Iterator[str]:
 
 
 def _told_taken(parties: Parties) -> Iterator[str]:
-    """What the module before is for, in the words of who reads the code."""
+    """Yield the doc lines of the module that runs before everything else."""
     yield "Made of the declared roles (manual, Protocol)."
     if parties.superior is not None:
         yield "An order is new if its number differs from the last, until it is answered and the answer's own orders are echoed."
@@ -172,7 +172,7 @@ def _too_late(party: Party) -> Iterator[str]:
 
 
 def _answered_too_late(party: Party, most: str) -> Iterator[str]:
-    """Count cycles in which an order is not answered: one that rests is so by *done* alone, and still when it is late.
+    """Count the cycles for which an order is not answered; an order to rest is answered by *done* alone, even when it is late.
 
     They are counted in all, so that an order is answered for good or late for good, whatever the subordinate reports.
     """
@@ -223,7 +223,7 @@ def _held(party: Party) -> Iterator[str]:
 
 
 def _why_late(party: Party) -> Iterator[str]:
-    """Give the reason of what is late: it was not answered, or not even echoed."""
+    """Yield the assignments of the reason why an order is late: it was not answered, or not even echoed."""
     silent, slow = (
         None if reason is None else f"{party.name}.{party.reason} := {reason}"
         for reason in (party.late, party.unanswered)
@@ -248,7 +248,7 @@ def _resting(party: Party, served: bool) -> str:  # whether there is a superior
 
 
 def given(parties: Parties) -> Iterator[str]:
-    """What runs after everything else of a level."""
+    """Yield the module that runs after everything else of a level."""
     above, below = parties.superior, parties.subordinates
     reads = [part for party in below for part in (party.told, party.last)]
     writes = [part for party in below for part in (party.last, f"{party.told}.inc_command")]
@@ -297,7 +297,7 @@ def _numbered(party: Party) -> Iterator[str]:
 
 
 def properties(parties: Parties, own: set[str]) -> Iterator[str]:
-    """The properties that come with the protocol, but for those of the program's own of the same name, and those switched off."""
+    """Yield the properties of the protocol, except those switched off or declared by the program under the same name."""
     for party in parties.subordinates:
         if party.answered is not None and (name := f"{party.name}_late_stays") not in own:
             failed = f"{party.name}.late and {party.name}.status = {party.link.failed.text}"

@@ -19,7 +19,7 @@ _NOT_IN_REQUIREMENT = frozenset("|#\\")
 
 
 def requirements(scope: Scope, written: Iterable[tree.Name]) -> tuple[str, ...]:
-    """The names of requirements, each once; one that cannot be is reported."""
+    """Return the names of requirements, each once; report an invalid name."""
     known: dict[str, tree.Name] = {}
     for name in written:
         wrong = _wrong(name.text)
@@ -34,7 +34,7 @@ def requirements(scope: Scope, written: Iterable[tree.Name]) -> tuple[str, ...]:
 
 
 def _wrong(name: str) -> str:
-    """What is wrong with the name of a requirement; empty for nothing."""
+    """Return what is wrong with the name of a requirement; "" for nothing."""
     if not name or name != name.strip() or "  " in name:
         return "is empty, or has blanks around it or two together"
     if len(name) > MOST_REQUIREMENT:
@@ -59,7 +59,7 @@ class Names:
         self.path: list[str] = []
 
     def declare(self) -> tuple[Enum, ...]:
-        """Declares all, and gives the enumerations in text order."""
+        """Declare everything, and return the enumerations in text order."""
         scope = self.scope
         for unit in (d for d in self.all if isinstance(d, tree.UnitDecl)):
             if scope.claim(unit.name, "unit"):
@@ -90,7 +90,7 @@ class Names:
         return enums
 
     def _demand(self, space: str, name: tree.Name) -> bool:
-        """Resolves a name asked for before its turn; False where it asks for itself, which is reported."""
+        """Resolve a name that is asked for before its turn; return False (reported) where it depends on itself."""
         key = f"{space} {name.text}"
         if key in self.path:
             names = [link.partition(" ")[2] for link in (*self.path[self.path.index(key) :], key)]

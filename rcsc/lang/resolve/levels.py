@@ -70,7 +70,7 @@ LONGEST_PERIOD = 3_600_000
 
 @dataclass(frozen=True, slots=True)
 class Declarations:
-    """What levels run: tables, assumptions and procedures by name, and owners."""
+    """The parts that levels run: tables, assumptions and procedures by name, and owners."""
 
     tables: Mapping[TableName, Table]
     assumptions: Mapping[str, Assumption]
@@ -79,7 +79,7 @@ class Declarations:
 
 
 def level(scope: Scope, written: tree.LevelDecl, known: Declarations) -> Level | None:
-    """The level; None after an error in its tables."""
+    """Return the level; None after an error in its tables."""
     before, after = known.owners.laid_out(written.preprocess), known.owners.laid_out(written.postprocess)
     period = _period(scope, written)
     chosen = [_chosen(scope, clause, set(known.tables)) for clause in written.tables]
@@ -100,7 +100,7 @@ def level(scope: Scope, written: tree.LevelDecl, known: Declarations) -> Level |
 
 
 def periods(scope: Scope, levels: Iterable[tree.LevelDecl]) -> tuple[tuple[int, ...], frozenset[str]]:
-    """The periods of levels in ms, each once, ascending; and the names of the tables that they run."""
+    """Return the periods of levels in ms, each once, ascending; and the names of the tables that they run."""
     every = list(levels)
     named = (name for written in every for name in _named(written))
     return tuple(sorted({_period(scope, written) for written in every})), frozenset(named)
@@ -203,7 +203,7 @@ def _table(scope: Scope, name: tree.Name, tables: set[TableName]) -> bool:
 
 
 def _complete(scope: Scope, kind: Scalar, pairs: dict[Value, TableName], span: Span) -> bool:
-    """Whether every value of the selector has a table; the least ones without are reported."""
+    """Return whether every value of the selector has a table; report the least value without one, and the number of others."""
     low, high = key_bounds(kind)
     if len(pairs) == high - low + 1:
         return True
@@ -220,7 +220,7 @@ def _complete(scope: Scope, kind: Scalar, pairs: dict[Value, TableName], span: S
 
 
 def _each_once(scope: Scope, written: tree.LevelDecl) -> bool:
-    """Whether no table stands in two clauses; the second place is reported."""
+    """Return whether no table stands in two clauses; report the second place."""
     first: dict[str, tuple[int, Span]] = {}
     sound = True
     for at, clause in enumerate(written.tables):
@@ -236,7 +236,7 @@ def _each_once(scope: Scope, written: tree.LevelDecl) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Touched:
-    """What one clause of a level touches: of each leaf the table that reads it (first), and the one that writes it."""
+    """The leaves that one clause of a level touches: each with the first table that reads it, or with the one that writes it."""
 
     reads: Mapping[str, str]
     writes: Mapping[str, str]
@@ -245,7 +245,7 @@ class _Touched:
 def _in_order(
     scope: Scope, written: tree.LevelDecl, clauses: Sequence[TableChoice], known: Declarations
 ) -> list[TableChoice] | None:
-    """The clauses, each after those that write what it reads; where that leaves it free, single tables as declared, then choices.
+    """Order the clauses so that each follows those that write what it reads; else single tables as declared, then choices.
 
     None after an error: two that write one leaf, or that wait for each other.
     """
@@ -278,7 +278,7 @@ def _in_order(
 
 
 def _touched(choice: TableChoice, known: Declarations) -> _Touched:
-    """What a clause reads (in its selector, tests, actions and assumptions) and writes; hidden values of before are of no cycle."""
+    """Return the leaves that a clause reads (in its selector, tests, actions and assumptions) and those that it writes."""
     reads: dict[str, str] = {}
     writes: dict[str, str] = {}
     if isinstance(choice, TableByCommand):
@@ -296,7 +296,7 @@ def _touched(choice: TableChoice, known: Declarations) -> _Touched:
 
 
 def _one_writer(scope: Scope, written: tree.LevelDecl, touched: Sequence[_Touched]) -> bool:
-    """Whether no two clauses write one leaf; the first that two do is reported for each pair of tables."""
+    """Return whether no two clauses write one leaf; report the first shared leaf of each pair of tables."""
     known: dict[tuple[str, str], str] = {}
     writers: dict[str, str] = {}
     for part in touched:
@@ -317,7 +317,7 @@ def _one_writer(scope: Scope, written: tree.LevelDecl, touched: Sequence[_Touche
 def _circle(
     scope: Scope, written: tree.LevelDecl, touched: Sequence[_Touched], waits: Mapping[int, Mapping[int, str]]
 ) -> None:
-    """Report the shortest way round by which clauses wait for each other: each for one that is left, too."""
+    """Report the shortest cycle of clauses that wait for each other; each clause given waits for another of them."""
     steps = min((_way_back(start, waits) for start in waits), key=len)
     words = [
         f"`{touched[reader].reads[leaf]}` reads `{leaf}`, which `{touched[writer].writes[leaf]}` writes"
@@ -333,7 +333,7 @@ def _circle(
 
 
 def _way_back(start: int, waits: Mapping[int, Mapping[int, str]]) -> list[tuple[int, str, int]]:
-    """The shortest way from a clause over those that it waits for to one that was met: its round alone."""
+    """Return the shortest cycle of waits from a clause back to it; where there is none, a path longer than any cycle."""
     ways: dict[int, list[tuple[int, str, int]]] = {start: []}
     for reader in (queue := [start]):
         for writer, leaf in waits[reader].items():
@@ -346,7 +346,7 @@ def _way_back(start: int, waits: Mapping[int, Mapping[int, str]]) -> list[tuple[
 
 
 def lines_kept(scope: Scope, levels: Iterable[Level], tables: Iterable[Table], file: str) -> tuple[Enum, ...]:
-    """Declare, for each table that runs before another, the state that holds its line of the present cycle; return their types.
+    """Declare, for each table that runs before another, the state that holds its line of this cycle; return the types of these states.
 
     Only properties can name it: it is made after all else is resolved.
     """
@@ -355,7 +355,7 @@ def lines_kept(scope: Scope, levels: Iterable[Level], tables: Iterable[Table], f
 
 
 def _members(lines: Sequence[str]) -> Iterator[str]:
-    """A member for none of the lines, and one for each: its name, or `line_1` where that is a number."""
+    """Yield a member for "none of the lines", and one for each line: its name, or `line_1` where that is a number."""
     taken = set(lines)
 
     def free(word: str) -> str:

@@ -25,18 +25,18 @@ class Owners:
                 self._lay_out(name)
 
     def all(self) -> tuple[Owner, ...]:
-        """The owners as declared."""
+        """Return the owners as declared."""
         return tuple(
             Owner(name, tuple(m.text for m in owner.members), " ".join(owner.doc), owner.name.span)
             for name, owner in self.written.items()
         )
 
     def laid_out(self, names: tuple[tree.Name, ...]) -> tuple[str, ...]:
-        """The procedures that the named owners and procedures come to, in order."""
+        """Return the procedures of the named owners and procedures, in order."""
         return tuple(procedure for name in names for procedure in self._runs_of(name))
 
     def _runs_of(self, member: tree.Name) -> tuple[str, ...]:
-        """Return what a member runs; report one that is no owner and no procedure without parameters."""
+        """Return the procedures that a member runs; report one that is no owner and no procedure without parameters."""
         if member.text in self.runs:
             return self.runs[member.text]
         procedure = self.scope.procedures.get(member.text)
@@ -51,7 +51,7 @@ class Owners:
         return (member.text,)
 
     def _lay_out(self, start: str) -> None:
-        """Fills `runs` for `start` and all owners inside it; a circle is reported with its path."""
+        """Fill `runs` for `start` and all owners inside it; report a circle with its path."""
         path = {start: iter(self.written[start].members)}
         while path:
             name = next(reversed(path))

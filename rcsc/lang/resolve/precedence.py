@@ -43,7 +43,7 @@ from rcsc.lang.syntax.rows import Cell
 from rcsc.lang.syntax.spell import spell_expr
 
 ALL = "all"
-"""What stands for every line but those that stand above this one, or above all, too."""
+"""The word for every other line, except those that stand above this one or, like it, above all."""
 _OPPOSITE = {str(op.value): str(other.value) for op, other in OPPOSITE.items()}
 
 
@@ -54,7 +54,7 @@ Resolved: TypeAlias = tuple[tuple[Column, ...], tuple[Line, ...], tuple[Meeting,
 def with_precedence(
     scope: Scope, written: tree.TableDecl, columns: tuple[Column, ...], lines: tuple[Line, ...]
 ) -> Resolved:
-    """The columns and lines, with a column for what goes before a line adds to it; what is wrong is reported."""
+    """Return the columns and lines, with a column for the conditions that lines going before a line add to it; report errors."""
     unchanged: Resolved = columns, lines, ()
     if not any(row.above or row.same for row in written.rows):
         return unchanged
@@ -74,7 +74,7 @@ def with_precedence(
 
 
 def expanded(written: tree.TableDecl, table: Table, *, apart: bool = False) -> tree.TableDecl:
-    """The table as it is resolved: without `above` and `same`, and with a column for what they come to.
+    """Return the table as it is resolved: without `above` and `same`, with a column for the conditions that they add.
 
     `apart` gives it the columns of the model, of which each looks at another variable.
     """
@@ -105,7 +105,7 @@ def expanded(written: tree.TableDecl, table: Table, *, apart: bool = False) -> t
 
 
 def _condition(text: str) -> tree.Condition | None:
-    """A condition as a cell under `when`; None for an empty one."""
+    """Parse a condition as a cell under `when`; None for an empty one."""
     if not text:
         return None
     parsed = parse(Source("", f"assume it : {text}"))
@@ -120,7 +120,7 @@ def _condition(text: str) -> tree.Condition | None:
 
 @dataclass(frozen=True, slots=True)
 class _Order:
-    """How the lines of a table stand to each other, by name.
+    """The order of a table's lines, by name.
 
     Attributes:
         below: For each line those that stand above it.
@@ -132,7 +132,7 @@ class _Order:
 
     @classmethod
     def of(cls, scope: Scope, written: tree.TableDecl) -> "_Order":
-        """The order as written; what names no line, or goes in a circle, is reported."""
+        """Return the order as written; report names without a line, and circles."""
         same = _same(scope, written)
         above = _above(scope, written, same)
         order = cls(
@@ -151,7 +151,7 @@ class _Order:
 
 
 def _same(scope: Scope, written: tree.TableDecl) -> dict[str, frozenset[str]]:
-    """For each line those that do the same, directly or through others, itself too."""
+    """Return for each line those that do the same, directly or through others, itself included."""
     named = {row.name: {other.text for other in _others(scope, written, row)} for row in written.rows}
     both = {
         name: {*others, *(other for other in named if name in named[other])} for name, others in named.items()
@@ -160,7 +160,7 @@ def _same(scope: Scope, written: tree.TableDecl) -> dict[str, frozenset[str]]:
 
 
 def _above(scope: Scope, written: tree.TableDecl, same: Mapping[str, frozenset[str]]) -> dict[str, set[str]]:
-    """For each line those above which it stands, directly or through others."""
+    """Return for each line those above which it stands, directly or through others."""
     named = {row.name: {lower.text for lower in _named(scope, written, row)} for row in written.rows}
     above = {name: _reached(name, named) for name in named}
     whole = {row.name for row in written.rows if any(lower.text == ALL for lower in row.above)}
@@ -177,7 +177,7 @@ def _above(scope: Scope, written: tree.TableDecl, same: Mapping[str, frozenset[s
 
 
 def _others(scope: Scope, written: tree.TableDecl, row: tree.Row) -> Iterator[tree.Name]:
-    """The lines that a row names after `same`."""
+    """Yield the lines that a row names after `same`."""
     rows = {other.name: other for other in written.rows}
     for name in row.same:
         other = rows.get(name.text)
@@ -198,7 +198,7 @@ def _kind(written: tree.TableDecl) -> str:
 
 
 def _named(scope: Scope, written: tree.TableDecl, row: tree.Row) -> Iterator[tree.Name]:
-    """The lines that a row names after `above`, without `all`."""
+    """Yield the lines that a row names after `above`, without `all`."""
     rows = {other.name: other for other in written.rows}
     for lower in row.above:
         other = rows.get(lower.text)
@@ -222,7 +222,6 @@ def _named(scope: Scope, written: tree.TableDecl, row: tree.Row) -> Iterator[tre
 
 
 def _reached(name: str, edges: Mapping[str, Collection[str]]) -> set[str]:
-    """What can be reached from a line."""
     reached: set[str] = set()
     waiting = [name]
     while waiting:
@@ -234,13 +233,13 @@ def _reached(name: str, edges: Mapping[str, Collection[str]]) -> set[str]:
 
 
 def _circle(edges: Mapping[str, Collection[str]]) -> list[str]:
-    """A shortest circle, its first line at both ends; empty where there is none."""
+    """Return a shortest circle, with its first line at both ends; empty where there is none."""
     circles = [path for name in edges if (path := _back(name, edges))]
     return min(circles, key=len, default=[])
 
 
 def _back(name: str, edges: Mapping[str, Collection[str]]) -> list[str]:
-    """A shortest way from a line back to it; empty where there is none."""
+    """Return a shortest way from a line back to it; empty where there is none."""
     came: dict[str, str] = {}
     waiting = [name]
     for at in waiting:
@@ -265,7 +264,7 @@ def _report_circle(scope: Scope, written: tree.TableDecl, circle: list[str]) -> 
 
 
 def _marks(row: tree.Row) -> Span:
-    """Where a row says above what it stands."""
+    """Return the span of the names after `above` in a row."""
     return Span(row.above[0].span.file, row.above[0].span.start, row.above[-1].span.end)
 
 
@@ -288,7 +287,7 @@ class _Before:
 
 @dataclass(slots=True)
 class _Lines:
-    """The lines of a table, to tell what those above a line add to it.
+    """The lines of a table, to find the conditions that lines above add to a line.
 
     Attributes:
         boxes: For each line the keys that it may have, by leaf.
@@ -306,7 +305,6 @@ class _Lines:
     shared: dict[Expr, Test] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Works out the boxes."""
         self.boxes = [self._box(line) for line in self.lines]
         self.masks = [
             [
@@ -326,7 +324,7 @@ class _Lines:
         return boxes
 
     def reports_endless(self) -> bool:
-        """Report lines without conditions that go before others; whether there is one."""
+        """Report a line without conditions that goes before others; return whether there is one."""
         first = {line.name: at for at, line in enumerate(self.lines)}
         for at, line in enumerate(self.lines):
             if any(line.tests) or not any(
@@ -341,7 +339,7 @@ class _Lines:
         return False
 
     def added(self, at: int) -> dict[str, Test]:
-        """The tests that none which goes before a line comes through: one a leaf, so that boxes stay boxes, and "" for the rest."""
+        """Return the tests that no line going before this one comes through: one a leaf, so that boxes stay boxes, and "" for the rest."""
         above = self._uppers(at)
         before = [self._before(at, upper) for upper in self._above(at)]
         before += [
@@ -355,7 +353,7 @@ class _Lines:
         return {leaf: self._none_of(each) for leaf, each in by_leaf.items()}
 
     def given(self, at: int, tests: Sequence[Test | None]) -> Line:
-        """The line with these tests; their place is that of the line's name."""
+        """Return the line with these tests added; their place is that of the line's name."""
         line = self.lines[at]
         split, bounds = 2 * (1 + len(line.tests)), tuple(line.bounds)
         return replace(
@@ -367,15 +365,15 @@ class _Lines:
         )
 
     def _above(self, at: int) -> list[int]:
-        """The lines above a line that can match together with it."""
+        """Return the lines above a line that can match together with it."""
         return [upper for upper in self._uppers(at) if not self._apart(at, upper)]
 
     def _earlier(self, at: int) -> list[int]:
-        """The earlier lines that do the same, and can match together with it."""
+        """Return the earlier lines that do the same and can match together with it."""
         return [earlier for earlier in self._same(at) if earlier < at]
 
     def meetings(self) -> Iterator[Meeting]:
-        """What is said of pairs of lines: by name, and of those that do the same through others."""
+        """Yield the declarations about pairs of lines: those named, and those that do the same through others."""
         places = {line.name: at for at, line in enumerate(self.lines)}
         for row in self.written.rows:
             for lower in (lower for lower in row.above if lower.text in places):
@@ -407,12 +405,11 @@ class _Lines:
         return Meeting(self.lines[first].name, self.lines[second].name, where, same, span)
 
     def _uppers(self, at: int) -> list[int]:
-        """The lines above a line."""
         above = self.order.below[self.lines[at].name]
         return [upper for upper, line in enumerate(self.lines) if line.name in above]
 
     def _same(self, at: int) -> list[int]:
-        """The other lines that do the same, and can match together with it."""
+        """Return the other lines that do the same and can match together with it."""
         name = self.lines[at].name
         return [
             other
@@ -421,7 +418,7 @@ class _Lines:
         ]
 
     def _before(self, at: int, upper: int, unless: Sequence[int] = ()) -> _Before:
-        """A line that goes before another, with the columns of its tests that the other does not imply."""
+        """Return a line that goes before another, with the columns of its tests that the other does not imply."""
         tests = self.lines[upper].tests
         stated = [column for column, test in enumerate(tests) if test is not None]
         columns = tuple(column for column in stated if not self._implied(at, tests[column]))
@@ -429,7 +426,7 @@ class _Lines:
         return _Before(upper, columns or tuple(stated), tuple(less))
 
     def _apart(self, at: int, upper: int) -> bool:
-        """Whether two lines never match together, as far as it can be seen in cells."""
+        """Return whether the cells show that two lines never match together."""
         boxes, masks = self.boxes[at], self.masks[at]
         return any(
             not meet(box, boxes[leaf]) for leaf, box in self.boxes[upper].items() if leaf in boxes
@@ -441,7 +438,7 @@ class _Lines:
         )
 
     def _implied(self, at: int, test: Test | None) -> bool:
-        """Whether a test holds wherever the line matches, as far as it can be seen in cells."""
+        """Return whether the cells show that a test holds wherever the line matches."""
         if test is None or test in self.lines[at].tests:
             return True
         if test.box is None:
@@ -457,7 +454,7 @@ class _Lines:
         return meet(mine, test.box) == mine
 
     def _none_of(self, before: Sequence[_Before]) -> Test:
-        """The test that none of these lines comes through."""
+        """Return the test that none of these lines comes through."""
         condition = conjunction(map(self._not, before))
         if condition not in self.shared:
             words = _merged([(self._words(each), self._of_one_leaf(each)) for each in before])
@@ -468,7 +465,7 @@ class _Lines:
         return self.shared[condition]
 
     def _not(self, before: _Before) -> Expr:
-        """That a line does not match, in these columns, or one that goes before it does."""
+        """Return the condition that a line does not match, in these columns, or that one which goes before it does."""
         less = [
             self._not(_Before(other, tuple(range(len(self.lines[other].tests))))) for other in before.unless
         ]
@@ -479,12 +476,12 @@ class _Lines:
         return [test for column in before.columns if (test := tests[column]) is not None]
 
     def _of_one_leaf(self, before: _Before) -> bool:
-        """Whether these columns compare one leaf with constants."""
+        """Return whether these columns compare one leaf with constants."""
         one = len(before.columns) == 1 and not before.unless
         return one and all(test.box is not None for test in self._tests(before))
 
     def _words(self, before: _Before) -> tree.Expr:
-        """That the cells of these columns do not hold, as it would be written."""
+        """Return, as syntax, the condition that the cells of these columns do not hold."""
         row = self.rows[self.lines[before.line].name]
         terms = [
             tree.term(self.written.conditions[column], cell)
@@ -501,9 +498,9 @@ class _Lines:
 
 
 def _merged(words: Sequence[tuple[tree.Expr, bool]]) -> list[tree.Expr]:
-    """The conditions; those that exclude constants of one subject as one: `a not in {x, y}` for `a /= x`, `a /= y`.
+    """Return the conditions, those that exclude constants of one subject as one: `a not in {x, y}` for `a /= x`, `a /= y`.
 
-    Each comes with whether it compares with constants: a set has no others.
+    Each comes with a flag: it compares with constants. Only these join, as a set has constants alone.
     """
     merged: list[tuple[tree.Expr, bool]] = []
     for word, constant in words:
@@ -518,7 +515,7 @@ def _merged(words: Sequence[tuple[tree.Expr, bool]]) -> list[tree.Expr]:
 
 
 def _excluded(first: tree.Expr, second: tree.Expr) -> tree.Expr | None:
-    """What excludes all that two conditions exclude of one subject; None where one of them does something else."""
+    """Return the condition that excludes the constants of both; None where one does something else, or the subjects differ."""
     match _excluding(first), _excluding(second):
         case (subject, members), (other, more) if subject == other:
             every = tuple(dict.fromkeys((*members, *more)))
@@ -527,7 +524,7 @@ def _excluded(first: tree.Expr, second: tree.Expr) -> tree.Expr | None:
 
 
 def _excluding(word: tree.Expr) -> tuple[tree.Expr, tuple[tree.Member, ...]] | None:
-    """The subject of a condition that excludes constants, and these."""
+    """Return the subject of a condition that excludes constants, and the constants; None for any other condition."""
     match word:
         case tree.Binary("/=", subject, tree.Reference() | tree.IntLiteral() | tree.Mask() as value):
             return subject, (value,)
@@ -537,7 +534,7 @@ def _excluding(word: tree.Expr) -> tuple[tree.Expr, tuple[tree.Member, ...]] | N
 
 
 def _has_opposite(condition: Expr) -> bool:
-    """Whether a condition is a comparison of what can be no NaN: with one, `a < b` and `a >= b` are both false."""
+    """Return whether a condition compares values that can be no NaN: with one, `a < b` and `a >= b` are both false."""
     match condition:
         case Apply(op=op, args=(left, right)):
             return is_comparison(op) and is_finite(left) and is_finite(right)
@@ -545,7 +542,7 @@ def _has_opposite(condition: Expr) -> bool:
 
 
 def _other(expr: tree.Expr, *, ordered: bool) -> tree.Expr:
-    """The opposite of a condition; comparisons turn where neither side can be a NaN."""
+    """Return the opposite of a condition; comparisons turn where neither side can be a NaN."""
     match expr:
         case tree.Unary("not", operand):
             return operand

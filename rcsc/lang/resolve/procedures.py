@@ -41,7 +41,7 @@ _Body: TypeAlias = tuple[tuple[Parameter, ...], tuple[Statement, ...]]
 
 
 def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedure, ...]:
-    """All procedures, with what they read and write, calls included."""
+    """Resolve all procedures, with the leaves that they read and write, calls included."""
     for procedure in written:
         scope.signatures[procedure.name.text] = tuple(_signature(scope, procedure.params))
     bodies = {procedure.name.text: _body(scope, procedure) for procedure in written}
@@ -62,7 +62,7 @@ def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedu
 
 
 def _signature(scope: Scope, params: tuple[tree.Parameter, ...]) -> Iterator[Scalar]:
-    """The types of parameters; none names one that stands before it."""
+    """Yield the types of parameters; none may name a parameter before it."""
     before = Body()
     for param in params:
         kind = scalar_of(scope, param.type, before)
@@ -84,7 +84,7 @@ def _body(scope: Scope, written: tree.ProcedureDecl) -> _Body:
 
 
 def _call_order(scope: Scope, bodies: dict[str, _Body]) -> list[str]:
-    """Callees before callers; a cycle is reported with its path, and so are calls that nest too deep."""
+    """Return callees before callers; report a cycle with its path, and calls that nest too deep."""
     calls = {name: [s for s in everything(body[1]) if isinstance(s, Call)] for name, body in bodies.items()}
     deep: dict[str, int] = {}
     for name in bodies:
@@ -148,14 +148,14 @@ def _procedure(
 
 
 def _previous(scope: Scope, reads: set[VariableName]) -> dict[VariableName, VariableName]:
-    """The hidden states among the leaves that are read, each with the leaf that it is of."""
+    """Return the hidden states among the leaves that are read, each with its leaf."""
     return {hidden: name for name, hidden in scope.previous.items() if hidden in reads}
 
 
 def touched(
     body: Iterable[Statement], known: Mapping[str, Procedure]
 ) -> tuple[set[VariableName], set[VariableName]]:
-    """The leaves that statements may read, and those that they may write, calls included."""
+    """Return the leaves that statements may read, and those that they may write, calls included."""
     reads: set[VariableName] = set()
     writes: set[VariableName] = set()
     for statement in everything(body):
@@ -169,7 +169,7 @@ def touched(
 
 
 def _places(scope: Scope, written: tuple[tree.Expr, ...], writing: bool) -> set[VariableName]:
-    """Leaves under the declared paths."""
+    """Return the leaves under the declared paths."""
     leaves: set[VariableName] = set()
     for place in written:
         path = path_of(scope, Body(), place)
@@ -193,7 +193,7 @@ def _check_declared(
     reads: set[VariableName],
     writes: set[VariableName],
 ) -> None:
-    """Reports each place where a module touches what it does not name."""
+    """Report each place where a module touches a leaf that it does not declare."""
     for statement in everything(body):
         for expr in expressions(statement):
             for names, span in _reading(expr):
@@ -212,7 +212,7 @@ def _reading(expr: Expr) -> Iterator[tuple[tuple[VariableName, ...], Span]]:
 
 
 def _undeclared(scope: Scope, verb: str, extra: set[VariableName], span: Span) -> None:
-    """One report a variable: by its leaf where only one is touched."""
+    """Report each variable once: by its leaf where only one is touched."""
     leaves: dict[str, list[VariableName]] = {}
     of = {hidden: name for name, hidden in scope.previous.items()}
     for name in sorted({of.get(name, name) for name in extra}, key=scope.order):
@@ -224,7 +224,7 @@ def _undeclared(scope: Scope, verb: str, extra: set[VariableName], span: Span) -
 
 
 def _extern(scope: Scope, written: tree.ProcedureDecl) -> Extern:
-    """The names that an extern procedure gives of the user's functions, after a report of each that does not fit.
+    """Return the names of the user's functions for an extern procedure; report each that does not fit.
 
     Source: ISO C99, 6.4.1 (keywords) and 5.2.4.1 (63 significant characters of an internal name).
     """

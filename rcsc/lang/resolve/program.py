@@ -37,9 +37,9 @@ from rcsc.lang.syntax import tree
 
 
 def resolve(root: str, loaded: Loaded, *, least_first: bool = False) -> Program | tuple[Diagnostic, ...]:
-    """The program of the file `root`, or every diagnostic of it and of the files it uses, by position.
+    """Return the program of the file `root`, or every diagnostic of it and of the files it uses, by position.
 
-    With `least_first` it is read as files from before: what has no initial value starts with the least of its type.
+    With `least_first` a variable without an initial value starts with the least of its type, as in older files.
     """
     files = closure(root, loaded)
     wrong = tuple(d for d in loaded.diagnostics if d.primary.span.file in files)
@@ -58,13 +58,13 @@ def resolve(root: str, loaded: Loaded, *, least_first: bool = False) -> Program 
 
 
 def compile_text(text: str, file: str = "case.rcs") -> Program | tuple[Diagnostic, ...]:
-    """The program of a text that uses no other file."""
+    """Return the program of a text that uses no other file."""
     loaded = load(["-"], stdin=text, stdin_name=file)
     return loaded.diagnostics or resolve(loaded.roots[0], loaded)
 
 
 def closure(root: str, loaded: Loaded) -> list[str]:
-    """The file and all that it uses, used ones first."""
+    """Return the file and all that it uses, used ones first."""
     order: dict[str, None] = {}
     path = {root: iter(loaded.uses.get(root, ()))}
     while path:
@@ -86,7 +86,7 @@ class _Resolver:
         self.scope = Scope(limits=dict(limits), least_first=least_first)
 
     def program(self, all_: list[tree.Declaration], root: tree.File) -> Program | tuple[Diagnostic, ...]:
-        """The program, or what is wrong."""
+        """Return the program, or its diagnostics."""
         scope = self.scope
         scope.links = tuple(d.name.text for d in all_ if isinstance(d, tree.LinkDecl))
         parties = declared(scope, all_)

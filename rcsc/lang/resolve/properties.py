@@ -48,7 +48,7 @@ def resolve_property(scope: Scope, written: tree.PropertyDecl) -> Property | Non
 
 
 def _condition(scope: Scope, written: tree.Expr, why_no_before: str) -> Expr | None:
-    """A condition that speaks of something."""
+    """Resolve a condition that is about some variable; None (reported) where it is about none."""
     scope.in_property = True
     with without_before(scope, why_no_before), _with_counters(scope):
         condition = boolean(scope, Body(), written)
@@ -62,7 +62,7 @@ def _condition(scope: Scope, written: tree.Expr, why_no_before: str) -> Expr | N
 
 @contextmanager
 def _with_counters(scope: Scope) -> Iterator[None]:
-    """Inside, a counter that the compiler keeps for a `for` can be named, as witnesses and logs name it."""
+    """Make the counters of `for` known by name, inside, as witnesses and logs name them."""
     counters = {declared.name: declared for declared in scope.kept if scope.leaves[declared.leaves[0]].counts}
     scope.declared |= counters
     try:
@@ -90,7 +90,7 @@ class _Form:
     """A word between two conditions.
 
     Attributes:
-        condition: What the two say together, of a cycle and the one before.
+        condition: The condition that the two make, on a cycle and the one before.
         first_of_one_cycle: Why `was` cannot stand in the first condition; empty where it can. Likewise `other_of_one_cycle`.
     """
 

@@ -37,7 +37,7 @@ from rcsc.lang.syntax import tree
 
 
 def roles_of(scope: Scope, parties: Parties) -> Roles | None:
-    """Return whom the levels serve and command; None where neither is declared."""
+    """Return the neighbours that the levels serve and command; None where none is declared."""
     if not parties:
         return None
     above = parties.superior
@@ -48,7 +48,7 @@ def roles_of(scope: Scope, parties: Parties) -> Roles | None:
 
 
 def _link(link: tree.LinkDecl, order: str, report: str, scope: Scope) -> Link:
-    """Return what a link says, field by field, in words that two files have in common: of types their values, not their names."""
+    """Return the link field by field, in words that two files have in common: types by their values, not their names."""
     command, status = (
         scope.leaves[leaf].type for leaf in (f"{order}.input_command", f"{report}.status_report")
     )
@@ -118,9 +118,9 @@ def _part_of(leaf: str, record: str) -> bool:
 def restart_of(
     scope: Scope, parties: Parties, declarations: Sequence[tree.Declaration]
 ) -> tuple[tuple[VariableName, Adopted], ...] | None:
-    """Return what leaves adopt; None where neither the protocol nor a variable's `restart` nor `adopt` says, and all goes by names.
+    """Return what leaves adopt; None where neither protocol nor `restart` nor `adopt` declares it, so that names decide.
 
-    Where no roles are declared the other leaves still go by their names: a level that numbers its orders by hand does so after a
+    Without roles, the other leaves go by their names all the same: a level that numbers its orders by hand does so after a
     restart, too.
     """
     declared: dict[str, Adopted] = {
@@ -138,7 +138,7 @@ def restart_of(
 
 
 def _declared(scope: Scope, written: tree.AdoptDecl) -> dict[str, Adopted]:
-    """Return what `adopt` says of one leaf; nothing after an error."""
+    """Return what `adopt` declares for one leaf; empty after an error."""
     place = _leaf(scope, written.place)
     if place is None:
         return {}
@@ -162,7 +162,7 @@ def _declared(scope: Scope, written: tree.AdoptDecl) -> dict[str, Adopted]:
 
 
 def _leaf(scope: Scope, place: tree.Expr) -> Variable | None:
-    """Find the leaf that a place names; what is none is reported."""
+    """Return the leaf that a place names; None (reported) where it names none."""
     written = typed(scope, Body(), place)
     if written is None:
         return None
@@ -173,7 +173,7 @@ def _leaf(scope: Scope, place: tree.Expr) -> Variable | None:
 
 
 def _protocol(scope: Scope, parties: Parties) -> Iterator[tuple[str, Adopted]]:
-    """What a level adopts that starts anew: the order in its buffer counts as seen, and has failed; each level below is to rest."""
+    """Yield what a level adopts by protocol: the order in its buffer counts as seen, and has failed; each level below is to rest."""
     above = parties.superior
     if above is not None:
         yield "inc_command_seen", SameAs(f"{above.name}.inc_command")
@@ -199,7 +199,7 @@ def offered(
     tables: Sequence[Table],
     procedures: Sequence[Procedure],
 ) -> tuple[tuple[Assumption, ...], tuple[Table, ...]]:
-    """Return the tables with the assumptions of the protocol that they can rest on, and these.
+    """Return the assumptions of the protocol that tables can rest on, and the tables with them.
 
     They are monitored, and `prove` proves them: a state goes with the order that it waits for, and what rests says so.
     """
@@ -249,7 +249,7 @@ def _watched(scope: Scope, parties: Parties, deferred: Sequence[str]) -> Iterato
 
 
 def _resting(parties: Parties, table: Table) -> str | None:
-    """Say of each subordinate whose rest the table looks for what that means of what else it looks at."""
+    """Return the condition on the other leaves of each subordinate whose `resting` the table reads, as text; None for none."""
     read = set(map(str, table.variables))
     parts = []
     for party in parties.subordinates:

@@ -32,7 +32,7 @@ from rcsc.lang.syntax.rows import ACTION_WORDS
 
 
 def in_sequence(scope: Scope, tables: Iterable[Table], procedures: Iterable[Procedure]) -> None:
-    """Reports the cells that read what an earlier cell of their line may have written."""
+    """Report the cells that read a variable which an earlier cell of their line may have written."""
     known = {str(procedure.name): procedure for procedure in procedures}
     for table in tables:
         for line in table.every_line:
@@ -54,7 +54,7 @@ def _line(scope: Scope, actions: tuple[Action, ...], procedures: Mapping[str, Pr
 
 
 def _read(statement: Statement) -> list[tuple[VariableName, Span]]:
-    """What the cell itself reads, and where; not what a procedure reads that it calls."""
+    """Return the leaves that the cell itself reads, with their places; not those that a called procedure reads."""
     found: list[tuple[VariableName, Span]] = []
     for expr in expressions(statement):
         for part in parts(expr):
@@ -66,7 +66,7 @@ def _read(statement: Statement) -> list[tuple[VariableName, Span]]:
 
 
 def _nothing(statement: Statement) -> bool:
-    """Whether it writes a variable back as it is."""
+    """Return whether the statement writes a variable back unchanged."""
     match statement:
         case Assign(ToLeaf(name=name), Read(name=read)):
             return name == read
@@ -92,7 +92,7 @@ def _report(scope: Scope, name: VariableName, span: Span, by: Action, action: Ac
 
 
 def _spelled(action: Action) -> str | None:
-    """The action as it stands among others in one cell; None for an order to a subordinate."""
+    """Return the action as it is written among others in one cell; None for an order to a subordinate."""
     if action.heading in ACTION_WORDS:
         return action.text
     match action.statement:

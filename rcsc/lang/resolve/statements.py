@@ -61,7 +61,7 @@ class Statements:
     is_protocol: bool = False
 
     def block(self, written: tuple[tree.Statement, ...]) -> tuple[Statement, ...]:
-        """The statements; locals declared inside are forgotten after it."""
+        """Resolve the statements; locals declared inside are forgotten after it."""
         before = dict(self.body.visible)
         resolved = tuple(statement for part in written for statement in self._statement(part))
         self.body.visible = before
@@ -87,7 +87,7 @@ class Statements:
     # --- assignment ---
 
     def assign(self, place: tree.Expr, value: tree.Expr, deferred: bool, span: Span) -> tuple[Statement, ...]:
-        """One assignment a leaf."""
+        """Resolve an assignment, to one statement for each leaf."""
         if isinstance(place, tree.Reference) and place.name.text in self.body.visible:
             return self._assign_local(place, value, deferred, span)
         if isinstance(place, tree.Reference) and place.name.text in self.scope.orders and not deferred:
@@ -96,7 +96,7 @@ class Statements:
         return () if target is None else self.store(target, value, deferred, span)
 
     def order(self, subordinate: str, value: tree.Expr, span: Span) -> tuple[Statement, ...]:
-        """An order to a subordinate: the command, then each field that is named; the others are kept."""
+        """Resolve an order to a subordinate: the command, then each field that is named; the others are kept."""
         told, once_more = self.scope.orders[subordinate]
         if not isinstance(value, tree.Order):
             return self.assign(_part(told, tree.Name("input_command", value.span)), value, False, span)
@@ -130,7 +130,7 @@ class Statements:
         return target if target is not None and self._writable(target, deferred, place.span) else None
 
     def store(self, target: Path, value: tree.Expr, deferred: bool, span: Span) -> tuple[Statement, ...]:
-        """One assignment a leaf of the place."""
+        """Return one assignment for each leaf of the place."""
         if not isinstance(target.type, Bool | Enum | Int | Real):
             return self._copy(target, value, span)
         assigned = typed(self.scope, self.body, value, target.type)
@@ -192,7 +192,7 @@ class Statements:
         return True
 
     def _assignable(self, kind: Scalar, value: Typed, span: Span, name: str = "") -> bool:
-        """Whether a value may be given to what has this type, and this name if it is a variable; reports it where not."""
+        """Return whether a value may be assigned to this type; report it where not, with the variable's name if there is one."""
         if not same_kind(kind, value.expr.type):
             wanted = f"`{name}` is {kind_word(kind)}" if name else f"expected {kind_word(kind)}"
             helps = conversion(kind, value.expr.type)
@@ -206,7 +206,7 @@ class Statements:
         return True
 
     def _copy(self, target: Path, value: tree.Expr, span: Span) -> tuple[Statement, ...]:
-        """A whole record or array, leaf by leaf."""
+        """Copy a whole record or array, leaf by leaf."""
         origin = path_of(self.scope, self.body, value)
         if origin is None:
             return ()
@@ -229,7 +229,7 @@ class Statements:
         return tuple(copies)
 
     def _refused(self, target: Path, origin: Path, count: int, span: Span) -> bool:
-        """Whether a copy is too much, or would change an index that its later parts use."""
+        """Return whether a copy is too large, or would change an index that its later parts use; report it."""
         self.scope.copied += count * len(target.names) * len(origin.names)
         if self.scope.copied > MOST_STATEMENTS:
             message = f"copies of records and arrays come to more than {MOST_STATEMENTS} statements"
@@ -344,7 +344,7 @@ class Statements:
 
 
 def _part(record: str, name: tree.Name) -> tree.Expr:
-    """A field of a variable, at the place of its name."""
+    """Return a field of a variable, at the place of its name."""
     return tree.FieldOf(tree.Reference(replace(name, text=record), name.span), name, name.span)
 
 
@@ -359,12 +359,12 @@ def _suffixes(kind: Type, prefix: str = "") -> list[tuple[str, Scalar]]:
 
 
 def below(leaf: str, path: str) -> bool:
-    """Whether the leaf is the path or a part of it."""
+    """Return whether the leaf is the path or a part of it."""
     return leaf == path or leaf.startswith((f"{path}.", f"{path}["))
 
 
 def cost(body: tuple[Statement, ...], known: dict[str, int]) -> int:
-    """Statements that one run executes at most, calls included."""
+    """Return the greatest number of statements that one run executes, calls included."""
     total = 0
     for statement in body:
         total += 1

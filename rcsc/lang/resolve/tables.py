@@ -29,7 +29,7 @@ from rcsc.lang.syntax.rows import Bounds, Cell
 
 
 def table(scope: Scope, written: tree.TableDecl) -> Table:
-    """The table; what is wrong with it has been reported."""
+    """Resolve the table, and report what is wrong with it."""
     subjects = tuple(_subject(scope, heading) for heading in written.conditions)
     columns = tuple(
         _column(heading, subject) for heading, subject in zip(written.conditions, subjects, strict=True)
@@ -123,14 +123,14 @@ class _Cells:
         return None if path is None else (path, heading.cell)
 
     def _subordinate(self, column: int) -> str | None:
-        """The subordinate to which a column holds orders; None for other columns."""
+        """Return the subordinate to which a column holds orders; None for other columns."""
         target = self.places[column]
         place = None if target is None else target[0].names
         orders = self.scope.orders.items()
         return next((name for name, (told, _) in orders if place == (f"{told}.input_command",)), None)
 
     def tests(self, row: tree.Row) -> tuple[Test | None, ...]:
-        """One test a condition column."""
+        """Return one test for each condition column."""
         known = self.known.known
         keys = list(enumerate(map(id, row.conditions)))
         for key in keys:
@@ -143,7 +143,7 @@ class _Cells:
         return tuple([known[key] for key in keys])
 
     def actions(self, row: tree.Row) -> tuple[Action, ...]:
-        """The actions of all columns, left to right."""
+        """Return the actions of all columns, left to right."""
         result: list[Action] = []
         for column, written in enumerate(row.actions):
             if not written:
@@ -181,5 +181,5 @@ class _Cells:
 
 
 def replaced(path: Path, heading: Cell) -> Path:
-    """The path with the spans of its index in the file."""
+    """Return the path with the spans of its index in the file."""
     return path if path.index is None else Path(path.names, path.type, placed(path.index, heading))

@@ -38,7 +38,7 @@ from rcsc.lang.syntax.screen import MOST_NAME
 
 
 def declare_enum(scope: Scope, written: tree.EnumDecl) -> Enum:
-    """Adds an enumeration and its members."""
+    """Add an enumeration and its members."""
     first: dict[str, tree.Name] = {}
     for member in written.members:
         if member.text in first:
@@ -53,12 +53,12 @@ def declare_enum(scope: Scope, written: tree.EnumDecl) -> Enum:
 
 
 def declare_type(scope: Scope, written: tree.TypeDecl) -> None:
-    """Adds a named type."""
+    """Add a named type."""
     scope.types[written.name.text] = type_of(scope, written.type)
 
 
 def declare_record(scope: Scope, written: tree.RecordDecl) -> None:
-    """Adds a record."""
+    """Add a record."""
     parts: dict[str, RecordField] = {}
     for part in written.fields:
         kind = type_of(scope, part.type)
@@ -77,14 +77,14 @@ def declare_record(scope: Scope, written: tree.RecordDecl) -> None:
 
 
 def declare_constant(scope: Scope, written: tree.ConstDecl) -> None:
-    """Adds a constant."""
+    """Add a constant."""
     value = constant(scope, written.value)
     if value is not None:
         scope.constants[written.name.text] = Constant(value.literal(), value.bare)
 
 
 def declare_set_of(scope: Scope, written: tree.SetDecl) -> None:
-    """Adds a set of values of a scalar type."""
+    """Add a set of values of a scalar type."""
     kind = type_of(scope, written.type)
     if isinstance(kind, Array | Record):
         message = f"a set has values of a scalar type, `{written.name.text}` none"
@@ -107,7 +107,7 @@ def declare_set_of(scope: Scope, written: tree.SetDecl) -> None:
 
 
 def _of_set(scope: Scope, kind: Scalar, member: Typed) -> Constant | None:
-    """A member or an end of a range as a value of the set's type, whose unit it has; None after an error."""
+    """Return a member or an end of a range as a value of the set's type, with its unit; None after an error."""
     value, span = fold(member.expr), member.expr.span
     if value is None:
         scope.report(Code.NOT_CONSTANT, "the members of a set are constants", span)
@@ -122,7 +122,7 @@ def _of_set(scope: Scope, kind: Scalar, member: Typed) -> Constant | None:
 
 
 def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
-    """Adds a variable and its leaves; the pending leaf of a deferred one directly after it."""
+    """Add a variable and its leaves; the pending leaf of a deferred one directly after it."""
     kind = type_of(scope, written.type)
     if size(kind) + len(scope.leaves) > MOST_LEAVES:
         scope.report(
@@ -170,7 +170,7 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
 
 
 def settle_deferred(scope: Scope, written: tree.VariableDecl) -> None:
-    """Resolves `until`, once every variable is known."""
+    """Resolve `until`, once every variable is known."""
     name = written.name.text
     if written.deferred_until is None or name not in scope.deferred:
         return
@@ -180,7 +180,7 @@ def settle_deferred(scope: Scope, written: tree.VariableDecl) -> None:
 
 
 def _leaves(name: str, kind: Type, first: Value | None = None) -> Iterator[tuple[str, Scalar, Value | None]]:
-    """Yield the scalar parts, each with the value with which its record says that it starts."""
+    """Yield the scalar parts, each with the initial value from its record."""
     match kind:
         case Array(length, inner):
             for at in range(length):
@@ -193,7 +193,7 @@ def _leaves(name: str, kind: Type, first: Value | None = None) -> Iterator[tuple
 
 
 def element(kind: Type) -> Type:
-    """What an array, or an array of arrays, has; the type itself where it is no array."""
+    """Return the type of the elements of an array, or of arrays of arrays; the type itself where it is no array."""
     while isinstance(kind, Array):
         kind = kind.element
     return kind
@@ -237,7 +237,7 @@ def _restart(scope: Scope, written: tree.VariableDecl, kind: Type) -> Value | No
 
 
 def fits(scope: Scope, kind: Scalar, value: Typed, span: Span) -> bool:
-    """Whether a constant may be a value of the type; reports it where not."""
+    """Return whether a constant may be a value of the type; report it where not."""
     if not same_kind(kind, value.expr.type):
         scope.report(Code.KIND, f"expected {kind_word(kind)}, this is {kind_word(value.expr.type)}", span)
         return False

@@ -46,12 +46,12 @@ class Build:
         return tuple(self._name(token) for token in node.children) if node is not None else ()
 
     def _head(self, node: ParseNode) -> dict[str, Any]:
-        """Span, comments and doc lines of a declaration."""
+        """Return span, comments and doc lines of a declaration."""
         plain, doc = split(self.comments.take(node.start_pos))
         return {"span": self._span(node), "comments": plain, "doc": doc}
 
     def _quoted(self, node: ParseNode | None) -> tuple[tree.Name, ...]:
-        """Names in quotes."""
+        """Return the names in quotes, without the quotes."""
         strings = [] if node is None else [item for item in node.children if item.type == "STRING"]
         return tuple(
             tree.Name(str(token)[1:-1], Span(self.file, token.start_pos + 1, token.end_pos - 1))
@@ -59,11 +59,11 @@ class Build:
         )
 
     def _required(self, node: ParseNode) -> dict[str, Any]:
-        """Span, comments, doc lines and requirements of a declaration."""
+        """Return span, comments, doc lines and requirements of a declaration."""
         return {**self._head(node), "requirements": self._quoted(self._find(node.children, "req"))}
 
     def _above(self, node: ParseNode) -> dict[str, Any]:
-        """Span and comments of a statement or an arm."""
+        """Return span and comments of a statement or an arm."""
         comments = self.comments.take(node.start_pos)
         return {"span": self._span(node), "comments": tuple(words(text) for text in comments)}
 
@@ -80,7 +80,7 @@ class Build:
     # --- declarations ---
 
     def declaration(self, node: ParseNode) -> tree.Declaration:
-        """Any declaration."""
+        """Build any declaration."""
         built: tree.Declaration = getattr(self, f"_{node.data}")(node)
         return built
 
@@ -254,7 +254,7 @@ class Build:
         return tree.CommandsDecl(self._name(peer), self._name(link), *within, *answered, **head)
 
     def _bound(self, node: ParseNode | None) -> tuple[tree.Expr | None, tree.Name | None]:
-        """A number of cycles, and the reason of what takes longer."""
+        """Return a number of cycles, and the reason to report when it is exceeded."""
         if node is None:
             return None, None
         cycles, *reason = node.children
@@ -295,7 +295,7 @@ class Build:
     # --- types and units ---
 
     def type(self, node: ParseNode) -> tree.TypeExpr:
-        """Any type."""
+        """Build any type."""
         span = self._span(node)
         match node.data:
             case "bool_type":
@@ -338,7 +338,7 @@ class Build:
     # --- expressions ---
 
     def expr(self, node: ParseNode) -> tree.Expr:
-        """Any expression."""
+        """Build any expression."""
         rule, span, parts = node.data, self._span(node), node.children
         if rule in LOGIC:  # the rule is called as the word is
             return tree.Binary(rule, self.expr(parts[0]), self.expr(parts[1]), span)
@@ -436,7 +436,7 @@ class Build:
     # --- cells ---
 
     def cell(self, node: ParseNode) -> Any:
-        """A condition, an expression, requirements or a list of actions, by the start rule that parsed it."""
+        """Build a condition, an expression, requirements or a list of actions, by the start rule that parsed it."""
         part = node.children[0]
         match node.data:
             case "cell":
@@ -449,7 +449,7 @@ class Build:
                 return self.expr(part)
 
     def _condition(self, node: ParseNode) -> tree.Condition:
-        """A condition cell; `x for 2 [s]` says of the heading that it has been x for 2 s."""
+        """Build a condition cell; `x for 2 [s]` states that the heading has been x for 2 s."""
         span, parts = self._span(node), node.children
         if node.data == "lasts":
             return tree.Lasting(self._untimed(parts[0]), self.expr(parts[-1]), span)
@@ -486,11 +486,11 @@ class Build:
     # --- statements ---
 
     def block(self, node: ParseNode) -> tuple[tree.Statement, ...]:
-        """The statements between braces."""
+        """Build the statements between braces."""
         return tuple(self.statement(item) for item in node.children if isinstance(item, ParseNode))
 
     def statement(self, node: ParseNode) -> tree.Statement:
-        """Any statement."""
+        """Build any statement."""
         built: tree.Statement = getattr(self, f"_{node.data}_statement")(node.children, self._above(node))
         return built
 

@@ -12,7 +12,7 @@ _TOKEN = re.compile(r'"[^"\\\n]*"|#[^\r\n]*')
 
 
 class Comments:
-    """The comments of `source`, in order, each until taken."""
+    """The comments of `source`, in order; each stays until it is taken."""
 
     def __init__(self, source: Source) -> None:
         self._source = source
@@ -40,17 +40,17 @@ class Comments:
         return tuple(text for _, text in taken)
 
     def rest(self) -> tuple[str, ...]:
-        """Take those left."""
+        """Take the comments that are left."""
         return self.take(1 << 62)
 
 
 def words(comment: str) -> str:
-    """The text of a comment, without its marks and the space after them."""
+    """Return the text of a comment, without its marks and the space after them."""
     return comment.lstrip("#").removeprefix(" ").rstrip()
 
 
 def split(comments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Plain comments and the texts of doc lines (`##`), of comments that stand before a declaration."""
+    """Return the plain comments and the texts of doc lines (`##`), from the comments before a declaration."""
     plain = tuple(words(text) for text in comments if not text.startswith("##"))
     doc = tuple(words(text) for text in comments if text.startswith("##"))
     return plain, doc

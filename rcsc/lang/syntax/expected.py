@@ -77,7 +77,7 @@ ELSEWHERE = {
 
 
 def expected(terminals: Iterable[str]) -> str:
-    """At most six things, joined with commas and `or`; symbols first, groups named."""
+    """Return at most six things, joined with commas and `or`; symbols first, groups named."""
     names = set(terminals)
     parts: list[str] = []
     for group, word in (
@@ -104,17 +104,17 @@ _HELPS = {
     "EXECUTING": _STATUS,
     "ORDER": "a field of a link stands in `order { NAME : TYPE }` or in `report { NAME : TYPE }`",
 }
-"""What helps where a word of the protocol is missing, by the terminal."""
+"""Help where a word of the protocol is missing, by the terminal."""
 _NOT_FOR = "parentheses say what has held: `not (c for 2 [s])`, or `(not c) for 2 [s]`"
 _FOR_WITHIN = {
     ",": "each subordinate has a declaration of its own: `commands NAME : LINK`",
     "else": "the reason is that of a time: `within 25 cycles else REASON`",
 }
-"""What helps behind `commands NAME : LINK`, by what is found there."""
+"""Help after `commands NAME : LINK`, by the word found there."""
 
 
 def missing_word(found: str, terminals: Iterable[str]) -> str:
-    """What helps where one of these words is missing, and something else is found; empty where nothing is known."""
+    """Return help for a place where one of these words is missing and another is found; "" where none is known."""
     names = set(terminals)
     if found == "for":
         return _NOT_FOR
@@ -124,7 +124,7 @@ def missing_word(found: str, terminals: Iterable[str]) -> str:
 
 
 def operator_meant(text: str, at: int) -> tuple[int, str] | None:
-    """Where an operator of another language begins, and how it is written there: the one that covers the character `at`."""
+    """Find the operator of another language that covers the character `at`: where it begins, and its spelling there."""
     for operator in ELSEWHERE:
         for begin in range(at, max(at - len(operator), -1), -1):
             if text.startswith(operator, begin):
@@ -133,7 +133,7 @@ def operator_meant(text: str, at: int) -> tuple[int, str] | None:
 
 
 def word_meant(word: str, terminals: Iterable[str]) -> str:
-    """The word of the language that was meant, of those that could stand there; empty where none is much like it."""
+    """Return the word of the language that was probably meant, of those allowed here; "" where none is much like it."""
     words = (one for name in set(terminals) - _SYMBOLS for one in _CLASSES.get(name, (name.lower(),)))
     known = {one for one in words if one.isalpha()}
     if word in known:

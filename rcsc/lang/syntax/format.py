@@ -15,7 +15,7 @@ _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.SetDecl, tree.TypeDecl, t
 
 
 def format_file(file: tree.File, width: int = WIDTH) -> str:
-    """The file's text; tables are at most `width` characters wide where that can be."""
+    """Return the file's text; tables are at most `width` characters wide where possible."""
     lines: list[str] = []
     before: tree.Declaration | None = None
     for declaration in file.declarations:
@@ -30,7 +30,7 @@ def format_file(file: tree.File, width: int = WIDTH) -> str:
 
 
 def _together(first: tree.Declaration, second: tree.Declaration) -> bool:
-    """Whether two declarations stand without a line between them."""
+    """Return whether two declarations stand without a blank line between them."""
     if not isinstance(first, _LONE) or type(first) is not type(second) or second.comments:
         return False
     return (
@@ -202,7 +202,7 @@ def _statement(statement: tree.Statement, depth: int) -> Iterator[str]:
 
 
 def _if(branch: tree.If, depth: int, lead: str) -> Iterator[str]:
-    """An `if`; one alone in an `else`, without comments, goes on as `else if`."""
+    """Yield the lines of an `if`; one alone in an `else`, without comments, goes on as `else if`."""
     pad = "  " * depth
     yield f"{lead}if {spell_expr(branch.condition)} {{"
     yield from _block(branch.then, depth + 1)

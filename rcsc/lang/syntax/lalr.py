@@ -38,7 +38,7 @@ class _Reduction(NamedTuple):
     """A rule as its reduction needs it.
 
     Attributes:
-        size: How many symbols it takes from the stack.
+        size: The number of symbols that it takes from the stack.
         origin: The symbol that it makes.
         name: The name of its nodes; empty where the children go to the parent.
         picked: Which of the symbols become children, and whether their own children do; None for all as they are.
@@ -55,7 +55,7 @@ class _Reduction(NamedTuple):
 
 
 class _Terminal(NamedTuple):
-    """What a word is: a pattern, or a text that stands for itself."""
+    """The definition of a word: a pattern, or a text that stands for itself."""
 
     name: str
     regexp: str
@@ -72,7 +72,7 @@ class Grammar(NamedTuple):
         ends: The state that it ends in.
         terminals: In the order in which they are tried.
         skipped: The pattern of what stands between words.
-        rules: What a reduction does.
+        rules: The reductions.
         states: For each state what each symbol leads to: a state, or -1 - the position of a rule.
     """
 
@@ -85,7 +85,7 @@ class Grammar(NamedTuple):
     states: Sequence[Mapping[str, int]]
 
     def to_json(self) -> str:
-        """One line a state, so that a change of the grammar can be seen in a diff; symbols by their positions."""
+        """Return the tables as JSON with a line for each state, so that diffs show grammar changes; symbols by their positions."""
         symbols = sorted({symbol for state in self.states for symbol in state})
         at = {symbol: place for place, symbol in enumerate(symbols)}
         states = [[n for symbol, to in state.items() for n in (at[symbol], to)] for state in self.states]
@@ -114,7 +114,7 @@ def _dense(value: object) -> str:
 
 
 def grammar_of_json(text: str) -> Grammar:
-    """The tables that `Grammar.to_json` wrote."""
+    """Read the tables that `Grammar.to_json` wrote."""
     read = json.loads(text)
     symbols = read["symbols"]
     return Grammar(
@@ -129,7 +129,7 @@ def grammar_of_json(text: str) -> Grammar:
 
 
 def grammar_of_lark(parser: Any, of: str) -> Grammar:
-    """The tables that Lark made, the states numbered as one meets them from the start rules, so that they are the same in every run.
+    """Return the tables that Lark made; states are numbered in the order of their first visit from the start rules, alike in every run.
 
     Args:
         parser: A `lark.Lark` for LALR.
@@ -162,7 +162,7 @@ def grammar_of_lark(parser: Any, of: str) -> Grammar:
 
 
 def _met(table: Any) -> Iterator[int]:
-    """Each state once, in the order in which it is met from the start rules."""
+    """Yield each state once, in the order of its first visit from the start rules."""
     waiting = [state for _, state in sorted(table.start_states.items())]
     met = set(waiting)
     for state in waiting:
@@ -175,7 +175,7 @@ def _met(table: Any) -> Iterator[int]:
 
 @dataclass(frozen=True, slots=True)
 class _Words:
-    """The terminals that some state takes: how to match one, and names of words that look like another terminal."""
+    """The terminals that some state takes: how to match one, and the names of words that look like another terminal."""
 
     match: Callable[[str, int], re.Match[str] | None]
     special: Mapping[str, Mapping[str, str]]
@@ -197,7 +197,7 @@ class Tables:
         self._skip = re.compile(self._skipped).match
 
     def parse(self, text: str, start: str) -> ParseNode | None:
-        """The tree of a text by a start rule; None where it has none."""
+        """Return the tree of a text by a start rule; None where it has none."""
         states, last, position = self._states, self._ends[start], 0
         stack, values, begins, ends = [self._starts[start]], list[Any](), list[int](), list[int]()
         while True:
@@ -232,7 +232,7 @@ class Tables:
             ends.append(position)
 
     def _words_at(self, state: int) -> _Words:
-        """What may stand next in a state; the same for all states that take the same terminals."""
+        """Return the words that may stand next in a state; states that take the same terminals share them."""
         taken = frozenset(self._states[state])
         if taken not in self._words:
             self._words[taken] = _words(
@@ -242,13 +242,13 @@ class Tables:
 
 
 def _rank(terminal: Any) -> tuple[int, int, int, str]:
-    """Lark's order of terminals: the first that matches is taken."""
+    """Return the sort key of Lark's order of terminals: the first that matches is taken."""
     pattern = terminal.pattern
     return -terminal.priority, -pattern.max_width, -len(pattern.value), terminal.name
 
 
 def _words(skipped: str, terminals: Sequence[_Terminal]) -> _Words:
-    """Build one pattern of what is skipped and these terminals; words that a pattern of their priority matches are told by text."""
+    """Build one pattern from the skipped text and these terminals; words that also match a pattern of their priority are told by text."""
     special: dict[str, dict[str, str]] = {}
     for wide in (terminal for terminal in terminals if not terminal.text):
         whole = re.compile(wide.regexp).fullmatch
@@ -285,7 +285,7 @@ def _reduction(rule: Any) -> _Reduction:
 def _reduce(
     rule: _Reduction, stack: list[int], values: list[Any], begins: list[int], ends: list[int]
 ) -> None:
-    """Pop a rule's symbols from the stacks and push what it makes of them; the caller pushes the state."""
+    """Pop a rule's symbols from the stacks and push their node or parts; the caller pushes the state."""
     if not rule.size:
         values.append([] if not rule.name else ParseNode(rule.name, [], -1, -1))
         begins.append(-1)

@@ -31,11 +31,11 @@ _BEFORE = _OPERATORS | frozenset("in not was when for next and or xor implies".s
 
 @dataclass(slots=True)
 class _Column:
-    """A column: its heading and its cells, and how wide it is.
+    """A column: its heading, its cells and its width.
 
     Attributes:
         atoms: The pieces into which each distinct text can be broken.
-        heights: How many rows each text needs at the present width.
+        heights: The number of rows that each text needs at the present width.
         narrower: The next width below that changes something, and the heights then; None where there is none.
     """
 
@@ -55,11 +55,11 @@ class _Column:
 
     @property
     def least(self) -> int:
-        """The least width it can have."""
+        """The least width that the column can have."""
         return max((len(atom.strip()) for atoms in self.atoms for atom in atoms), default=0)
 
     def pieces(self, width: int) -> list[list[str]]:
-        """The texts, each broken into pieces no wider than that where they can be; of a heading the last are the longest."""
+        """Return the texts, each broken into pieces no wider than `width` where possible; a heading fills its last pieces first."""
         known: dict[int, list[str]] = {id(self.atoms[0]): _filled_last(self.atoms[0], width)}
         for atoms in self.atoms:
             if id(atoms) not in known:
@@ -67,11 +67,11 @@ class _Column:
         return [known[id(atoms)] for atoms in self.atoms]
 
     def heights(self, width: int) -> list[int]:
-        """How many rows each text needs."""
+        """Return the number of rows that each text needs."""
         return list(map(len, self.pieces(width)))
 
     def narrower(self) -> int | None:
-        """The next width at which more is broken."""
+        """Return the next smaller width, at which more texts break; None where there is none."""
         if self.width <= self.least:
             return None
         distinct = {id(pieces): pieces for pieces in self.pieces(self.width - 1)}.values()
@@ -79,7 +79,7 @@ class _Column:
 
 
 def _atoms(text: str, *, heading: bool) -> list[str]:
-    """The parts between which a text can be broken, each with the blank after it, if any.
+    """Return the parts between which a text can be broken, each with the blank after it, if any.
 
     >>> _atoms("path_length - path_at", heading=True)
     ['path_', 'length ', '- path_', 'at']
@@ -108,14 +108,14 @@ def _atoms(text: str, *, heading: bool) -> list[str]:
 
 
 def _stays(before: str, word: str, *, heading: bool) -> bool:
-    """Whether a word stays on the row of the word before it."""
+    """Return whether a word stays on the row of the word before it."""
     if before in _BEFORE or word.startswith("["):
         return True
     return not heading and word in _OPERATORS
 
 
 def _filled(atoms: Sequence[str], width: int) -> list[str]:
-    """The pieces, each as long as fits."""
+    """Fill pieces from the first, each as long as fits."""
     pieces: list[str] = [""]
     for atom in atoms:
         if pieces[-1] and len(pieces[-1]) + len(atom.rstrip()) > width:
@@ -126,7 +126,7 @@ def _filled(atoms: Sequence[str], width: int) -> list[str]:
 
 
 def _filled_last(atoms: Sequence[str], width: int) -> list[str]:
-    """The pieces, the last one as long as fits, then the one before it, and so on."""
+    """Fill pieces from the last, each as long as fits."""
     pieces = [""]
     for atom in reversed(atoms):
         if pieces[0] and len(f"{atom}{pieces[0]}".rstrip()) > width:
@@ -136,7 +136,7 @@ def _filled_last(atoms: Sequence[str], width: int) -> list[str]:
 
 
 def table_rows(table: tree.TableDecl, width: int) -> Iterator[tuple[tree.Row | None, str]]:
-    """The rows of a table, each with the line whose comments stand above it, if any."""
+    """Yield the rows of a table, each with the line whose comments stand above it, if any."""
     columns = _columns(table)
     names = ["line", *(row.stub for row in table.rows)]
     again = ["line", *(row.name for row in table.rows)]
@@ -161,7 +161,7 @@ def _columns(table: tree.TableDecl) -> list[_Column]:
 
 
 def _heading(heading: tree.Heading, words: Collection[str]) -> str:
-    """A heading; a variable that is called like one of the words stands in parentheses."""
+    """Return a heading; a variable called like one of the words stands in parentheses."""
     if heading.subject is None:
         return heading.word
     text = spell_expr(heading.subject)
@@ -192,7 +192,7 @@ def _action(cell: tuple[tree.Statement, ...] | tree.Comparison) -> str:
 
 
 def _total(widths: Sequence[int], stub: int) -> int:
-    """The length of a row: each column has a bar and two blanks, and there is one bar more in `||`."""
+    """Return the length of a row: each column has a bar and two blanks, and there is one bar more in `||`."""
     return 2 + sum(width + 3 for width in (stub, *widths))
 
 
@@ -201,7 +201,7 @@ def _length(columns: Sequence[_Column], stub: int) -> int:
 
 
 def _parts(columns: list[_Column], width: int, stub: int) -> list[list[_Column]]:
-    """The columns of each part, as wide as they are written."""
+    """Divide the columns into parts, and set their widths."""
     if _length(columns, stub) <= width:
         return [columns]
     parted = _parted(columns, width, stub)
@@ -222,7 +222,7 @@ def _parts(columns: list[_Column], width: int, stub: int) -> list[list[_Column]]
 
 
 def _parted(columns: list[_Column], width: int, stub: int) -> list[list[_Column]]:
-    """The columns parted: conditions from actions, but where the rest of many conditions has room for them."""
+    """Divide the columns: conditions from actions, unless the last conditions leave room for the first actions."""
     conditions = list(_side([column for column in columns if column.is_condition], width, stub))
     actions = list(_side([column for column in columns if not column.is_condition], width, stub))
     if len(conditions) > 1 and actions:
@@ -238,7 +238,7 @@ def _widen(columns: Sequence[_Column], widths: Sequence[int]) -> None:
 
 
 def _side(columns: list[_Column], width: int, stub: int) -> Iterator[list[_Column]]:
-    """The columns of one side, in as few parts as can be: each takes what fits when all is broken."""
+    """Yield the columns of one side, in as few parts as possible: each takes what fits when all is broken."""
     part: list[_Column] = []
     for column in columns:
         least = [each.least for each in (*part, column)]
@@ -269,12 +269,12 @@ def _fit(columns: Sequence[_Column], width: int, stub: int) -> None:
 
 
 def _heights(columns: Sequence[_Column]) -> list[int]:
-    """How many rows the heading and each line need."""
+    """Return the number of rows that the heading and each line need."""
     return [max(of) for of in zip(*(column.heights(column.width) for column in columns), strict=True)]
 
 
 def _rows_of(parts: Sequence[Sequence[_Column]]) -> int:
-    """How many rows all parts have, separators included."""
+    """Return the number of rows of all parts, separators included."""
     return sum(1 + sum(_heights(part)) for part in parts)
 
 

@@ -58,11 +58,11 @@ MOST_CONJUNCTS = 100
 
 
 _TABLES = "rcs.tables.json"
-"""What Lark makes of the grammar; `python -m rcsc.lang.syntax.parse` makes it anew after a change of the grammar."""
+"""Lark's tables of the grammar; `python -m rcsc.lang.syntax.parse` makes them anew after a change of the grammar."""
 
 
 def _grammar_folder() -> Path:
-    """Where the grammar is: inside the wheel's package, or beside it."""
+    """Return the folder of the grammar: inside the wheel's package, or beside it."""
     packaged = Path(__file__).parents[2] / "_data" / "grammar"
     return packaged if packaged.is_dir() else Path(__file__).parents[3] / "grammar"
 
@@ -74,14 +74,14 @@ def _grammar_text() -> str:
 
 @cache
 def _parser() -> lark.Lark:
-    """The LALR parser of the grammar, as Lark makes it: it says what is wrong with a text."""
+    """Return the LALR parser of the grammar, as Lark makes it: it tells what is wrong with a text."""
     starts = ["file", "cell", "when", "heading", "requirements", "actions"]
     return lark.Lark(_grammar_text(), parser="lalr", start=starts)
 
 
 @cache
 def _tables() -> Tables:
-    """The tables that are kept beside the grammar; from Lark where they are of another text of it."""
+    """Return the tables kept beside the grammar; if they are of an older grammar, have Lark make them."""
     kept = _grammar_folder() / _TABLES
     grammar = grammar_of_json(kept.read_text(encoding="utf-8")) if kept.is_file() else None
     if grammar is None or grammar.of != _digest():
@@ -90,13 +90,13 @@ def _tables() -> Tables:
 
 
 def ready() -> None:
-    """Make what the first wrong text needs, which takes longer than to parse a hundred right ones."""
+    """Prepare the parser that reports errors, which takes longer than to parse a hundred correct texts."""
     _parser()
     _tables()
 
 
 def made_tables() -> Grammar:
-    """The tables of the grammar, made by Lark."""
+    """Return the tables of the grammar, made by Lark."""
     return grammar_of_lark(_parser(), _digest())
 
 
@@ -105,10 +105,10 @@ def _digest() -> str:
 
 
 def _parsed(text: str, start: str) -> ParseNode:
-    """The parse tree of a text by one of the start rules.
+    """Return the parse tree of a text by one of the start rules.
 
     Raises:
-        lark.UnexpectedInput: It has none.
+        lark.UnexpectedInput: The text has no tree.
     """
     root = _tables().parse(text, start)
     if root is None:
@@ -119,7 +119,7 @@ def _parsed(text: str, start: str) -> ParseNode:
 
 @lru_cache(maxsize=128)  # one run reads a file for each root that uses it, and a shell at each reload
 def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
-    """The tree of `source`, or what is wrong with its text.
+    """Return the tree of `source`, or what is wrong with its text.
 
     After an error parsing goes on with the next declaration, so that one run reports several.
     """
@@ -140,7 +140,7 @@ def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
 
 
 def _deep_in(root: ParseNode) -> tuple[int, int] | None:
-    """Start and end of the first node that lies too deep; what follows may then call itself at each depth."""
+    """Return start and end of the first node that lies too deep; where there is none, later stages may recurse at each depth."""
     waiting = [(root, 0)]
     while waiting:
         node, depth = waiting.pop()
@@ -159,7 +159,7 @@ class _Pieces:
     nodes: list[ParseNode] = field(default_factory=list)
 
     def parse(self) -> list[Diagnostic]:
-        """Fill `nodes`; return what was wrong."""
+        """Fill `nodes`; return the syntax errors."""
         text, offset = self.source.text, 0
         diagnostics: list[Diagnostic] = []
         while len(diagnostics) < MOST_ERRORS:
@@ -176,7 +176,7 @@ class _Pieces:
 
 
 def _syntax_error(error: lark.UnexpectedInput, file: str, start: int, end: int, text: str) -> Diagnostic:
-    """Describe what stands there and what was expected; the parsed text begins at `start` of the file."""
+    """Describe the word found and the words expected; the parsed text begins at `start` of the file."""
     at = cast("int | None", error.pos_in_stream) or 0
     position, word = start + at, ""
     wanted: set[str] = set()
@@ -229,7 +229,7 @@ class _Line:
 
 
 def _over(pieces: Sequence[_Line]) -> _Line:
-    """One line, of what each part says of it."""
+    """Join the parts of a line into one line."""
     first, *more = pieces
     conditions = [cell for line in more for cell in line.cells.conditions[1:]]
     cells = Cells(
@@ -241,15 +241,15 @@ def _over(pieces: Sequence[_Line]) -> _Line:
 
 
 _NO_COMMENTS = Comments(Source("", ""))
-"""Of a cell, which has none."""
+"""The comments of a cell, which has none."""
 
 
 @lru_cache(maxsize=8192)  # an editor reads a text at every key, and of its cells the key has changed one
 def _meant(text: str, start: str) -> Any:
-    """What the text of a cell means by one of the start rules; None where it nests too deep.
+    """Return the meaning of a cell's text by one of the start rules; None where it nests too deep.
 
     Raises:
-        lark.UnexpectedInput: It means nothing.
+        lark.UnexpectedInput: The text has no meaning.
     """
     node = _parsed(text, start)
     return None if _deep_in(node) else Build("", _NO_COMMENTS, None).cell(node)
@@ -260,7 +260,7 @@ class _Rows:
     """Parses the rows of a table; each distinct cell text once.
 
     Attributes:
-        memory: What was parsed, by start rule and text.
+        memory: The parsed cells, by start rule and text.
         meant: The sound condition cells, by their text with its blanks: those under `when`, and others.
     """
 
@@ -275,7 +275,7 @@ class _Rows:
     def table(
         self, rows: list[ParseLeaf]
     ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...], bool]:
-        """Condition headings, action headings and lines of a table, and whether it has a column of requirements."""
+        """Return condition headings, action headings and lines of a table, and whether it has a column of requirements."""
         read = [self._part(groups[0], groups[1:]) for groups in parts(rows)]
         heads = [part[0] for part in read if part is not None]
         if len(heads) < len(read):
@@ -289,14 +289,14 @@ class _Rows:
         return conditions, actions, named, traced is not None
 
     def _traced(self, headings: Sequence[Cell]) -> int | None:
-        """The position of the column of requirements among those after `||`."""
+        """Return the position of the column of requirements among those after `||`."""
         traced = [at for at, cell in enumerate(headings) if cell.text == REQUIREMENTS]
         for at in traced[1:]:
             self._report(Code.SYNTAX, "a table has at most one column `req`", headings[at], IN_QUOTES)
         return traced[0] if traced else None
 
     def _part(self, head: list[ParseLeaf], groups: list[list[ParseLeaf]]) -> tuple[Cells, list[_Line]] | None:
-        """The heading of a part, and its lines."""
+        """Return the heading of a part, and its lines."""
         cells = self._whole(head)
         if cells is None:
             return None
@@ -317,7 +317,7 @@ class _Rows:
         return _Line(rows[0].start_pos, cells.last.ends[1], cells, comments)
 
     def _whole(self, rows: list[ParseLeaf]) -> Cells | None:
-        """A row, with those that go on with it."""
+        """Return a row, joined with the rows that go on with it."""
         cells = above = self._cut(rows[0])
         for row in rows[1:]:
             more = self._cut(row)
@@ -342,7 +342,7 @@ class _Rows:
         return cells
 
     def _across(self, read: list[list[_Line]], heads: list[Cells]) -> list[_Line]:
-        """The lines, each with its cells of all parts; none where a part names others."""
+        """Return the lines, each with its cells of all parts; none where a part names other lines."""
         first = read[0]
         if len(read) == 1:
             return first
@@ -423,7 +423,7 @@ class _Rows:
         )
 
     def _default(self, tests: Sequence[Cell]) -> Cell | None:
-        """The cell that makes a line the DEFAULT line; None of others. What stands wrongly with it is reported."""
+        """Return the cell that makes a line the DEFAULT line, else None; report what stands wrongly with it."""
         default = tests[0] if tests and _says_default(tests[0]) else None
         for cell in tests[1:]:
             if default is not None and cell.text:
@@ -437,7 +437,7 @@ class _Rows:
     def _at_once(
         self, cells: Sequence[Cell], headings: Sequence[tree.Heading]
     ) -> tuple[tree.Condition | None, ...] | None:
-        """The conditions of a single row, for which a cell is made only where its text is new.
+        """Return the conditions of a single row; make a cell only where its text is new.
 
         None where a cell says DEFAULT, or goes on in another row.
         """
@@ -462,7 +462,7 @@ class _Rows:
         return tuple(replace(name, span=tree.absolute(name.span, cell)) for name in names or ())
 
     def _even(self, row: ParseLeaf, cells: Cells, other: Cells, called: str) -> bool:
-        """Whether a row has as many cells as another that it stands below."""
+        """Return whether a row has as many cells as another that it stands below; report it where not."""
         for side, got, want in (
             ("conditions", cells.conditions, other.conditions),
             ("actions", cells.actions, other.actions),
@@ -495,7 +495,7 @@ class _Rows:
         return cast("tree.Condition | None", self._parse("cell", cell, helps))
 
     def _conjunction(self, cell: Cell) -> tree.Comparison | None:
-        """What a cell says that joins conditions by `and`; each distinct one is parsed once.
+        """Return the conditions that `and` joins in a cell; each distinct one is parsed once.
 
         None where the cell is no such list, goes on in another row, or is wrong: then it is parsed whole.
         """
@@ -540,7 +540,7 @@ class _Rows:
         return () if value is None else tree.Comparison("=", value, Span("", 0, len(cell.text)))
 
     def _parse(self, start: str, cell: Cell, helps: str = "") -> Any:
-        """The parsed cell, from memory where the same text stood before; None after an error, which `helps` then."""
+        """Return the parsed cell, from memory where the text is known; None after an error, which then has the help `helps`."""
         if (start, cell.text) in self.memory:
             return self.memory[start, cell.text]
         try:

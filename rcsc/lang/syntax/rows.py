@@ -25,17 +25,17 @@ STUB = re.compile(r"(?P<name>\w+)(\s+(above|same)\s+\w+(\s*,\s*\w+)*)*$", re.ASC
 _MARK = re.compile(r"\s+(above|same)\s+(\w+(?:\s*,\s*\w+)*)", re.ASCII)
 MARKS = "after a line's name may stand `above LINE, LINE`, or `above all`, and `same LINE`"
 CALL = re.compile(r"(?!(?:abs|min|max|int|real|single|not)\b)[A-Za-z_][A-Za-z0-9_]*\s*\(|[^=]*:=")
-"""What looks like a call or an assignment, and stands perhaps where a value should."""
+"""Text that looks like a call or an assignment, and may stand where a value should."""
 CALL_UNDER = "a call or an assignment stands under `procedures`, `command_out` or `status_out`"
 IN_QUOTES = (
     'under `req` stand requirements in quotes: `"SR-12", "SR-13"`; a variable of that name is headed `(req)`'
 )
 ORDER = re.compile(r"(\w+)\s*\(")
-"""What begins as an order does that has fields."""
+"""The beginning of an order with fields."""
 NAMED_FIELDS = "an order to a subordinate names its fields: `{}(FIELD := VALUE)`"
 TO_WHOM = "an order says to whom: `SUBORDINATE := {}(FIELD := VALUE)`"
 EMPTY_CELL = "an empty cell is `| |`, with a blank; `||` stands once in a row, between conditions and actions"
-"""What helps where cells of a row are missing, or stand on the wrong side."""
+"""Help where cells of a row are missing, or stand on the wrong side."""
 BITS = re.compile(r"(?=[01]*[xX])[01xX]+")
 """A mask of one group, which would be a name or a number elsewhere."""
 ONE_GROUP = "bits of one group are written with `0b`: `0b{}`"
@@ -71,12 +71,12 @@ class Cell:
 
     @property
     def span(self) -> Span:
-        """The first piece, which is all of most cells."""
+        """The place of the first piece, which is all of most cells."""
         return self.at(0, len(self.text))
 
     @property
     def ends(self) -> tuple[int, int]:
-        """Start and end of `span`: they are asked for of every cell, of which few have more than one piece.
+        """Start and end of `span`, kept apart for speed: every cell is asked for them, and few have more than one piece.
 
         >>> Cell("on", "a.rcs", 40).ends, Cell("in {left, right}", "a.rcs", 40, ((10, 90),)).ends
         ((40, 42), (40, 49))
@@ -87,7 +87,7 @@ class Cell:
         return span.start, span.end
 
     def at(self, start: int, end: int) -> Span:
-        """The place in the file of characters of the text: of those that stand in the piece of the first.
+        """Return the place in the file of characters of the text; only of those in the same piece as the first.
 
         >>> cell = Cell("in {left, right}", "a.rcs", 40, ((10, 90),))
         >>> cell.at(4, 8), cell.at(10, 15)
@@ -106,11 +106,11 @@ class Cell:
         return Span(self.file, place + start - begin, place + max(start, min(end, past)) - begin)
 
     def blank(self) -> "Cell":
-        """The cell, without the `-` that may stand in an empty one."""
+        """Return the cell, without the `-` that may stand in an empty one."""
         return replace(self, text="") if self.text == "-" else self
 
     def part(self, start: int, end: int) -> "Cell":
-        """Some characters of the first piece, as a cell.
+        """Return some characters of the first piece, as a cell.
 
         >>> Cell("halted above ready", "a.rcs", 40).part(13, 18)
         Cell(text='ready', file='a.rcs', start=53, further=())
@@ -118,7 +118,7 @@ class Cell:
         return Cell(self.text[start:end], self.file, self.start + start)
 
     def with_piece(self, piece: "Cell") -> "Cell":
-        """The cell with one piece more; a blank between, but after `_` and `.`.
+        """Return the cell with one piece more; a blank between, but after `_` and `.`.
 
         >>> Cell("new_", "", 3).with_piece(Cell("command", "", 30)).text
         'new_command'
@@ -131,7 +131,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Stub:
-    """What the first cell of a line says: its name, the lines above which it stands, and those that do the same."""
+    """The parts of a line's first cell: its name, the lines above which it stands, and those that do the same."""
 
     name: Cell
     above: tuple[Cell, ...] = ()
@@ -139,7 +139,7 @@ class Stub:
 
 
 def stub_of(cell: Cell) -> Stub:
-    """The first cell of a line, taken apart; all of it is the name where it is no such thing.
+    """Take the first cell of a line apart; a cell that does not fit the pattern is all name.
 
     >>> stub = stub_of(Cell("halted above ready, idle same off", "a.rcs", 0))
     >>> stub.name.text, [(line.text, line.start) for line in stub.above], [line.text for line in stub.same]
@@ -163,7 +163,7 @@ _JOINTS = re.compile(
 
 
 def conjuncts(text: str) -> list[tuple[int, int]]:
-    """Where each of the conditions stands that `and` joins in a text; none where it is no such list.
+    """Return the place of each condition that `and` joins in a text; empty where it is no such list.
 
     >>> text = "a = 1 and (b or c)"
     >>> [text[start:end] for start, end in conjuncts(text)]
@@ -192,7 +192,7 @@ def conjuncts(text: str) -> list[tuple[int, int]]:
 
 
 class _Made(Sequence[_Item], Generic[_Item]):
-    """Values that are made where they are asked for: most of a large table's never are."""
+    """Values that are made on demand: most of a large table's never are."""
 
     __slots__ = ()
 
@@ -207,7 +207,6 @@ class _Made(Sequence[_Item], Generic[_Item]):
     def __getitem__(self, at: slice) -> tuple[_Item, ...]: ...
 
     def __getitem__(self, at: int | slice) -> _Item | tuple[_Item, ...]:
-        """The value of a position, or several."""
         return tuple(self)[at] if isinstance(at, slice) else self._at(range(len(self))[at])
 
 
@@ -231,15 +230,13 @@ class Side(_Made[Cell]):
 
     @property
     def texts(self) -> list[str]:
-        """What stands between the bars, with its blanks."""
+        """The texts between the bars, with their blanks."""
         return self.body.split("|")
 
     def __len__(self) -> int:
-        """How many cells there are."""
         return self.body.count("|") + 1
 
     def __iter__(self) -> Iterator[Cell]:
-        """All cells, from left to right."""
         offset = self.start
         for piece in self.texts:
             yield self._cell(piece, offset)
@@ -264,12 +261,12 @@ class Cells:
 
     @property
     def all(self) -> tuple[Cell, ...]:
-        """Those of both sides."""
+        """The cells of both sides."""
         return (*self.conditions, *self.actions)
 
     @property
     def last(self) -> Cell:
-        """The last of them."""
+        """The last cell."""
         return (self.actions or self.conditions)[-1]
 
 
@@ -292,11 +289,9 @@ class LineCells(_Made[Cell]):
     traced: int | None = None
 
     def __len__(self) -> int:
-        """How many there are."""
         return len(self.cells.conditions) + len(self.cells.actions) - (self.traced is not None)
 
     def __iter__(self) -> Iterator[Cell]:
-        """All of them, from left to right."""
         yield self.name
         yield from self.cells.conditions[1:]
         yield from (cell for at, cell in enumerate(self.cells.actions) if at != self.traced)
@@ -319,11 +314,9 @@ class Bounds(_Made[int]):
     cells: Sequence[Cell]
 
     def __len__(self) -> int:
-        """Two a cell."""
         return 2 * len(self.cells)
 
     def __iter__(self) -> Iterator[int]:
-        """Those of all cells, from left to right."""
         return chain.from_iterable(cell.ends for cell in self.cells)
 
     def _at(self, at: int) -> int:
@@ -331,12 +324,12 @@ class Bounds(_Made[int]):
 
 
 def is_separator(row: str) -> bool:
-    """Whether the row is only `|---|---|`."""
+    """Return whether the row is only `|---|---|`."""
     return SEPARATOR.match(row) is not None
 
 
 def parts(rows: Sequence[_Row]) -> list[list[list[_Row]]]:
-    """The rows of each part of a table: first its heading's, then those of each line.
+    """Return the rows of each part of a table: first its heading's, then those of each line.
 
     A part begins with a heading, which is the first row, and later one whose first cell is `line` with a separator below. A row
     that goes on with the one above stands with it.
@@ -361,7 +354,7 @@ def parts(rows: Sequence[_Row]) -> list[list[list[_Row]]]:
 
 
 def joined(cells: Cells, more: Cells, above: Cells) -> Cells | Cell:
-    """A row with the row that goes on with it; or the piece that has nothing in the row directly `above` it.
+    """Join a row with the row that goes on with it; or return the piece that has nothing in the row directly `above` it.
 
     All have as many cells.
     """
@@ -377,7 +370,7 @@ def joined(cells: Cells, more: Cells, above: Cells) -> Cells | Cell:
 
 
 def cut(row: str, start: int, file: str) -> Cells | str:
-    """The cells of `row`, which begins at `start`; a message where `||` does not divide it once."""
+    """Return the cells of `row`, which begins at `start`; a message where `||` does not divide it once."""
     row = row.partition("#")[0].rstrip()
     left, bar, right = row.partition("||")
     if not bar:
@@ -390,5 +383,5 @@ def cut(row: str, start: int, file: str) -> Cells | str:
 
 
 def _side(body: str, start: int, file: str) -> Side:
-    """The cells of one side; a bar at the end closes the last."""
+    """Return the cells of one side; a bar at the end closes the last."""
     return Side(body.removesuffix("|"), file, start)

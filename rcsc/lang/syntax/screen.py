@@ -26,7 +26,7 @@ _DECLARATION = re.compile(
 
 
 def refuse(source: Source) -> tuple[Diagnostic, ...]:
-    """A diagnostic where the text must not be parsed."""
+    """Return a diagnostic where the text must not be parsed."""
     text = source.text
     if len(text) > MOST_CHARACTERS:
         return (_error(Code.TOO_LARGE, f"the file has more than {MOST_CHARACTERS} characters", source, 0, 0),)
@@ -49,14 +49,14 @@ def refuse(source: Source) -> tuple[Diagnostic, ...]:
 
 
 def _long_name(text: str) -> tuple[int, int] | None:
-    """Start and end of the first name that is too long; it stands in a line that is."""
+    """Return start and end of the first name that is too long; only a line that is too long can have one."""
     if max(map(len, text.split("\n"))) <= MOST_NAME:
         return None
     return next((word.span() for word in _LONG.finditer(text) if word.lastgroup), None)
 
 
 def _too_deep(text: str) -> int | None:
-    """The offset at which brackets nest too deep; operators and blocks are counted in what was parsed."""
+    """Return the offset at which brackets nest too deep; operators and blocks are counted after parsing."""
     depth = 0
     for match in _TOKEN.finditer(text):
         token = match.group()
@@ -75,7 +75,7 @@ def too_deep(source: Source, start: int, end: int) -> Diagnostic:
 
 
 def blank_before(text: str, offset: int) -> str:
-    """The text with everything before `offset` made blank, so that offsets stay true."""
+    """Return the text with everything before `offset` made blank, so that offsets stay true."""
     return text if not offset else re.sub(r"[^\n]", " ", text[:offset]) + text[offset:]
 
 
@@ -86,7 +86,7 @@ def next_declaration(text: str, after: int, begun: int) -> int:
 
 
 def shortened(word: str) -> str:
-    """`word`, cut where it is long, with control characters made visible."""
+    """Return `word`, cut where it is long, with control characters made visible."""
     shown = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in word)
     return shown if len(shown) <= 40 else shown[:37] + "..."
 

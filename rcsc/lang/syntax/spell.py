@@ -19,23 +19,23 @@ from rcsc.lang.syntax import tree
 
 
 def spell_names(names: Iterable[tree.Name]) -> str:
-    """Names of requirements, each in quotes."""
+    """Return names of requirements, each in quotes."""
     return ", ".join(f'"{name.text}"' for name in names)
 
 
 def spell_req(declaration: tree.Required) -> str:
-    """The requirements of a declaration, with a blank before them; empty for none."""
+    """Return the requirements of a declaration, with a blank before them; "" for none."""
     return f" req {spell_names(declaration.requirements)}" if declaration.requirements else ""
 
 
 def spell_expr(expr: tree.Expr, least: int = 0) -> str:
-    """The expression, in parentheses where it binds looser than `least`."""
+    """Return the expression, in parentheses where it binds looser than `least`."""
     text, strength = _expr(expr)
     return f"({text})" if strength < least else text
 
 
 def _expr(expr: tree.Expr) -> tuple[str, int]:
-    """The text, and how tightly it binds."""
+    """Return the text, and how tightly it binds."""
     match expr:
         case tree.BoolLiteral() | tree.IntLiteral() | tree.RealLiteral() | tree.Mask():
             return _literal(expr), POSTFIX
@@ -101,19 +101,19 @@ def _with_arguments(expr: tree.Apply | tree.Order) -> str:
 
 
 def _binary(op: str, left: tree.Expr, right: tree.Expr) -> tuple[str, int]:
-    """Relations do not stand in a row; `implies` takes what follows it, the others what stands before them."""
+    """Spell a binary operator: relations do not chain, `implies` groups to the right, the others to the left."""
     strength = BITWISE.get(op) or Op(op).strength
     first = spell_expr(left, strength + (strength in (IMPLICATION, RELATION) or _mixed(op, left)))
     return f"{first} {op} {spell_expr(right, strength + (strength != IMPLICATION))}", strength
 
 
 def _mixed(op: str, left: tree.Expr) -> bool:
-    """Whether arithmetic and bits meet, or two operators on bits: other languages bind them otherwise."""
+    """Return whether arithmetic meets bits, or two different operators on bits meet: other languages bind them otherwise."""
     return isinstance(left, tree.Binary) and left.op != op and not BITWISE.keys().isdisjoint((op, left.op))
 
 
 def spell_set(members: tuple[tree.Member, ...]) -> str:
-    """The members of a set in braces, or its name alone."""
+    """Return the members of a set in braces, or its name alone."""
     match members:
         case [tree.NamedSet(name)]:
             return name.text
@@ -121,7 +121,7 @@ def spell_set(members: tuple[tree.Member, ...]) -> str:
 
 
 def spell_member(member: tree.Member) -> str:
-    """A value, or a range."""
+    """Return a value, a range or the name of a set as text."""
     match member:
         case tree.Range(low, high):
             return f"{spell_expr(low, SUM)} .. {spell_expr(high, SUM)}"
@@ -139,7 +139,7 @@ def _in(written: tree.InSet | tree.InRange | tree.OneOf) -> str:
 
 
 def spell_unit(unit: tree.Unit) -> str:
-    """`[mm/s]`."""
+    """Return a unit in its brackets, as `[mm/s]`."""
     above = [_factor(f, 1) for f in unit.factors if f.power > 0]
     below = [_factor(f, -1) for f in unit.factors if f.power <= 0]
     return "[" + "/".join(["*".join(above) or "1", *below]) + "]"
@@ -151,13 +151,13 @@ def _factor(factor: tree.UnitFactor, sign: int) -> str:
 
 
 def spell_field(part: tree.FieldDecl) -> str:
-    """A field of a record or a link: its name, its type, and with what it starts."""
+    """Return a field of a record or a link: its name, its type, and its initial value."""
     begins = "" if part.initial is None else f" = {spell_expr(part.initial)}"
     return f"{part.name.text} : {spell_type(part.type)}{begins}"
 
 
 def spell_type(kind: tree.TypeExpr) -> str:
-    """A type."""
+    """Return a type as text."""
     match kind:
         case tree.BoolType():
             return "bool"
@@ -176,7 +176,7 @@ def spell_type(kind: tree.TypeExpr) -> str:
 
 
 def spell_condition(condition: tree.Condition, whole: bool) -> str:
-    """A condition cell; under `when` (`whole`) just the expression."""
+    """Return a condition cell as text; under `when` (`whole`) just the expression."""
     match condition:
         case tree.Comparison(op, value):
             if whole:
@@ -197,19 +197,18 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
 
 
 def _in_groups(member: tree.Member) -> bool:
-    """Whether it is a mask that a cell may have without `0b`; one of digits alone would be a number with it."""
+    """Return whether it is a mask that a cell may have without `0b`; a mask of digits alone would be a number with it."""
     return isinstance(member, tree.Mask) and "_" in member.text
 
 
 def _listed(member: tree.Member) -> str:
-    """A member of a list in a cell."""
     if isinstance(member, tree.Mask) and _in_groups(member):
         return member.text.replace("_", " ")
     return spell_member(member)
 
 
 def _plain(value: tree.Expr) -> bool:
-    """Whether `value` alone cannot be taken for DEFAULT, nor for what the heading has been for a time."""
+    """Return whether `value` alone cannot be taken for DEFAULT, nor for a condition that has held for a time."""
     return not (isinstance(value, tree.Lasts) or _is_default(value))
 
 
@@ -218,7 +217,7 @@ def _is_default(value: tree.Expr) -> bool:
 
 
 def spell_statement(statement: tree.Assign | tree.Call) -> str:
-    """An assignment or a call."""
+    """Return an assignment or a call as text."""
     if isinstance(statement, tree.Assign):
         return f"{'next ' if statement.deferred else ''}{spell_expr(statement.place)} := {spell_expr(statement.value)}"
     return statement.name.text + (

@@ -15,7 +15,7 @@ NOWHERE = Span("", 0, 0)
 
 
 def at() -> Span:
-    """A span field: where the node was written; not part of what it says."""
+    """Return a field for the place where the node was written, which is no part of what it says."""
     return field(default=NOWHERE, compare=False, repr=False)
 
 
@@ -157,7 +157,7 @@ class Was:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """`@T(a) when b`, `@F(a)`, `@C(a)`: what came to hold, ceased to hold or changed with this cycle; `b` held before it.
+    """`@T(a) when b`, `@F(a)`, `@C(a)`: `a` became true, became false or changed with this cycle, and `b` held before it.
 
     Attributes:
         word: `@T`, `@F` or `@C`; others are reported when names are resolved.
@@ -171,7 +171,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Lasts:
-    """`a for 2 [s]`: a holds, and has held since a time that long ago or longer."""
+    """`a for 2 [s]`: a holds, and has held for that time or longer."""
 
     condition: "Expr"
     time: "Expr"
@@ -446,7 +446,7 @@ class Between:
 
 @dataclass(frozen=True, slots=True)
 class Lasting:
-    """A condition cell `> 3 for 2 [s]`: one that has held since a time that long ago or longer."""
+    """A condition cell `> 3 for 2 [s]`: one that has held for that time or longer."""
 
     condition: Comparison | OneOf | Between
     time: Expr
@@ -472,7 +472,7 @@ class Row:
         unreachable: `DEFAULT unreachable`.
         above: The lines before which it goes where both match; `all` is every other.
         same: Those that do the same where both match.
-        requirements: What stands under the heading `req`; `cells` leaves it out.
+        requirements: The names under the heading `req`; `cells` leaves them out.
     """
 
     name: str
@@ -489,7 +489,7 @@ class Row:
 
     @property
     def stub(self) -> str:
-        """The first cell: the name, and how the line stands to others."""
+        """The first cell: the name, and the marks `above` and `same`."""
         marks = (("above", self.above), ("same", self.same))
         said = (f"{word} {', '.join(name.text for name in names)}" for word, names in marks if names)
         return " ".join((self.name, *said))
@@ -736,7 +736,7 @@ class CommandsDecl(Documented):
 
 @dataclass(frozen=True, slots=True)
 class AdoptDecl(Documented):
-    """`adopt place := expr` or `adopt place after place`: what a scalar has when the level starts anew.
+    """`adopt place := expr` or `adopt place after place`: the value that a scalar takes when the level starts anew.
 
     `after` counts on from a number: the one that stands in the scalar's own buffer, else the other place's.
     """
@@ -834,12 +834,12 @@ class File:
 
 
 def absolute(relative: Span, cell: Cell) -> Span:
-    """The span in the file of a node inside a table cell."""
+    """Return the span in the file of a node inside a table cell."""
     return cell.at(relative.start, relative.end)
 
 
 def term(heading: Heading, cell: Condition) -> Expr:
-    """What a condition cell says, as an expression."""
+    """Return the meaning of a condition cell, as an expression."""
     if heading.subject is None:
         assert isinstance(cell, Comparison)
         return cell.value

@@ -28,7 +28,7 @@ _Splice = tuple[int, int, str]
 
 
 def with_proposal(source: Source, proposal: Proposal) -> str | None:
-    """The text in which a proposal's changes are made; None where it cannot be said."""
+    """Return the text with a proposal's changes made; None where they do not fit it."""
     text = source.text
     for change in proposal.changes:
         table = table_of(text, proposal.table)
@@ -40,7 +40,7 @@ def with_proposal(source: Source, proposal: Proposal) -> str | None:
 
 
 def with_spelling(source: Source, diagnostic: Diagnostic) -> tuple[str, str] | None:
-    """The text in which a name is spelt as the finding's help has it, and that name; None where it has none."""
+    """Return the text with a name spelt as the finding's help proposes, and that name; None where it proposes none."""
     meant = next((found[1] for each in diagnostic.help if (found := _MEANT.search(each))), None)
     span = diagnostic.primary.span
     if meant is None or span.file != source.name or span.start == span.end:
@@ -49,7 +49,7 @@ def with_spelling(source: Source, diagnostic: Diagnostic) -> tuple[str, str] | N
 
 
 def laid_out(source: Source, text: str) -> str:
-    """A changed text, laid out if the one before was."""
+    """Return a changed text, laid out if the old text was."""
     end = "\r\n" if "\r\n" in source.text else "\n"
     if formatted(source) != source.text:
         return text
@@ -57,7 +57,7 @@ def laid_out(source: Source, text: str) -> str:
 
 
 def formatted(source: Source, end: str = "") -> str | None:
-    """A text as `rcsc fmt` lays it out, its lines ended as they were or as asked for; None where it does not parse."""
+    """Return a text as `rcsc fmt` lays it out, with its own line ends or those given; None where it does not parse."""
     end = end or ("\r\n" if "\r\n" in source.text else "\n")
     parsed = parse(source)
     if not isinstance(parsed, tree.File):
@@ -67,7 +67,7 @@ def formatted(source: Source, end: str = "") -> str | None:
 
 
 def spliced(text: str, splices: Sequence[_Splice]) -> str:
-    """The text with parts of it, from start to end, replaced."""
+    """Return the text with parts of it, from start to end, replaced."""
     for start, end, new in sorted(splices, reverse=True):
         text = text[:start] + new + text[end:]
     return text
@@ -95,7 +95,7 @@ def _splices(text: str, table: WrittenTable, change: Change) -> list[_Splice] | 
 
 
 def _line(table: WrittenTable, name: str) -> tuple[int, tuple[RowText, ...]]:
-    """The position of a line, and its rows in the first part; none where there is no such line."""
+    """Return the position of a line, and its rows in the first part; no rows where there is no such line."""
     for at, rows in enumerate(table.parts[0].lines if table.parts else ()):
         cells = joined_cells(rows)
         if cells.conditions and stub_of(cells.conditions[0]).name.text == name:

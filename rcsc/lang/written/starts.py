@@ -40,9 +40,9 @@ FieldT = TypeVar("FieldT", bound=tree.FieldDecl)
 def written_out(
     loaded: Loaded, names: Sequence[str], programs: Mapping[str, Program]
 ) -> tuple[dict[str, tree.File], list[str]]:
-    """Return the files of `names` that change, and what was written, in words.
+    """Return the files of `names` that change, and messages about the values written.
 
-    A number is written as the program writes it already where it does, since no text has two numbers that are one double.
+    Each number is spelled as the program spells it already, since no text may have two numbers that are one double.
     """
     files: dict[str, tree.File] = {}
     words: list[str] = []
@@ -61,7 +61,7 @@ def written_out(
 
 
 def started_otherwise(loaded: Loaded, programs: Mapping[str, Program]) -> Iterator[str]:
-    """Yield what still starts otherwise than it did in `programs`, in words: what files say that were not to be changed."""
+    """Yield messages about variables that still start otherwise than in `programs`: they stand in files that were not to be changed."""
     told: dict[str, None] = {}
     for root, before in programs.items():
         after = resolve(root, loaded)
@@ -79,14 +79,14 @@ def started_otherwise(loaded: Loaded, programs: Mapping[str, Program]) -> Iterat
 
 @dataclass(slots=True)
 class _File:
-    """One file, in the words of a program that uses it."""
+    """One file, resolved in a program that uses it."""
 
     program: Program
     texts: Mapping[tuple[bool, float], str]
     words: list[str] = field(default_factory=list)
 
     def declaration(self, written: tree.Declaration) -> tree.Declaration:
-        """The declaration with the values written out."""
+        """Return the declaration with the values written out."""
         match written:
             case tree.VariableDecl(initial=None):
                 name = written.name.text
@@ -117,7 +117,7 @@ class _File:
         )
 
     def _first(self, place: str, kind: Type | None, safe: Value | None = None) -> tree.Expr | None:
-        """What is to be written; None where it starts as it did."""
+        """Return the initial value to write; None where the variable starts as it did."""
         scalar = None if kind is None else element(kind)
         if not isinstance(scalar, Bool | Enum | Int | Real):
             return None
@@ -131,7 +131,7 @@ class _File:
 
 
 def _texts(files: Iterable[tree.File]) -> dict[tuple[bool, float], str]:
-    """How numbers with a point are written in the files, by whether they become singles and by the value; bounds of singles first."""
+    """Return the spelling of numbers with a point in the files, by whether they become singles and by value; bounds of singles first."""
     written = [(literal, bound) for file in files for literal, bound in _literals(file, False)]
     texts: dict[tuple[bool, float], str] = {}
     for literal, _ in sorted(written, key=lambda each: not each[1]):

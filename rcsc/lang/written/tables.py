@@ -17,7 +17,7 @@ _HEAD = re.compile(
 )
 """A level names its tables otherwise: without a brace, or `by` what."""
 NEW_LINE = "new"
-"""What a line is called that nobody has named."""
+"""Name of a line that nobody has named."""
 _ROW = re.compile(r"^[ \t]*(?P<row>\|[^\r\n]*)", re.MULTILINE)
 _END = re.compile(r"^[ \t]*(?P<brace>\})|^[ \t]*(?:[A-Za-z_])", re.MULTILINE)
 
@@ -30,7 +30,7 @@ class RowText(str):
 
     @classmethod
     def at(cls, text: str, start: int) -> "RowText":
-        """The row that begins there."""
+        """Return the row that begins there."""
         row = cls(text)
         row.start = start
         return row
@@ -54,7 +54,7 @@ class WrittenTable:
     """A table as it stands.
 
     Attributes:
-        name: What it is called; `named` is the offset of that.
+        name: Its name; `named` is the offset of that.
         start: The offset of the word `table`.
         end: The offset after its brace, or where it ends without one.
         rows: All rows, in order.
@@ -68,14 +68,14 @@ class WrittenTable:
 
     @property
     def parts(self) -> tuple[WrittenPart, ...]:
-        """Its parts; rows of dashes left out."""
+        """The parts of the table, without rows of dashes."""
         found = parts(self.rows) if self.rows else []
         return tuple(
             WrittenPart(tuple(groups[0]), tuple(map(tuple, groups[1:]))) for groups in found if groups
         )
 
     def rows_of(self, part: WrittenPart) -> tuple[RowText, ...]:
-        """All rows of one of its parts, those of dashes, too."""
+        """Return all rows of one of its parts, with those of dashes."""
         begin = part.heading[0].start
         past = min(
             (each.heading[0].start for each in self.parts if each.heading[0].start > begin), default=self.end
@@ -97,12 +97,12 @@ def tables_of(text: str) -> Iterator[WrittenTable]:
 
 
 def table_of(text: str, name: str) -> WrittenTable | None:
-    """The first table of this name."""
+    """Return the first table of this name; None where there is none."""
     return next((table for table in tables_of(text) if table.name == name), None)
 
 
 def cells_of(row: RowText, file: str = "") -> Cells:
-    """The cells of a row; one without `||` once has all of them before it."""
+    """Return the cells of a row; all count as conditions where it has not exactly one `||`."""
     cells = cut(row, row.start, file)
     if isinstance(cells, Cells):
         return cells
@@ -116,7 +116,7 @@ def cells_of(row: RowText, file: str = "") -> Cells:
 
 
 def joined_cells(rows: Sequence[RowText], file: str = "") -> Cells:
-    """The cells of a line over the rows that it takes; a row that has other cells than the first is left out."""
+    """Return the cells of a line over the rows that it takes, without rows whose number of cells differs from the first."""
     whole = cells_of(rows[0], file)
     split = len(whole.conditions)
     every = list(whole.all)
@@ -132,7 +132,7 @@ def joined_cells(rows: Sequence[RowText], file: str = "") -> Cells:
 
 
 def pieces(cell: Cell) -> list[tuple[int, int]]:
-    """Start and end of each piece of a cell; an empty one has one, of no length.
+    """Return start and end of each piece of a cell; an empty cell has one piece, of no length.
 
     >>> pieces(Cell("in {left, right}", "a.rcs", 40, ((10, 90),)))
     [(40, 49), (90, 96)]
@@ -146,19 +146,19 @@ def pieces(cell: Cell) -> list[tuple[int, int]]:
 
 
 def dashes(row: RowText) -> bool:
-    """Whether a row is only `|---|---|`."""
+    """Return whether a row is only `|---|---|`."""
     return is_separator(row)
 
 
 def whole_line(text: str, row: RowText) -> tuple[int, int]:
-    """From the beginning of a row's line of text to that of the next."""
+    """Return the offsets of the beginning of a row's line of text and of the next line."""
     start = text.rfind("\n", 0, row.start) + 1
     end = text.find("\n", row.past)
     return start, len(text) if end < 0 else end + 1
 
 
 def fresh_name(names: Collection[str], above: str = "") -> str:
-    """A name for a line that no other has: the next number or letter after that of the line above, else `new`.
+    """Return a name for a line that no other has: the next number or letter after that of the line above, else `new`.
 
     >>> fresh_name(["1", "2", "3"], "1"), fresh_name(["a"], "a"), fresh_name(["go", "new"], "go")
     ('4', 'b', 'new_2')

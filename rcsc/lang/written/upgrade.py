@@ -34,19 +34,19 @@ _NUMBER, _COMMAND = "inc_command", "input_command"
 _ECHO, _ECHOED, _STATUS = "inc_command_echo", "ref_command_echo", "status_report"
 _SEEN = "inc_command_seen"
 _BY_HAND = (_SEEN, _NUMBER, _ECHO)
-"""What nobody names in a level that declares its roles."""
+"""Leaves that a level with declared roles does not assign itself."""
 
 Trees: TypeAlias = Mapping[str, tree.File]
 
 
 @dataclass(frozen=True, slots=True)
 class Upgraded:
-    """What becomes of files.
+    """The result of an upgrade.
 
     Attributes:
         files: The new trees of files that change.
-        done: What was rewritten, in words.
-        left: What would be declared, for each level that writes the protocol by hand.
+        done: The rewritings, in words.
+        left: The declarations that each level with a protocol by hand could have, as text.
         diagnostics: Why a program that uses the files could not be read; then nothing changes.
     """
 
@@ -58,7 +58,7 @@ class Upgraded:
 
 @dataclass(frozen=True, slots=True)
 class _Rewriting:
-    """One declaration that may be written otherwise: its file, its place there, and what stands in its place."""
+    """A possible rewriting of one declaration: its file, its place there, and the new declaration."""
 
     file: str
     place: int
@@ -67,7 +67,7 @@ class _Rewriting:
 
 
 def upgrade(loaded: Loaded, names: Sequence[str]) -> Upgraded:
-    """Rewrite older forms in the files `names`, which every program of `loaded` that uses them is asked about."""
+    """Rewrite older forms in the files `names`, as far as every program of `loaded` that uses them means the same."""
     roots = [
         root for root in dict.fromkeys((*loaded.roots, *names)) if set(closure(root, loaded)) & set(names)
     ]
@@ -94,7 +94,7 @@ def upgrade(loaded: Loaded, names: Sequence[str]) -> Upgraded:
 
 @dataclass(slots=True)
 class _Upgrade:
-    """The programs as they are, and what may be rewritten in their files."""
+    """The programs as they are, and the possible rewritings in their files."""
 
     loaded: Loaded
     programs: Mapping[str, Program]
@@ -104,7 +104,7 @@ class _Upgrade:
         self.meaning = {root: _meaning(program) for root, program in self.programs.items()}
 
     def rewritings(self, name: str) -> Iterator[_Rewriting]:
-        """What may be rewritten in a file."""
+        """Yield the possible rewritings in a file."""
         users = [program for root, program in self.programs.items() if name in closure(root, self.loaded)]
         for place, declared in enumerate(self.loaded.files[name].declarations):
             match declared:
@@ -125,7 +125,7 @@ class _Upgrade:
                     yield _Rewriting(name, place, bare, words)
 
     def kept(self, all_: Sequence[_Rewriting]) -> list[_Rewriting]:
-        """Those that change nothing: all together, else as many as can be, in order."""
+        """Return the rewritings that change no meaning: all together, else as many as possible, in order."""
         if len({(each.file, each.place) for each in all_}) == len(all_) and self._same(all_):
             return list(all_)
         kept: list[_Rewriting] = []
@@ -135,7 +135,7 @@ class _Upgrade:
         return kept
 
     def _same(self, rewritings: Sequence[_Rewriting]) -> bool:
-        """Whether every program means the same with them."""
+        """Return whether every program means the same with them."""
         loaded = replace(self.loaded, files=self.files(rewritings))
         for root, before in self.meaning.items():
             after = resolve(root, loaded, least_first=True)
@@ -144,7 +144,7 @@ class _Upgrade:
         return True
 
     def files(self, rewritings: Sequence[_Rewriting]) -> Trees:
-        """All files, with those rewritten."""
+        """Return all files, with those rewritten."""
         files = dict(self.loaded.files)
         for name in {each.file for each in rewritings}:
             instead = {each.place: each.instead for each in rewritings if each.file == name}
@@ -154,7 +154,7 @@ class _Upgrade:
 
 
 def _meaning(program: Program) -> Program:
-    """The program, in one order, and with what it adopts after a restart said in one place."""
+    """Return the program in a normal form: procedures sorted, and what it adopts after a restart stated in one place."""
     return replace(
         program,
         variables=tuple(replace(variable, restart=None) for variable in program.variables),
@@ -164,7 +164,7 @@ def _meaning(program: Program) -> Program:
 
 
 def _adopts(name: str, programs: Sequence[Program]) -> str | None:
-    """The member that a state adopts after a restart because of its name, in all of the programs."""
+    """Return the member that a state adopts after a restart because of its name, in all of the programs; else None."""
     members = set()
     for program in programs:
         adopted = program.adopted.get(name)
@@ -187,24 +187,24 @@ class _Buffer:
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The name of the variable."""
         return self.declared.name.text
 
     def has(self, *fields: str) -> bool:
-        """Whether the record has the fields."""
+        """Return whether the record has the fields."""
         return set(fields) <= {part.name.text for part in self.record.fields}
 
     def type_of(self, name: str) -> str:
-        """The type of a field, as it is written."""
+        """Return the type of a field, as it is written."""
         return next(spell_type(part.type) for part in self.record.fields if part.name.text == name)
 
     def rest(self, *without: str) -> list[tree.FieldDecl]:
-        """The fields but those."""
+        """Return the fields except those."""
         return [part for part in self.record.fields if part.name.text not in without]
 
 
 def _draft(root: str, loaded: Loaded, program: Program, names: Sequence[str]) -> str:
-    """What a level that writes the protocol by hand would declare; empty where there is none."""
+    """Return the declarations that a level with a protocol by hand could have instead; "" where there are none."""
     if program.roles is not None or not program.levels or not set(closure(root, loaded)) & set(names):
         return ""
     declarations = [d for file in closure(root, loaded) for d in loaded.files[file].declarations]
@@ -277,7 +277,7 @@ def _link(
 
 
 def _field(side: str, part: tree.FieldDecl, members: Mapping[str, tuple[str, ...]]) -> str:
-    """A field of a link; an enumeration whose first member is `none`, or with `restart`, says why a command failed."""
+    """Return a field of a link; an enumeration with `restart`, or with `none` first, becomes the reason of failures."""
     kind = spell_type(part.type)
     own = members.get(kind, ())
     if side == "report" and ("restart" in own or own[:1] == ("none",)):
@@ -286,12 +286,12 @@ def _field(side: str, part: tree.FieldDecl, members: Mapping[str, tuple[str, ...
 
 
 def _member(word: str, members: tuple[str, ...]) -> str:
-    """The member of that name; else `?`, for the author to say."""
+    """Return the member of that name; else `?`, for the author to replace."""
     return word if word in members else "?"
 
 
 def _written_by_hand(declarations: Sequence[tree.Declaration]) -> Iterator[str]:
-    """Modules and procedures that number orders, echo them, or see that one is new."""
+    """Yield modules and procedures that number orders, echo them, or tell that one is new."""
     for declared in declarations:
         if isinstance(declared, tree.ProcedureDecl) and any(
             spell_expr(place).rpartition(".")[2] in _BY_HAND for place in _assigned(declared.body)

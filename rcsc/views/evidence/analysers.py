@@ -26,11 +26,11 @@ from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
 
 TIMEOUT_S = 900.0
 LOOK_S = 300.0
-"""How long a tool may look at one text; what takes longer is told, and is no evidence."""
+"""Seconds that a tool may take for one text; a run that takes longer is reported, and is no evidence."""
 CALLS = 200_000
-"""How many calls are drawn under each sanitizer."""
+"""Number of calls that are drawn under each sanitizer."""
 BOUND = ("--param", "analyzer-bb-explosion-factor=20", "-Wanalyzer-too-complex")
-"""How far gcc's analyser goes: four times as far as by itself; where it goes no further, it says so, and that is a finding."""
+"""The limit of gcc's analyser: four times its own; where it stops there it says so, and that is a finding."""
 WARNINGS = (
     "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wcast-qual", "-Wshadow",
     "-Wundef", "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wvla", "-Wswitch-enum", "-Wnull-dereference",
@@ -65,7 +65,7 @@ EXPLAINED: Mapping[str, str] = {
     "unsigned-integer-overflow": "`m & (m - 1)` of no line, and the portable position of a bit, wrap as C defines it",
     "unsigned-shift-base": "the portable position of a bit multiplies and shifts as C defines it",
 }
-"""Why a finding of a kind is meant; those of any other kind are shortfalls."""
+"""The reason why a kind of finding is meant so; findings of any other kind are shortfalls."""
 PLANTED = """int planted(const int *at);
 int planted(const int *at) { int here; if (at == 0) { here = *at; } return here; }
 """
@@ -74,21 +74,21 @@ TELLS: Mapping[str, str] = {
     "clang-19": "-Wsometimes-uninitialized",
     "clang-tidy-19": "clang-analyzer-core.NullDereference",
 }
-"""What each tool must find in `PLANTED`: one that is silent there shows nothing elsewhere."""
+"""The check that each tool must report in `PLANTED`: one that is silent there shows nothing elsewhere."""
 SANITIZED = ("signed integer overflow", "AddressSanitizer")
-"""What a sanitizer must say of the faults that are planted at the end of the drawn calls."""
+"""Messages that a sanitizer must print about the planted faults in the program of drawn calls."""
 LINE = re.compile(
     r"^(?:.*/)?(?P<file>[\w.]+):(?P<line>\d+)(?::\d+)?: (?:warning|error|runtime error): (?P<text>.*)$"
 )
 NAMED = re.compile(r"^(?P<what>.*?) \[(?P<check>[-\w.,+=]+)\]$")
 DONE = re.compile(r"^\d+ calls$", re.MULTILINE)
-"""What the drawn calls say at their end."""
+"""The last line that the drawn calls print."""
 WRAPS = ("unsigned integer overflow", "left shift of")
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a tool says of a place, and by which of its checks."""
+    """A tool's message about a place, and the check that gave it."""
 
     tool: str
     file: str
@@ -98,7 +98,7 @@ class Finding:
 
     @property
     def reason(self) -> str:
-        """Why it is meant; empty where nothing explains it."""
+        """The reason why the code is meant so; "" where nothing explains it."""
         return next((EXPLAINED[name] for name in self.check.split(",") if name in EXPLAINED), "")
 
 
@@ -115,7 +115,7 @@ TOOLS = ("gcc", "clang-19", "clang-tidy-19")
 
 
 def collect(subject: Subject) -> Evidence:
-    """Run every tool that is here on every text of the C of a program."""
+    """Run every installed tool on every text of the C of a program."""
 
     def texts() -> Iterator[Text]:
         for title, each in (("", subject), ("defensive, ", subject.defensive())):
@@ -128,12 +128,12 @@ def collect(subject: Subject) -> Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """What is looked at.
+    """A text of C to be analysed.
 
     Attributes:
-        title: What its runs are called with.
+        title: The prefix of its runs' names.
         files: The C and what it includes, text by path.
-        source: Name of the file that is looked at; the others are built where it is run.
+        source: Name of the file to analyse; the others are built where it is run.
         main: C that calls it; see `player`.
     """
 
@@ -144,7 +144,7 @@ class Text:
 
 
 def looked_at(texts: Iterable[Text], progress: Callable[[str], None]) -> Evidence:
-    """Run every tool that is here on each of some texts, and say what is found."""
+    """Run every installed tool on each of some texts, and collect the findings."""
     here = {name for name in TOOLS if shutil.which(name)}
     if not here:
         return Evidence(
@@ -172,7 +172,7 @@ def _reports(text: Text, here: set[str], progress: Callable[[str], None]) -> Ite
 
 
 def _static(source: str) -> Iterator[tuple[str, list[str]]]:
-    """Commands that look at the text, and do not run it."""
+    """Yield the commands that analyse the text without running it."""
     compiled = ["-c", "-o", "text.o", source]
     yield "gcc -fanalyzer", ["gcc", "-std=c99", "-O2", "-fanalyzer", *BOUND, *WARNINGS, *compiled]
     for text, portable in PORTABLE.items():
@@ -184,7 +184,7 @@ def _static(source: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def _sanitized(*sources: str) -> Iterator[tuple[str, list[str]]]:
-    """Commands that build the drawn calls with sanitizers."""
+    """Yield the commands that build the drawn calls with sanitizers."""
     for compiler, flags in SANITIZERS.items():
         for text, portable in PORTABLE.items():
             if compiler == "clang-19" or not portable:
@@ -196,7 +196,7 @@ def _sanitized(*sources: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def _deaf(here: set[str]) -> Iterator[Report]:
-    """Let each tool look at planted faults; a report of those that do not tell of them."""
+    """Let each tool look at planted faults; yield a report of each that does not find them."""
     for name, command in _static("planted.c"):
         if command[0] in here:
             with scratch("analysers") as place:
@@ -214,7 +214,7 @@ def _asked(name: str, command: list[str], place: Path) -> Report:
 
 
 def _ran(name: str, command: list[str], place: Path) -> Report:
-    """Build the drawn calls with a sanitizer and run them; then the faults that are planted after them."""
+    """Build the drawn calls with a sanitizer and run them; before that, run the planted faults, which it must report."""
     program = place / "drawn"
     program.unlink(missing_ok=True)
     built = run_command(command, place, TIMEOUT_S)
@@ -231,7 +231,7 @@ def _ran(name: str, command: list[str], place: Path) -> Report:
 
 
 def _findings(tool: str, text: str) -> Iterator[Finding]:
-    """What a tool printed, each place and check once; not of the drawn calls."""
+    """Yield the findings that a tool printed, each place and check once, without those in the drawn calls."""
     seen: set[tuple[str, int, str]] = set()
     for line in text.split("\n"):
         match = LINE.match(line)
@@ -252,7 +252,7 @@ def _overflow(told: str) -> str:
 
 
 def drawn(program: Program, symbols: Symbols, *, defensive: bool) -> str:
-    """C that calls every function with drawn states: within their ranges and at their ends, and some inputs outside."""
+    """Return C that calls every function with drawn states: within their ranges and at their ends, and some inputs outside."""
     lines = [f"static {symbols.struct} s;", *stand_ins(program, symbols, drawn_value)]
     for name, strange in (("any", True), ("admitted", False)):
         state = [*_state(program, symbols, strange=strange), *(_bytes() if strange and defensive else ())]
@@ -264,13 +264,13 @@ def drawn(program: Program, symbols: Symbols, *, defensive: bool) -> str:
 
 
 def player(header: str, lines: Sequence[str], body: Sequence[str], calls: int) -> str:
-    """C with a `main` that does something drawn many times; given an argument, it makes the faults that must be told.
+    """Return C whose `main` does something drawn many times; given an argument, it makes the faults that must be reported.
 
     Args:
-        header: What it includes.
-        lines: What stands before `main`; `next()` and `real(low, high)` draw.
+        header: The header that it includes.
+        lines: The text before `main`; `next()` and `real(low, high)` draw.
         body: Statements of a loop over `n`.
-        calls: How often they run.
+        calls: The number of rounds.
     """
     return "\n".join([
         "#include <stdio.h>", "#include <string.h>", f'#include "{header}"',
@@ -287,7 +287,7 @@ def player(header: str, lines: Sequence[str], body: Sequence[str], calls: int) -
 
 
 def _state(program: Program, symbols: Symbols, *, strange: bool) -> Iterator[str]:
-    """Draw inputs; now and then the whole state, which otherwise goes on; one input in sixteen is of its whole type."""
+    """Yield C that draws inputs, and now and then the whole state; one input in 256 is drawn from its whole type, if `strange`."""
     yield f"    if (next() % 8u == 0u) {{ {symbols.init}(&s);"
     states = [v for v in program.variables if v.kind is not Role.INPUT]
     yield "    if (next() % 2u == 0u) {"
@@ -304,7 +304,7 @@ def _state(program: Program, symbols: Symbols, *, strange: bool) -> Iterator[str
 
 
 def _bytes() -> Iterator[str]:
-    """Now and then some bytes are any, where the C trusts no state."""
+    """Yield C that now and then sets some byte to any value, where the C trusts no state."""
     yield "    if (next() % 16u == 0u) {"
     yield "        unsigned char *byte = (unsigned char *)&s;"
     yield "        byte[sizeof s.digest + (next() % (sizeof s - sizeof s.digest))] = (unsigned char)(next() & 255u);"
@@ -312,7 +312,7 @@ def _bytes() -> Iterator[str]:
 
 
 def drawn_value(c_type: str, kind: Scalar, whole: bool) -> str:
-    """A drawn value of a kind, or of its whole C type; half of the whole numbers are at an end."""
+    """Return C for a drawn value of a kind, or of its whole C type; nearly half of the whole numbers are at an end."""
     if isinstance(kind, Real):
         low, high = ("-1e30", "1e30") if whole else (float(kind.low).hex(), float(kind.high).hex())
         return f"({c_type})real({low}, {high})"
@@ -366,7 +366,7 @@ def _reasons(check: str) -> Iterator[str]:
 
 
 def _commands() -> Iterator[str]:
-    """The commands, and the versions of the tools."""
+    """Yield the commands, and the versions of the tools."""
     yield "Commands:"
     yield ""
     for name, command in (*_static("FILE.c"), *_sanitized("FILE.c")):

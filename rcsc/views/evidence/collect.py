@@ -57,14 +57,14 @@ def collect(settings: Settings, kinds: Collection[str], folder: Path) -> Conclus
 
 @dataclass(frozen=True, slots=True)
 class _Looks:
-    """What evidence is made of: its name, and evidence of it by kind."""
+    """A program or system to make evidence of: its name, and its evidence by kind."""
 
     name: str
     at: Callable[[str], Evidence]
 
 
 def _subjects(settings: Settings, project: Proved, clashes: list[Diagnostic]) -> Iterator[tuple[str, _Looks]]:
-    """Every program by its root, then every system by its description; systems whose C cannot be made are put among `clashes`."""
+    """Yield every program by its root, then every system by its description; put systems without C among `clashes`."""
     for root, program in project.executable:
         subject = _subject(program, settings)
         yield root, _Looks(program.program.name, partial(_looked, subject))
@@ -84,7 +84,7 @@ def _looked(subject: Subject, kind: str) -> Evidence:
 
 
 def _of_tables(settings: Settings) -> Settings:
-    """The settings with the programs of the systems' levels among the paths."""
+    """Return the settings with the programs of the systems' levels among the paths."""
     return replace(settings, paths=tables_in(settings.paths, tuple(systems_in(settings.paths))))
 
 
@@ -94,14 +94,14 @@ def _subject(program: ProvedProgram, settings: Settings) -> Subject:
 
 
 def _same_name(name: str, root: str, other: str) -> Diagnostic:
-    """Say that no evidence was made of a program: its files would be those of another."""
+    """Report that no evidence was made of a program: its files would be those of another."""
     message = f"no evidence of `{root}`: its folder `{name}` has that of `{other}`"
     helps = ("make the evidence of each by itself, with a folder of its own, or rename one of the files",)
     return Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)
 
 
 def _findings(root: str, kind: str, evidence: Evidence) -> Iterator[Diagnostic]:
-    """One finding for a kind that lacks something, with every shortfall as a note."""
+    """Yield one finding for a kind that lacks something, with every shortfall as a note."""
     if evidence.missing:
         message = f"no evidence of kind `{kind}`: {evidence.missing}"
         yield Diagnostic(Code.EVIDENCE_LACKS, message, Label(Span(root, 0, 0)))
@@ -113,7 +113,7 @@ def _findings(root: str, kind: str, evidence: Evidence) -> Iterator[Diagnostic]:
 
 
 def _written(folder: Path, made: Mapping[str, Mapping[str, Evidence]]) -> Iterator[Diagnostic]:
-    """Write every file and the index; what the operating system refuses."""
+    """Write every file and the index; yield a diagnostic for each that the operating system refuses."""
     files = {
         f"{program}/{kind}/{path}": text
         for program, kinds in made.items()
@@ -133,7 +133,7 @@ def _written(folder: Path, made: Mapping[str, Mapping[str, Evidence]]) -> Iterat
 
 
 def _index(made: Mapping[str, Mapping[str, Evidence]]) -> str:
-    """A page that says of each program and kind what it shows, what it lacks, and where its files are."""
+    """Return a page with the results of each program and kind, the shortfalls, and links to the files."""
     parts = ["# Evidence", ""]
     for program, kinds in made.items():
         parts += [f"## {program}", ""]

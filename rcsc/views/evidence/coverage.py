@@ -15,11 +15,11 @@ from rcsc.views.evidence.llvm import Measured, Tools, measured, tools
 from rcsc.views.evidence.out_of_reach import Missed, Reasons
 
 GUARDED = "defensive"
-"""What stands before the places, and over the files, of C that trusts no state."""
+"""Prefix of the places, and folder of the files, of C that trusts no state."""
 
 
 def collect(subject: Subject) -> Evidence:
-    """Make vectors, play them in the C as clang counts it, and say why what is not covered cannot be; the same for `--defensive`."""
+    """Make vectors, measure their coverage with clang, and explain what cannot be covered; the same for `--defensive`."""
     llvm = tools()
     if isinstance(llvm, Absent):
         return Evidence((), missing=llvm.reason)
@@ -34,7 +34,7 @@ def collect(subject: Subject) -> Evidence:
 
 
 def _of(llvm: Tools, subject: Subject, document: VectorSet) -> Evidence:
-    """Play the vectors of one text of the C, and say what they do not cover."""
+    """Play the vectors of one text of the C, and report what they do not cover."""
     plan = subject.plan
     vectors = vectors_c(document.program, document.symbols, document.kept)
     subject.progress(f"measuring the C of {document.program.name}")
@@ -59,7 +59,7 @@ def _told(missed: Missed) -> dict[str, object]:
 
 
 def _counts(seen: Measured, missed: Sequence[Missed]) -> list[tuple[str, int, int, int]]:
-    """Of statements, branches and MC/DC: all, covered, and of the others those out of reach."""
+    """Return for statements, branches and MC/DC: all, those covered, and of the others those out of reach."""
     kinds = {"statement": [m for m in missed if m.what == "statement"]}
     kinds["mcdc"] = [m for m in missed if m.what.startswith("condition ")]
     kinds["branch"] = [m for m in missed if m not in kinds["statement"] and m not in kinds["mcdc"]]
@@ -104,7 +104,7 @@ def _shortfalls(document: VectorSet, seen: Measured, missed: Sequence[Missed]) -
 
 
 def _report(llvm: Tools, document: VectorSet, seen: Measured, missed: Sequence[Missed]) -> str:
-    """A page: figures, then everything that is not covered, with its reason."""
+    """Return a page: figures, then everything that is not covered, with its reason."""
     lines = [f"# Coverage of {document.symbols.source}", ""]
     lines += [f"- {line}" for line in _figures(llvm, document, seen, missed)]
     lines += [

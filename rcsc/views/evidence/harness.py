@@ -16,7 +16,7 @@ Value = Callable[[str, Scalar, bool], str]
 
 
 def calls(symbols: Symbols, *, defensive: bool) -> Iterator[str]:
-    """A call of every function; `any` makes a state, `admitted` one with inputs within their ranges."""
+    """Yield a call of every function; `any` makes a state, `admitted` one with inputs within their ranges."""
     check = f"{symbols.program}_check(&s)"
     yield f"any(); {symbols.init}(&s);"
     yield f"any(); (void){check};"
@@ -29,7 +29,7 @@ def calls(symbols: Symbols, *, defensive: bool) -> Iterator[str]:
 
 
 def stand_ins(program: Program, symbols: Symbols, value: Value) -> Iterator[str]:
-    """Functions of the user's, that give anything of its type."""
+    """Yield C functions in place of the user's, which give any value of their types."""
     for procedure in externs(program):
         given = [symbols.c_type(name) for name in procedure.reads]
         given += [symbols.value_type(p.type) for p in procedure.params]
@@ -45,7 +45,7 @@ def stand_ins(program: Program, symbols: Symbols, value: Value) -> Iterator[str]
 
 
 def bounds(c_type: str, kind: Scalar, *, whole: bool) -> tuple[int, int]:
-    """The bounds of a kind that is no real, or of its C type."""
+    """Return the bounds of a kind that is no real, or of its C type."""
     if isinstance(kind, Bool):
         return 0, 1
     if not whole and not isinstance(kind, Real):

@@ -11,12 +11,12 @@ from rcsc.proof.solvers.options import Options
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A proved program, and what was emitted of it.
+    """A proved program, and its emitted files.
 
     Attributes:
         files: The emitted files, text by path below the generated folder.
-        options: How its proofs are made, where a kind makes some.
-        progress: Told what is being done.
+        options: The options of proofs, where a kind makes some.
+        progress: Called with each step.
     """
 
     proved: ProvedProgram
@@ -27,7 +27,7 @@ class Subject:
 
     @property
     def program(self) -> Program:
-        """What was proved."""
+        """The program that was proved."""
         return self.proved.program
 
     def defensive(self) -> "Subject":
@@ -42,7 +42,7 @@ class Shortfall:
 
     Attributes:
         where: File and line, of the C or of a table, as a person would look it up.
-        what: What is not shown, and why.
+        what: The missing part, and the reason.
     """
 
     where: str
@@ -51,12 +51,12 @@ class Shortfall:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What one kind says of one program.
+    """The result of one kind for one program.
 
     Attributes:
         figures: Lines for the terminal and the index.
-        files: What is kept, by path below the folder of the program and kind.
-        shortfalls: What is not shown; none for evidence that is whole.
+        files: The files to keep, by path below the folder of the program and kind.
+        shortfalls: The parts that are not shown; none for evidence that is whole.
         missing: The tool that is not installed, and what would install it; then nothing is shown.
     """
 
@@ -71,7 +71,7 @@ class Kind:
     """A kind of evidence.
 
     Attributes:
-        summary: What it shows, in a few words, for the help and the index.
+        summary: Its subject in a few words, for the help and the index.
         collect: Makes it for one program.
     """
 

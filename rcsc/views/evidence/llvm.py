@@ -77,14 +77,14 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What was measured of one C file.
+    """The measurements of one C file.
 
     Attributes:
         branches, decisions, regions: In the order of the file.
         lines: Lines with a statement, and those that ran.
         text: The file as llvm-cov prints it, with counts.
-        played: What the program said that played the vectors.
-        passed: Whether all of them gave what they must.
+        played: The output of the program that played the vectors.
+        passed: Whether all of them gave the right result.
     """
 
     branches: tuple[Point, ...]
@@ -97,7 +97,7 @@ class Measured:
 
 
 def tools() -> Tools | Absent:
-    """The newest tools that this module knows the formats of."""
+    """Return the newest tools whose formats this module knows."""
     for version in reversed(VERSIONS):
         found = [shutil.which(f"{tool}-{version}") for tool in ("clang", "llvm-profdata", "llvm-cov")]
         clang, profdata, cov = found
@@ -109,7 +109,7 @@ def tools() -> Tools | Absent:
 
 
 def measured(llvm: Tools, files: Mapping[str, str], source: str, vectors: str) -> Measured | BuildFailed:
-    """Build the emitted C with counters, play the vectors, and read what was counted.
+    """Build the emitted C with counters, play the vectors, and read the counts.
 
     Args:
         llvm: The tools.
@@ -164,18 +164,18 @@ def measured(llvm: Tools, files: Mapping[str, str], source: str, vectors: str) -
 
 
 def _stopped(tool: str, ran: Ran) -> str:
-    """Why a command gave nothing: its first lines, which have the first error."""
+    """Return the reason why a command failed: the first lines of its errors."""
     first = "\n".join(ran.err.strip().splitlines()[:6])
     return first or f"{tool} {ending(ran, COMPILE_S)}"
 
 
 def files_text(files: Mapping[str, str], source: str) -> str:
-    """The text of the file of this name."""
+    """Return the text of the file of this name."""
     return next(text for path, text in files.items() if Path(path).name == source)
 
 
 def _read(data: Mapping[str, Any], text: str, shown: str, played: str, passed: bool) -> Measured:
-    """What llvm-cov exports (its format 2.0.1) as values."""
+    """Read the export of llvm-cov (its format 2.0.1)."""
     lines = text.splitlines()
     branches, decisions, regions = list[Point](), list[Decision](), list[Region]()
     for function in data["functions"]:

@@ -15,11 +15,11 @@ from rcsc.code.testing.executors.targets import targets
 from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
 
 QUESTION_S = 20.0
-"""How long ESBMC may think about one question, in seconds."""
+"""Time limit of ESBMC for one question, in seconds."""
 
 
 def collect(subject: Subject) -> Evidence:
-    """Ask about every function of a program."""
+    """Ask ESBMC about every function of a program."""
     found = esbmc()
     if isinstance(found, Absent):
         return Evidence((), missing=found.reason)

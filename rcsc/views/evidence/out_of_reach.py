@@ -41,11 +41,11 @@ OTHER_LINE = "the table has no other line, and no other outcome is within reach"
 
 @dataclass(frozen=True, slots=True)
 class Missed:
-    """Something that was not covered.
+    """A condition or statement that was not covered.
 
     Attributes:
-        what: The condition, and what was not seen of it.
-        reason: Why it cannot be; empty where that is not known.
+        what: The condition, and the outcome that was not seen.
+        reason: The reason why it cannot be covered; empty where none is known.
     """
 
     function: str
@@ -78,7 +78,7 @@ class Reasons:
         self.held = {f"{self.names.program}_{op}_{short}" for op in HELD for short in SHORT}
 
     def _places(self) -> Iterator[tuple[str, list[Place]]]:
-        """The places of the decisions of each function."""
+        """Yield the places of the decisions of each function."""
         p, names, program = self.names.program, self.names, self.plan.program
         for procedure in program.procedures:
             yield f"{p}_do_{names.procedures[procedure.name]}", [Place("procedure", procedure.name)]
@@ -100,7 +100,7 @@ class Reasons:
     # --- what was missed ---
 
     def missed(self, measured: Measured) -> Iterator[Missed]:
-        """Everything that was not covered, each with its reason."""
+        """Yield everything that was not covered, each with its reason."""
         by_function: dict[str, list[Point]] = {}
         for point in measured.branches:
             by_function.setdefault(point.function, []).append(point)
@@ -126,19 +126,19 @@ class Reasons:
                 yield Missed(region.function, region.line, "statement", reason)
 
     def _safe(self, points: Sequence[Point]) -> Iterator[str]:
-        """Why safe values are not shown, for each place that would."""
+        """Yield, for each place that would show safe values, the reason why it is not reached."""
         for point in points:
             if GUARD.match(point.text) and "!=" in point.text:
                 yield "" if point.true else self.branch(point, True, points)
 
     def _of_constant(self, region: Region) -> str:
-        """Why the value of a choice is not taken that a compiler decides, and counts as no branch."""
+        """Return the reason why a choice by a constant, which counts as no branch, has no such value."""
         table = self._table(region.function)
         which = {"(-1)": NONE, "(-2)": SEVERAL}.get(region.text[:4])
         return "" if table is None else self.shown.get(("matched", table.name, which), "")
 
     def branch(self, point: Point, truth: bool, points: Sequence[Point]) -> str:
-        """Why a condition cannot have this truth; empty where that is not known."""
+        """Return the reason why a condition cannot have this truth value; "" where none is known."""
         function = point.function
         if function == f"{self.names.program}_exact" or point.text.startswith(
             f"!{self.names.program}_exact()"
@@ -175,7 +175,7 @@ class Reasons:
         return ""
 
     def _keys(self, function: str) -> list[Hashable]:
-        """Decision and number of each condition of a function, in order."""
+        """Return decision and number of each condition of a function, in order."""
         places = self.places.get(function, [])
         inside = [(at, d) for place in places for at, d in enumerate(self.decisions) if d.place == place]
         return [
@@ -186,7 +186,7 @@ class Reasons:
         ]
 
     def _line_keys(self, table: Table) -> list[Hashable]:
-        """What each comparison of a matcher is: of classes of a leaf, or a condition of a test."""
+        """Return the key of each comparison of a matcher: classes of a leaf, or a condition of a test."""
         planned = next(each for each in self.plan.tables if each.table.name == table.name)
         keys = list[Hashable](_asked(planned))
         for probe in (probe for group in planned.matcher.groups for probe in group):
@@ -210,7 +210,7 @@ class Reasons:
         return keys
 
     def condition(self, decision: Decision, number: int, inside: Sequence[Decision]) -> str:
-        """Why a condition cannot be shown to decide on its own; empty where that is not known."""
+        """Return the reason why a condition cannot be shown to decide on its own; "" where none is known."""
         function, table = decision.function, self._table(decision.function)
         if function == f"{self.names.program}_exact":
             return MACHINE
@@ -249,11 +249,11 @@ class Reasons:
         return None
 
     def _matches(self, function: str, table: Table) -> bool:
-        """Whether it is the function that finds the line of a table."""
+        """Return whether it is the function that finds the line of a table."""
         return function == f"{self.names.program}_match_{self.names.tables[table.name]}"
 
     def _of_table(self, table: Table, point: Point, truth: bool) -> str:
-        """Why no line matches, or several, or a line does not run, is out of reach."""
+        """Return the reason why it is out of reach that no line matches, or several, or that a line runs."""
         if not truth:  # a switch on one line alone
             alone = len(table.lines) + (table.default is not None) == 1 and point.text.startswith("case ")
             return OTHER_LINE if alone and self._matched_once(table) else ""
@@ -268,11 +268,11 @@ class Reasons:
         return ""
 
     def _matched_once(self, table: Table, level: Level | None = None) -> bool:
-        """Whether both no line and several lines are out of reach: anywhere, or in the cycle of a level."""
+        """Return whether both no line and several lines are out of reach: anywhere, or in the cycle of a level."""
         return self._never(table, NONE, level) and self._never(table, SEVERAL, level)
 
     def _never(self, table: Table, which: int, level: Level | None) -> bool:
-        """Whether it is out of reach that no line of a table matches, or several."""
+        """Return whether it is out of reach that no line of a table matches, or several."""
         if which == NONE and table.default is not None:
             return True
         name = str(table.name)
@@ -290,13 +290,13 @@ class Reasons:
         return next((table for table in tables if function == f"{p}_{names[table.name]}_step"), None)
 
     def _of_step(self, table: Table, point: Point, truth: bool) -> str:
-        """Why a step is not refused, or ends in no fault."""
+        """Return the reason why a step is not refused, or ends in no fault."""
         if not GUARD.match(point.text) or truth is not ("!=" in point.text) or self._refuses():
             return ""
         return ADMITTED if "==" in point.text else FAULTLESS if self._sound([table]) else ""
 
     def _of_level(self, level: Level, point: Point, truth: bool, points: Sequence[Point]) -> str:
-        """Why a cycle is not refused, ends in no fault, or runs no table for want of one."""
+        """Return the reason why a cycle is not refused, ends in no fault, or always has a table for its command."""
         tables = [table for table in self.plan.program.tables if table.name in level.table_names]
         guards = [other for other in points if GUARD.match(other.text)]
         if point in guards:
@@ -313,17 +313,17 @@ class Reasons:
         return ""
 
     def _excluded(self, level: Level, which: int) -> str:
-        """Why no table of a cycle before its last has no line, or several."""
+        """Return the reason why every table of a cycle before its last has a line, or not several."""
         tables = [table for table in self.plan.program.tables if table.name in level.staged]
         return UNENDED if all(self._never(table, which, level) for table in tables) else ""
 
     def _sound(self, tables: Sequence[Table], level: Level | None = None) -> bool:
-        """Whether these tables leave no fault."""
+        """Return whether these tables leave no fault."""
         extern = any(procedure.extern for procedure in self.plan.program.procedures)
         return not extern and all(self._matched_once(table, level) and not table.stops for table in tables)
 
     def _refuses(self) -> bool:
-        """Whether some input can be refused, or the state."""
+        """Return whether some input, or the state, can be refused."""
         return self.plan.defensive or any(
             variable.kind is Kind.INPUT
             and not isinstance(variable.type, Bool)
@@ -334,7 +334,7 @@ class Reasons:
 
 
 def _generic(text: str) -> bool:
-    """Whether it is a condition that no expression of the language is: of a loop, a fault, a switch, a match."""
+    """Return whether it is no expression of the language: a condition of a loop, a fault, a switch or a match."""
     patterns = (LOOP, GUARD, NO_LINE, SEVERAL_LINES)
     return any(pattern.match(text) for pattern in patterns) or text.startswith("case ") or "_holds_" in text
 
@@ -348,7 +348,7 @@ def _not_seen(points: Sequence[Point]) -> Iterator[tuple[Point, bool]]:
 
 
 def _asked(planned: PlanTable) -> Iterator[Hashable]:
-    """What each question of a matcher that works in windows compares: classes of a leaf."""
+    """Yield the classes of a leaf that each question of a matcher compares, if it works in windows."""
     windows = planned.matcher.windows
     if windows is None:
         return

@@ -46,14 +46,14 @@ TOOLS = "packages gcc-arm-none-eabi and qemu-system-arm, gcc-riscv64-unknown-elf
 
 @dataclass(frozen=True, slots=True)
 class Need:
-    """What one function needs on one board.
+    """The needs of one function on one board.
 
     Attributes:
         frame: Bytes of its own stack.
         chain: Bytes of stack of its deepest chain of calls, without what the compiler's library takes; None where a frame is not static.
         bound: Instructions of its longest path; None where `unbounded` says why.
         alone: Bytes of code and constants of an image with it alone; None for a function of the file's own.
-        calls: How often it was called in the sessions; 0 for a function of the file's own.
+        calls: The number of its calls in the sessions; 0 for a function of the file's own.
         observed: The most instructions that a call took.
         deepest: The most bytes of stack that a call took, with those of the compiler's library.
     """
@@ -98,7 +98,7 @@ KIND = Kind("stack, code and instructions of each function, on emulated Cortex-M
 
 
 def measure(board: Board, plan: Plan, files: Mapping[str, str]) -> list[Need] | BuildFailed:
-    """What each function of a program needs on a board, those that others call first.
+    """Measure the needs of each function of a program on a board, those that others call first.
 
     Args:
         board: A board whose tools are installed.
@@ -125,7 +125,7 @@ def measure(board: Board, plan: Plan, files: Mapping[str, str]) -> list[Need] | 
 
 
 def _disassembled(board: Board, place: Path) -> Assembly | BuildFailed:
-    """The image as its tools tell it; what they say where they do not even name `main`."""
+    """Return the disassembled image; the tools' output where they do not even name `main`."""
     dumped = run_command([f"{board.tools}objdump", "-d", "--no-show-raw-insn", "image.elf"], place, TOOL_S)
     named = run_command([f"{board.tools}nm", "image.elf"], place, TOOL_S)
     for tool, ran, word in (("objdump", dumped, "<main>:"), ("nm", named, " main\n")):
@@ -137,7 +137,7 @@ def _disassembled(board: Board, place: Path) -> Assembly | BuildFailed:
 
 
 def _entries(plan: Plan, symbols: Symbols) -> dict[str, str]:
-    """The functions that others call and that take a time of their own, and the statement before which each is called.
+    """Return the functions that callers use and that take time of their own, each with the statement before its call.
 
     A table that some assumption stops is not matched by itself: `line` may be asked only where that holds.
     """
@@ -147,7 +147,7 @@ def _entries(plan: Plan, symbols: Symbols) -> dict[str, str]:
 
 
 def image_c(plan: Plan, symbols: Symbols, entries: Mapping[str, str]) -> str:
-    """C that runs the sessions and says what each entry took."""
+    """Return C that runs the sessions and prints the needs of each entry."""
     program, struct = plan.program, symbols.struct
     script = ("extern uint32_t rcsc_script;",) if externs(program) else ()
     drawn = ("rcsc_script = any(64u);",) if externs(program) else ()
@@ -181,7 +181,7 @@ def image_c(plan: Plan, symbols: Symbols, entries: Mapping[str, str]) -> str:
 
 
 def _inputs(program: Program, symbols: Symbols) -> Iterator[str]:
-    """C that gives a state the inputs of a drawn one, most of the time only some of them."""
+    """Yield C that gives a state the inputs of a drawn one, most of the time only some of them."""
     yield f"static void draw({symbols.struct} *s) {{ static {symbols.struct} drawn; drawn = *s; scatter(&drawn);"
     for variable in program.variables:
         if variable.kind is VariableKind.INPUT:
@@ -224,7 +224,7 @@ def _needs(
 
 
 def _loops(text: str) -> dict[int, int]:
-    """How often each loop of the C runs, by the line that it begins in."""
+    """Return how often each loop of the C runs, by the line in which it begins."""
     lines = text.splitlines()
     bounds: dict[int, int] = {}
     for at, line in enumerate(lines, 1):
@@ -237,12 +237,12 @@ def _loops(text: str) -> dict[int, int]:
 
 
 def _original(function: str) -> str:
-    """The name under which the compiler tells the frame of a function that it made of another."""
+    """Return the name under which the compiler reports the frame of a function that it made of another."""
     return re.sub(r"\.\d+$", "", function)
 
 
 def _frames(text: str) -> dict[str, tuple[int, bool]]:
-    """The frame of each function in bytes, and whether it is always that."""
+    """Return the frame of each function in bytes, and whether its size is fixed."""
     found: dict[str, tuple[int, bool]] = {}
     for match in FRAME.finditer(text):
         name, size, how = _original(match[1]), int(match[2]), match[3]
@@ -254,7 +254,7 @@ def _frames(text: str) -> dict[str, tuple[int, bool]]:
 def _chain(
     function: str, bounds: Bounds, frames: Mapping[str, tuple[int, bool]], above: tuple[str, ...] = ()
 ) -> int | None:
-    """The stack of the deepest chain of calls within the file; None where a frame is not static, or a chain has no end."""
+    """Return the stack of the deepest chain of calls within the file; None where a frame is not static, or a chain has no end."""
     if function in above:
         return None
     own, static = frames.get(_original(function), (0, True))
@@ -272,14 +272,14 @@ def _bound(bounds: Bounds, function: str) -> tuple[int | None, str]:
 
 
 def _codes(board: Board, place: Path, compiled_file: str) -> dict[str, int]:
-    """The bytes of the code of each function."""
+    """Return the number of bytes of the code of each function."""
     said = run_command([f"{board.tools}nm", "-S", compiled_file], place, TOOL_S).out
     rows = (line.split() for line in said.splitlines())
     return {row[3]: int(row[1], 16) for row in rows if len(row) == 4 and row[2] in "tT"}
 
 
 def _alone(board: Board, place: Path, function: str) -> int | None:
-    """The bytes of code and constants of an image that keeps what one function needs, the compiler's library included."""
+    """Return the bytes of code and constants of an image with one function and its needs, the compiler's library included."""
     objects = [path.name for path in sorted(place.glob("*.o")) if path.name not in {"image.o", "copies.o"}]
     made = link(
         board,
@@ -300,7 +300,7 @@ def _alone(board: Board, place: Path, function: str) -> int | None:
 
 
 def _doubts(needs: Sequence[Need]) -> Iterator[Shortfall]:
-    """Figures that contradict each other or are not whole."""
+    """Yield a shortfall for each figure that contradicts another or is not whole."""
     for need in needs:
         where = f"{need.board}, {need.function}"
         if need.calls and need.observed is None:
@@ -368,7 +368,7 @@ _INTRODUCTION = (
 
 
 def _rows(needs: Sequence[Need], *, entries: bool) -> Iterator[str]:
-    """A table of Markdown."""
+    """Yield a table of Markdown."""
     yield from _headed(ENTRY_COLUMNS if entries else OWN_COLUMNS)
     for n in needs:
         bound = str(n.bound) if n.bound is not None else f"none: {n.unbounded}"
@@ -389,7 +389,7 @@ def _headed(heads: Sequence[str]) -> Iterator[str]:
 
 
 def _figures(needs: Sequence[Need]) -> Iterator[str]:
-    """For each board the deepest stack and the dearest call."""
+    """Yield for each board the deepest stack and the dearest call."""
     for board in dict.fromkeys(need.board for need in needs):
         own = [need for need in needs if need.board == board and need.calls]
         deep = max(own, key=lambda need: need.deepest or 0)

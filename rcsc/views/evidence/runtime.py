@@ -38,7 +38,7 @@ from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
 
 PACKAGE = "frama-c-base"
 STATES = 1000
-"""How many states EVA keeps apart in a chain of comparisons: more than a program has variables."""
+"""Number of states that EVA keeps apart in a chain of comparisons: more than a program has variables."""
 TIMEOUT_S = 1800.0
 MEMORY_MB = 6000
 GREATEST = {"double": "0x1.fffffffffffffp+1023", "float": "0x1.fffffep+127"}
@@ -61,7 +61,7 @@ WORDS: Mapping[str, str] = {
     "initialization": "reads of what was written",
     "precondition of __builtin_ctz": "arguments of __builtin_ctz that are not zero",
 }
-"""What the classes of EVA's alarms are called."""
+"""The classes of EVA's alarms as text."""
 PROVED = frozenset({"Valid", "Considered valid"})
 DEAD = "Dead"
 FINITE = "Valid for finite reals"
@@ -71,7 +71,7 @@ VERDICTS = ("shown", "shown for finite reals", "not shown", "never reached")
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """What must hold at one place of the C, and what EVA says of it.
+    """A property that must hold at one place of the C, and EVA's answer.
 
     Attributes:
         kind: The class of the alarm, as Frama-C names it.
@@ -88,12 +88,12 @@ class Property:
 
     @property
     def place(self) -> tuple[str, int, str, str]:
-        """Where it stands and what it says, whatever a run shows of it."""
+        """The place and the text of the property, whatever a run shows of it."""
         return self.file, self.line, self.kind, self.text
 
     @property
     def verdict(self) -> str:
-        """What became of it: a column of the certificate."""
+        """The verdict: a column of the certificate."""
         if self.status in PROVED:
             return "shown"
         if self.status == FINITE:
@@ -114,7 +114,7 @@ class Analysis:
 
 @cache
 def version() -> str | None:
-    """Frama-C's version; None where it is not installed."""
+    """Return Frama-C's version; None where it is not installed."""
     program = shutil.which("frama-c")
     return None if program is None else run_command([program, "-version"], Path(), 60.0).out.strip()
 
@@ -131,7 +131,7 @@ def collect(subject: Subject) -> Evidence:
 
 
 def _analyses(subject: Subject, title: str, *, defensive: bool) -> tuple[Analysis, ...]:
-    """What EVA is asked of one text: any bytes; and, of a program with reals, finite ones."""
+    """Run EVA on one text: for any bytes and, of a program with reals, for finite ones."""
     whole = _analysis(subject, f"{title}any bytes", defensive=defensive, finite=False)
     if not any(isinstance(variable.type, Real) for variable in subject.program.variables):
         return (whole,)
@@ -170,7 +170,7 @@ def _analysis(subject: Subject, name: str, *, defensive: bool, finite: bool) -> 
 
 
 def _command(symbols: Symbols, place: Path, *, finite: bool, defensive: bool) -> list[str]:
-    """The command; files by whole paths, since Frama-C asks the shell's `PWD` where it is."""
+    """Return the command; files by whole paths, since Frama-C takes its folder from the shell's `PWD`."""
     p = symbols.program
     apart = ["main", f"{p}_check", f"{p}_admit", *([f"{p}_begin"] if defensive else [])]
     apart += [*symbols.steps.values(), *symbols.cycles.values()]
@@ -183,7 +183,7 @@ def _command(symbols: Symbols, place: Path, *, finite: bool, defensive: bool) ->
 
 
 def harness(program: Program, symbols: Symbols, *, defensive: bool, finite: bool) -> str:
-    """The C that calls every function of the header on states of which nothing is known."""
+    """Return the C that calls every function of the header on states of which nothing is known."""
     lines = ['#include "__fc_builtin.h"', f'#include "{symbols.header}"', f"static {symbols.struct} s;"]
     lines += stand_ins(program, symbols, _any)
     lines += ["static void any(void) {", "    Frama_C_make_unknown((char *)&s, sizeof s);"]
@@ -204,7 +204,7 @@ def harness(program: Program, symbols: Symbols, *, defensive: bool, finite: bool
 
 
 def _any(c_type: str, kind: Scalar, whole: bool) -> str:
-    """Any value of a kind, or of its whole C type, as an expression of EVA's."""
+    """Return any value of a kind, or of its whole C type, as an expression of EVA's."""
     if isinstance(kind, Real):
         most = GREATEST[c_type]
         low, high = (f"-{most}", most) if whole else (float(kind.low).hex(), float(kind.high).hex())
@@ -217,7 +217,7 @@ def _any(c_type: str, kind: Scalar, whole: bool) -> str:
 
 
 def _properties(text: str) -> Iterator[Property]:
-    """What Frama-C's report says of the emitted C; not of the harness, and not what its library assumes of itself."""
+    """Yield the properties of the emitted C in Frama-C's report, without those of the harness and of its library."""
     heading, *rows = (line.split("\t") for line in text.splitlines() or [""])
     for row in (dict(zip(heading, cells, strict=False)) for cells in rows):
         kind = row["property kind"]
@@ -293,7 +293,7 @@ HEAD = re.compile(r"/\* (?P<line>\S+\.rcs line [^:*]+)")
 
 
 def line_of(text: str, number: int) -> str:
-    """The table line that a line of C belongs to, as the comment above it says; empty where there is none."""
+    """Return the table line that a line of C belongs to, from the comment above it; "" where there is none."""
     for line in reversed(text.split("\n")[:number]):
         if line == "}":
             return ""

@@ -47,12 +47,12 @@ class SheetRow:
 
     @property
     def width_px(self) -> float:
-        """Badge and text."""
+        """Width of badge and text."""
         return self.badge_px + max((len(text) for _, text in self.texts), default=0) * LETTER_PX + 6
 
     @property
     def height_px(self) -> float:
-        """All of its texts."""
+        """Height of all of its texts."""
         return max(1, len(self.texts)) * TEXT_PX + 3
 
 
@@ -75,7 +75,7 @@ class SheetBox:
     height_px: float
 
     def holds(self, point: Point, inset_px: float = 0.0) -> bool:
-        """Whether a point lies in it."""
+        """Return whether a point lies in the box, at least `inset_px` from its border."""
         x, y = point[0] - self.corner[0], point[1] - self.corner[1]
         return inset_px <= x <= self.width_px - inset_px and inset_px <= y <= self.height_px - inset_px
 
@@ -169,7 +169,7 @@ def _boxes(chart: Chart, shut: Sequence[str]) -> Iterator[SheetBox]:
 
 
 def _words(kind: str, text: str, whole: str = "") -> SheetRow:
-    """A row of text alone."""
+    """Return a row of text alone."""
     texts = tuple((kind, piece) for piece in _short(text))
     return SheetRow("", texts, f"{text}\n{whole}" if whole else text)
 
@@ -180,7 +180,7 @@ def _staying(row: Row) -> SheetRow:
 
 
 def _leading(rows: Sequence[Row]) -> Iterator[SheetRow]:
-    """Yield the lines on an arrow; of many that ask and do the same, those after the first name it."""
+    """Yield the lines on an arrow; of many with the same guard and actions, those after the first name that one."""
     first: dict[tuple[tuple[str, str], ...], str] = {}
     for row in rows:
         texts = (*_guard(row.edge, ""), *_does(row.edge)) or (("guard", "always"),)
@@ -192,7 +192,7 @@ def _leading(rows: Sequence[Row]) -> Iterator[SheetRow]:
 
 
 def _guard(edge: Edge, empty: str) -> Iterator[tuple[str, str]]:
-    """Yield what must hold beside the state, and who decides."""
+    """Yield the condition beside the state, and the procedures that decide."""
     if edge.default:
         yield "default", edge.default
     texts = _short(plain(edge.shown)) or ((empty,) if empty and not edge.default else ())
@@ -204,7 +204,7 @@ def _guard(edge: Edge, empty: str) -> Iterator[tuple[str, str]]:
 
 
 def _does(edge: Edge) -> Iterator[tuple[str, str]]:
-    """Yield the actions: what is ordered first, then outputs, what is computed last; reports are told at the state."""
+    """Yield the actions: the order first, then outputs, computed values last; reports stand at the state."""
     cells = dict(labels.effect_cells(edge.effect))
     cells.pop("status_out", None)
     ordered = cells.pop("command_out", "")
@@ -217,7 +217,7 @@ def _does(edge: Edge) -> Iterator[tuple[str, str]]:
 
 
 def _short(text: str) -> tuple[str, ...]:
-    """A text in lines of bounded length, of bounded number."""
+    """Return a text in a bounded number of lines of bounded length."""
     lines = [piece for line in wrapped(text.replace("; ", ", ")) for piece in _cut(line)]
     return (
         (*lines[: MOST_TEXTS - 1], f"{lines[MOST_TEXTS - 1][: MOST_LETTERS - 1]}…")
@@ -227,7 +227,7 @@ def _short(text: str) -> tuple[str, ...]:
 
 
 def _cut(line: str) -> Iterator[str]:
-    """Yield a line that has no place to break in pieces: after `_` or `.` where that leaves no short one."""
+    """Yield a line without blanks in pieces: cut after `_` or `.` where that leaves no short one."""
     while len(line) > MOST_LETTERS:
         at = max(line.rfind(sign, 0, MOST_LETTERS) for sign in "_.") + 1
         at = at if at > MOST_LETTERS // 2 else MOST_LETTERS
@@ -250,7 +250,7 @@ def _whole(row: Row) -> str:
 
 
 def _stacked(rows: Sequence[SheetRow], top_px: float = _PAD_PX / 2) -> tuple[SheetRow, ...]:
-    """The rows, one below the other."""
+    """Return the rows with their places, one below the other."""
     found = list[SheetRow]()
     for row in rows:
         found.append(SheetRow(row.line, row.texts, row.whole, top_px))
@@ -259,7 +259,7 @@ def _stacked(rows: Sequence[SheetRow], top_px: float = _PAD_PX / 2) -> tuple[She
 
 
 def _sized(name: str, kind: str, states: tuple[str, ...], rows: tuple[SheetRow, ...]) -> SheetBox:
-    """A box around rows, not yet placed."""
+    """Return a box around rows, not yet placed."""
     width = max([_LEAST_PX if kind != "label" else 0.0, *(row.width_px + 2 * _PAD_PX for row in rows)])
     return SheetBox(
         name, kind, states, rows, (0, 0), width, rows[-1].top_px + rows[-1].height_px + _PAD_PX / 2
@@ -276,7 +276,7 @@ def _arrows(chart: Chart, boxes: Mapping[str, SheetBox]) -> Iterator[ChartArrow]
 
 
 def _drawn(boxes: Mapping[str, SheetBox], state: str) -> str:
-    """The box of a state: its own, or the shut composite around it."""
+    """Return the box of a state: its own, or the shut composite around it."""
     return next(name for name, box in boxes.items() if state in box.states and box.kind in ("state", "shut"))
 
 
@@ -289,7 +289,7 @@ _Parts = Sequence[tuple[ChartArrow, SheetBox | None]]
 
 
 def _halves(parts: _Parts, opened: Sequence[Composite], boxes: Mapping[str, SheetBox]) -> Iterator[Arrow]:
-    """Yield what the layout program draws: an arrow to its label and one on, or one alone."""
+    """Yield the arrows for the layout program: one to a label and one on from it, or a single one."""
     states = {each.name: each.states for each in opened}
     for at, (arrow, label) in enumerate(parts):
         leaves = arrow.source if arrow.source in states else ""
@@ -304,7 +304,7 @@ def _halves(parts: _Parts, opened: Sequence[Composite], boxes: Mapping[str, Shee
 def _frames(
     opened: Sequence[Composite], boxes: Mapping[str, SheetBox], parts: _Parts, chart: Chart
 ) -> list[Frame]:
-    """The open composites with all that is in them, labels of inner arrows, too."""
+    """Return the open composites with their content, which includes labels of inner arrows."""
     around = {name: inside(opened, name) for name in boxes if name and name != ANY}
     for name, box in boxes.items():
         if box.kind == "shut":
@@ -326,7 +326,7 @@ def _frames(
 def _common(
     opened: Sequence[Composite], boxes: Mapping[str, SheetBox], chart: Chart, arrow: ChartArrow
 ) -> str:
-    """The innermost composite that has both ends of an arrow; the one that it leaves is not."""
+    """Return the innermost composite that has both ends of an arrow, other than the one it leaves; "" for none."""
     ends = set[str]()
     for end in (arrow.source, arrow.target):
         states = next((each.states for each in chart.composites if each.name == end), None)
@@ -337,7 +337,7 @@ def _common(
 
 
 def _heading(each: Composite) -> SheetBox:
-    """What stands in an open composite beside its states."""
+    """Return the text in an open composite beside its states."""
     many = _words("name", f"any of these {len(each.states)}  ", ", ".join(each.states))
     return _sized(each.name, "open", each.states, _stacked([many, *map(_staying, each.stays)]))
 

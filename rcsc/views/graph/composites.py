@@ -37,7 +37,7 @@ class Row:
 
     Attributes:
         sources: The states that it leaves, where they are not all that the arrow leaves; else empty.
-        edges: What it stands for.
+        edges: The edges that it stands for.
     """
 
     line: str
@@ -46,7 +46,7 @@ class Row:
 
     @property
     def edge(self) -> Edge:
-        """An edge for all: the one of which most has to be said."""
+        """The edge with the longest condition, to stand for all."""
         return max(self.edges, key=lambda edge: len(edge.shown))
 
 
@@ -55,7 +55,7 @@ class ChartArrow:
     """Lines that lead from a state, or a composite state, to a state.
 
     Attributes:
-        dashed: Whether what procedures compute decides whether it is taken, or it is DEFAULT.
+        dashed: Whether procedures decide if it is taken, or its line is DEFAULT.
     """
 
     source: str
@@ -86,7 +86,7 @@ class Chart:
     Attributes:
         composites: Of two that share states one is inside the other, and comes later.
         stays: By state the lines on which it stays, but for those of a composite.
-        doing: By state what the lines that lead there order and report, in words; where they do not agree nothing.
+        doing: By state the orders and reports of lines that lead there, as text; nothing where they do not agree.
     """
 
     graph: StateGraph
@@ -97,7 +97,7 @@ class Chart:
 
 
 def folded(graph: StateGraph) -> Chart:
-    """The graph with composite states for fans and for loops of one line."""
+    """Return the graph with composite states for fans and for loops of one line."""
     edges = [settled(graph, edge) for edge in graph.edges if not edge.default.endswith("unreachable")]
     loops, arrows = _parted(edges)
     fans = _fans(arrows, graph)
@@ -124,7 +124,7 @@ def folded(graph: StateGraph) -> Chart:
 
 
 def unfolded(chart: Chart) -> frozenset[Edge]:
-    """The edges that a chart says, each as its graph has it, settled (`drawing.settled`)."""
+    """Return the edges of a chart, each as its graph has it, settled (`drawing.settled`)."""
     rows = [row for arrow in chart.arrows for row in arrow.rows]
     rows += [row for each in chart.composites for row in each.stays]
     rows += [row for each in chart.stays.values() for row in each]
@@ -132,14 +132,14 @@ def unfolded(chart: Chart) -> frozenset[Edge]:
 
 
 def inside(composites: Sequence[Composite], state: str) -> str:
-    """The innermost composite of a state, or of a composite that is not its own; empty for none."""
+    """Return the innermost composite around a state, or around a composite; "" for none."""
     states = next((set(each.states) for each in composites if each.name == state), {state})
     around = [each for each in composites if states < set(each.states) or {state} <= set(each.states)]
     return around[-1].name if around else ""
 
 
 def collapsed(chart: Chart, hidden: Collection[str]) -> Chart:
-    """The chart with some composites shut: what happens inside is not drawn, what leaves or enters does so at their border."""
+    """Return the chart with some composites shut: arrows inside are left out, others begin or end at their border."""
     shut = [each for each in chart.composites if each.name in hidden]
     outer = [each for each in shut if not any(set(each.states) < set(more.states) for more in shut)]
     stand_in = {state: each.name for each in outer for state in each.states}
@@ -176,7 +176,7 @@ def collapsed(chart: Chart, hidden: Collection[str]) -> Chart:
 
 
 def _parted(edges: Iterable[Edge]) -> tuple[list[Edge], list[Edge]]:
-    """What stays, and what goes."""
+    """Return the loops and the arrows between states."""
     loops, arrows = list[Edge](), list[Edge]()
     for edge in edges:
         (loops if edge.target in (edge.source, ANY) else arrows).append(edge)
@@ -184,7 +184,7 @@ def _parted(edges: Iterable[Edge]) -> tuple[list[Edge], list[Edge]]:
 
 
 def _fans(arrows: Sequence[Edge], graph: StateGraph) -> dict[str, tuple[str, ...]]:
-    """By state those from which edges lead there, where they are many."""
+    """Return, by state, the states from which edges lead there, where they are many."""
     fans = {
         state: _ordered(graph, {edge.source for edge in arrows if edge.target == state} - {ANY})
         for state in graph.states
@@ -193,7 +193,7 @@ def _fans(arrows: Sequence[Edge], graph: StateGraph) -> dict[str, tuple[str, ...
 
 
 def _waiting(loops: Sequence[Edge], graph: StateGraph) -> dict[tuple[str, str], tuple[str, ...]]:
-    """By line and what it does the states in which it stays, where they are several."""
+    """Return, by line and its procedures that decide, the states in which it stays, where they are several."""
     found: dict[tuple[str, str], set[str]] = {}
     for edge in loops:
         if edge.source != ANY and edge.line:
@@ -208,14 +208,14 @@ def _ordered(graph: StateGraph, states: Collection[str]) -> tuple[str, ...]:
 def _saved(
     fans: Mapping[str, tuple[str, ...]], arrows: Sequence[Edge]
 ) -> Iterator[tuple[tuple[str, ...], int]]:
-    """Yield the states of each fan, and what it folds: arrows, and rows of one line that leaves several states."""
+    """Yield the states of each fan, and the number of arrows and of rows of one line that it folds."""
     for target, states in fans.items():
         own = [edge for edge in arrows if edge.target == target and edge.source in states]
         yield states, len(states) - 1 + len(own) - len({(edge.line, edge.decided) for edge in own})
 
 
 def _composites(graph: StateGraph, wanted: Iterable[tuple[tuple[str, ...], int]]) -> list[Composite]:
-    """Sets of states of which none is all, and no two cross; those that fold most are taken first."""
+    """Choose sets of states, none of all states and no two crossing; those that fold most are taken first."""
     worth: dict[tuple[str, ...], int] = {}
     for states, saved in wanted:
         worth[states] = worth.get(states, 0) + saved
@@ -260,7 +260,7 @@ def _arrows(
 
 
 def _rows(edges: Sequence[Edge], every: tuple[str, ...]) -> Iterator[Row]:
-    """Yield a row a line; of the edges of one line that decide and those that do not, one each."""
+    """Yield one row for each line; two where some of its edges are decided by procedures, and others are not."""
     for (line, _), group in groupby(edges, key=lambda edge: (edge.line, edge.decided)):
         own = tuple(group)
         sources = tuple(edge.source for edge in own)
@@ -279,7 +279,7 @@ def _states(chart: Chart, name: str) -> tuple[str, ...]:
 
 
 def _doing(state: str, edges: Sequence[Edge]) -> tuple[str, ...]:
-    """What the lines that lead to a state, or stay in it, order and report, where all that say it agree; procedures left out.
+    """Return the orders and reports of lines that lead to a state or stay in it, where these lines agree; procedures are left out.
 
     >>> entering = [Edge("1", "a", "b", effect="command_out(locate) status_out(executing)")]
     >>> _doing("b", [*entering, Edge("2", "b", "b", effect="status_out(executing)"), Edge("3", "c", "b", effect="command_out(grip)")])

@@ -11,7 +11,7 @@ from rcsc.views.graph.layout import Arrangement, Arrow, Frame, LayoutBox, Point,
 
 _Curve = tuple[Point, ...]
 _STEPS = 100
-"""Points of a curve that are looked at: so dense that no letter lies between two."""
+"""Points of a curve that are tested: so dense that no letter lies between two."""
 _INSET_PX, _TIP_PX = 1.0, 9.0
 
 
@@ -53,7 +53,7 @@ def _points(curve: _Curve) -> Iterator[Point]:
 
 
 def _halves(piece: _Curve, t: float) -> tuple[_Curve, _Curve]:
-    """A piece of a Bezier curve in two (de Casteljau)."""
+    """Divide a piece of a Bezier curve in two (de Casteljau)."""
     rows = [list(piece)]
     while len(rows[-1]) > 1:
         rows.append(
@@ -69,7 +69,7 @@ def _halves(piece: _Curve, t: float) -> tuple[_Curve, _Curve]:
 
 
 def _cut(placed: Arrangement, boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> Arrangement:
-    """The layout, each curve from where it last leaves the box of its source to where it first comes to that of its target."""
+    """Return the layout with each curve cut: from its last exit from the source's box to its first entry into the target's."""
     rooms = {box.name: (box, centre) for box, centre in zip(boxes, placed.centres, strict=True)}
     curves = [_between(*curve, rooms, arrow) for curve, arrow in zip(placed.curves, arrows, strict=True)]
     return replace(placed, curves=tuple(curves))
@@ -97,7 +97,7 @@ def _far(one: Point, other: Point) -> float:
 
 
 def _first(curve: _Curve, holds: Callable[[Point], bool]) -> tuple[int, float] | None:
-    """The piece, and how far along it, just before something first holds; None where it never does, or does from the beginning."""
+    """Find the piece, and the way along it, just before a condition first holds; None where it never does, or holds from the beginning."""
     for number, point in enumerate(_points(curve)):
         if holds(point):
             at, step = number // (_STEPS + 1) * 3, number % (_STEPS + 1)
@@ -113,5 +113,5 @@ def _first(curve: _Curve, holds: Callable[[Point], bool]) -> tuple[int, float] |
 
 
 def _before(curve: _Curve, at: int, t: float) -> _Curve:
-    """What of a curve comes before a place."""
+    """Return the part of a curve before a place."""
     return (*curve[:at], *_halves(curve[at : at + 4], t)[0])

@@ -42,7 +42,7 @@ class Derived:
 
     Attributes:
         everywhere: Terms of every edge that leaves a single state; they are left out of `shown`.
-        lost: What the graph does not hold, in sentences; no proof rests on them.
+        lost: Parts of the table that the graph does not hold, in sentences; no proof rests on them.
     """
 
     graph: StateGraph
@@ -53,10 +53,10 @@ class Derived:
 def derive(
     program: Program, table: Table, file: tree.File, options: Options, state: str = ""
 ) -> Derived | Diagnostic:
-    """The graph of a table.
+    """Derive the graph of a table.
 
     Args:
-        program: What runs the table.
+        program: The program that runs the table.
         table: One of its tables.
         file: The file that declares the table.
         options: Limits of the solver.
@@ -87,7 +87,7 @@ def _undecided(table: Table) -> Diagnostic:
 
 
 def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic:
-    """The variable whose values are the states."""
+    """Return the variable whose values are the states."""
     fit = [
         v
         for v in program.variables
@@ -120,7 +120,7 @@ def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic
 
 
 def _moved(program: Program, table: Table, candidates: list[Variable]) -> list[Variable]:
-    """Those that some line of the table may write: what others write, such as a report, is no state of it."""
+    """Return those that some line of the table may write: a variable that others write, such as a report, is no state of it."""
     procedures = {str(each.name): each for each in program.procedures}
     statements = [action.statement for line in table.every_line for action in line.actions]
     written = may_write(statements, procedures)
@@ -197,7 +197,7 @@ class _Derivation:
         return f"{' | '.join(left)} || {' | '.join(right)}".strip()
 
     def _terms(self, at: int, columns: tuple[int, ...] | None = None) -> list[tree.Expr]:
-        """What the line's cells say, the state's left out; of these columns only where they are given."""
+        """Return the conditions in the line's cells, without the state's; only those of `columns`, where these are given."""
         cells = zip(self.written.conditions, self._row(at).conditions, strict=True)
         return [
             tree.term(heading, cell)
@@ -208,7 +208,7 @@ class _Derivation:
     # --- edges ---
 
     def _edges(self, at: int, line: Line | Default, steps: list[Step], states: list[Value]) -> list[Edge]:
-        """The edges of one line; a single edge from ANY where it leads alike from every state."""
+        """Return the edges of one line; a single edge from ANY where it leads alike from every state."""
         default = "" if isinstance(line, Line) else f"DEFAULT{' unreachable' if line.unreachable else ''}"
         sources = list(dict.fromkeys(step.source for step in steps))
         goal = self._goal(line.actions)
@@ -235,18 +235,18 @@ class _Derivation:
         ]
 
     def _goal(self, actions: tuple[Action, ...]) -> Value | None:
-        """The state to which one action goes, whatever the input, before any other can write it; None where none does."""
+        """Return the state to which one action goes, whatever the input, before any other can write it; None where none does."""
         writers = [action for action in actions if self.steps.writes(action)]
         goals = [self.steps.sets(action) for action in writers]
         return goals[0] if goals and all(goal is None for goal in goals[1:]) else None
 
     def _deciders(self, actions: tuple[Action, ...], goal: Value | None) -> str:
-        """The actions that can write the state, without the one that the edge itself says."""
+        """Return the actions that can write the state, without the one that the edge itself shows."""
         writers = [action for action in actions if self.steps.writes(action)]
         return ", ".join(action.text for action in (writers if goal is None else writers[1:]))
 
     def _unreached(self, base: Edge, goal: Value | None, at: int) -> list[Edge]:
-        """A DEFAULT line that is never reached is drawn for what it says; another line has no edge."""
+        """Return an edge for a DEFAULT line that is never reached; note any other line as lost, without an edge."""
         if base.default:
             return [replace(base, target=ANY if goal is None else self._spelled(goal))]
         self.lost.append(
@@ -255,7 +255,7 @@ class _Derivation:
         return []
 
     def _narrowed(self, at: int, sources: list[Value]) -> None:
-        """Notes as lost that the states written are not those from which the edges come."""
+        """Note as lost that the states written are not those from which the edges come."""
         stated = [
             spell_condition(cell, whole=False)
             for heading, cell in zip(self.written.conditions, self._row(at).conditions, strict=True)
@@ -270,7 +270,7 @@ class _Derivation:
             self.lost.append(f"line `{name}`: {written} under `{self.steps.state.name}` comes back as {then}")
 
     def _effect(self, row: tree.Row, actions: tuple[Action, ...], goal: Value | None) -> str:
-        """The action cells, without the one action that the edge itself says."""
+        """Return the action cells, without the one action that the edge itself shows."""
         left = list(actions)
         told = None if goal is None else next(action for action in actions if self.steps.writes(action))
         cells = []
@@ -283,7 +283,7 @@ class _Derivation:
     # --- what is shown ---
 
     def _common(self, edges: list[Edge]) -> list[tree.Expr]:
-        """The terms shared by every edge that leaves a single state."""
+        """Return the terms shared by every edge that leaves a single state."""
         own = [labels.terms_of(edge.guard) for edge in edges if edge.source != ANY]
         return [term for term in own[0] if all(term in terms for terms in own)] if len(own) > 1 else []
 
@@ -312,7 +312,7 @@ def _heading(heading: tree.Heading) -> str:
 
 
 def _taken(left: list[Action]) -> Action:
-    """The next action written; the assignment of a whole record is several in the model."""
+    """Take the next action as written; the assignment of a whole record is several in the model."""
     first = left.pop(0)
     while left and isinstance(first.statement, Assign) and _of_one(first, left[0]):
         left.pop(0)

@@ -81,11 +81,11 @@ class Sheaf:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What is drawn.
+    """The content of a drawing.
 
     Attributes:
         notes: Below the title.
-        nodes: Name and what stands in it.
+        nodes: Each name and the text in its circle.
     """
 
     title: str
@@ -95,7 +95,7 @@ class Picture:
 
 
 def svg(graph: StateGraph, everywhere: str = "") -> str:
-    """The drawing of a state graph; `everywhere` is noted once for every arrow from a state.
+    """Return the drawing of a state graph; `everywhere` is noted once for every arrow from a state.
 
     Raises:
         NoLayoutError: There is no layout program.
@@ -112,7 +112,7 @@ def svg(graph: StateGraph, everywhere: str = "") -> str:
 
 
 def settled(graph: StateGraph, edge: Edge) -> Edge:
-    """The edge, without deciding procedures where its line can lead nowhere else from there."""
+    """Return the edge, without deciding procedures where its line can lead nowhere else from there."""
     elsewhere = any(
         (other.line, other.source) == (edge.line, edge.source) and other.target != edge.target
         for other in graph.edges
@@ -121,7 +121,7 @@ def settled(graph: StateGraph, edge: Edge) -> Edge:
 
 
 def _sheaves(edges: Iterable[Edge]) -> list[Sheaf]:
-    """The edges between the same two nodes together; dashed ones apart."""
+    """Group the edges between the same two nodes; dashed ones apart."""
     pairs: dict[tuple[str, str, bool], list[Edge]] = {}
     for edge in edges:
         dashed = bool(edge.default or (edge.decided and edge.line))
@@ -138,7 +138,7 @@ def _sheaves(edges: Iterable[Edge]) -> list[Sheaf]:
 
 
 def _never(edge: Edge) -> bool:
-    """Whether the edge belongs to a DEFAULT line that is never taken: noted beside the drawing."""
+    """Return whether the edge belongs to a DEFAULT line that is never taken: it is noted beside the drawing."""
     return edge.default.endswith("unreachable")
 
 
@@ -172,14 +172,14 @@ def _row(edge: Edge) -> ArrowLine:
 
 
 def plain(guard: str) -> str:
-    """A guard for the eye: `not a` for `a = false`, and commas."""
+    """Return a guard for reading: `not a` for `a = false`, and commas."""
     short = re.sub(r"(?<![\w.\]])([\w.\[\]]+) = true(?![\w.])", r"\1", guard)
     short = re.sub(r"(?<![\w.\]])([\w.\[\]]+) = false(?![\w.])", r"not \1", short)
     return short if any(f" {op} " in short for op in LOGIC - {Op.AND}) else ", ".join(split(short, " and "))
 
 
 def folded(text: str) -> Iterator[str]:
-    """The text in lines, broken after commas and before `and`."""
+    """Yield the text in lines, broken after commas and before `and` or `or`."""
     line = ""
     for piece in re.split(r"(?<=, )|(?= (?:and|or) )", text):
         if line and len(line) + len(piece.rstrip()) > MOST_LETTERS:
@@ -194,7 +194,7 @@ def folded(text: str) -> Iterator[str]:
 
 
 def drawn(picture: Picture) -> str:
-    """The picture as SVG."""
+    """Return the picture as SVG."""
     boxes = [_box(name, shown) for name, shown in picture.nodes.items()]
     placed = place(boxes, [_arrow(sheave) for sheave in picture.sheaves])
     head_px = 22.0 + 16.0 * len(picture.notes)
@@ -268,7 +268,7 @@ def _node(box: LayoutBox, centre: Point, shown: str) -> Iterator[str]:
 
 
 def _label(sheaf: Sheaf, centre: Point) -> Iterator[str]:
-    """The rows, one below the other, on a sheet that dims the arrows below."""
+    """Yield the rows, one below the other, on a sheet that dims the arrows below."""
     room = _arrow(sheaf)
     left, top = centre[0] - room.width_px / 2 + 4, centre[1] - room.height_px / 2 + 2
     for row in sheaf.rows:

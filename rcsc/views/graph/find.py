@@ -34,13 +34,13 @@ class FoundTable:
 
     @property
     def place(self) -> str:
-        """What names the table and no other."""
+        """The name of the table that no other has: its file and its own name."""
         return f"{self.table.file}:{self.table.name}"
 
 
 @dataclass(frozen=True, slots=True)
 class NotFound:
-    """Why there is no table.
+    """The reasons why there is no table.
 
     Attributes:
         sources: Texts that `diagnostics` point into.
@@ -53,7 +53,7 @@ class NotFound:
 def tables(
     named: str, *, running: bool = False, preferred: Collection[str] = ()
 ) -> list[FoundTable] | NotFound:
-    """The tables that a name means, each once, in order of file and place.
+    """Return the tables that a name means, each once, in order of file and place.
 
     Args:
         named: A table, a file, a file and its table, or a folder.
@@ -81,7 +81,7 @@ def tables(
 
 
 def _parted(named: str) -> tuple[str | None, str]:
-    """The file or folder named, and the table."""
+    """Divide a name into the file or folder, if any, and the table."""
     if os.path.exists(named) or named.endswith(".rcs"):
         return named, ""
     file, colon, name = named.rpartition(":")
@@ -93,7 +93,7 @@ def _here() -> str:
 
 
 def _programs(loaded: Loaded) -> Iterator[tuple[str, Program]]:
-    """Every root that resolves; those with a level first."""
+    """Yield every root that resolves, with its program; those with a level first."""
     programs = [
         (root, program) for root in loaded.roots if isinstance(program := resolve(root, loaded), Program)
     ]
@@ -141,7 +141,7 @@ def _run_here(entry: FoundTable) -> bool:
 
 
 def _in_level(entry: FoundTable) -> FoundTable:
-    """The table in a program of its project whose level runs it; unchanged where there is none."""
+    """Return the table in a program of its project whose level runs it; unchanged where there is none."""
     root = project_root(entry.table.file)
     every = _every(load([root])) if os.path.isfile(os.path.join(root, "rcsc.toml")) else []
     if isinstance(every, NotFound):

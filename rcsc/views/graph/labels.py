@@ -36,12 +36,12 @@ class WordsError(Exception):
 
 
 def guard(terms: list[tree.Expr]) -> str:
-    """The terms joined by `and`; "" without any."""
+    """Return the terms joined by `and`; "" without any."""
     return " and ".join(spell_expr(term, NEGATION) for term in terms)
 
 
 def terms_of(text: str) -> list[tree.Expr]:
-    """The terms of a guard; WordsError where it is no expression."""
+    """Return the terms of a guard; raise WordsError where it is no expression."""
     if not text.strip():
         return []
     [row] = _rows(f"table t {{\n| line | when ||\n| a | {text} ||\n}}\n", text)
@@ -60,7 +60,7 @@ def _conjuncts(expr: tree.Expr) -> Iterator[tree.Expr]:
 
 
 def cell(expr: tree.Expr) -> tuple[tree.Expr, tree.Condition] | None:
-    """The heading and the cell that say the same; None for what stands only under `when`."""
+    """Return the heading and the cell with the same meaning; None for a term that can stand only under `when`."""
     match expr:
         case tree.Binary(op, subject, value) if op in ("=", "/=", "<", "<=", ">", ">="):
             return (subject, tree.Comparison(op, value)) if not _constant(subject) else None
@@ -84,7 +84,7 @@ def _constant(expr: tree.Expr) -> bool:
 
 
 def effect(headings: tuple[str, ...], cells: tuple[str, ...]) -> str:
-    """Action cells after their headings; the blank ones left out.
+    """Return action cells after their headings, without blank ones.
 
     Args:
         headings: As the table spells them.
@@ -95,7 +95,7 @@ def effect(headings: tuple[str, ...], cells: tuple[str, ...]) -> str:
 
 
 def effect_cells(text: str) -> list[tuple[str, str]]:
-    """Heading and cell of each part of an effect; WordsError where it is not made so."""
+    """Return heading and cell of each part of an effect; raise WordsError where it has another form."""
     cells = []
     at = 0
     while text[at:].strip():
@@ -120,7 +120,7 @@ def _closing(text: str, opening: int) -> int:
 
 
 def split(text: str, mark: str = ",") -> list[str]:
-    """The pieces between marks outside brackets."""
+    """Return the pieces between marks outside brackets."""
     pieces, depth, begun = [], 0, 0
     for at, letter in enumerate(text):
         depth += (letter in _OPEN) - (letter in _CLOSE)
@@ -131,14 +131,14 @@ def split(text: str, mark: str = ",") -> list[str]:
 
 
 def check_actions(heading: str, text: str) -> None:
-    """WordsError where the cell cannot stand under the heading."""
+    """Raise WordsError where the cell cannot stand under the heading."""
     column, value = (heading, text) if heading in ACTION_WORDS else ("procedures", f"{heading} := {text}")
     _rows(f"table t {{\n| line | when || {column} |\n| a | true || {value} |\n}}\n", text)
 
 
 @lru_cache(maxsize=4_096)  # the lines of a table have most of their cells in common
 def _rows(table: str, text: str) -> tuple[tree.Row, ...]:
-    """The one row of a table made around a text."""
+    """Return the one row of a table made around a text."""
     parsed = parse(Source("", table))
     if not isinstance(parsed, tree.File):
         raise WordsError(f"{parsed[0].message}, in `{text}`")

@@ -27,7 +27,7 @@ class NoLayoutError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class LayoutBox:
-    """Something to be placed: a circle or a rectangle, `width_px` by `height_px`."""
+    """A circle or a rectangle to be placed, `width_px` by `height_px`."""
 
     name: str
     width_px: float
@@ -37,7 +37,7 @@ class LayoutBox:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """From a box to a box; a label of size 0 is none.
+    """An arrow from a box to a box, perhaps with a label; a label of size 0 is none.
 
     Attributes:
         leaves: The frame at whose border it begins, around `source`; "" for the box itself.
@@ -89,10 +89,10 @@ def place(
     *,
     straight: bool = False,
 ) -> Arrangement:
-    """The layout of the boxes and arrows, in ranks from top to bottom; a box is in one frame at most.
+    """Lay out the boxes and arrows, in ranks from top to bottom; a box is in one frame at most.
 
     Args:
-        boxes: What is placed.
+        boxes: The boxes to place.
         arrows: Between them.
         frames: Around them.
         straight: Whether arrows are straight pieces in place of curves.
@@ -123,13 +123,13 @@ def place(
 
 
 def _corners(text: str, point: Callable[[str], Point]) -> tuple[Point, Point]:
-    """`left,bottom,right,top`."""
+    """Read `left,bottom,right,top` as two corners."""
     left, bottom, right, top = text.split(",")
     return point(f"{left},{top}"), point(f"{right},{bottom}")
 
 
 def _curve(text: str, point: Any) -> tuple[tuple[Point, ...], Point]:
-    """`e,tip p0 p1 p2 p3 ...`; without an arrow's end the last point is the tip."""
+    """Read `e,tip p0 p1 p2 p3 ...`; without an arrow's end the last point is the tip."""
     parts = text.split()
     tips = [part[2:] for part in parts if part.startswith("e,")]
     points = tuple(point(part) for part in parts if part[1:2] != ",")
@@ -137,7 +137,7 @@ def _curve(text: str, point: Any) -> tuple[tuple[Point, ...], Point]:
 
 
 def _words(frames: Sequence[Frame]) -> dict[str, str]:
-    """What frames are called in DOT, by name, those inside them after them."""
+    """Return the names of frames in DOT, by name; a frame's inner frames follow it."""
     waiting, found = list(frames), list[Frame]()
     while waiting:
         found.append(waiting.pop(0))
@@ -179,7 +179,7 @@ def _framed(frame: Frame, number: Mapping[str, int], words: Mapping[str, str]) -
 
 
 def _blank(arrow: Arrow) -> str:
-    """A label that takes this much room and no more."""
+    """Return a label that takes this much room and no more."""
     size = f'WIDTH="{round(arrow.width_px)}" HEIGHT="{round(arrow.height_px)}"'
     return f'<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="0" FIXEDSIZE="TRUE" {size}><TR><TD></TD></TR></TABLE>>'
 

@@ -23,7 +23,7 @@ _MOST = 2 / 3
 
 
 def derive_lines(program: Program, table: Table, file: tree.File, options: Options) -> Derived | Diagnostic:
-    """The graph of a table's lines; the level that runs the table, if one does, is followed for a whole cycle."""
+    """Derive the graph of a table's lines; the level that runs the table, if one does, is followed for a whole cycle."""
     try:
         with smt.together(options.drawn):
             follows = following(program, table, options)

@@ -28,8 +28,8 @@ class Against:
     """The verdict on a table in place of another.
 
     Attributes:
-        diagnostics: Why it is not the same; empty where it is proved.
-        questions: How many the proof put to Z3.
+        diagnostics: The differences; empty where it is proved to be the same.
+        questions: The number of questions put to Z3.
         sources: Texts that `diagnostics` point into.
     """
 
@@ -39,7 +39,7 @@ class Against:
 
 
 def in_place(file: tree.File, table: tree.TableDecl) -> str:
-    """The file's text with the table replacing the one of its name, or at its end; comments above a table stay."""
+    """Return the file's text with the table in place of the one of its name, or at its end; comments above a table stay."""
     kept: list[tree.Declaration] = []
     there = False
     for declaration in file.declarations:
@@ -55,12 +55,12 @@ def in_place(file: tree.File, table: tree.TableDecl) -> str:
 def against(
     loaded: Loaded, root: str, program: Program, table: Table, new: Tabled, options: Options
 ) -> Against:
-    """Whether the graph's table does what the present one does, from the same state.
+    """Prove or refute that the graph's table does what the present one does, from the same state.
 
     Args:
         loaded: Has the files of the program.
         root: The root file of the program.
-        program: What `root` resolves to.
+        program: The program of `root`.
         table: The present table.
         new: The table to stand in its place, and where the graph begins.
         options: Limits of the solver.
@@ -109,7 +109,7 @@ def _assuming(table: Table, other: Table) -> Diagnostic:
 
 
 def _begins(program: Program, table: Table, new: Tabled) -> Diagnostic | None:
-    """A diagnostic where the graph begins in another state."""
+    """Return a diagnostic where the graph begins in another state."""
     name, initial = new.begins
     state = next((variable for variable in program.variables if variable.name == name), None)
     if not initial or state is None or spell(state.type, state.initial) == initial:

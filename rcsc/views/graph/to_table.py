@@ -41,12 +41,12 @@ class Tabled:
     begins: tuple[str, str] = ("", "")
 
     def text(self) -> str:
-        """The table, and what it uses, in the one layout."""
+        """Return the table, and the files it uses, in the one layout."""
         return format_file(tree.File((*self.uses, self.table)))
 
 
 def tabled(graph: StateGraph) -> Tabled:
-    """The table of a graph; UnreadableError, at its edge, where a guard or an effect is not in the language."""
+    """Return the table of a graph; raise UnreadableError, at its edge, where a guard or an effect is not in the language."""
     if graph.state == LINES:
         raise UnreadableError("this is a graph of lines: only a graph of states says a table")
     for name in (graph.table, *graph.assuming):
@@ -84,7 +84,7 @@ class _Line:
 
 
 def _lines(graph: StateGraph) -> Iterator[_Line]:
-    """The lines, in the order in which they are drawn."""
+    """Yield the lines, in the order in which they are drawn."""
     groups: dict[object, list[Edge]] = {}
     for number, edge in enumerate(graph.edges):
         key = (edge.line, edge.guard, edge.effect, edge.default) if edge.line else number
@@ -108,7 +108,7 @@ def _lines(graph: StateGraph) -> Iterator[_Line]:
 
 
 def _named(lines: list[_Line], graph: StateGraph, notes: list[str]) -> list[_Line]:
-    """The lines, each with a name of its own, in the order that the graph gives."""
+    """Return the lines, each with a name of its own, in the order that the graph gives."""
     taken = {line.name for line in lines if line.name}
     named = []
     for number, line in enumerate(lines):
@@ -166,7 +166,7 @@ class _Columns:
         return cls(graph, bool(graph.columns), conditions, actions)
 
     def row(self, line: _Line) -> tuple[_Line, dict[str, str], dict[str, str]]:
-        """The cells of a line by heading."""
+        """Return the cells of a line by heading."""
         try:
             conditions: dict[str, str] = {}
             for expr in [*self._state(line), *labels.terms_of(line.edge.guard)]:
@@ -199,7 +199,7 @@ class _Columns:
         ]
 
     def _condition(self, expr: tree.Expr, cells: dict[str, str]) -> None:
-        """Puts a term under its heading, or under `when` where that is taken."""
+        """Put a term under its heading, or under `when` where that is taken."""
         parted = labels.cell(expr)
         if parted is not None:
             heading = spell_expr(parted[0])
@@ -215,7 +215,7 @@ class _Columns:
         cells[_WHEN] = f"{cells[_WHEN]} and {text}" if _WHEN in cells else text
 
     def text(self, graph: StateGraph, rows: list[tuple[_Line, dict[str, str], dict[str, str]]]) -> str:
-        """The table as text, in no layout."""
+        """Return the table as text, in no layout."""
         conditions = self.conditions or [_WHEN]
         ranked = [word for word in self.actions if word in ACTION_WORDS and not self.fixed]
         actions = sorted(ranked, key=("procedures", "command_out", "status_out").index)

@@ -16,7 +16,7 @@ from rcsc.views.pages.drawn import Cell
 
 
 class Data(Protocol):
-    """What knows the data of a kind of system; every method raises `CodedError` where the data is not in order."""
+    """A user's object that knows the data of a kind of system; every method raises `CodedError` where the data is not in order."""
 
     def build(
         self, system: Description, signs: Mapping[str, Signature], output: Path | None, *, writes: bool
@@ -34,7 +34,7 @@ class Data(Protocol):
     def rows(
         self, system: Description, signs: Mapping[str, Signature], database: Path | None
     ) -> Mapping[str, int]:
-        """How many rows each table has."""
+        """Return the number of rows of each table."""
         ...
 
     def lines(
@@ -44,12 +44,12 @@ class Data(Protocol):
         ...
 
     def drawn(self, log: Log, system: Description, signs: Mapping[str, Signature]) -> Cell:
-        """What stands outside the levels, drawn of a log."""
+        """Return the world outside the levels, to be drawn from a log."""
         ...
 
 
 def known(system: Description) -> Data:
-    """Return who knows the data of a system.
+    """Return the object that knows the data of a system.
 
     Raises:
         BadDescription: There is no data, or nobody who knows it.

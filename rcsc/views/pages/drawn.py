@@ -8,7 +8,7 @@ class Drawing(Protocol):
 
     @property
     def svg(self) -> str:
-        """The document."""
+        """The picture as an SVG document."""
         ...
 
     @property
@@ -18,11 +18,11 @@ class Drawing(Protocol):
 
 
 class Cell(Protocol):
-    """What stands outside the levels of a log."""
+    """The world outside the levels of a log."""
 
     @property
     def data(self) -> str:
-        """What the file is called that says where things are."""
+        """The name of the file with the places of things."""
         ...
 
     def drawn(self, tick: int, *, projected: bool = False) -> Drawing:

@@ -18,10 +18,10 @@ from rcsc.views.pages.frame import PAGES
 
 @dataclass(frozen=True, slots=True)
 class _Tick:
-    """What a frame of the page shows.
+    """The content of one frame of the page.
 
     Attributes:
-        mark: What stands out about it; empty for nothing.
+        mark: A remark on it; empty for none.
         broken: Whether it is the one in which the obligation is broken.
         drawn: The cell; None where there is none.
     """
@@ -34,12 +34,12 @@ class _Tick:
 
 
 def trace(path: Path, log: Log, finding: LoggedFinding, cell: Cell | None, why_not: str = "") -> None:
-    """Writes the page.
+    """Write the page.
 
     Args:
         path: Where to.
         log: The run.
-        finding: What it breaks.
+        finding: The obligation that it breaks.
         cell: To be drawn.
         why_not: Why there is none, a sentence.
 
@@ -50,7 +50,7 @@ def trace(path: Path, log: Log, finding: LoggedFinding, cell: Cell | None, why_n
 
 
 def page(log: Log, finding: LoggedFinding, cell: Cell | None, why_not: str = "") -> str:
-    """The page; arguments as those of `trace`."""
+    """Return the page; arguments are as in `trace`."""
     return PAGES.get_template("trace.html.jinja").render(
         finding=finding,
         ticks=[_tick(frame, log, finding, cell) for frame in frames(log)],
@@ -71,7 +71,7 @@ def _tick(frame: LoggedTick, log: Log, finding: LoggedFinding, cell: Cell | None
 
 
 def _notes(log: Log, finding: LoggedFinding) -> list[str]:
-    """Return what holds of the whole run, a sentence each."""
+    """Return notes on the whole run, a sentence each."""
     at, many = finding.broken_at, len(log.ticks)
     begun = (
         f"The shortest run that shows it, of system `{log.facts['name']}`: broken in cycle {at} of {many}."
@@ -87,7 +87,7 @@ def _notes(log: Log, finding: LoggedFinding) -> list[str]:
 
 
 def about_cell(cell: Cell | None, why_not: str) -> str:
-    """What the pictures of the cell rest on; arguments as those of `trace`."""
+    """Return a sentence about the source of the cell's pictures; arguments are as in `trace`."""
     if cell is None:
         return f"No cell is drawn: {why_not}"
     return (

@@ -30,7 +30,7 @@ def environment(package: str, folder: str) -> jinja2.Environment:
 
 
 def quoted(text: str) -> Markup:
-    """A text whose names stand in backticks, with the names set apart."""
+    """Mark up a text: names that stand in backticks become code."""
     pieces = text.split("`")
     if len(pieces) % 2 == 0:  # one is left over: nothing is meant by any
         return escape(text)
@@ -41,12 +41,12 @@ def quoted(text: str) -> Markup:
 
 
 def hashed(script: str) -> str:
-    """Name a script as a policy does: by its SHA-256."""
+    """Return a script's name in a policy: its SHA-256."""
     return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"
 
 
 def packed(data: Any) -> Markup:
-    """Write data into a `script` element that is none: gzip, in letters that mean nothing to HTML; the same for the same."""
+    """Pack data for a `script` element that is not run: gzip in base64, harmless in HTML; equal data give equal text."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return Markup(base64.b64encode(compressed(text.encode())).decode())  # noqa: S704  # nothing is left that means something to HTML
 

@@ -20,7 +20,7 @@ from rcsc.views.pages.witness import FRAMES_APART, MOST_SERIES
 MOST_PICTURES = 60
 """Pictures of the cell in a page; a long run has them further apart."""
 ENDED = ("done", "failed")
-"""How a report ends an order where its program does not declare whom its level serves."""
+"""Statuses that end an order where its program does not declare whom its level serves."""
 
 
 @dataclass(slots=True)
@@ -36,7 +36,7 @@ class _Ordered:
     reason: str = ""
 
     def row(self, number: int, last: int) -> ReportRow:
-        """As a row of the report; one that is not answered at the end of the log is under way."""
+        """Return the order as a row of the report; one without an answer at the end of the log is under way."""
         cycles = (self.until or last) - self.since + 1
         return ReportRow(number, f"{self.level}: {self.text}", self.state or "under way", cycles, self.reason)
 
@@ -46,7 +46,7 @@ def story_of(
     cell: Cell | None = None,
     why_not: str = "",
 ) -> Story:
-    """Return what a page shows of the log.
+    """Return the story of the log, for a page.
 
     Args:
         log: The run.
@@ -74,7 +74,7 @@ def story_of(
 
 
 def _ordered(log: Log) -> list[_Ordered]:
-    """Every order that a level took from outside, in order."""
+    """Return every order that a level took from outside, in order."""
     levels, every = {level.name: level.sign for level in log.levels}, list[_Ordered]()
     standing: dict[tuple[str, str], _Ordered] = {}
     for frame in frames(log):
@@ -102,7 +102,7 @@ def _ordered(log: Log) -> list[_Ordered]:
 
 
 def _taken(frame: LoggedTick, levels: Mapping[str, object]) -> Iterator[tuple[str, Order, Reported | None]]:
-    """What levels are ordered from outside in a tick, with what they report."""
+    """Yield the orders that levels get from outside in a tick, with their reports."""
     for box in frame.boxes:
         for order, report in box.above:
             if order is not None and order.other not in levels:
@@ -122,7 +122,7 @@ def _values(fields: tuple[TickValue, ...]) -> str:
 
 
 def drawn_first(log: Log, displays: Mapping[str, Sequence[str]]) -> list[str]:
-    """Which variables have a curve at first: the numbers of the displays, else the first that buffers from outside or to there carry."""
+    """Return the variables that have a curve at first: numbers of the displays, else the first in buffers from or to the outside."""
     known = {name for name, (_, column) in named_columns(log).items() if _is_number(column)}
     shown = [name for names in displays.values() for name in names if name in known]
     return list(dict.fromkeys(shown or list(_outside(log, known))[:MOST_SERIES]))
@@ -133,7 +133,7 @@ def _is_number(column: LogColumn) -> bool:
 
 
 def _outside(log: Log, known: Collection[str]) -> Iterator[str]:
-    """Names of numbers in buffers with one end outside the levels."""
+    """Yield the names of numbers in buffers with one end outside the levels."""
     levels = {level.name for level in log.levels}
     for wire in log.system().wires:
         ends = [end for end in (wire.source, wire.target) if end.partition(".")[0] in levels]
@@ -144,7 +144,7 @@ def _outside(log: Log, known: Collection[str]) -> Iterator[str]:
 
 
 def _pictures(log: Log, cell: Cell | None, ordered: Sequence[_Ordered]) -> list[CellPicture]:
-    """The cell at even distances, the last tick among them."""
+    """Return pictures of the cell at even distances, the last tick among them."""
     if cell is None or not log.ticks:
         return []
     apart = max(FRAMES_APART, -(-len(log.ticks) // MOST_PICTURES))

@@ -39,7 +39,7 @@ class CellPicture:
 
 @dataclass(frozen=True, slots=True)
 class Matched:
-    """How often a line of a table ran."""
+    """The number of times that a line of a table ran."""
 
     level: str
     table: str
@@ -58,7 +58,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where a part was to end, and where it ended: lengths in mm, angles in degrees, in words as they are to be read."""
+    """The wanted and the actual place of a part: lengths in mm, angles in degrees, as text for the reader."""
 
     part: str
     wanted: str
@@ -67,26 +67,26 @@ class Placement:
 
 
 class Played(Protocol):
-    """What draws a run tick by tick: `rcsc.desk.studio.share.document.Played`."""
+    """A run to be drawn tick by tick: `rcsc.desk.studio.share.document.Played`."""
 
     @property
     def data(self) -> Markup:
-        """The run."""
+        """The data of the run."""
         ...
 
     @property
     def script(self) -> Markup:
-        """What draws it."""
+        """The script that draws it."""
         ...
 
     @property
     def hash(self) -> str:
-        """As a policy names the script."""
+        """The script's name in a policy."""
         ...
 
     @property
     def style(self) -> Markup:
-        """How it looks."""
+        """The style sheet."""
         ...
 
 
@@ -99,13 +99,13 @@ class Story:
         rows: Of the script.
         frames: The filmstrip.
         matched: Lines of tables, also those that never ran, in the order of the tables.
-        timing: How long things took.
+        timing: Durations.
         placements: Of the parts.
         margins_deg: The least distance of each joint from its limits.
         tick_ms: Of the system.
-        ticks: How many there were: those of all rows, and those in which nothing was ordered any more.
-        recorded: What is said of the log that the story is of; empty for a run that was watched. Its rows are orders, which may overlap.
-        about_cell: What the pictures rest on, where that is not the plant.
+        ticks: The number of ticks: those of all rows, and those after the last order.
+        recorded: A sentence about the story's log, whose rows are orders and may overlap; empty for a run that was watched.
+        about_cell: The source of the pictures, where it is not the plant.
         played: The run tick by tick, as the studio shows it.
         left_out: Cycles of the run that are not in `played`, the first of it.
     """
@@ -126,13 +126,13 @@ class Story:
 
     @property
     def counted(self) -> str:
-        """How many rows a script had, or how many orders there are in a log; empty for none."""
+        """The number of rows of a script, or of orders in a log, as text; "" for none."""
         word = "order" if self.recorded else "row"
         return f"{len(self.rows)} {word}{'s' if len(self.rows) != 1 else ''}, " if self.rows else ""
 
     @property
     def outcome(self) -> str:
-        """What became of them: of a script what stopped it, of a log how many there are of each; empty where all is done."""
+        """The outcome: of a script the row that stopped it, of a log the number of orders by state; "" where all are done."""
         bad = [row for row in self.rows if row.state != "done"]
         if not bad:
             return ""
@@ -144,7 +144,7 @@ class Story:
 
     @property
     def aside(self) -> int:
-        """Cycles of no row: in which a level came to rest after the last."""
+        """The number of cycles of no row: those in which a level came to rest after the last."""
         within = self.rows and not self.recorded  # orders of a log overlap
         return max(0, self.ticks - sum(row.cycles for row in self.rows)) if within else 0
 
@@ -160,7 +160,7 @@ class _Table:
 
 
 def report(path: Path, story: Story) -> None:
-    """Writes the page.
+    """Write the page.
 
     Raises:
         OSError: The file could not be written.
@@ -169,7 +169,7 @@ def report(path: Path, story: Story) -> None:
 
 
 def page(story: Story) -> str:
-    """The page; the same text for the same story."""
+    """Return the page; equal stories give equal text."""
     return PAGES.get_template("report.html.jinja").render(
         story=story,
         seconds=lambda tick: tick * story.tick_ms / 1000,
@@ -178,7 +178,7 @@ def page(story: Story) -> str:
 
 
 def _tables(matched: Sequence[Matched]) -> list[_Table]:
-    """The lines by table; tables and lines stay in their order."""
+    """Group the lines by table; tables and lines stay in their order."""
     lines: dict[tuple[str, str], list[Matched]] = {}
     for line in matched:
         lines.setdefault((line.level, line.table), []).append(line)

@@ -30,10 +30,10 @@ class RunWitness:
 
     Attributes:
         run: System and operator.
-        pictures: How what stands outside looks: an SVG document by kind, drawn when it is called.
+        pictures: Functions that draw the world outside as an SVG document, by kind.
         film: Whether pictures for a report are kept.
         seconds: Spent on watching.
-        matched: How often each line ran, by level, table and line.
+        matched: The number of times that each line ran, by level, table and line.
     """
 
     run: ScriptedRun
@@ -47,14 +47,14 @@ class RunWitness:
     _drawn: int = -FRAMES_APART
 
     def __post_init__(self) -> None:
-        """Notes what nobody has set at the beginning: nothing, where the run goes on from another."""
+        """Note the variables that nobody has set at the beginning: none, where the run goes on from another."""
         system = self.run.system
         self.unset = Unsets(system.description.wires, {spec.name: spec for spec in system.description.levels})
         if system.tick == 0:
             self.unset.begin(map(_seen, system.levels), partial(_published, system))
 
     def __call__(self, system: System, due: tuple[RunningLevel, ...]) -> None:
-        """After each cycle."""
+        """Watch a cycle that has just ended."""
         begun = time.perf_counter()
         self._note(system, due)
         for level in due:
@@ -65,15 +65,15 @@ class RunWitness:
         self.seconds += time.perf_counter() - begun
 
     def look(self) -> None:
-        """Looks at what stands outside, after each cycle; here nothing is known of it."""
+        """Look at the world outside, after each cycle; here nothing is known of it."""
 
     @property
     def drawn(self) -> Sequence[str]:
-        """Which variables, `level.variable`, the report draws at first."""
+        """The variables, `level.variable`, that the report draws at first."""
         return drawn_first(self.run.system)
 
     def _note(self, system: System, due: tuple[RunningLevel, ...]) -> None:
-        """What was set in the tick."""
+        """Note the variables that were set in the tick."""
         for restart in system.restarts:
             if restart.begun is Begun.ANEW and restart.level in self.unset.now:
                 level = system.level(restart.level)
@@ -101,7 +101,7 @@ class RunWitness:
         return f"row {row.number}: {row.text}"
 
     def story(self, title: str, seconds: float) -> Story:
-        """For the report.
+        """Return the story of the run, for the report.
 
         Args:
             title: Of the page.
@@ -126,7 +126,7 @@ class RunWitness:
         )
 
     def closing(self) -> Iterator[str]:
-        """What is said of the plant at the end, a line each."""
+        """Yield remarks on the plant at the end, a line each."""
         yield from ()
 
 
@@ -139,7 +139,7 @@ def _published(system: System, name: str) -> bool:
 
 
 def drawn_first(system: System) -> list[str]:
-    """What is worth a curve: the numbers of the displays, else numbers that come from outside or go there."""
+    """Return the variables with a curve at first: numbers of the displays, else numbers that come from outside or go there."""
     shown = [name for names_ in system.description.displays.values() for name in names_]
     numbers = {
         f"{level.name}.{leaf.name}": leaf
@@ -152,7 +152,7 @@ def drawn_first(system: System) -> list[str]:
 
 
 def _outside(system: System, known: Iterable[str]) -> Iterator[str]:
-    """Names of variables of buffers with one end outside the levels."""
+    """Yield the names of variables of buffers with one end outside the levels."""
     levels = {level.name for level in system.levels}
     for wire in system.description.wires:
         ends = [end for end in (wire.source, wire.target) if end.partition(".")[0] in levels]
@@ -161,7 +161,7 @@ def _outside(system: System, known: Iterable[str]) -> Iterator[str]:
 
 
 def _lines(system: System, matched: Counter[tuple[str, str, str]]) -> list[tuple[str, str, str]]:
-    """All lines of all levels' tables, in their order; those that ran are among them."""
+    """Return all lines of all levels' tables, in their order; those that ran are among them."""
     every = [
         (level.name, table, line)
         for level in system.levels

@@ -43,7 +43,7 @@ _USES = re.compile(r"\b(?:asm|__asm__|malloc|calloc|realloc|free|fopen|fclose|er
 
 
 class Compliance(StrEnum):
-    """How a guideline is kept."""
+    """The compliance with a guideline."""
 
     COMPLIANT = "compliant"
     DEVIATION = "deviation"
@@ -66,12 +66,12 @@ class Place:
 
     @property
     def where(self) -> str:
-        """File and line."""
+        """The file and line."""
         return f"{self.finding.file}:{self.finding.line}"
 
     @property
     def what(self) -> str:
-        """What was found: the add-on says no more than a rule's number, and the rest is said here."""
+        """The finding as text: the add-on gives only a rule's number, and `RULES` the rest."""
         return RULES.get(self.guideline, "") if self.finding.of_addon else self.finding.text
 
 
@@ -89,12 +89,12 @@ class Summary:
 
     @property
     def unexplained(self) -> tuple[Place, ...]:
-        """Findings that no reason explains; a mandatory guideline has none that could."""
+        """The findings without a reason; for a mandatory guideline no reason counts."""
         mandatory = {one.number for one in guidelines() if one.category is Category.MANDATORY}
         return tuple(one for one in self.places if one.deviation is None or one.guideline in mandatory)
 
     def of(self, guideline: Guideline) -> tuple[Compliance, str]:
-        """How a guideline is kept, and how that was checked."""
+        """Return the compliance with a guideline, and how it was checked."""
         number, looks = guideline.number, self.checked.rules.get(guideline.number, "")
         own = [place for place in self.places if place.guideline == number]
         how = looks or SEARCHED.get(number, "") or ("a search of the text" if own else "")
@@ -110,7 +110,7 @@ class Summary:
 
 
 def summary(files: Mapping[str, str]) -> Summary:
-    """Check C and headers, and explain what is found by its place."""
+    """Check C and headers, and explain the findings by their places."""
     checked = check(files)
     findings = (*checked.findings, *own_findings(files), *_unguarded(files))
     return Summary(checked, tuple(Place(one, explained(one, files)) for one in findings), _plain(files))
@@ -125,7 +125,7 @@ def _unguarded(files: Mapping[str, str]) -> Iterator[Finding]:
 
 
 def _plain(files: Mapping[str, str]) -> bool:
-    """Whether the C uses nothing of the standard library but its types."""
+    """Return whether the C uses nothing of the standard library but its types."""
     texts = [text for path, text in files.items() if path.endswith((".c", ".h"))]
     included = {name for text in texts for name in re.findall(r"#include <([^>]+)>", text)}
     return included <= set(_ONLY) and not any(_USES.search(text) for text in texts)
@@ -169,7 +169,7 @@ def _shortfalls(made: Summary) -> Iterator[Shortfall]:
 
 
 def _table(made: Summary) -> str:
-    """One row for each guideline: number, category, compliance, how it was checked, deviations and their reasons."""
+    """Return one row for each guideline: number, category, compliance, how it was checked, deviations and their reasons."""
     rows = [("guideline", "category", "compliance", "checked by", "places", "reasons")]
     for one in guidelines():
         compliance, how = made.of(one)
@@ -180,7 +180,6 @@ def _table(made: Summary) -> str:
 
 
 def _places(made: Summary) -> str:
-    """One row for each finding."""
     rows = [("guideline", "file", "line", "check", "finding", "reason")]
     for place in sorted(made.places, key=lambda one: (one.guideline, one.finding.file, one.finding.line)):
         reason = place.deviation.reason if place.deviation is not None else "VIOLATION"
@@ -198,7 +197,7 @@ def _places(made: Summary) -> str:
 
 
 def _suppressions(made: Summary) -> str:
-    """The same for cppcheck's `--suppressions-list`, place by place, for who runs it again; own searches left out."""
+    """Return the same for cppcheck's `--suppressions-list`, place by place, to run it again; own searches are left out."""
     lines = [
         f"// {place.guideline}: {place.deviation.reason}\n{place.finding.check}:{place.finding.file}:{place.finding.line}"
         for place in made.places
@@ -208,7 +207,7 @@ def _suppressions(made: Summary) -> str:
 
 
 def main(folder: str) -> int:
-    """Check a folder of generated C; say what no reason explains."""
+    """Check a folder of generated C; print the findings without a reason."""
     paths = sorted(path for path in Path(folder).iterdir() if path.suffix in {".c", ".h"})
     made = summary({path.name: read.text(path) for path in paths})
     for place in made.unexplained:

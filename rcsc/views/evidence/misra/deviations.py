@@ -18,9 +18,9 @@ class Deviation:
     """A place where a guideline is not kept, on purpose.
 
     Attributes:
-        guideline: Which it is of: one that the checker names otherwise stands under its own.
-        code: What the line must say for the reason to hold there.
-        files: What the file's name must end with.
+        guideline: Its guideline, also where the checker names another.
+        code: A pattern that the line must match for the reason to hold there.
+        files: The required end of the file's name.
     """
 
     check: str
@@ -85,7 +85,7 @@ DEVIATIONS = (
 
 
 def explained(finding: Finding, files: Mapping[str, str]) -> Deviation | None:
-    """Give the deviation that this finding is, by what stands at its place; None where nothing explains it."""
+    """Return the deviation that explains a finding, by the text at its place; None where nothing does."""
     text = next((text for path, text in files.items() if path.rpartition("/")[2] == finding.file), "")
     lines = text.splitlines()
     line = lines[finding.line - 1] if 0 < finding.line <= len(lines) else ""
@@ -98,13 +98,13 @@ def explained(finding: Finding, files: Mapping[str, str]) -> Deviation | None:
 
 
 def _declared(line: str, files: Mapping[str, str]) -> bool:
-    """Whether a header declares the function that this line defines."""
+    """Return whether a header declares the function that this line defines."""
     name = line.partition("(")[0].split()[-1].lstrip("*")
     return any(f"{name}(" in text for path, text in files.items() if path.endswith(".h"))
 
 
 def own_findings(files: Mapping[str, str]) -> Iterator[Finding]:
-    """Give the places that cppcheck does not look for: basic types, enumerators compared with objects, functions that change nothing."""
+    """Yield places that cppcheck does not look for: basic types, enumerators compared with objects, functions without effect."""
     bare = {
         path.rpartition("/")[2]: _bare(text) for path, text in files.items() if path.endswith((".c", ".h"))
     }
@@ -120,5 +120,5 @@ def own_findings(files: Mapping[str, str]) -> Iterator[Finding]:
 
 
 def _bare(text: str) -> str:
-    """The text with comments made blank."""
+    """Return the text with comments made blank."""
     return _COMMENT.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)

@@ -10,7 +10,7 @@ from enum import StrEnum
 
 
 class Category(StrEnum):
-    """How binding a guideline is."""
+    """The category of a guideline: how binding it is."""
 
     MANDATORY = "mandatory"
     REQUIRED = "required"
@@ -32,7 +32,7 @@ class Guideline:
 _DIRECTIVES = {
     "1": (1, ""), "2": (1, ""), "3": (1, ""), "4": (14, "2 4 5 6 8 9 13"),
 }  # fmt: skip
-"""How many directives each section has, and which of them are advisory."""
+"""The number of directives in each section, and those of them that are advisory."""
 _RULES = {
     "1": (4, "2", ""), "2": (7, "3 4 5 6 7", ""), "3": (2, "", ""), "4": (2, "2", ""), "5": (9, "9", ""), "6": (2, "", ""),
     "7": (4, "", ""), "8": (14, "7 9 11 13", ""), "9": (5, "", "1"), "10": (8, "5", ""), "11": (9, "4 5", ""),
@@ -40,11 +40,11 @@ _RULES = {
     "17": (8, "5 8", "3 4 6"), "18": (8, "4 5", ""), "19": (2, "2", "1"), "20": (14, "1 5 10", ""),
     "21": (21, "12", "13 17 18 19 20"), "22": (10, "", "2 4 5 6"),
 }  # fmt: skip
-"""How many rules each section has, which of them are advisory, and which mandatory."""
+"""The number of rules in each section, those of them that are advisory, and those that are mandatory."""
 
 
 def guidelines() -> Iterator[Guideline]:
-    """Give every guideline, directives first.
+    """Yield every guideline, directives first.
 
     >>> [one.number for one in guidelines()][:2], sum(1 for _ in guidelines())
     (['Dir 1.1', 'Dir 2.1'], 176)

@@ -19,7 +19,7 @@ BRANCHES_RISCV = frozenset(
 )
 CALLS = frozenset({"bl", "call", "jal"})
 CASES = "__gnu_thumb1_case_"
-"""How the compiler's library calls what jumps by the table that follows the call."""
+"""Prefix of the library's functions that jump by the table after their call."""
 FUNCTION = re.compile(r"\t\.type\t([\w.$]+), ?[%@]function")
 LABEL = re.compile(r"([\w.$]+):")
 DATA = re.compile(r"\t\.(?:byte|2byte|short|hword|word|4byte)\t(.*)")
@@ -35,7 +35,7 @@ TARGET = re.compile(r"\b([0-9a-f]+) <([\w.$]+)(\+0x[0-9a-f]+)?>")
 
 
 class UnboundedError(Exception):
-    """There is no bound; the reason."""
+    """There is no bound; the text has the reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +52,12 @@ class Instruction:
 
     @property
     def target(self) -> str:
-        """Where it goes, as its last operand says."""
+        """The label or place to which it goes: its last operand."""
         return self.operands.split(",")[-1].strip().removesuffix("@long jump").strip()
 
     @property
     def cost(self) -> int:
-        """How many instructions the assembler makes of it at most."""
+        """The number of instructions that the assembler makes of it at most."""
         if self.name in {"call", "tail", "la", "lla"}:
             return 2
         if self.name == "li":
@@ -75,7 +75,7 @@ class Routine:
 
 @dataclass(slots=True)
 class Assembly:
-    """What a text of assembly holds.
+    """The content of a text of assembly.
 
     Attributes:
         tables: For each label that data follow, the labels among them.
@@ -86,7 +86,7 @@ class Assembly:
 
 
 def of_compiler(text: str) -> Assembly:
-    """Read what a compiler wrote."""
+    """Read the assembly that a compiler wrote."""
     made = Assembly()
     functions = set(FUNCTION.findall(text))
     routine, last, line = Routine(), "", 0
@@ -110,12 +110,12 @@ def of_compiler(text: str) -> Assembly:
 
 
 def _bare(operands: str) -> str:
-    """Operands without a comment."""
+    """Return operands without a comment."""
     return re.split(r"\s*(?:@|\t#)", operands)[0].strip()
 
 
 def of_disassembly(text: str, symbols: str) -> Assembly:
-    """Read what `objdump -d --no-show-raw-insn` says, and what `nm` says of all the names that a place has."""
+    """Read the output of `objdump -d --no-show-raw-insn`, and of `nm` for all names of a place."""
     made = Assembly()
     routine = Routine()
     for raw in text.splitlines():
@@ -145,7 +145,7 @@ class Bounds:
     """Longest paths of the functions of a program.
 
     Attributes:
-        program: What the compiler wrote of it.
+        program: The compiler's assembly of it.
         library: The linked image, for what else it calls.
         loops: How often the loop that begins in each line of the C runs.
     """
@@ -157,7 +157,7 @@ class Bounds:
     open: list[str] = field(default_factory=list)
 
     def of(self, function: str) -> int:
-        """The instructions of the longest path, that of the return counted.
+        """Return the number of instructions of the longest path, with that of the return.
 
         Raises:
             UnboundedError: None can be told, or what it calls has none.
@@ -178,7 +178,7 @@ class Bounds:
         return found
 
     def calls(self, function: str) -> frozenset[str]:
-        """What it calls, or jumps to at its end."""
+        """Return the functions that it calls, or jumps to at its end."""
         _, routine = self._routine(function)
         ends = (step.target for step in routine.code if step.name in CALLS | JUMPS | {"tail"})
         return frozenset(end for end in ends if not end.startswith(".L"))
@@ -190,7 +190,7 @@ class Bounds:
         raise UnboundedError(f"calls `{function}`, which is not in the image by itself")
 
     def _called(self, routine: Routine, at: int, function: str) -> int:
-        """What a call costs; one that copies costs as many rounds as it is given bytes."""
+        """Return the cost of a call; a function that copies runs as many rounds as it is given bytes."""
         if function not in COPIES:
             return self.of(function)
         for step in reversed(routine.code[:at]):
@@ -223,7 +223,7 @@ class Bounds:
 
 
 def _successors(assembly: Assembly, routine: Routine, at: int) -> tuple[list[int], list[str]]:
-    """Where an instruction may go within its function, and which functions run before it does."""
+    """Return the places within its function where an instruction may go, and the functions that run before that."""
     step, labels = routine.code[at], routine.labels
     name, target, after = step.name, step.target, at + 1
     if name in CALLS:
@@ -248,7 +248,7 @@ def _successors(assembly: Assembly, routine: Routine, at: int) -> tuple[list[int
 
 
 def _returns(step: Instruction) -> bool | None:
-    """Whether a return is one on a condition; None for what is no return."""
+    """Return whether a return has a condition; None for an instruction that is no return."""
     name, operands = step.name, step.operands
     for stem in ("bx", "pop", "ldmfd", "ldmia", "ldr"):
         condition = name.removeprefix(stem)
@@ -259,7 +259,7 @@ def _returns(step: Instruction) -> bool | None:
 
 
 def _table(assembly: Assembly, routine: Routine, at: int, *, follows: bool) -> list[int]:
-    """The entries of the table of a jump: it follows the instruction, or is the last whose place was asked for before it."""
+    """Return the entries of a jump's table: it follows the instruction, or is the last whose address was taken before it."""
     if follows:
         named = [label for label, place in routine.labels.items() if place == at + 1]
     else:
@@ -279,7 +279,7 @@ def _path(
     lines: Mapping[int, int],
     loops: Mapping[int, int],
 ) -> int:
-    """The cost of the dearest path from the entry; of a loop, its dearest round as often as it can run and once more."""
+    """Return the cost of the dearest path from the entry; a loop costs its dearest round as often as it can run and once more."""
     best = 0
     reached: dict[int, int] = {entry: 0}
     for part in _components(graph, entry):  # in the order in which they run
@@ -317,7 +317,7 @@ def _loop(
 
 
 def _components(graph: Mapping[int, Sequence[int]], entry: int) -> list[frozenset[int]]:
-    """The strongly connected parts that are reached, each after all that lead to it.
+    """Return the strongly connected parts that are reached, each after all that lead to it.
 
     Source: R. Tarjan, "Depth-first search and linear graph algorithms", 1972; without recursion.
     """

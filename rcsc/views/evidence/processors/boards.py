@@ -22,11 +22,11 @@ PAINTED = 1024
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A processor, and how it is emulated.
+    """A processor and its emulator.
 
     Attributes:
-        compiler: The cross compiler, with what says for which processor.
-        tools: What the names of its binary utilities begin with.
+        compiler: The cross compiler, with the options for the processor.
+        tools: The prefix of its binary utilities.
         emulator: The command that runs an image, but for its path.
         origins: Where code and where data lie.
     """
@@ -38,13 +38,13 @@ class Board:
     origins: tuple[str, str]
 
     def absent(self) -> str:
-        """What is not installed of what it needs; empty for nothing."""
+        """Return the commands that it needs and that are not installed; "" for none."""
         needed = (self.compiler[0], f"{self.tools}objdump", self.emulator[0])
         return ", ".join(command for command in needed if not _is_there(command))
 
     @property
     def version(self) -> str:
-        """The compiler, and its version, as it says them."""
+        """The compiler and its version, as it prints them."""
         return run_command([self.compiler[0], "--version"], Path(), COMPILE_S).out.partition("\n")[0]
 
 
@@ -214,7 +214,7 @@ void reset(void)
 
 
 def harness() -> str:
-    """C that an image begins with: `measure(call, state, seen)` calls and counts, `tell(name, seen, none)` says it."""
+    """Return the C that an image begins with: `measure(call, state, seen)` calls and counts, `tell(name, seen, none)` prints."""
     return HARNESS.format(painted=PAINTED)
 
 

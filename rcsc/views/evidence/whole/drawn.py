@@ -19,7 +19,7 @@ def drawn_system(system: Linked, calls: int) -> str:
 
     Args:
         system: The system.
-        calls: How many steps it makes.
+        calls: The number of steps.
     """
     p = system.word
     lines = [f"static {p}_t s, copy;"]
@@ -63,7 +63,7 @@ def drawn_system(system: Linked, calls: int) -> str:
 
 
 def _values(end: End, place: str) -> Iterator[str]:
-    """Statements that draw each leaf of a place; one in sixteen of its whole type."""
+    """Yield statements that draw each leaf of a place; one in sixteen from its whole type."""
     for at in end.run:
         leaf, kind = end.program.sign.leaves[at], end.program.plan.program.variables[at].type
         inside, any_ = (drawn_value(leaf.c_type, kind, whole) for whole in (False, True))
@@ -71,7 +71,7 @@ def _values(end: End, place: str) -> Iterator[str]:
 
 
 def _answer(question: Question) -> Iterator[str]:
-    """A function of the user's that the system asks."""
+    """Yield a function in place of the user's, which the system asks."""
     yield f"{question.head} {{"
     yield from (f"    (void)key_{at};" for at, _ in enumerate(question.keys))
     place = "answer" if isinstance(question.into.kind, Array) else "(*answer)"
@@ -80,5 +80,5 @@ def _answer(question: Question) -> Iterator[str]:
 
 
 def _spoilt(level: LinkedLevel) -> str:
-    """A statement that makes the copy's state of a level one that cannot be gone on from."""
+    """Return a statement that spoils the copy's state of a level, so that nothing can go on from it."""
     return f"copy.{level.member}.digest ^= 1u;"

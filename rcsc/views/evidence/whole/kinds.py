@@ -29,8 +29,8 @@ class Whole:
     """A system whose tables are proved.
 
     Attributes:
-        files: What `rcsc compile` writes of it and of its levels, text by path.
-        progress: Told what is being done.
+        files: The files that `rcsc compile` writes of it and of its levels, text by path.
+        progress: Called with each step.
     """
 
     system: Linked
@@ -44,14 +44,14 @@ class Whole:
 
 
 def collect(whole: Whole, kind: str) -> Evidence:
-    """Make evidence of one kind; one that does not look at such C says why."""
+    """Make evidence of one kind; where the kind does not look at such C, give the reason."""
     if kind in LOOKS:
         return LOOKS[kind](whole)
     return Evidence((f"{whole.source} is not looked at: {PASSES[kind]}",))
 
 
 def _coverage(whole: Whole) -> Evidence:
-    """What the drawn sessions reach of the C, as clang counts it; what they do not reach is listed."""
+    """Measure what the drawn sessions reach of the C, as clang counts it, and list what they do not."""
     llvm = tools()
     if isinstance(llvm, Absent):
         return Evidence((), missing=llvm.reason)
@@ -80,7 +80,7 @@ def _coverage(whole: Whole) -> Evidence:
 
 
 def _counts(seen: Measured) -> Sequence[tuple[str, int, int]]:
-    """Of statements, branches and MC/DC: all, and those that were covered."""
+    """Return for statements, branches and MC/DC: all, and those that were covered."""
     outcomes = [count > 0 for point in seen.branches for count in (point.true, point.false)]
     shown = [each for decision in seen.decisions for each in decision.shown]
     blocks = [region.count > 0 for region in seen.regions]
@@ -89,7 +89,7 @@ def _counts(seen: Measured) -> Sequence[tuple[str, int, int]]:
 
 
 def _missed(whole: Whole, seen: Measured) -> Iterator[Missed]:
-    """What was not covered, with the reason where one is known."""
+    """Yield everything that was not covered, with the reason where one is known."""
     for point in seen.branches:
         for word, count in (("true", point.true), ("false", point.false)):
             if not count:
@@ -104,7 +104,7 @@ def _missed(whole: Whole, seen: Measured) -> Iterator[Missed]:
 
 
 def _fresh(whole: Whole, point: Point) -> str:
-    """Why `check` refuses no level that starts anew; empty where that is not known."""
+    """Return the reason why `check` refuses no level that starts anew; "" where none is known."""
     for level in whole.system.levels:
         if point.function == f"{whole.system.word}_restart_{level.member}":
             program, leaves = level.program.plan.program, level.program.sign.leaves

@@ -29,7 +29,7 @@ FORMS: Mapping[str, GraphForm] = {
 
 
 def form_of(text: str) -> str:
-    """The form that the text is in, by how it begins; Mermaid where nothing else fits."""
+    """Return the form of the text, by its beginning; Mermaid where nothing else fits."""
     begun = text.lstrip("\ufeff \t\r\n")
     if begun.startswith("<"):
         return "scxml"

@@ -26,7 +26,7 @@ _TOKEN = re.compile(
 
 
 def write(graph: StateGraph) -> str:
-    """The graph in DOT."""
+    """Write the graph in DOT."""
     lines = [f"digraph {_quoted(graph.table)} {{"]
     lines += [f"  {word}={_quoted(text)};" for word, text in header(graph).items()]
     lines += ["  node [shape=circle];", "  edge [fontsize=10];"]
@@ -57,7 +57,7 @@ def _attributes(edge: Edge) -> str:
 
 
 def wrapped(text: str) -> str:
-    """The text broken before ` and ` where a line gets too wide."""
+    """Break the text before ` and ` where a line gets too wide."""
     lines = [""]
     for piece in re.split(r"(?= and )", text):
         if lines[-1] and len(lines[-1]) + len(piece) > MOST_WIDE:
@@ -76,7 +76,7 @@ def _quoted(text: str) -> str:
 
 
 def read(text: str) -> StateGraph:
-    """The graph that the text draws; UnreadableError where it is none."""
+    """Read the graph that the text draws; raise UnreadableError where it is none."""
     reader = _Reader(list(_tokens(text)))
     reader.graph()
     return finished(reader.attributes, reader.drawn)
@@ -109,7 +109,7 @@ def _tokens(text: str) -> Iterator[_Token]:
 
 @dataclass(slots=True)
 class _Reader:
-    """Reads one graph; `edge` attributes set for all are not looked at."""
+    """Reads one graph; ignores `edge` attributes set for all."""
 
     tokens: list[_Token]
     at: int = 0
@@ -118,7 +118,7 @@ class _Reader:
     drawn: list[ReadArrow] = field(default_factory=list)
 
     def graph(self) -> None:
-        """Reads the whole text."""
+        """Read the whole text."""
         self._skip_word("strict")
         begun = self._take("name")
         if begun.text.lower() != "digraph":
@@ -131,7 +131,7 @@ class _Reader:
             raise UnreadableError(f"`{self._now().text}` after the graph", self._now().offset)
 
     def _statements(self) -> None:
-        """Reads the statements up to the closing brace."""
+        """Read the statements up to the closing brace."""
         self.depth += 1
         if self.depth > DEEPEST:
             raise UnreadableError(f"subgraphs are nested more than {DEEPEST} deep", self._now().offset)

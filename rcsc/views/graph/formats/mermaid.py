@@ -21,7 +21,7 @@ _LINE = re.compile(r"(?:\(?(\w+)\)?(?=\s|\[|$))?\s*(DEFAULT(?: unreachable)?(?=\
 
 
 def write(graph: StateGraph) -> str:
-    """The graph as a Mermaid state diagram."""
+    """Write the graph as a Mermaid state diagram."""
     lines = ["stateDiagram-v2", *(f"  %% {word}: {text}" for word, text in header(graph).items())]
     any_id = _free("any_state", graph.states)
     if any(ANY in (edge.source, edge.target) for edge in graph.edges):
@@ -50,7 +50,7 @@ def _text(edge: Edge) -> str:
 
 
 def read(text: str) -> StateGraph:
-    """The graph that the text draws; UnreadableError where it is none."""
+    """Read the graph that the text draws; raise UnreadableError where it is none."""
     read_ = _Read()
     at = 0
     for raw in text.splitlines(keepends=True):
@@ -70,7 +70,7 @@ def read(text: str) -> StateGraph:
 
 @dataclass(slots=True)
 class _Read:
-    """What the lines so far say: of the graph, of its arrows, and what states are shown as, by their names."""
+    """The content of the lines so far: attributes of the graph, its arrows, and the shown names of states by their own."""
 
     attributes: dict[str, str] = field(default_factory=dict)
     drawn: list[ReadArrow] = field(default_factory=list)
@@ -78,7 +78,7 @@ class _Read:
     begun: bool = False
 
     def line(self, line: str, offset: int) -> None:
-        """Takes the next line, without the space around it; `offset` is where in the text it begins."""
+        """Take the next line, without the space around it; `offset` is where in the text it begins."""
         if match := _HEADER.match(line):
             if match[1] in HEADER:
                 self.attributes[match[1]] = match[2].strip()
@@ -111,7 +111,7 @@ class _Read:
 
 
 def _transition(text: str, offset: int) -> dict[str, str]:
-    """The attributes that a transition's text states."""
+    """Return the attributes that a transition's text states."""
     match = _LINE.match(text)
     assert match is not None  # everything in it may be left out
     attributes = {"line": match[1] or "", "default": match[2] or ""}
@@ -129,7 +129,7 @@ def _transition(text: str, offset: int) -> dict[str, str]:
 
 
 def _closing(text: str) -> int:
-    """Where the bracket that opens the text is closed; -1 where it is not."""
+    """Return the position where the bracket that opens the text is closed; -1 where it is not."""
     depth = 0
     for at, letter in enumerate(text):
         depth += (letter == "[") - (letter == "]")

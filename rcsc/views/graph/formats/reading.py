@@ -25,7 +25,7 @@ class UnreadableError(Exception):
 MOST_BYTES = 16 * 1024 * 1024
 """Largest text of a graph."""
 MOST_ARROWS = 4096
-"""More make no table that anyone reads."""
+"""Most arrows of a graph; more make no table that anyone reads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class ReadArrow:
     offset: int = 0
 
     def edge(self) -> Edge:
-        """The arrow as an edge of a state graph."""
+        """Return the arrow as an edge of a state graph."""
         attributes = self.attributes
         return Edge(
             attributes.get("line", "").strip(),
@@ -53,7 +53,7 @@ class ReadArrow:
 
 
 def finished(attributes: Mapping[str, str], drawn: list[ReadArrow]) -> StateGraph:
-    """The graph of what was read; UnreadableError where it is no graph of a table."""
+    """Return the graph of the arrows read; raise UnreadableError where it is no graph of a table."""
     if not drawn:
         raise UnreadableError("the graph has no edge")
     if len(drawn) > MOST_ARROWS:
@@ -73,7 +73,7 @@ def finished(attributes: Mapping[str, str], drawn: list[ReadArrow]) -> StateGrap
 
 
 def diagnosed(error: UnreadableError, source: Source) -> Diagnostic:
-    """The error at its place in the text."""
+    """Return the error as a diagnostic at its place in the text."""
     start = min(max(error.offset, 0), len(source.text))
     end = source.text.find("\n", start)
     span = Span(source.name, start, len(source.text) if end < 0 else end)

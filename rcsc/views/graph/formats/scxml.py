@@ -23,7 +23,7 @@ _WORDS = ("line", "does", "decided", "default")
 
 
 def write(graph: StateGraph) -> str:
-    """The graph as SCXML."""
+    """Write the graph as SCXML."""
     whole = _free("any", graph.states)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>']
     about = "".join(f"\n    rcsc:{word}={quoteattr(text)}" for word, text in header(graph).items())
@@ -61,7 +61,7 @@ def _transition(edge: Edge) -> str:
 
 
 def read(text: str) -> StateGraph:
-    """The graph that the text draws; UnreadableError where it is none."""
+    """Read the graph that the text draws; raise UnreadableError where it is none."""
     try:
         root = xml_of(text)
     except Malformed as error:
@@ -89,7 +89,7 @@ def _offset(text: str, row: int) -> int:
 
 
 class _Reader:
-    """The transitions; their places are found by counting them in the text, for the parser does not tell."""
+    """Reads the transitions; counts them in the text to find their places, for the parser does not tell."""
 
     def __init__(self, text: str) -> None:
         self.places = [
@@ -99,7 +99,7 @@ class _Reader:
         self.drawn: list[ReadArrow] = []
 
     def state(self, state: "Element", name: str) -> None:
-        """The transitions of a state and of those within it, in the order of the text."""
+        """Read the transitions of a state and of those within it, in the order of the text."""
         for element in state:
             if element.tag == _STATE and name != ANY:
                 raise UnreadableError(f"state `{name}` has states of its own; only the outermost may")

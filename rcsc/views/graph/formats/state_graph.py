@@ -20,8 +20,8 @@ class Edge:
         line: Name of the line; "" where whoever drew it gave none.
         source: A state, or ANY.
         target: A state, or ANY. An edge to another state says that the line writes it; a loop writes nothing.
-        guard: What must hold beside the state, terms joined by `and`; "" is nothing.
-        effect: What the line does beside going there, as `heading(action, action) heading(...)`.
+        guard: The condition beside the state, terms joined by `and`; "" for none.
+        effect: The line's other actions, as `heading(action, action) heading(...)`.
         decided: Procedures that decide the target; then the edge only shows where they can lead. "" where the edge says it.
         default: "", `DEFAULT` or `DEFAULT unreachable`.
         shown: The guard without what the state implies; for the eye alone.
@@ -50,7 +50,7 @@ class StateGraph:
         deferred: Whether the next state waits for an echo: `next cur_state := s`.
         initial: The state before the first cycle; "" where it is not said.
         assuming: Names of the assumptions.
-        uses: What the table's file uses.
+        uses: The files that the table's file uses.
         columns: The table's heading row without the line's name, `a | b || procedures | command_out`; "" where it is not said.
         lines: The lines' names in the table's order; those not named come last.
         states: Every state that is drawn, in declared order.
@@ -73,7 +73,7 @@ HEADER = ("table", "state", "next", "initial", "assuming", "uses", "columns", "l
 
 
 def header(graph: StateGraph) -> dict[str, str]:
-    """The attributes of the graph as a whole; empty texts left out."""
+    """Return the attributes of the graph as a whole, without empty ones."""
     attributes = {
         "table": graph.table,
         "state": graph.state,
@@ -88,7 +88,7 @@ def header(graph: StateGraph) -> dict[str, str]:
 
 
 def with_header(attributes: dict[str, str], edges: tuple[Edge, ...], states: tuple[str, ...]) -> StateGraph:
-    """The graph with these attributes; one that is missing is as in `StateGraph`."""
+    """Return the graph with these attributes; one that is missing is as in `StateGraph`."""
     return StateGraph(
         attributes.get("table", ""),
         attributes.get("state", "cur_state"),
